@@ -1,0 +1,1 @@
+"""truearm makes serial robots accurate."""

@@ -1,0 +1,143 @@
+"""Reading text and writing files so that nothing is ever half-written."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from truearm.errors import InputError, nearest_names
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+def read_bytes(path: Path) -> bytes:
+    """Return the content of a file, or refuse with the reason it cannot be read."""
+    if path.is_dir():
+        raise InputError("this is a folder, a file is needed", where=str(path))
+    if not path.exists():
+        siblings = [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else []
+        near = nearest_names(path.name, siblings)
+        cure = f"Did you mean {' or '.join(near)}?" if near else "Check the path."
+        raise InputError("there is no such file", where=str(path), cure=cure)
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError(f"the file cannot be read ({error.strerror})", where=str(path)) from error
+
+
+def read_text(path: Path) -> str:
+    """Return the text of a UTF-8 file without its byte order mark."""
+    content = read_bytes(path)
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"the file is not UTF-8 text (byte {error.start})", where=str(path), cure="Save it as UTF-8."
+        ) from error
+    if not text.strip():
+        raise InputError("the file is empty", where=str(path))
+    return text
+
+
+def read_yaml(path: Path, schema: type[Model]) -> Model:
+    """Read a YAML file into a pydantic model, refusing what does not fit it.
+
+    ``1e-3`` is a number, as YAML 1.2 says; a key given twice is refused.
+    """
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import MarkedYAMLError, YAMLError
+
+    text = read_text(path)
+    try:
+        content = YAML(typ="safe", pure=True).load(text)
+    except MarkedYAMLError as error:
+        mark = error.problem_mark
+        where = f"{path}, line {mark.line + 1}" if mark else str(path)
+        problem = " ".join(str(error.problem or "not valid").split())
+        raise InputError(f"this is not valid YAML ({problem})", where=where) from error
+    except YAMLError as error:
+        raise InputError(f"this is not valid YAML ({' '.join(str(error).split())})", where=str(path)) from error
+    return validated(content, schema, str(path))
+
+
+def validated(content: object, schema: type[Model], where: str) -> Model:
+    """Return `content` as `schema`, or refuse it naming the entry that is wrong."""
+    if not isinstance(content, Mapping):
+        raise InputError("the file must hold named entries (name: value)", where=where, came=type(content).__name__)
+    try:
+        return schema.model_validate(dict(content))
+    except ValidationError as error:
+        raise _refusal(error, schema, where) from error
+
+
+def _refusal(error: ValidationError, schema: type[BaseModel], where: str) -> InputError:
+    first = error.errors(include_url=False)[0]
+    entry = "".join(f"[{part + 1}]" if isinstance(part, int) else f".{part}" for part in first["loc"]).lstrip(".")
+    came: Any = first.get("input")
+    if isinstance(came, dict | list):
+        came = None
+    cure = None
+    if first["type"] == "extra_forbidden":
+        what = "this entry is not known here"
+        known = list(schema.model_fields) if len(first["loc"]) == 1 else []
+        near = nearest_names(str(first["loc"][-1]), known)
+        came = None
+        cure = f"Did you mean {' or '.join(near)}?" if near else None
+    elif first["type"] == "missing":
+        what, came = "this entry is missing", None
+    else:
+        what = first["msg"].removeprefix("Value error, ")
+        what = what[0].lower() + what[1:]
+    return InputError(what, where=f"{where}, {entry}" if entry else where, came=came, cure=cure)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a whole file or nothing: a reader never sees half of it, and a failure leaves the old one."""
+    write_files(path.parent, {path.name: text})
+
+
+def writable_folder(folder: Path) -> Path:
+    """Make sure that files can be written in `folder`, before any long work, and return it."""
+    for parent in (folder, *folder.parents):
+        if parent.exists():
+            if not parent.is_dir():
+                raise InputError("this is a file, a folder is needed", where=str(parent))
+            if not os.access(parent, os.W_OK | os.X_OK):
+                raise InputError("the folder cannot be written to", where=str(parent), cure="Choose another --out.")
+            break
+    return folder
+
+
+def write_files(folder: Path, files: Mapping[str, str]) -> None:
+    """Write several files into a folder; they are put in place only once all of them are on disk."""
+    writable_folder(folder)
+    staged: list[tuple[Path, Path]] = []
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, text in files.items():
+            target = folder / name
+            if target.is_dir():
+                raise InputError("this is a folder, a file is to be written here", where=str(target))
+            handle, temporary = tempfile.mkstemp(prefix=f".{name}.", dir=folder)
+            staged.append((Path(temporary), target))
+            with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as stream:
+                stream.write(text)
+            Path(temporary).chmod(0o666 & ~_umask())
+        for temporary_path, target in staged:
+            temporary_path.replace(target)
+    except OSError as error:
+        raise InputError(f"the file cannot be written ({error.strerror})", where=str(error.filename or folder)) from error
+    finally:
+        for temporary_path, _ in staged:
+            temporary_path.unlink(missing_ok=True)
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

@@ -1,0 +1,1 @@
+"""What was measured, what is compared, and what simulates it."""

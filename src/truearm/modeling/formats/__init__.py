@@ -1,0 +1,1 @@
+"""Files that hold robots: truearm's own YAML, URDF, DH tables."""

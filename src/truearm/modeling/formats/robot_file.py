@@ -1,0 +1,345 @@
+"""Robot files: one YAML file is one robot, nominal or calibrated.
+
+Lengths are written in the file's own units and kept in SI inside. Reading a file and writing it again gives the
+same file from the second time on.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints, field_validator, model_validator
+
+from truearm.errors import InputError, nearest_names
+from truearm.files import read_yaml
+from truearm.modeling.conventions import convention
+from truearm.modeling.effects import EFFECTS
+from truearm.modeling.parameters import Parameter
+from truearm.modeling.robot import Joint, LinkMass, Robot, Target, Tool, Truth
+from truearm.modeling.transform import Transform
+from truearm.units import to_si, written
+
+SCHEMA = "truearm-robot/1"
+
+Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
+Triple = tuple[Number, Number, Number]
+Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", strict=True)]
+
+
+class _Entry(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class _Units(_Entry):
+    length: Literal["mm", "m", "um", "in"]
+    angle: Literal["deg", "rad"]
+
+
+class _Joint(BaseModel):
+    """A row of the table: the columns depend on the convention and are checked with it."""
+
+    model_config = ConfigDict(extra="allow", frozen=True)
+    name: Name | None = None
+    type: Literal["revolute", "prismatic"] = "revolute"
+    limits: tuple[Number, Number] | None = None
+
+
+class _Place(_Entry):
+    translation: Triple = (0.0, 0.0, 0.0)
+    quaternion: tuple[Number, Number, Number, Number] | None = None
+
+    @field_validator("quaternion")
+    @classmethod
+    def _unit_length(cls, q: tuple[float, ...] | None) -> tuple[float, ...] | None:
+        if q is not None and abs(math.hypot(*q) - 1.0) > 1e-6:
+            raise ValueError("a quaternion (w, x, y, z) must have length 1")
+        return q
+
+
+class _Mass(_Entry):
+    link: int
+    mass: Annotated[float, Field(ge=0, allow_inf_nan=False)]
+    cog: Triple
+
+
+class _Tool(_Entry):
+    targets: dict[Name, Triple]
+    mass: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
+    cog: Triple = (0.0, 0.0, 0.0)
+
+
+class _Truth(_Entry):
+    source: str
+    values: dict[str, Number]
+    compliance: dict[int, Number] = {}
+
+
+class _Target(_Entry):
+    name: Name
+    quaternion: tuple[Number, Number, Number, Number] | None = None
+
+
+class _Parameter(_Entry):
+    nominal: Number
+    value: Number
+    prior: Annotated[float, Field(gt=0, allow_inf_nan=False)]
+    unit: str
+    deviation: Number | None = None
+    informed: Number | None = None
+
+
+class _Priors(_Entry):
+    length: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
+    angle: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
+
+
+class RobotFile(_Entry):
+    """Schema ``truearm-robot/1``."""
+
+    truearm: Literal["truearm-robot/1"]
+    name: Name
+    title: str = ""
+    source: str = ""
+    units: _Units
+    convention: Literal["standard-dh", "modified-dh", "hayati", "modified-hayati", "translations", "urdf"]
+    joints: list[_Joint] = Field(min_length=1)
+    flange: _Place = _Place()
+    masses: list[_Mass] = []
+    tools: dict[Name, _Tool] = {}
+    truths: dict[Name, _Truth] = {}
+    priors: _Priors = _Priors()
+    effects: list[str] = []
+    base_quaternion: tuple[Number, Number, Number, Number] = (1.0, 0.0, 0.0, 0.0)
+    targets: list[_Target] = []
+    parameters: dict[str, _Parameter] = {}
+    history: list[str] = []
+
+    @model_validator(mode="after")
+    def _effects_known(self) -> RobotFile:
+        known = [effect.name for effect in EFFECTS]
+        for name in self.effects:
+            if name not in known:
+                raise ValueError(f"there is no joint effect {name!r}; allowed: {', '.join(known)}")
+        return self
+
+
+def read_robot(path: Path) -> Robot:
+    """Read a robot file."""
+    return robot_from_file(read_yaml(path, RobotFile), str(path))
+
+
+def robot_from_file(content: RobotFile, where: str) -> Robot:
+    """Build the robot that a checked file describes; `where` names the file in messages."""
+    length, angle = content.units.length, content.units.angle
+
+    def metres(values: tuple[float, float, float]) -> tuple[float, float, float]:
+        x, y, z = (to_si(v, length) for v in values)
+        return x, y, z
+
+    joints = tuple(
+        _joint(content, number, entry, f"{where}, joints[{number}]") for number, entry in enumerate(content.joints, 1)
+    )
+    for mass in content.masses:
+        if not 1 <= mass.link <= len(joints):
+            raise InputError(
+                "there is no such link", where=f"{where}, masses", came=mass.link, allowed=f"1 to {len(joints)}"
+            )
+    robot = Robot(
+        name=content.name,
+        title=content.title or content.name,
+        source=content.source,
+        convention_name=content.convention,
+        joints=joints,
+        flange=Transform(metres(content.flange.translation), content.flange.quaternion or (1.0, 0.0, 0.0, 0.0)),
+        masses=tuple(LinkMass(m.link, m.mass, metres(m.cog)) for m in content.masses),
+        base_quaternion=content.base_quaternion,
+        targets=tuple(Target(t.name, t.quaternion) for t in content.targets),
+        effect_names=tuple(content.effects),
+        priors={
+            unit: to_si(value, file_unit)
+            for unit, value, file_unit in (("m", content.priors.length, length), ("rad", content.priors.angle, angle))
+            if value is not None
+        },
+        tools={
+            name: Tool({t: metres(p) for t, p in tool.targets.items()}, tool.mass, metres(tool.cog))
+            for name, tool in content.tools.items()
+        },
+        history=tuple(content.history),
+    )
+    shown = {"m": length, "rad": angle, "1": "1"}
+
+    def known(name: str, entry: str) -> Parameter:
+        if name in robot.parameters:
+            return robot.parameters[name]
+        near = nearest_names(name, robot.parameters)
+        cure = f"Did you mean {' or '.join(near)}?" if near else None
+        raise InputError("the robot has no such parameter", where=f"{where}, {entry}", came=name, cure=cure)
+
+    truths = {
+        truth_name: Truth(
+            truth.source,
+            {n: to_si(v, shown[known(n, f"truths.{truth_name}").unit]) for n, v in truth.values.items()},
+            truth.compliance,
+        )
+        for truth_name, truth in content.truths.items()
+    }
+    parameters = []
+    for name, entry in content.parameters.items():
+        plain = known(name, "parameters")
+        unit = shown[plain.unit]
+        if entry.unit != unit:
+            raise InputError(
+                "the unit differs from the file's", where=f"{where}, parameters.{name}", came=entry.unit, allowed=unit
+            )
+        parameters.append(
+            Parameter(
+                name,
+                plain.unit,
+                plain.group,
+                nominal=to_si(entry.nominal, unit),
+                value=to_si(entry.value, unit),
+                prior=to_si(entry.prior, unit),
+                deviation=None if entry.deviation is None else to_si(entry.deviation, unit),
+                informed=entry.informed,
+            )
+        )
+    return replace(robot, truths=truths, known={p.name: p for p in parameters})
+
+
+def _joint(content: RobotFile, number: int, entry: _Joint, where: str) -> Joint:
+    table = convention(content.convention)
+    allowed = table.row_units(entry.type)
+    row: dict[str, float] = {}
+    for column, value in (entry.model_extra or {}).items():
+        if column == "axis" and "axis_x" in allowed and isinstance(value, list) and len(value) == 3:
+            row |= {f"axis_{a}": _number(v, f"{where}.axis") for a, v in zip("xyz", value, strict=True)}
+            continue
+        if column not in allowed:
+            near = nearest_names(column, allowed)
+            raise InputError(
+                f"a joint of convention {content.convention} has no such entry",
+                where=where,
+                came=column,
+                allowed=", ".join(["name", "type", "limits", *allowed]),
+                cure=f"Did you mean {' or '.join(near)}?" if near else None,
+            )
+        unit = {"m": content.units.length, "rad": content.units.angle, "1": "1"}[allowed[column]]
+        row[column] = to_si(_number(value, f"{where}.{column}"), unit)
+    unit = content.units.angle if entry.type == "revolute" else content.units.length
+    limits = None
+    if entry.limits is not None:
+        low, high = entry.limits
+        if not low < high:
+            raise InputError("the lower limit must be below the upper one", where=f"{where}.limits", came=[low, high])
+        limits = (to_si(low, unit), to_si(high, unit))
+    return Joint(entry.name or f"joint_{number}", entry.type, row, limits)
+
+
+def _number(value: object, where: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise InputError("a number belongs here", where=where, came=value)
+    return float(value)
+
+
+# -- writing ---------------------------------------------------------------------------------------------------
+
+
+def robot_text(robot: Robot) -> str:
+    """Return the robot as the text of a robot file, in mm and degrees."""
+    from ruamel.yaml import YAML
+    from ruamel.yaml.comments import CommentedMap, CommentedSeq
+
+    def flow(content: Mapping[str, Any] | list[Any]) -> CommentedMap | CommentedSeq:
+        made = CommentedMap(content) if isinstance(content, Mapping) else CommentedSeq(content)
+        made.fa.set_flow_style()
+        return made
+
+    def mm(values: tuple[float, float, float]) -> CommentedSeq:
+        return flow([written(v, "mm") for v in values])
+
+    shown = {"m": "mm", "rad": "deg", "1": "1"}
+    units = {c: u for kind in ("revolute", "prismatic") for c, u in robot.convention.row_units(kind).items()}  # type: ignore[arg-type]
+
+    def joint(j: Joint) -> CommentedMap:
+        row: dict[str, Any] = {"name": j.name, "type": j.kind}
+        if "axis_x" in j.row:
+            row["axis"] = flow([j.row[f"axis_{a}"] for a in "xyz"])
+        row |= {c: written(v, shown[units[c]]) for c, v in j.row.items() if not c.startswith("axis_")}
+        if j.limits:
+            row["limits"] = flow([written(v, "deg" if j.kind == "revolute" else "mm") for v in j.limits])
+        return flow(row)  # type: ignore[return-value]
+
+    content: dict[str, Any] = {
+        "truearm": SCHEMA,
+        "name": robot.name,
+        "title": robot.title,
+        "source": robot.source,
+        "units": flow({"length": "mm", "angle": "deg"}),
+        "convention": robot.convention_name,
+        "joints": [joint(j) for j in robot.joints],
+    }
+    if robot.flange != Transform():
+        content["flange"] = {
+            "translation": mm(robot.flange.translation),
+            "quaternion": flow(list(robot.flange.quaternion)),
+        }
+    if robot.masses:
+        content["masses"] = [flow({"link": m.joint, "mass": m.mass, "cog": mm(m.cog)}) for m in robot.masses]
+    if robot.tools:
+        content["tools"] = {
+            name: {"targets": {t: mm(p) for t, p in tool.targets.items()}, "mass": tool.mass, "cog": mm(tool.cog)}
+            for name, tool in robot.tools.items()
+        }
+    if robot.truths:
+        content["truths"] = {
+            name: {
+                "source": truth.source,
+                "values": {n: written(v, shown[robot.parameters[n].unit]) for n, v in truth.values.items()},
+                "compliance": dict(truth.compliance),
+            }
+            for name, truth in robot.truths.items()
+        }
+    if robot.priors:
+        names = {"m": "length", "rad": "angle"}
+        content["priors"] = {names[u]: written(v, shown[u]) for u, v in robot.priors.items()}
+    if robot.effect_names:
+        content["effects"] = list(robot.effect_names)
+    if robot.base_quaternion != (1.0, 0.0, 0.0, 0.0):
+        content["base_quaternion"] = flow(list(robot.base_quaternion))
+    if robot.targets:
+        content["targets"] = [
+            flow({"name": t.name} | ({"quaternion": flow(list(t.quaternion))} if t.quaternion else {}))
+            for t in robot.targets
+        ]
+    if robot.known:
+        content["parameters"] = {
+            name: flow(_parameter(robot.known[name], shown)) for name in robot.parameters if name in robot.known
+        }
+    if robot.history:
+        content["history"] = list(robot.history)
+    yaml = YAML()
+    yaml.width = 4096
+    yaml.indent(mapping=2, sequence=4, offset=2)
+    stream = io.StringIO()
+    yaml.dump(content, stream)
+    return stream.getvalue()
+
+
+def _parameter(p: Parameter, shown: Mapping[str, str]) -> dict[str, Any]:
+    unit = shown[p.unit]
+    made: dict[str, Any] = {
+        "unit": unit,
+        "nominal": written(p.nominal, unit),
+        "value": written(p.value, unit),
+        "prior": written(p.prior, unit),
+    }
+    if p.deviation is not None:
+        made["deviation"] = written(p.deviation, unit)
+    if p.informed is not None:
+        made["informed"] = p.informed
+    return made

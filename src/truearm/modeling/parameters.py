@@ -1,0 +1,121 @@
+"""Parameters as objects: a name, a unit, a value and what is known about it.
+
+Vectors of parameters exist only inside solvers, in the order of :class:`FreeParameters`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Final, Literal
+
+import numpy as np
+
+from truearm.modeling.chain import Array
+
+Group = Literal["base", "joint zero", "gain", "geometry", "target"]
+Unit = Literal["m", "rad", "1"]
+
+#: What a nominal value is believed to be good for (one standard deviation) unless the robot file says otherwise.
+#: Machined links and mastered joints are good to about 1 mm and 0.1 deg; where robot and reflectors stand is unknown.
+PRIOR: Final[Mapping[tuple[str, str], float]] = {
+    ("base", "m"): 1.0,
+    ("base", "rad"): 1.0,
+    ("target", "m"): 1.0,
+    ("target", "rad"): 1.0,
+    ("joint zero", "m"): 1e-3,
+    ("joint zero", "rad"): math.radians(0.1),
+    ("geometry", "m"): 1e-3,
+    ("geometry", "rad"): math.radians(0.1),
+    ("gain", "1"): 1e-3,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One number of the robot model.
+
+    Attributes
+    ----------
+    name
+        Stable and the same in files, reports and messages: ``theta_offset_2``, ``base_x``.
+    unit
+        SI unit of all values here: ``m``, ``rad`` or ``1``.
+    group
+        What the parameter describes; models free whole groups.
+    nominal
+        Value before calibration.
+    value
+        Current value.
+    prior
+        Standard deviation of the nominal value.
+    deviation
+        Standard deviation of the current value, where it was identified.
+    informed
+        Share of the prior variance that the data removed, 0 to 1, where it was identified.
+    """
+
+    name: str
+    unit: Unit
+    group: Group
+    nominal: float
+    value: float
+    prior: float
+    deviation: float | None = None
+    informed: float | None = None
+
+    def restarted(self, nominal: float | None = None) -> Parameter:
+        """Return the parameter as before any identification, at `nominal` if that is given."""
+        start = self.nominal if nominal is None else nominal
+        return replace(self, nominal=start, value=start, deviation=None, informed=None)
+
+
+def parameter(name: str, unit: Unit, group: Group, nominal: float, priors: Mapping[str, float]) -> Parameter:
+    """Make a parameter at its nominal value, with the prior of its group.
+
+    Parameters
+    ----------
+    priors
+        The robot file's own priors by SI unit, used for geometry and joint zeros.
+    """
+    prior = PRIOR[group, unit]
+    if group in ("geometry", "joint zero"):
+        prior = priors.get(unit, prior)
+    return Parameter(name, unit, group, nominal, nominal, prior)
+
+
+@dataclass(frozen=True)
+class FreeParameters:
+    """The parameters a solver may change, in the one order that its vectors have."""
+
+    parameters: tuple[Parameter, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names in vector order."""
+        return tuple(p.name for p in self.parameters)
+
+    @property
+    def start(self) -> Array:
+        """Current values."""
+        return np.array([p.value for p in self.parameters])
+
+    @property
+    def nominal(self) -> Array:
+        """Centres of the priors."""
+        return np.array([p.nominal for p in self.parameters])
+
+    @property
+    def prior(self) -> Array:
+        """Standard deviations of the priors."""
+        return np.array([p.prior for p in self.parameters])
+
+    def values(self, vector: Array) -> dict[str, float]:
+        """Name the entries of a vector."""
+        return dict(zip(self.names, map(float, vector), strict=True))
+
+    def without(self, names: Iterable[str]) -> FreeParameters:
+        """Return the others."""
+        dropped = set(names)
+        return FreeParameters(tuple(p for p in self.parameters if p.name not in dropped))

@@ -1,0 +1,410 @@
+"""A robot: its chain, its parameters, and the frames before and behind it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from truearm.errors import InputError, nearest_names
+from truearm.modeling.chain import Array, Chain, Element, Sweep
+from truearm.modeling.conventions import Convention, JointKind, convention
+from truearm.modeling.effects import EFFECTS, Effect
+from truearm.modeling.parameters import Group, Parameter, Unit, parameter
+from truearm.modeling.transform import Transform, fixed_rotation
+
+Values = Mapping[str, float | Array]
+
+
+@dataclass(frozen=True)
+class Joint:
+    """One joint as the robot file describes it.
+
+    Attributes
+    ----------
+    name
+        The maker's name.
+    kind
+        ``revolute`` or ``prismatic``.
+    row
+        Nominal value of each column of the convention [m and rad].
+    limits
+        Lowest and highest reading [rad or m], where known.
+    """
+
+    name: str
+    kind: JointKind
+    row: Mapping[str, float]
+    limits: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class LinkMass:
+    """Mass of the link behind a joint.
+
+    Attributes
+    ----------
+    joint
+        Number of the joint, from 1.
+    mass
+        [kg].
+    cog
+        Centre of gravity in the link's frame [m].
+    """
+
+    joint: int
+    mass: float
+    cog: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Target:
+    """A point, or a frame, fixed to the flange, that an instrument sees.
+
+    Its position is three parameters; its orientation is `quaternion` followed by three small rotations that are
+    parameters too.
+
+    Attributes
+    ----------
+    name
+        As the data call it.
+    quaternion
+        Reference orientation in the flange frame, None for a point.
+    """
+
+    name: str
+    quaternion: tuple[float, float, float, float] | None = None
+
+    def parameter(self, axis: str) -> str:
+        """Return the name of the parameter for ``x``, ``y``, ``z``, ``rx``, ``ry`` or ``rz``."""
+        prefix = self.name if self.name.startswith("target") else f"target_{self.name}"
+        return f"{prefix}_{axis}"
+
+    @cached_property
+    def chain(self) -> Chain:
+        """The way from the flange to the target."""
+        elements = tuple(Element(motion, parameter=self.parameter(axis)) for axis, motion in _SLIDES)
+        if self.quaternion is not None:
+            elements += fixed_rotation(self.quaternion)
+            elements += tuple(Element(motion, parameter=self.parameter(axis)) for axis, motion in _TURNS)
+        return Chain(elements)
+
+
+@dataclass(frozen=True)
+class Truth:
+    """Published or chosen parameter values, for simulation.
+
+    Attributes
+    ----------
+    source
+        Where they come from.
+    values
+        Parameter values [m, rad]; what is not named is nominal.
+    compliance
+        Deflection of a joint per moment about its axis [rad/(N m)], by joint number; only the twin knows it.
+    """
+
+    source: str
+    values: Mapping[str, float]
+    compliance: Mapping[int, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Tool:
+    """An end-effector with targets, for simulation.
+
+    Attributes
+    ----------
+    targets
+        Position of each target in the flange frame [m].
+    mass, cog
+        [kg] and [m] in the flange frame, where known.
+    """
+
+    targets: Mapping[str, tuple[float, float, float]]
+    mass: float = 0.0
+    cog: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+_SLIDES = (("x", "Tx"), ("y", "Ty"), ("z", "Tz"))
+_TURNS = (("rx", "Rx"), ("ry", "Ry"), ("rz", "Rz"))
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A serial robot, nominal or calibrated.
+
+    Joint positions are ``(n, joints)`` in rad (m for prismatic joints); everything is in SI units. The base frame
+    stands in the world at ``base_x``, ``base_y``, ``base_z``, turned by `base_quaternion` and then by the small
+    ``base_rx``, ``base_ry``, ``base_rz`` (Nubiola, equation I.2, with the reference orientation split off so
+    that no installation meets a singular angle). The world is the instrument's frame.
+
+    Attributes
+    ----------
+    name, title, source
+        Short name, full name, and where the numbers come from.
+    convention_name
+        Name of the kinematic convention of the joints' rows.
+    joints
+        From base to flange.
+    flange
+        From the last link's frame to the flange.
+    masses
+        Link masses, where published.
+    base_quaternion
+        Reference orientation of the base in the world.
+    targets
+        What the instrument sees.
+    effect_names
+        Joint effects that are part of the model.
+    known
+        Parameters that differ from the plain nominal ones.
+    priors
+        The file's own standard deviations of nominal values, by SI unit.
+    tools, truths
+        For simulation.
+    history
+        One line for each thing done to the robot.
+    """
+
+    name: str
+    title: str
+    source: str
+    convention_name: str
+    joints: tuple[Joint, ...]
+    flange: Transform = Transform()
+    masses: tuple[LinkMass, ...] = ()
+    base_quaternion: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+    targets: tuple[Target, ...] = ()
+    effect_names: tuple[str, ...] = ()
+    known: Mapping[str, Parameter] = field(default_factory=dict)
+    priors: Mapping[str, float] = field(default_factory=dict)
+    tools: Mapping[str, Tool] = field(default_factory=dict)
+    truths: Mapping[str, Truth] = field(default_factory=dict)
+    history: tuple[str, ...] = ()
+
+    @property
+    def convention(self) -> Convention:
+        """The kinematic convention."""
+        return convention(self.convention_name)
+
+    @cached_property
+    def trunk(self) -> Chain:
+        """The chain from the world to the flange."""
+        base = tuple(Element(motion, parameter=f"base_{axis}") for axis, motion in _SLIDES)
+        base += fixed_rotation(self.base_quaternion)
+        base += tuple(Element(motion, parameter=f"base_{axis}") for axis, motion in _TURNS)
+        links = [
+            element
+            for number, joint in enumerate(self.joints, 1)
+            for element in self.convention.elements(number, joint.row, joint.kind)
+        ]
+        flange = tuple(
+            Element(motion, value=value)
+            for (_, motion), value in zip(_SLIDES, self.flange.translation, strict=True)
+            if value
+        )
+        return Chain((*base, *links, *flange, *fixed_rotation(self.flange.quaternion)))
+
+    @cached_property
+    def effects(self) -> tuple[Effect, ...]:
+        """The joint effects of the model."""
+        kinds = tuple(joint.kind for joint in self.joints)
+        return tuple(effect(kinds) for effect in EFFECTS if effect.name in self.effect_names)
+
+    @cached_property
+    def parameters(self) -> Mapping[str, Parameter]:
+        """All parameters by name: base, joints, effects, targets."""
+        zeros = {f"{self.convention.zero(j.kind)}_{i}" for i, j in enumerate(self.joints, 1)}
+        found: dict[str, Parameter] = {}
+
+        def add(name: str, unit: Unit, group: Group, nominal: float) -> None:
+            if name in found:
+                raise InputError(
+                    "two parameters of the robot would have the same name", where=name, cure="Rename the target."
+                )
+            found[name] = self.known.get(name) or parameter(name, unit, group, nominal, self.priors)
+
+        for element in self.trunk.elements:
+            if element.parameter is not None:
+                name = element.parameter
+                group: Group = "joint zero" if name in zeros else "geometry"
+                add(name, _unit(element), "base" if name.startswith("base_") else group, element.value)
+        for effect in self.effects:
+            for name, value in effect.nominal.items():
+                add(name, "1", "gain", value)
+        for target in self.targets:
+            for element in target.chain.elements:
+                if element.parameter is not None:
+                    add(element.parameter, _unit(element), "target", element.value)
+        return found
+
+    @cached_property
+    def values(self) -> Mapping[str, float]:
+        """Current value of every parameter [m, rad, 1]."""
+        return {name: p.value for name, p in self.parameters.items()}
+
+    @property
+    def base(self) -> Transform:
+        """Where the base frame stands in the world."""
+        sweep = Chain(self.trunk.elements[: self.trunk.index("base_rz") + 1]).sweep(np.zeros((0, 1)), self.values)
+        return Transform.from_matrix(sweep.matrix()[0], sweep.position[:, 0])
+
+    def target(self, name: str) -> Target:
+        """Return the target called `name`."""
+        for target in self.targets:
+            if target.name == name:
+                return target
+        known = [target.name for target in self.targets]
+        near = nearest_names(name, known)
+        raise InputError(
+            "the robot has no target of this name",
+            where=self.name,
+            came=name,
+            allowed=", ".join(known) or "none: the robot has no targets",
+            cure=f"Did you mean {' or '.join(near)}?" if near else None,
+        )
+
+    # -- changed copies ------------------------------------------------------------------------------------
+
+    def with_parameters(self, parameters: Iterable[Parameter]) -> Robot:
+        """Return the robot with some parameters replaced."""
+        changed = {p.name: p for p in parameters}
+        unknown = sorted(set(changed) - set(self.parameters))
+        if unknown:
+            raise InputError("the robot has no such parameter", where=self.name, came=unknown[0])
+        return replace(self, known={**self.known, **changed})
+
+    def with_values(self, values: Mapping[str, float]) -> Robot:
+        """Return the robot with some parameter values replaced [m, rad, 1]."""
+        for name in values:
+            if name not in self.parameters:
+                near = nearest_names(name, self.parameters)
+                cure = f"Did you mean {' or '.join(near)}?" if near else None
+                raise InputError("the robot has no such parameter", where=self.name, came=name, cure=cure)
+        return self.with_parameters(replace(self.parameters[n], value=float(v)) for n, v in values.items())
+
+    def with_effects(self, names: Sequence[str]) -> Robot:
+        """Return the robot with these joint effects added."""
+        return replace(self, effect_names=tuple(dict.fromkeys((*self.effect_names, *names))))
+
+    def with_frames(self, base: Transform, targets: Mapping[str, Transform | Sequence[float]]) -> Robot:
+        """Return the robot at another place with other targets, both as nominal values.
+
+        Parameters
+        ----------
+        base
+            ``T_world_base``.
+        targets
+            For each target its place on the flange: a transform, or a position [m] for a point.
+        """
+        kept = {n: p for n, p in self.known.items() if p.group not in ("base", "target")}
+        made, places = [], dict(zip(("base_x", "base_y", "base_z"), base.translation, strict=True))
+        for name, place in targets.items():
+            frame = place if isinstance(place, Transform) else None
+            target = Target(name, frame.quaternion if frame else None)
+            position = frame.translation if frame else place
+            places |= {target.parameter(a): float(v) for a, v in zip("xyz", position, strict=True)}  # type: ignore[arg-type]
+            made.append(target)
+        moved = replace(self, base_quaternion=base.quaternion, targets=tuple(made), known=kept)
+        return moved.with_parameters(moved.parameters[n].restarted(v) for n, v in places.items())
+
+    # -- kinematics ----------------------------------------------------------------------------------------
+
+    def variables(self, q: Array, values: Values) -> Array:
+        """Return the true joint variables ``(joints, ..., n)`` behind the readings `q`."""
+        readings = np.ascontiguousarray(np.asarray(q, float).T)
+        if readings.ndim != 2 or len(readings) != len(self.joints):
+            raise InputError(
+                "wrong number of joint positions",
+                where=self.name,
+                came=f"an array of shape {np.shape(q)}",
+                allowed=f"(n, {len(self.joints)})",
+            )
+        variables = readings
+        for effect in self.effects:
+            deflection = effect.deflection(readings, values)
+            if deflection.ndim > variables.ndim:
+                variables = variables[:, None, :]
+            variables = variables + deflection
+        return variables
+
+    def sweep(self, q: Array, target: str | None = None, values: Values | None = None) -> Sweep:
+        """Run through the chain to the flange, or to a target.
+
+        Parameters
+        ----------
+        q
+            Joint readings, ``(n, joints)``.
+        target
+            Name of a target; the flange if None.
+        values
+            All parameter values, instead of the robot's own; each a number or ``(trials, 1)``.
+        """
+        values = self.values if values is None else values
+        variables = self.variables(q, values)
+        trunk = self.trunk.sweep(variables, values)
+        return trunk if target is None else self.target(target).chain.sweep(variables, values, trunk)
+
+    def poses(self, q: Array, target: str | None = None) -> tuple[Array, Array]:
+        """Return positions ``(n, 3)`` [m] and rotations ``(n, 3, 3)`` of the flange or a target in the world."""
+        sweep = self.sweep(q, target)
+        return np.ascontiguousarray(sweep.position.T), np.ascontiguousarray(sweep.matrix())
+
+    def joint_jacobian(self, q: Array, target: str | None = None) -> Array:
+        """Return the geometric Jacobian ``(n, 6, joints)`` in the world, linear rows first [m, rad per rad or m].
+
+        Rates are those of the true joint variables.
+        """
+        sweep = self.sweep(q, target)
+        return np.moveaxis(np.concatenate(sweep.derivatives(self._moving), axis=1), (0, 1), (2, 1))
+
+    def derivatives(
+        self, sweep: Sweep, q: Array, names: Sequence[str], values: Values | None = None
+    ) -> tuple[Array, Array]:
+        """Return how the tip of a sweep moves with the parameters `names`.
+
+        Parameters
+        ----------
+        sweep
+            From :meth:`sweep` with the same `q` and `values`.
+
+        Returns
+        -------
+        linear, angular
+            ``(len(names), 3, ..., n)`` in the world [m and rad per unit of the parameter]; zero for parameters of
+            other targets.
+        """
+        values = self.values if values is None else values
+        places = {e.parameter: i for i, e in enumerate(sweep.elements) if e.parameter is not None}
+        shape = (len(names), *sweep.position.shape)
+        linear, angular = np.zeros(shape), np.zeros(shape)
+        rows = [i for i, name in enumerate(names) if name in places]
+        linear[rows], angular[rows] = sweep.derivatives([places[names[i]] for i in rows])
+        if self.effects and len(rows) < len(names):
+            by_joint = sweep.derivatives(self._moving)
+            readings = np.asarray(q, float).T
+            rates = {n: r for effect in self.effects for n, r in effect.derivative(readings, values).items()}
+            for i, name in enumerate(names):
+                for joint, rate in rates.get(name, {}).items():
+                    linear[i] += rate * by_joint[0][joint]
+                    angular[i] += rate * by_joint[1][joint]
+        return linear, angular
+
+    @cached_property
+    def _moving(self) -> list[int]:
+        """Index of the element that each joint variable moves."""
+        places = {e.variable: i for i, e in enumerate(self.trunk.elements) if e.variable is not None}
+        return [places[i] for i in range(len(self.joints))]
+
+    def random_configurations(self, count: int, rng: np.random.Generator) -> Array:
+        """Return joint readings ``(count, joints)`` drawn evenly within the limits; half a turn or 1 m where unknown."""
+        default = {"revolute": (-np.pi, np.pi), "prismatic": (-0.5, 0.5)}
+        low, high = np.array([j.limits or default[j.kind] for j in self.joints]).T
+        return rng.uniform(low, high, (count, len(self.joints)))
+
+
+def _unit(element: Element) -> Unit:
+    return "rad" if element.turns else "m"

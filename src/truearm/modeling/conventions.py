@@ -111,7 +111,8 @@ class OriginConvention(Convention):
 
     def elements(self, number: int, row: Mapping[str, float], kind: JointKind) -> tuple[Element, ...]:
         """Build the origin, its small rotations and the joint."""
-        axis = tuple(row.get(f"axis_{a}", default) for a, default in zip("xyz", (0.0, 0.0, 1.0), strict=True))
+        axis = [row.get(f"axis_{a}", default) for a, default in zip("xyz", (0.0, 0.0, 1.0), strict=True)]
+        length = math.hypot(*axis)  # files may round it
         along = max("xyz", key=lambda a: abs(axis["xyz".index(a)]))
         place = [Element(m, row.get(c, 0.0), f"{c}_{number}") for c, m in self.link[:3]]
         turn = [Element(m, row.get(c, 0.0)) for c, m in self.link[3:]]
@@ -120,7 +121,7 @@ class OriginConvention(Convention):
             "R" if kind == "revolute" else "T",
             parameter=f"{self.zero(kind)}_{number}",
             variable=number - 1,
-            axis=(axis[0], axis[1], axis[2]),
+            axis=(axis[0] / length, axis[1] / length, axis[2] / length),
         )
         return (*place, *turn, *small, joint)
 

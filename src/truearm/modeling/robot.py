@@ -191,22 +191,35 @@ class Robot:
         return convention(self.convention_name)
 
     @cached_property
+    def base_elements(self) -> tuple[Element, ...]:
+        """The way from the world to the base frame."""
+        return (
+            *(Element(motion, parameter=f"base_{axis}") for axis, motion in _SLIDES),
+            *fixed_rotation(self.base_quaternion),
+            *(Element(motion, parameter=f"base_{axis}") for axis, motion in _TURNS),
+        )
+
+    @cached_property
+    def link_elements(self) -> tuple[tuple[Element, ...], ...]:
+        """The way along each link, from base to flange; the link's frame is at its end."""
+        return tuple(
+            self.convention.elements(number, joint.row, joint.kind) for number, joint in enumerate(self.joints, 1)
+        )
+
+    @cached_property
+    def flange_elements(self) -> tuple[Element, ...]:
+        """The way from the last link's frame to the flange."""
+        slides = zip(_SLIDES, self.flange.translation, strict=True)
+        return (
+            *(Element(motion, value=value) for (_, motion), value in slides if value),
+            *fixed_rotation(self.flange.quaternion),
+        )
+
+    @cached_property
     def trunk(self) -> Chain:
         """The chain from the world to the flange."""
-        base = tuple(Element(motion, parameter=f"base_{axis}") for axis, motion in _SLIDES)
-        base += fixed_rotation(self.base_quaternion)
-        base += tuple(Element(motion, parameter=f"base_{axis}") for axis, motion in _TURNS)
-        links = [
-            element
-            for number, joint in enumerate(self.joints, 1)
-            for element in self.convention.elements(number, joint.row, joint.kind)
-        ]
-        flange = tuple(
-            Element(motion, value=value)
-            for (_, motion), value in zip(_SLIDES, self.flange.translation, strict=True)
-            if value
-        )
-        return Chain((*base, *links, *flange, *fixed_rotation(self.flange.quaternion)))
+        links = (element for link in self.link_elements for element in link)
+        return Chain((*self.base_elements, *links, *self.flange_elements))
 
     @cached_property
     def effects(self) -> tuple[Effect, ...]:
@@ -249,7 +262,7 @@ class Robot:
     @property
     def base(self) -> Transform:
         """Where the base frame stands in the world."""
-        sweep = Chain(self.trunk.elements[: self.trunk.index("base_rz") + 1]).sweep(np.zeros((0, 1)), self.values)
+        sweep = Chain(self.base_elements).sweep(np.zeros((0, 1)), self.values)
         return Transform.from_matrix(sweep.matrix()[0], sweep.position[:, 0])
 
     def target(self, name: str) -> Target:

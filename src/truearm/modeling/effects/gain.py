@@ -28,7 +28,8 @@ class Gain(Effect):
 
     def deflection(self, q: Array, values: Mapping[str, float | Array]) -> Array:
         """Return (k1 - 1) q."""
-        return np.stack([(np.asarray(values[f"gain_{i + 1}"]) - 1.0) * reading for i, reading in enumerate(q)])
+        turned = [(np.asarray(values[f"gain_{i + 1}"]) - 1.0) * reading for i, reading in enumerate(q)]
+        return np.stack(np.broadcast_arrays(*turned))
 
     def derivative(self, q: Array, values: Mapping[str, float | Array]) -> Mapping[str, Mapping[int, Array]]:
         """Return q."""

@@ -13,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints, field_validator, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints, model_validator
 
 from truearm.errors import InputError, nearest_names
 from truearm.files import read_yaml
@@ -27,7 +27,18 @@ from truearm.units import to_si, written
 SCHEMA = "truearm-robot/1"
 
 Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=True)]
+Mass = Annotated[float, Field(ge=0, allow_inf_nan=False, strict=True)]
 Triple = tuple[Number, Number, Number]
+
+
+def _unit_length(q: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
+    if abs(math.hypot(*q) - 1.0) > 1e-6:
+        raise ValueError(f"a quaternion (w, x, y, z) must have length 1, this one has {math.hypot(*q):.6g}")
+    return q
+
+
+Quaternion = Annotated[tuple[Number, Number, Number, Number], AfterValidator(_unit_length)]
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", strict=True)]
 
 
@@ -51,51 +62,44 @@ class _Joint(BaseModel):
 
 class _Place(_Entry):
     translation: Triple = (0.0, 0.0, 0.0)
-    quaternion: tuple[Number, Number, Number, Number] | None = None
-
-    @field_validator("quaternion")
-    @classmethod
-    def _unit_length(cls, q: tuple[float, ...] | None) -> tuple[float, ...] | None:
-        if q is not None and abs(math.hypot(*q) - 1.0) > 1e-6:
-            raise ValueError("a quaternion (w, x, y, z) must have length 1")
-        return q
+    quaternion: Quaternion | None = None
 
 
 class _Mass(_Entry):
-    link: int
-    mass: Annotated[float, Field(ge=0, allow_inf_nan=False)]
+    link: Annotated[int, Field(strict=True)]
+    mass: Mass
     cog: Triple
 
 
 class _Tool(_Entry):
     targets: dict[Name, Triple]
-    mass: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
+    mass: Mass = 0.0
     cog: Triple = (0.0, 0.0, 0.0)
 
 
 class _Truth(_Entry):
     source: str
     values: dict[str, Number]
-    compliance: dict[int, Number] = {}
+    compliance: dict[Annotated[int, Field(strict=True)], Number] = {}
 
 
 class _Target(_Entry):
     name: Name
-    quaternion: tuple[Number, Number, Number, Number] | None = None
+    quaternion: Quaternion | None = None
 
 
 class _Parameter(_Entry):
     nominal: Number
     value: Number
-    prior: Annotated[float, Field(gt=0, allow_inf_nan=False)]
+    prior: Positive
     unit: str
     deviation: Number | None = None
     informed: Number | None = None
 
 
 class _Priors(_Entry):
-    length: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
-    angle: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
+    length: Positive | None = None
+    angle: Positive | None = None
 
 
 class RobotFile(_Entry):
@@ -114,7 +118,7 @@ class RobotFile(_Entry):
     truths: dict[Name, _Truth] = {}
     priors: _Priors = _Priors()
     effects: list[str] = []
-    base_quaternion: tuple[Number, Number, Number, Number] = (1.0, 0.0, 0.0, 0.0)
+    base_quaternion: Quaternion = (1.0, 0.0, 0.0, 0.0)
     targets: list[_Target] = []
     parameters: dict[str, _Parameter] = {}
     history: list[str] = []
@@ -144,10 +148,13 @@ def robot_from_file(content: RobotFile, where: str) -> Robot:
     joints = tuple(
         _joint(content, number, entry, f"{where}, joints[{number}]") for number, entry in enumerate(content.joints, 1)
     )
-    for mass in content.masses:
-        if not 1 <= mass.link <= len(joints):
+    numbered = [("link", "masses", mass.link) for mass in content.masses]
+    for name, truth in content.truths.items():
+        numbered += [("joint", f"truths.{name}.compliance", joint) for joint in truth.compliance]
+    for kind, part, number in numbered:
+        if not 1 <= number <= len(joints):
             raise InputError(
-                "there is no such link", where=f"{where}, masses", came=mass.link, allowed=f"1 to {len(joints)}"
+                f"there is no such {kind}", where=f"{where}, {part}", came=number, allowed=f"1 to {len(joints)}"
             )
     robot = Robot(
         name=content.name,
@@ -218,6 +225,8 @@ def _joint(content: RobotFile, number: int, entry: _Joint, where: str) -> Joint:
     for column, value in (entry.model_extra or {}).items():
         if column == "axis" and "axis_x" in allowed and isinstance(value, list) and len(value) == 3:
             row |= {f"axis_{a}": _number(v, f"{where}.axis") for a, v in zip("xyz", value, strict=True)}
+            if abs(math.hypot(*value) - 1.0) > 1e-6:
+                raise InputError("an axis must have length 1", where=f"{where}.axis", came=value)
             continue
         if column not in allowed:
             near = nearest_names(column, allowed)

@@ -1,0 +1,449 @@
+"""The whole job: load, check, split, fit, judge, write. The command and a script both call this."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shlex
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.errors import InputError, nearest_names
+from truearm.files import read_bytes, write_files, writable_folder
+from truearm.identification.bounds import Bounds, read_bounds
+from truearm.identification.fit import Fit, Redundant, Status, check_targets, identify, place
+from truearm.identification.losses import LOSSES, Loss
+from truearm.identification.models import MODELS, Model
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.readers.canonical import read_csv
+from truearm.measurement.statistics import Errors, Spread, errors_of
+from truearm.modeling.conventions import parallel_joints_without_beta
+from truearm.modeling.formats.robot_file import robot_text
+from truearm.modeling.robot import Robot
+from truearm.notices import Notice
+from truearm.robots import load_robot
+from truearm.units import from_si
+from truearm.version import __version__
+
+Train = int | Literal["all"] | None
+
+
+def load_data(path: str | Path) -> Dataset:
+    """Return the dataset in a canonical CSV file.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be used; the message names the line and the column.
+    """
+    return read_csv(Path(path))
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """A finished calibration: the fit, and the proof on configurations it has not seen.
+
+    Attributes
+    ----------
+    fit
+        Made from the training part alone.
+    nominal
+        Errors of the uncalibrated robot on the held-out part, base and targets fitted on the training part. If
+        nothing was held out, on the training part.
+    train
+        Errors of the calibrated robot on the training part.
+    validation
+        Errors of the calibrated robot on the held-out part; None if nothing was held out.
+    warnings
+        What to know about the result, in plain words.
+    data
+        All readings.
+    training, held_out
+        Indices of the configurations of each part.
+    command
+        How to run it again.
+    urdf
+        The user's own URDF, if that is where the robot came from.
+    """
+
+    fit: Fit
+    nominal: Errors
+    train: Errors
+    validation: Errors | None
+    warnings: tuple[Notice, ...]
+    data: Dataset
+    training: NDArray[np.intp]
+    held_out: NDArray[np.intp]
+    command: str
+    history: str
+    urdf: bytes | None = None
+
+    @cached_property
+    def robot(self) -> Robot:
+        """The calibrated robot, base and targets included."""
+        return replace(self.fit.robot, history=(*self.fit.robot.history, self.history))
+
+    @property
+    def status(self) -> Status:
+        """How the fit ended."""
+        return self.fit.status
+
+    def summary(self) -> dict[str, Any]:
+        """Return the figures as ``--json`` prints them: errors in mm and mrad."""
+        return {
+            "status": self.status.value,
+            "warnings": [{"code": n.code, "message": n.message} for n in self.warnings],
+            "nominal": errors_summary(self.nominal),
+            "train": errors_summary(self.train),
+            "validation": None if self.validation is None else errors_summary(self.validation),
+        }
+
+    def result(self) -> dict[str, Any]:
+        """Return what ``result.json`` holds: the summary and every parameter."""
+        return {"truearm": "truearm-result/1", **self.summary(), "parameters": list(self._parameters())}
+
+    def _parameters(self) -> Sequence[dict[str, Any]]:
+        free, dropped = set(self.fit.free.names), {r.dropped for r in self.fit.redundancies}
+        shown = {"m": "mm", "rad": "deg", "1": "1"}
+        rows = []
+        for p in self.robot.parameters.values():
+            unit = shown[p.unit]
+            if p.name in dropped:
+                status = "dropped"
+            elif p.name not in free:
+                status = "fixed"
+            else:
+                status = "at-bound" if p.name in self.fit.at_bound else "identified"
+            rows.append(
+                {
+                    "name": p.name,
+                    "unit": unit,
+                    "nominal": from_si(p.nominal, unit),
+                    "value": from_si(p.value, unit),
+                    "deviation": None if p.deviation is None else from_si(p.deviation, unit),
+                    "informed": p.informed,
+                    "status": status,
+                }
+            )
+        return rows
+
+    def save(self, folder: str | Path, progress: Callable[[str], None] = lambda _: None) -> tuple[Path, ...]:
+        """Write ``calibrated.yaml``, ``result.json``, ``report.html`` and ``calibrated.urdf`` into a folder.
+
+        All of them or none: an earlier result stays until the new one is complete.
+
+        Returns
+        -------
+        The files written.
+        """
+        from truearm.modeling.formats.urdf import calibrated_urdf, urdf_text
+        from truearm.reporting.report import Report, report_html
+
+        folder = writable_folder(Path(folder))
+        progress("drawing the report")
+        urdf = calibrated_urdf(self.urdf, self.robot)[0].decode() if self.urdf else urdf_text(self.robot)[0]
+        report = Report(
+            fit=self.fit,
+            data=self.data,
+            training=self.training,
+            held_out=self.held_out,
+            nominal=self.nominal,
+            train=self.train,
+            validation=self.validation,
+            warnings=self.warnings,
+            command=self.command,
+            history=self.history,
+        )
+        files = {
+            "calibrated.yaml": robot_text(self.robot),
+            "result.json": json.dumps(self.result(), indent=2, allow_nan=False) + "\n",
+            "report.html": report_html(report),
+            "calibrated.urdf": urdf,
+        }
+        progress("writing the files")
+        write_files(folder, files)
+        return tuple(folder / name for name in files)
+
+
+def calibrate(
+    robot: Robot | str | Path,
+    data: Dataset | str | Path,
+    *,
+    model: str = "geometric",
+    train: Train = None,
+    seed: int = 0,
+    loss: Loss = "linear",
+    redundancy: Redundant = "prior",
+    bounds: Bounds | str | Path | None = None,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Calibration:
+    """Calibrate a robot and judge it on configurations the fit has not seen.
+
+    Parameters
+    ----------
+    robot
+        A robot, or what :func:`load_robot` takes. Its parameter values are the start.
+    data
+        Readings, or a canonical CSV file.
+    model
+        ``offsets`` (joint zeros), ``joints`` (zeros and gains) or ``geometric`` (every geometric parameter and the
+        joint zeros).
+    train
+        How many configurations to train on, drawn with `seed`; the rest is held out. None is 70 %; ``all`` holds
+        nothing out.
+    seed
+        Of the split: training is the first `train` of ``numpy.random.default_rng(seed).permutation(n)``.
+    loss
+        ``linear``, ``huber``, ``cauchy`` or ``l1``.
+    redundancy
+        ``prior`` or ``drop``, see :func:`truearm.identification.fit.identify`.
+    bounds
+        Limits of parameter values, or a bounds file.
+    progress
+        Called with a few words at each step.
+
+    Raises
+    ------
+    InputError
+        For anything that cannot be used, with a message that says what to do.
+    """
+    urdf = None
+    chosen = _chosen(model, {m.name: m for m in MODELS}, "model")
+    _chosen(loss, {name: name for name in LOSSES}, "loss")
+    _chosen(redundancy, {name: name for name in get_args(Redundant)}, "redundancy")
+    words = ["truearm", "calibrate", str(robot) if isinstance(robot, str | Path) else "ROBOT"]
+    if isinstance(robot, str | Path):
+        progress("reading the robot")
+        name = str(robot).partition("#")[0]
+        if name.lower().endswith((".urdf", ".xml")):
+            urdf = read_bytes(Path(name))
+        robot = load_robot(robot)
+    digest = ""
+    if isinstance(data, str | Path):
+        progress("reading the data")
+        path = Path(data)
+        data = load_data(path)
+        digest = f" (sha256 {hashlib.sha256(read_bytes(path)).hexdigest()[:12]})"
+    bounds_file = "bounds"
+    if isinstance(bounds, str | Path):
+        bounds_file = str(bounds)
+        bounds = read_bounds(Path(bounds))
+    check_joints(robot, data)
+    n = data.configurations
+    count = _train_count(train, n, data.source)
+    order = np.random.default_rng(seed).permutation(n)
+    training, held_out = order[:count], order[count:]
+    first = data.of_configurations(training)
+    second = data.of_configurations(held_out) if len(held_out) else None
+    check_targets(first, second)
+
+    progress("placing the nominal robot")
+    nominal = place(robot, first)
+    progress(f"identifying the {chosen.name} model on {count} configurations")
+    fit = identify(
+        robot, first, chosen, loss=loss, redundancy=redundancy, bounds=bounds, bounds_file=bounds_file
+    )
+    progress("judging it")
+    judged = first if second is None else second
+    validation = None if second is None else errors_of(fit.robot, second)
+    words += [data.source, "--model", chosen.name, "--train", "all" if second is None else str(count)]
+    words += ["--seed", str(seed)]
+    words += ["--loss", loss] if loss != "linear" else []
+    words += ["--redundancy", redundancy] if redundancy != "prior" else []
+    words += ["--bounds", bounds_file] if bounds is not None else []
+    history = (
+        f"calibrated by truearm {__version__}: model {chosen.name}, {count} of {n} configurations of"
+        f" {Path(data.source).name}{digest}, seed {seed}, loss {loss}, redundancy {redundancy}"
+    )
+    return Calibration(
+        fit=fit,
+        nominal=errors_of(nominal.robot, judged),
+        train=errors_of(fit.robot, first),
+        validation=validation,
+        warnings=tuple(_warnings(fit, second is None)),
+        data=data,
+        training=training,
+        held_out=held_out,
+        command=shlex.join(words),
+        history=history,
+        urdf=urdf,
+    )
+
+
+def validate(robot: Robot | str | Path, data: Dataset | str | Path) -> Errors:
+    """Judge a calibrated robot on new data taken in the same frames.
+
+    Raises
+    ------
+    InputError
+        If the robot has no targets, or the data name others.
+    """
+    robot = load_robot(robot) if isinstance(robot, str | Path) else robot
+    data = load_data(data) if isinstance(data, str | Path) else data
+    if not robot.targets:
+        raise InputError(
+            "the robot has no targets, so it cannot say where the instrument should have seen them",
+            where=robot.name,
+            cure="Use the calibrated.yaml that 'truearm calibrate' wrote: it holds base and targets.",
+        )
+    check_joints(robot, data)
+    for name in data.targets:
+        robot.target(name)
+    if not data.has_position.any():
+        raise InputError("there is no position reading at all", where=data.source, cure="Fill in x, y and z.")
+    return errors_of(robot, data)
+
+
+def check_joints(robot: Robot, data: Dataset) -> None:
+    """Refuse data whose joints are not the robot's.
+
+    Raises
+    ------
+    InputError
+        Naming the counts, or the joint whose unit does not fit.
+    """
+    if data.joints.shape[1] != len(robot.joints):
+        raise InputError(
+            "the number of joints differs from the robot's",
+            where=data.source,
+            came=f"{data.joints.shape[1]} joint columns",
+            allowed=f"{len(robot.joints)} ({robot.name})",
+            cure="Give one column joint_i for each joint of the robot, base first.",
+        )
+    for number, (joint, kind) in enumerate(zip(robot.joints, data.joint_kinds, strict=True), 1):
+        if joint.kind != kind:
+            units = {"revolute": "deg or rad", "prismatic": "mm, m, um or in"}
+            raise InputError(
+                f"joint {number} of {robot.name} is {joint.kind}, but its column has a unit of a {kind} joint",
+                where=f"{data.source}, column joint_{number}",
+                allowed=units[joint.kind],
+            )
+
+
+def errors_summary(errors: Errors) -> dict[str, Any]:
+    """Return error statistics in mm and mrad, as JSON holds them."""
+    made: dict[str, Any] = {"configurations": errors.configurations}
+    for key, spread, scale in (
+        ("position_mm", errors.position_spread, 1e3),
+        ("orientation_mrad", errors.orientation_spread, 1e3),
+    ):
+        if spread is not None:
+            made[key] = _scaled(spread, scale)
+    return made
+
+
+def _scaled(spread: Spread, scale: float) -> dict[str, float]:
+    return {
+        "mean": spread.mean * scale,
+        "rms": spread.rms * scale,
+        "p95": spread.p95 * scale,
+        "max": spread.max * scale,
+    }
+
+
+def _train_count(train: Train, n: int, where: str) -> int:
+    if train == "all":
+        return n
+    if n < 2:
+        raise InputError(
+            "one configuration cannot be split into training and held-out parts",
+            where=where,
+            cure="Measure more, or use --train all.",
+        )
+    count = round(0.7 * n) if train is None else int(train)
+    if not 1 <= count < n:
+        raise InputError(
+            "the number of training configurations must leave some to judge by",
+            where="--train",
+            came=count,
+            allowed=f"1 to {n - 1}, or all ({where} has {n} configurations)",
+        )
+    return count
+
+
+def _chosen(name: str, known: Mapping[str, Any], option: str) -> Any:
+    if name in known:
+        return known[name]
+    near = nearest_names(name, known)
+    raise InputError(
+        f"there is no {option} of this name",
+        where=f"--{option}",
+        came=name,
+        allowed=", ".join(known),
+        cure=f"Did you mean {' or '.join(near)}?" if near else None,
+    )
+
+
+def _warnings(fit: Fit, nothing_held_out: bool) -> list[Notice]:
+    found = []
+    if nothing_held_out:
+        found.append(
+            Notice(
+                "nothing-held-out",
+                "Nothing was held out: the errors are those of the training readings and flatter the model. "
+                "Leave --train out to see the error on configurations the fit has not seen.",
+            )
+        )
+    robot = fit.robot
+    if "joint zero" in fit.model.groups and "geometry" in fit.model.groups:
+        pairs = parallel_joints_without_beta(robot.convention, [dict(j.row) for j in robot.joints])
+        if pairs:
+            names = ", ".join(f"{a} and {b}" for a, b in pairs)
+            better = {"standard-dh": "hayati", "modified-dh": "modified-hayati"}.get(
+                robot.convention_name, robot.convention_name
+            )
+            found.append(
+                Notice(
+                    "parallel-axes",
+                    f"Joints {names} are parallel and no beta lets them tilt against each other, so the model "
+                    f"cannot follow the real robot. Write 'convention: {better}' in the robot file and "
+                    f"'beta: 0' at the link between them.",
+                )
+            )
+    if fit.status is Status.NOT_CONVERGED:
+        found.append(Notice("not-converged", f"The fit did not converge. {Status.NOT_CONVERGED.advice}"))
+    if fit.unseen:
+        found.append(
+            Notice(
+                "rank-loss",
+                f"The training data do not determine {', '.join(fit.unseen)}, on which predictions elsewhere "
+                f"depend. {Status.RANK_LOSS.advice}",
+            )
+        )
+    if fit.at_bound:
+        found.append(Notice("at-bound", f"At a bound: {', '.join(fit.at_bound)}. {Status.AT_BOUND.advice}"))
+    if fit.redundancies:
+        combinations = "; ".join(f"{r.dropped} ({r.combination})" for r in fit.redundancies)
+        found.append(
+            Notice(
+                "redundant",
+                "Held at their nominal values, because the readings cannot tell the combination in brackets "
+                f"apart: {combinations}. Predictions are not affected.",
+            )
+        )
+    if fit.excess > 1.0:
+        found.append(
+            Notice(
+                "residuals-exceed-sigma",
+                f"The residuals are {fit.excess:.1f} times what the declared deviations allow: the robot does "
+                f"something that the {fit.model.name} model cannot express, or sigma is too small. The "
+                "deviations of the parameters are widened by that factor.",
+            )
+        )
+    if fit.robot.effect_names:
+        gains = ", ".join(fit.robot.effect_names)
+        found.append(
+            Notice(
+                "urdf-partial",
+                f"calibrated.urdf holds the geometry and the joint zeros; a URDF cannot hold: {gains} "
+                f"({', '.join(p.name for p in robot.parameters.values() if p.group == 'gain')}), nor the base "
+                "and the targets in the instrument's frame. calibrated.yaml holds everything.",
+            )
+        )
+    return found

@@ -1,0 +1,93 @@
+"""``truearm robots`` and ``truearm show``."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from truearm.cli.output import Json, print_json
+
+if TYPE_CHECKING:
+    from truearm.modeling.robot import Robot
+
+
+def robots(json: Json = False) -> None:
+    """List the robots of the library."""
+    from truearm.robots import library, load_robot
+
+    found = [load_robot(robot_id) for robot_id in library()]
+    if json:
+        print_json([{"id": r.name, "title": r.title, "joints": len(r.joints), "source": r.source} for r in found])
+        return
+    width = max(len(r.name) for r in found)
+    for r in found:
+        typer.echo(f"{r.name:{width}}  {len(r.joints)} joints  {r.title}")
+
+
+def show(
+    robot: Annotated[str, typer.Argument(metavar="ROBOT", help="A library id, a robot file or a URDF.")],
+    json: Json = False,
+) -> None:
+    """Show a robot: its joints, its reach at zero, what is known about it."""
+    from truearm.robots import load_robot
+
+    loaded = load_robot(robot)
+    content = _content(loaded)
+    if json:
+        print_json(content)
+        return
+    typer.echo(f"{loaded.title} ({loaded.name})")
+    typer.echo(f"Source: {loaded.source}")
+    typer.echo(f"Convention: {loaded.convention_name}")
+    for joint in content["joints"]:
+        row = "  ".join(f"{name} {value:g}" for name, value in joint["values"].items())
+        limits = "  limits {:g} to {:g}".format(*joint["limits"]) if joint["limits"] else ""
+        typer.echo(f"  {joint['name']} ({joint['type']})  {row}{limits}")
+    x, y, z = content["flange_at_zero_mm"]
+    typer.echo(f"Flange at zero readings, from the base: x {x:.3f}  y {y:.3f}  z {z:.3f} mm")
+    for key, label in (("masses_kg", "Link masses"), ("truths", "Truths for simulation"), ("targets", "Targets")):
+        if content[key]:
+            entries = content[key]
+            words = [f"{k} {v:g} kg" for k, v in entries.items()] if isinstance(entries, dict) else entries
+            typer.echo(f"{label}: {', '.join(words)}")
+    for line in loaded.history:
+        typer.echo(f"History: {line}")
+
+
+def _content(robot: Robot) -> dict[str, Any]:
+    import numpy as np
+
+    from truearm.units import from_si
+
+    shown = {"m": "mm", "rad": "deg", "1": "1"}
+    base = robot.base
+    position, _ = robot.poses(np.zeros((1, len(robot.joints))))
+    joints = []
+    for number, joint in enumerate(robot.joints, 1):
+        values = {
+            p.name: from_si(p.value, shown[p.unit])
+            for element in robot.link_elements[number - 1]
+            if element.parameter is not None
+            for p in [robot.parameters[element.parameter]]
+        }
+        unit = "deg" if joint.kind == "revolute" else "mm"
+        limits = [from_si(v, unit) for v in joint.limits] if joint.limits else None
+        joints.append({"name": joint.name, "type": joint.kind, "values": values, "limits": limits})
+    return {
+        "name": robot.name,
+        "title": robot.title,
+        "source": robot.source,
+        "convention": robot.convention_name,
+        "units": {"length": "mm", "angle": "deg"},
+        "joints": joints,
+        "flange_at_zero_mm": [
+            round(float(v) * 1e3, 9) for v in base.rotation.T @ (position[0] - np.array(base.translation))
+        ],
+        "effects": list(robot.effect_names),
+        "masses_kg": {f"link {m.joint}": m.mass for m in robot.masses},
+        "tools": list(robot.tools),
+        "truths": ["nominal", "random", *robot.truths],
+        "targets": [target.name for target in robot.targets],
+        "history": list(robot.history),
+    }

@@ -1,0 +1,42 @@
+"""``truearm simulate``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def simulate(
+    robot: Annotated[str, typer.Argument(metavar="ROBOT", help="A library id, a robot file or a URDF.")],
+    truth: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME|FILE", help="nominal, random, a truth of the robot file ('truearm show'), or a robot file."
+        ),
+    ],
+    poses: Annotated[int, typer.Option(metavar="N", min=1, help="Configurations, drawn evenly within the limits.")],
+    noise: Annotated[float, typer.Option(metavar="MM", min=0.0, help="Standard deviation per coordinate.")],
+    out: Annotated[Path, typer.Option("--out", metavar="DATA.csv", help="File to write.")],
+    seed: Annotated[int, typer.Option(metavar="S", min=0, help="Of configurations and noise.")] = 0,
+) -> None:
+    """Measure a digital twin whose truth is known, with a simulated tracker."""
+    import numpy as np
+
+    from truearm.cli.output import progress
+    from truearm.files import write_text, writable_folder
+    from truearm.measurement.readers.canonical import csv_text
+    from truearm.measurement.truths import truth_twin
+    from truearm.measurement.twin import measure
+    from truearm.robots import load_robot
+
+    writable_folder(out.parent)
+    rng = np.random.default_rng(seed)
+    nominal = load_robot(robot)
+    twin = truth_twin(nominal, truth, rng)
+    with progress() as say:
+        say(f"measuring {poses} configurations")
+        data = measure(twin, nominal.random_configurations(poses, rng), noise / 1e3, rng)
+    write_text(out, csv_text(data))
+    typer.echo(f"{poses} configurations of {nominal.name} ({truth}), {len(data.targets)} targets: {out}")

@@ -1,0 +1,40 @@
+"""``truearm demo``, ``example`` and ``new-robot``: ways to begin."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def demo(
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for data and results.")] = Path(
+        "truearm-demo"
+    ),
+) -> None:
+    """Run the main job on a built-in digital twin of an ABB IRB 120."""
+    from truearm.cli.calibrate import print_calibration
+    from truearm.cli.output import progress
+    from truearm.demonstration import demonstration
+
+    with progress() as say:
+        calibration = demonstration(out, say)
+    print_calibration(calibration)
+    typer.echo(f"The report is {out / 'report.html'}; open it in a browser.")
+
+
+def example(folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder to write into.")]) -> None:
+    """Write a small complete session to imitate: a robot, its data, the commands."""
+    from truearm.demonstration import example as write
+
+    for path in write(folder):
+        typer.echo(str(path))
+
+
+def new_robot(file: Annotated[Path, typer.Argument(metavar="FILE", help="Robot file to write.")]) -> None:
+    """Write a commented robot file to fill in."""
+    from truearm.demonstration import new_robot as write
+
+    write(file)
+    typer.echo(f"{file}: fill it in, then look at it with 'truearm show {file}'.")

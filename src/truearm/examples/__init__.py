@@ -1,0 +1,1 @@
+"""Files to start from: the robot file to fill in."""

@@ -1,0 +1,1 @@
+"""From readings to the parameters of the real robot."""

@@ -1,0 +1,94 @@
+"""Bounds on parameters, from a file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from truearm.errors import InputError, nearest_names
+from truearm.files import read_yaml
+from truearm.modeling.chain import Array
+from truearm.modeling.parameters import FreeParameters, Parameter
+from truearm.units import to_si
+
+_Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+
+
+class _Units(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    length: Literal["mm", "m", "um", "in"]
+    angle: Literal["deg", "rad"]
+
+
+class Bounds(BaseModel):
+    """Schema ``truearm-bounds/1``.
+
+    A name is a parameter (``theta_offset_2``) or a family (``theta_offset``: those of all joints).
+
+    Attributes
+    ----------
+    within
+        Largest distance from the nominal value.
+    between
+        Lowest and highest value.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    truearm: Literal["truearm-bounds/1"]
+    units: _Units
+    within: dict[str, Annotated[float, Field(ge=0, strict=True, allow_inf_nan=False)]] = {}
+    between: dict[str, tuple[_Number, _Number]] = {}
+
+
+def read_bounds(path: Path) -> Bounds:
+    """Read a bounds file."""
+    return read_yaml(path, Bounds)
+
+
+def bound_vectors(bounds: Bounds, free: FreeParameters, where: str) -> tuple[Array, Array]:
+    """Return lowest and highest value of every free parameter [SI], infinite where the file says nothing.
+
+    Raises
+    ------
+    InputError
+        For a name that is no free parameter and no family of them, or bounds that leave no room.
+    """
+    low = np.full(len(free.names), -np.inf)
+    high = np.full(len(free.names), np.inf)
+    shown = {"m": bounds.units.length, "rad": bounds.units.angle, "1": "1"}
+    for name, width in bounds.within.items():
+        for i in _places(name, free, f"{where}, within"):
+            p = free.parameters[i]
+            size = to_si(width, shown[p.unit])
+            low[i], high[i] = max(low[i], p.nominal - size), min(high[i], p.nominal + size)
+    for name, (lowest, highest) in bounds.between.items():
+        for i in _places(name, free, f"{where}, between"):
+            unit = shown[free.parameters[i].unit]
+            low[i], high[i] = max(low[i], to_si(lowest, unit)), min(high[i], to_si(highest, unit))
+    for i in np.flatnonzero(low > high):
+        raise InputError(
+            "the bounds leave no value", where=f"{where}, {free.names[i]}", cure="The lower one must not be higher."
+        )
+    return low, high
+
+
+def _places(name: str, free: FreeParameters, where: str) -> list[int]:
+    found = [i for i, p in enumerate(free.parameters) if name in (p.name, _family(p))]
+    if found:
+        return found
+    known = sorted({*free.names, *(_family(p) for p in free.parameters)})
+    near = nearest_names(name, known)
+    raise InputError(
+        "no free parameter of this model has this name",
+        where=where,
+        came=name,
+        allowed=", ".join(known),
+        cure=f"Did you mean {' or '.join(near)}?" if near else None,
+    )
+
+
+def _family(p: Parameter) -> str:
+    return p.name.rpartition("_")[0] if p.group not in ("base", "target") else p.name

@@ -1,0 +1,172 @@
+"""Where the robot and its targets are, in closed form, before anything is identified.
+
+With the nominal flange poses (R_c, p_c) a reading of target t at configuration c is
+``y = R (R_c t + p_c) + p``; turned back by the base, ``R' y - p_c = R_c t + R' p``. For a given R this is linear
+in the target t and in u = R' p with a matrix that does not depend on R, so both can be projected out once and for
+all: what is left is ``|M vec(R) - m|^2``, nine numbers on the rotations, which a coarse look at all rotations and
+a few Gauss-Newton steps solve. Measured orientations add rows to it: the axis about which a target turned between
+two configurations is the axis about which the flange turned, seen from the instrument.
+No start needs to be given by hand, and the number of joints does not matter.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from truearm.errors import InputError
+from truearm.measurement.dataset import Dataset
+from truearm.modeling.chain import Array
+from truearm.modeling.robot import Robot
+from truearm.modeling.transform import Transform, rotation_from_quaternion
+
+#: Weight of one radian against one metre in the search for the base's orientation: an arm's length.
+_ARM = 0.3
+
+
+def initial_frames(robot: Robot, data: Dataset) -> Robot:
+    """Return the robot placed where the data say it stands, with the data's targets on its flange.
+
+    Parameters
+    ----------
+    robot
+        Its kinematic parameters are used as they are; its own base and targets are left out of account.
+    data
+        At least one position reading; orientations are used where present.
+
+    Raises
+    ------
+    InputError
+        If no target has a position.
+    """
+    placed = robot.with_frames(Transform(), {})
+    p, R = placed.poses(data.joints)
+    with_position = data.has_position
+    if not with_position.any():
+        raise InputError("there is no position reading at all", where=data.source, cure="Fill in x, y and z.")
+    seen = [t for t in range(len(data.targets)) if (with_position & (data.target == t)).any()]
+    readings = np.flatnonzero(with_position)
+    where, what = data.configuration[readings], data.target[readings]
+    centre = data.position[readings].mean(axis=0)
+    y = data.position[readings] - centre
+
+    # R' y - p_c = R_c t + u: left side linear in the nine entries of R, right side in the targets and u.
+    known = np.zeros((len(readings), 3, 3 * len(seen) + 3))
+    for column, t in enumerate(seen):
+        mine = what == t
+        known[mine, :, 3 * column : 3 * column + 3] = R[where[mine]]
+    known[:, :, -3:] = np.eye(3)
+    known = known.reshape(-1, known.shape[2])
+    turned = np.zeros((len(readings), 3, 9))
+    for i in range(3):
+        turned[:, i, i::3] = y  # (R' y)_i = sum_j R_ji y_j with vec(R) row by row
+    turned = turned.reshape(-1, 9)
+    left = p[where].reshape(-1)
+    basis = _column_space(known)
+    M = turned - basis @ (basis.T @ turned)
+    m = left - basis @ (basis.T @ left)
+
+    rotations = {t: _orientations(data, t) for t in seen}
+    for where_t, Y in rotations.values():
+        before, after = _turn_axes(R[where_t]), _turn_axes(Y)
+        rows = np.zeros((len(before), 3, 9))
+        for i in range(3):
+            rows[:, i, 3 * i : 3 * i + 3] = before
+        M = np.concatenate([M, _ARM * rows.reshape(-1, 9)])
+        m = np.concatenate([m, _ARM * after.reshape(-1)])
+
+    base = _nearest_rotation(M.T @ M, M.T @ m)
+    solution = np.linalg.lstsq(known, turned @ base.reshape(-1) - left, rcond=1e-10)[0]
+    places: dict[str, Transform | Array] = {}
+    for column, t in enumerate(seen):
+        point = solution[3 * column : 3 * column + 3]
+        where_t, Y = rotations[t]
+        if len(where_t):
+            on_flange = np.swapaxes(R[where_t], 1, 2) @ (base.T @ Y)
+            U, _, Vt = np.linalg.svd(on_flange.mean(axis=0))
+            places[data.targets[t]] = Transform.from_matrix(U @ np.diag([1, 1, np.linalg.det(U @ Vt)]) @ Vt, point)
+        else:
+            places[data.targets[t]] = point
+    origin = base @ solution[-3:] + centre
+    return robot.with_frames(Transform.from_matrix(base, origin), places)  # type: ignore[arg-type]
+
+
+def _column_space(A: Array) -> Array:
+    U, s, _ = np.linalg.svd(A, full_matrices=False)
+    return U[:, s > 1e-10 * s[0]]
+
+
+def _orientations(data: Dataset, target: int) -> tuple[Array, Array]:
+    """Return configuration indices and rotations of the orientation readings of a target."""
+    mine = np.flatnonzero(data.has_orientation & (data.target == target))
+    if data.quaternion is None or len(mine) == 0:
+        return np.zeros(0, dtype=np.intp), np.zeros((0, 3, 3))
+    return data.configuration[mine], rotation_from_quaternion(data.quaternion[mine])
+
+
+def _turn_axes(R: Array) -> Array:
+    """Return sin(angle) times the axis of the turns between neighbours and against the first."""
+    pairs = np.concatenate([R[1:] @ np.swapaxes(R[:-1], 1, 2), R[1:] @ R[:1].swapaxes(1, 2)])
+    return 0.5 * np.stack(
+        [
+            pairs[:, 2, 1] - pairs[:, 1, 2],
+            pairs[:, 0, 2] - pairs[:, 2, 0],
+            pairs[:, 1, 0] - pairs[:, 0, 1],
+        ],
+        axis=1,
+    )
+
+
+def _nearest_rotation(G: Array, g: Array) -> Array:
+    """Minimise r' G r - 2 g' r over the rotations, r = vec(R) row by row."""
+    candidates = rotation_from_quaternion(_even_quaternions(4000))
+    best = candidates[np.argsort(_cost(G, g, candidates))[:24]]
+    for _ in range(50):
+        # R exp(w): the columns of d vec(R) / dw are vec(R [e_k]x)
+        D = np.stack([(best @ generator).reshape(-1, 9) for generator in _GENERATORS], axis=2)
+        r = best.reshape(-1, 9)
+        gradient = np.einsum("nij,ni->nj", D, r @ G - g)
+        hessian = np.einsum("nij,ik,nkl->njl", D, G, D)
+        damping = 1e-9 * np.trace(hessian, axis1=1, axis2=2)[:, None, None] * np.eye(3) + 1e-300 * np.eye(3)
+        step = -np.linalg.solve(hessian + damping, gradient[:, :, None])[:, :, 0]
+        size = np.linalg.norm(step, axis=1, keepdims=True)
+        step *= np.minimum(1.0, 0.5 / np.maximum(size, 1e-300))
+        moved = best @ _rotations(step)
+        better = _cost(G, g, moved) <= _cost(G, g, best)
+        best = np.where(better[:, None, None], moved, best)
+        if not better.any() or size[better].max() < 1e-12:
+            break
+    return best[np.argmin(_cost(G, g, best))]
+
+
+_GENERATORS = np.array(
+    [
+        [[0.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]],
+        [[0.0, 0.0, 1.0], [0.0, 0.0, 0.0], [-1.0, 0.0, 0.0]],
+        [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]],
+    ]
+)
+
+
+def _cost(G: Array, g: Array, R: Array) -> Array:
+    r = R.reshape(-1, 9)
+    return np.einsum("ni,ij,nj->n", r, G, r) - 2 * r @ g
+
+
+def _rotations(w: Array) -> Array:
+    """Return the rotations with rotation vectors `w`, ``(n, 3)``."""
+    angle = np.linalg.norm(w, axis=1, keepdims=True)
+    q = np.concatenate([np.cos(angle / 2), 0.5 * np.sinc(angle / (2 * np.pi)) * w], axis=1)
+    return rotation_from_quaternion(q)
+
+
+def _even_quaternions(count: int) -> Array:
+    """Spread unit quaternions evenly over all rotations (super-Fibonacci spiral, Alexa 2022)."""
+    phi, psi = np.sqrt(2.0), 1.533751168755204288118041
+    s = np.arange(count) + 0.5
+    t = s / count
+    d = 2 * np.pi * s
+    alpha, beta = d / phi, d / psi
+    inner, outer = np.sqrt(t), np.sqrt(1 - t)
+    return np.stack(
+        [inner * np.sin(alpha), inner * np.cos(alpha), outer * np.sin(beta), outer * np.cos(beta)], axis=1
+    )

@@ -1,0 +1,49 @@
+"""Which parameters a model frees. Base and targets are always free."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+from truearm.modeling.parameters import FreeParameters, Group
+from truearm.modeling.robot import Robot
+
+
+@dataclass(frozen=True)
+class Model:
+    """A family of robots to look in.
+
+    Attributes
+    ----------
+    name
+        As the command line spells it.
+    summary
+        What it frees, in words.
+    groups
+        Parameter groups that are free besides base and targets.
+    effects
+        Joint effects that are added.
+    """
+
+    name: str
+    summary: str
+    groups: tuple[Group, ...]
+    effects: tuple[str, ...] = ()
+
+    def prepared(self, robot: Robot) -> Robot:
+        """Return the robot with the model's effects, every parameter starting anew from its current value."""
+        known = robot.with_effects(self.effects)
+        return known.with_parameters(p.restarted(p.value) for p in known.known.values())
+
+    def free(self, robot: Robot) -> FreeParameters:
+        """Return the free parameters of a robot, base first, targets last."""
+        groups = ("base", "target", *self.groups)
+        return FreeParameters(tuple(p for p in robot.parameters.values() if p.group in groups))
+
+
+FRAMES: Final = Model("frames", "where the robot stands and where its targets are", ())
+MODELS: Final = (
+    Model("offsets", "joint zeros", ("joint zero",)),
+    Model("joints", "joint zeros and gains (level 1)", ("joint zero", "gain"), ("gain",)),
+    Model("geometric", "every geometric parameter and the joint zeros (level 2)", ("joint zero", "geometry")),
+)

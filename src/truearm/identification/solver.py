@@ -1,0 +1,156 @@
+"""Gauss-Newton with Levenberg's damping on a whitened problem, with bounds and losses.
+
+Each step solves a small triangular problem left by a QR decomposition of the whitened Jacobian (never the normal
+equations: residuals without noise would drown in them). Bounds are kept by solving that small problem under
+bounds (`scipy.optimize.lsq_linear`). Losses other than the linear one reweight whole readings between steps.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from truearm.identification.losses import Loss, robust_scale, weights
+from truearm.identification.problem import Problem
+from truearm.modeling.chain import Array
+
+_STEPS: Final = {"linear": 60, "huber": 100, "cauchy": 100, "l1": 300}
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Where a solver stopped.
+
+    Attributes
+    ----------
+    vector
+        Parameter values, in the order of the problem.
+    converged
+        Whether the last step was too small to matter.
+    steps
+        Number of steps taken.
+    residual, jacobian
+        Whitened residual ``(rows,)`` and Jacobian of the readings there, not weighted by a loss.
+    weight
+        What the loss left of each reading, ``(readings,)``.
+    """
+
+    vector: Array
+    converged: bool
+    steps: int
+    residual: Array
+    jacobian: Array
+    weight: Array
+
+
+def solve(problem: Problem, loss: Loss = "linear", bounds: tuple[Array, Array] | None = None) -> Solution:
+    """Minimise the whitened residuals under a loss.
+
+    Parameters
+    ----------
+    problem
+        What is minimised; starts at its free parameters' values, moved inside the bounds.
+    loss
+        ``linear`` is least squares; ``l1`` the sum of the norms of the readings (Li et al. 2016, with
+        "|X - X'|" read as each point's distance).
+    bounds
+        Lowest and highest value of every parameter [SI], infinite where there is none.
+    """
+    x = problem.free.start
+    if bounds is not None:
+        x = np.clip(x, *bounds)
+    prior = problem.free.prior
+    damping = 0.0
+    scale: float | None = None
+    r, J = problem.linearised(x)
+    steps, converged = 0, False
+    for steps in range(1, _STEPS[loss] + 1):
+        norms = _norms(r)
+        scale = _next_scale(loss, norms, scale, steps)
+        w = weights(loss, norms, scale)
+        R, c = _triangle(problem, x, r, J, w)
+        cost = _cost(problem, x, r, w)
+        accepted = False
+        for _ in range(25):
+            step = _step(R * prior, c, damping, _room(x, bounds, prior)) * prior
+            trial = x + step
+            r_trial = problem.residual(trial)
+            gain = cost - _cost(problem, trial, r_trial, w)
+            predicted = float(c @ c) - float(np.sum((R @ step + c) ** 2))
+            accepted = gain >= 0.0 or predicted <= 1e-13 * cost
+            if accepted:
+                damping = 0.0 if damping < 1e-9 else damping / 10
+                break
+            damping = max(10 * damping, 1e-6 * float(np.sum((R * prior) ** 2)) / len(prior))
+        if not accepted:
+            break
+        x = trial
+        r, J = problem.linearised(x)
+        small = float(np.abs(step / prior).max()) < (1e-9 if loss == "linear" else 1e-6)
+        if small or predicted <= 1e-24 * max(cost, 1.0):
+            converged = loss != "l1" or scale <= _FLOOR * float(np.median(_norms(r)) + 1e-300)
+            if converged:
+                break
+    norms = _norms(r)
+    final = np.ones_like(norms) if loss == "linear" else weights(loss, norms, scale or 1.0)
+    return Solution(x, converged, steps, r, J, final)
+
+
+_FLOOR: Final = 1e-4  # an l1 reading closer than this share of the median counts as met
+
+
+def _next_scale(loss: Loss, norms: Array, scale: float | None, step: int) -> float:
+    if loss == "linear":
+        return 1.0
+    if loss == "l1":
+        floor = 0.3 * _FLOOR * float(np.median(norms)) + 1e-300
+        return max(floor, float(np.median(norms)) if scale is None else 0.5 * scale)
+    if scale is None or step <= 10:  # then held, so that the weights can settle
+        return max(robust_scale(norms), 1e-300)
+    return scale
+
+
+def _norms(r: Array) -> Array:
+    return np.linalg.norm(r.reshape(-1, 3), axis=1)
+
+
+def _cost(problem: Problem, x: Array, r: Array, w: Array) -> float:
+    prior, _ = problem.prior_rows(x)
+    return float(np.sum(w * np.sum(r.reshape(-1, 3) ** 2, axis=1))) + float(prior @ prior)
+
+
+def _triangle(problem: Problem, x: Array, r: Array, J: Array, w: Array) -> tuple[Array, Array]:
+    """Return R and c with |R s + c|^2 equal to the linearised cost of a step s, up to a constant."""
+    root = np.repeat(np.sqrt(w), 3)
+    stacked = np.column_stack([J, r]) * root[:, None]
+    if problem.priors:
+        prior, weight = problem.prior_rows(x)
+        stacked = np.concatenate([stacked, np.column_stack([np.diag(weight), prior])])
+    triangle = np.linalg.qr(stacked, mode="r")
+    return triangle[:, :-1], triangle[:, -1]
+
+
+def _room(x: Array, bounds: tuple[Array, Array] | None, prior: Array) -> tuple[Array, Array] | None:
+    if bounds is None:
+        return None
+    return (bounds[0] - x) / prior, (bounds[1] - x) / prior
+
+
+def _step(A: Array, c: Array, damping: float, room: tuple[Array, Array] | None) -> Array:
+    """Minimise |A s + c|^2 + damping |s|^2, within `room` if there are bounds."""
+    if room is not None:
+        from scipy.optimize import lsq_linear
+
+        low, high = room
+        held = high - low < 1e-15
+        low, high = np.where(held, -1e-15, np.minimum(low, 0.0)), np.where(held, 1e-15, np.maximum(high, 0.0))
+        damped = np.concatenate([A, np.sqrt(damping + 1e-24) * np.eye(A.shape[1])])
+        target = np.concatenate([-c, np.zeros(A.shape[1])])
+        result = lsq_linear(damped, target, bounds=(low, high), method="bvls", tol=1e-14, max_iter=400)
+        return np.asarray(np.clip(result.x, *room))
+    U, s, Vt = np.linalg.svd(A, full_matrices=False)
+    kept = s > 1e-14 * s[0]
+    factor = np.where(kept, s / np.where(kept, s**2 + damping, 1.0), 0.0)
+    return np.asarray(-Vt.T @ (factor * (U.T @ c)))

@@ -1,0 +1,263 @@
+"""The canonical CSV: one row a reading, with its configuration, joints, target and units in the header."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from truearm.errors import InputError, nearest_names
+from truearm.files import read_text
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.readers.cells import Cells, Layout, read_cells
+from truearm.measurement.readers.rows import Readings, dataset_of, found_configurations
+from truearm.modeling.chain import Array
+from truearm.units import ANGLE_UNITS, LENGTH_UNITS, SMALL_ANGLE_UNITS, checked_unit, written
+
+_POSITION: Final = ("x", "y", "z")
+_QUATERNION: Final = ("qw", "qx", "qy", "qz")
+_ROLES: Final = ("target", "reference")
+_UNITS: Final[dict[str, tuple[str, ...]]] = dict.fromkeys((*_POSITION, "sigma"), LENGTH_UNITS) | {
+    "sigma_rot": SMALL_ANGLE_UNITS
+}
+_PLAIN: Final = ("configuration", "target", "role", *_QUATERNION)
+#: Every column as one writes it, for messages.
+_SHOWN: Final = (
+    {"configuration": "configuration", "joint_1": "joint_1 [deg]", "target": "target", "role": "role"}
+    | {axis: f"{axis} [mm]" for axis in _POSITION}
+    | {part: part for part in _QUATERNION}
+    | {"sigma": "sigma [mm]", "sigma_rot": "sigma_rot [mrad]"}
+)
+_ALLOWED: Final = ", ".join(_SHOWN.values()).replace("[deg]", "[deg] ..")
+_HEADING: Final = re.compile(r"(?P<name>[^\[]*?)\s*(?:\[(?P<unit>[^\]]*)\])?")
+_JOINT: Final = re.compile(r"joint_([1-9][0-9]*)")
+_SEPARATORS: Final = {";": "semicolons", "\t": "tabs", "|": "vertical bars"}
+
+
+@dataclass(frozen=True)
+class _Column:
+    place: int
+    unit: str
+
+
+def read_csv(path: Path) -> Dataset:
+    """Read a canonical CSV.
+
+    A row with an empty x, y or z has no position, and one with an empty qw, qx, qy or qz no orientation: it
+    stays, as a missing reading. Quaternions must have length 1 within 1e-3 and are then normalised.
+
+    Returns
+    -------
+    Dataset
+        Configurations in order of first appearance; rows of the role ``reference`` are in ``references``.
+    """
+    text = read_text(path)
+    header = 1 + next(number for number, line in enumerate(io.StringIO(text, newline="")) if line.strip())
+    _refuse_other_separators(text, f"{path}, line {header}")
+    cells = read_cells(text, str(path), Layout(header=header))
+    columns = _columns(cells)
+    joints = [columns[f"joint_{number}"] for number in _joint_numbers(columns)]
+    labels = cells.texts(columns["configuration"].place)
+    configurations = found_configurations(cells, labels, [j.place for j in joints], [j.unit for j in joints])
+
+    def numbers(*names: str, positive: bool = False) -> Array:
+        found = [columns[name] for name in names]
+        return np.column_stack(
+            [cells.numbers(column.place, column.unit, missing=True, positive=positive) for column in found]
+        )
+
+    readings = Readings(
+        source=str(path),
+        lines=cells.lines,
+        configuration=configurations.of_row,
+        targets=cells.texts(columns["target"].place),
+        reference=np.array(_roles(cells, columns)) == "reference",
+        position=numbers(*_POSITION),
+        quaternion=numbers(*_QUATERNION) if "qw" in columns else None,
+        sigma=numbers("sigma", positive=True)[:, 0] if "sigma" in columns else None,
+        sigma_rot=numbers("sigma_rot", positive=True)[:, 0] if "sigma_rot" in columns else None,
+    )
+    return dataset_of(readings, configurations)
+
+
+def _refuse_other_separators(text: str, where: str) -> None:
+    heading = text.lstrip().splitlines()[0]
+    seen = next((name for sign, name in _SEPARATORS.items() if sign in heading), None)
+    if seen is None and "," not in heading and len(heading.split()) > 3:
+        seen = "blanks"
+    if seen is not None:
+        raise InputError(
+            "the columns are not separated by commas",
+            where=where,
+            came=seen,
+            allowed="commas",
+            cure="Save the file with commas and decimal points, or import it with `truearm import table`.",
+        )
+
+
+def _columns(cells: Cells) -> dict[str, _Column]:
+    """Return the place and the unit of every column by its name, or refuse the header."""
+    columns: dict[str, _Column] = {}
+    for place, heading in enumerate(cells.names):
+        where = f"{cells.source}, line {cells.header}, column {place + 1}"
+        match = _HEADING.fullmatch(heading)
+        name, unit = (match["name"], match["unit"]) if match else (heading, None)
+        units = _UNITS.get(name)
+        if _JOINT.fullmatch(name):
+            units = (*ANGLE_UNITS, *LENGTH_UNITS)
+        if units is None and name not in _PLAIN:
+            word = re.split(r"[^A-Za-z]", name)[0]
+            near = nearest_names(name, _SHOWN, 1) or nearest_names(word, _SHOWN, 1)
+            raise InputError(
+                "the column is not known" if heading else "the column has no name",
+                where=where,
+                came=heading,
+                allowed=_ALLOWED,
+                cure=f"Did you mean {_SHOWN[near[0]]}?" if near else "Rename it, or leave it out.",
+            )
+        if name in columns:
+            raise InputError(
+                f"the column {name} is there twice",
+                where=f"{where} as well as column {columns[name].place + 1}",
+                came=heading,
+                cure="Remove one of them.",
+            )
+        if units is not None:
+            unit = checked_unit(unit, units, f"{where}, {heading}")
+        elif unit is not None:
+            raise InputError(
+                "this column takes no unit", where=where, came=heading, allowed=name, cure="Remove the unit."
+            )
+        columns[name] = _Column(place, unit or "1")
+    _refuse_missing(cells, columns)
+    return columns
+
+
+def _refuse_missing(cells: Cells, columns: dict[str, _Column]) -> None:
+    where = f"{cells.source}, line {cells.header}"
+    numbers = _joint_numbers(columns)
+    for number in range(1, max(numbers, default=1) + 1):
+        if number not in numbers:
+            raise InputError(
+                f"the column joint_{number} is missing",
+                where=where,
+                came=", ".join(f"joint_{n}" for n in numbers) or None,
+                allowed="joint_1, joint_2, .. without a gap",
+                cure=f"Add joint_{number} with its unit, such as joint_{number} [deg], or renumber.",
+            )
+    for name in ("configuration", "target", *_POSITION):
+        if name not in columns:
+            raise InputError(
+                f"the column {name} is missing", where=where, allowed=_ALLOWED, cure=f"Add {_SHOWN[name]}."
+            )
+    there = [name for name in _QUATERNION if name in columns]
+    if there and len(there) < 4:
+        raise InputError(
+            "the quaternion is not complete",
+            where=where,
+            came=", ".join(there),
+            allowed="qw, qx, qy, qz, or none of them",
+            cure=f"Add {', '.join(n for n in _QUATERNION if n not in there)}.",
+        )
+    if "sigma_rot" in columns and not there:
+        raise InputError(
+            "the column sigma_rot is there, and no orientation",
+            where=where,
+            allowed="sigma_rot together with qw, qx, qy, qz",
+            cure="Add the quaternion, or remove sigma_rot.",
+        )
+
+
+def _roles(cells: Cells, columns: dict[str, _Column]) -> tuple[str, ...]:
+    if "role" not in columns:
+        return ("target",) * len(cells.lines)
+    place = columns["role"].place
+    roles = cells.columns[place]
+    for role in dict.fromkeys(roles):
+        if role not in _ROLES:
+            raise InputError(
+                "the role is not known" if role else "the cell is empty",
+                where=cells.place(roles.index(role), place),
+                came=role or None,
+                allowed=" or ".join(_ROLES),
+                cure="A target is fixed to the robot's tool, a reference stands beside the robot.",
+            )
+    return roles
+
+
+def _joint_numbers(columns: Iterable[str]) -> list[int]:
+    return sorted(int(match[1]) for name in columns if (match := _JOINT.fullmatch(name)))
+
+
+# -- writing -------------------------------------------------------------------------------------------
+
+
+def csv_text(dataset: Dataset, length_unit: str = "mm", angle_unit: str = "deg") -> str:
+    """Return a dataset as the text of a canonical CSV.
+
+    Rows come configuration by configuration, in each one the targets first and then the reference points.
+    What was read from such a text is written as the same text again. ``sigma_rot`` is always in mrad.
+    """
+    checked_unit(length_unit, LENGTH_UNITS, "length unit")
+    checked_unit(angle_unit, ANGLE_UNITS, "angle unit")
+    references = dataset.references
+    parts = [dataset] if references is None else [dataset, references]
+    oriented = any(part.quaternion is not None or part.sigma_rot is not None for part in parts)
+    with_sigma = any(part.sigma is not None for part in parts)
+    with_sigma_rot = any(part.sigma_rot is not None for part in parts)
+    units = [angle_unit if kind == "revolute" else length_unit for kind in dataset.joint_kinds]
+    heading = [
+        "configuration",
+        *(f"joint_{number} [{unit}]" for number, unit in enumerate(units, 1)),
+        "target",
+        *(["role"] if references is not None else []),
+        *(f"{axis} [{length_unit}]" for axis in _POSITION),
+        *(_QUATERNION if oriented else ()),
+        *([f"sigma [{length_unit}]"] if with_sigma else []),
+        *(["sigma_rot [mrad]"] if with_sigma_rot else []),
+    ]
+    joints = [
+        [_shown(v, unit) for v, unit in zip(row, units, strict=True)] for row in dataset.joints.tolist()
+    ]
+    rows: list[list[list[str]]] = [[] for _ in dataset.labels]
+    for part, role in zip(parts, _ROLES, strict=False):
+        for reading, configuration in enumerate(part.configuration.tolist()):
+            row = [dataset.labels[configuration], *joints[configuration], part.targets[part.target[reading]]]
+            if references is not None:
+                row.append(role)
+            row += [_shown(v, length_unit) for v in part.position[reading].tolist()]
+            if oriented:
+                row += _cells(part.quaternion, reading, "1", 4)
+            if with_sigma:
+                row += _cells(part.sigma, reading, length_unit, 1)
+            if with_sigma_rot:
+                row += _cells(part.sigma_rot, reading, "mrad", 1)
+            rows[configuration].append(row)
+    unseen = next((label for label, found in zip(dataset.labels, rows, strict=True) if not found), None)
+    if unseen is not None:
+        raise InputError(
+            "a configuration has no reading, and a file could not hold it",
+            where=f"{dataset.source}, configuration {unseen}",
+            cure="Leave it out, or give it missing readings.",
+        )
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(heading)
+    writer.writerows(row for found in rows for row in found)
+    return stream.getvalue()
+
+
+def _cells(values: Array | None, reading: int, unit: str, count: int) -> list[str]:
+    if values is None:
+        return [""] * count
+    return [_shown(v, unit) for v in np.atleast_1d(values[reading]).tolist()]
+
+
+def _shown(value: float, unit: str) -> str:
+    return "" if np.isnan(value) else repr(written(value, unit))

@@ -1,0 +1,255 @@
+"""Delimited text as a grid of cells that know their line and column.
+
+Everything that reads a table of measurements reads it through this module, so that a refusal always names the
+file, the line and the column.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from truearm.errors import InputError
+from truearm.modeling.chain import Array
+from truearm.units import to_si
+
+_NUMBER: Final = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_WITH_COMMA: Final = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
+_NOT_FINITE: Final = re.compile(r"[+-]?(?:nan|inf|infinity)", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How the text of a table is laid out.
+
+    Attributes
+    ----------
+    delimiter
+        The character between two cells; None for any run of blanks.
+    decimal
+        The decimal sign, ``.`` or ``,``.
+    header
+        Line that holds the column names, counted from 1; None if there is none and columns go by number.
+    first_row
+        First line that may hold data; None for the one after the header.
+    comment
+        Lines that begin with this text are skipped; None if there are no comments.
+    """
+
+    delimiter: str | None = ","
+    decimal: str = "."
+    header: int | None = 1
+    first_row: int | None = None
+    comment: str | None = None
+
+
+@dataclass(frozen=True)
+class Cells:
+    """The cells of a table, column by column, without the blanks around them.
+
+    Attributes
+    ----------
+    source
+        The file, for messages.
+    header
+        Line of the column names; None if there is none.
+    names
+        Name of each column as the file has it; its number if there is no header.
+    lines
+        Line of each row.
+    columns
+        The cells, ``columns[column][row]``.
+    decimal
+        The decimal sign.
+    """
+
+    source: str
+    header: int | None
+    names: tuple[str, ...]
+    lines: tuple[int, ...]
+    columns: tuple[tuple[str, ...], ...]
+    decimal: str = "."
+
+    def place(self, row: int, column: int) -> str:
+        """Return the file, line and column of a cell, for messages."""
+        return f"{self.source}, line {self.lines[row]}, column {self.names[column]}"
+
+    def texts(self, column: int) -> tuple[str, ...]:
+        """Return a column of texts, one line each, none of them empty."""
+        cells = self.columns[column]
+        if "" in cells:
+            raise InputError(
+                "the cell is empty",
+                where=self.place(cells.index(""), column),
+                allowed="any text",
+                cure="Only readings may be missing: fill the cell, or remove the row.",
+            )
+        for text in dict.fromkeys(cells):
+            if len(text.splitlines()) > 1:
+                raise InputError(
+                    "the text has a line break",
+                    where=self.place(cells.index(text), column),
+                    came=text,
+                    allowed="text on one line",
+                    cure="Check for a quote that is opened and not closed, or rename it.",
+                )
+        return cells
+
+    def numbers(self, column: int, unit: str, *, missing: bool = False, positive: bool = False) -> Array:
+        """Return a column of numbers in SI units [m, rad or 1], ``(rows,)``.
+
+        Parameters
+        ----------
+        column
+            Which one.
+        unit
+            The unit of the column.
+        missing
+            Whether a cell may be empty; it is then NaN.
+        positive
+            Whether all numbers must be above zero.
+        """
+        cells = self.columns[column]
+        if self.decimal == "," and not any("." in cell for cell in cells):
+            cells = tuple(cell.replace(",", ".") for cell in cells)
+        for row, cell in enumerate(cells):
+            if not _NUMBER.fullmatch(cell) and not (missing and not cell):
+                raise self._not_a_number(row, column, missing=missing)
+        values = np.array([to_si(float(cell), unit) if cell else np.nan for cell in cells])
+        infinite = np.flatnonzero(np.isinf(values))
+        if len(infinite):
+            raise InputError(
+                "the number is too large",
+                where=self.place(int(infinite[0]), column),
+                came=cells[infinite[0]],
+                cure="Correct the cell.",
+            )
+        if positive and (values <= 0).any():
+            row = int(np.argmax(values <= 0))
+            raise InputError(
+                "a standard deviation must be above zero",
+                where=self.place(row, column),
+                came=cells[row],
+                allowed="a number above 0, or nothing",
+                cure="Write what the instrument is good for, or leave the whole column out.",
+            )
+        return values
+
+    def _not_a_number(self, row: int, column: int, *, missing: bool) -> InputError:
+        cell, where = self.columns[column][row], self.place(row, column)
+        if self.decimal == "," and "." in cell:
+            return InputError(
+                "the number has a point, and this file has decimal commas",
+                where=where,
+                came=cell,
+                allowed="a number with a decimal comma and no thousands separator",
+                cure="Say decimal: point in the mapping, or remove the thousands separators.",
+            )
+        if not cell:
+            return InputError(
+                "the cell is empty",
+                where=where,
+                allowed="a number",
+                cure="Only readings may be missing: fill the cell, or remove the row.",
+            )
+        allowed = "a finite number, or nothing" if missing else "a finite number"
+        if _NOT_FINITE.fullmatch(cell):
+            what = "NaN and infinity are not readings"
+            cure = "Leave the cell empty where there is no reading." if missing else "Fill in the number."
+        elif self.decimal == "." and _WITH_COMMA.fullmatch(cell):
+            what = "the number has a decimal comma"
+            cure = "Write a decimal point, or import the file with `truearm import table` and decimal: comma."
+        else:
+            what, cure = "a number belongs here", "Correct the cell."
+        return InputError(what, where=where, came=cell, allowed=allowed, cure=cure)
+
+
+def read_cells(text: str, source: str, layout: Layout) -> Cells:
+    """Split the text of a table into cells.
+
+    Blank lines and comment lines are skipped; all other lines must have as many cells as the header, or as
+    the first row where there is no header.
+    """
+    records = _records(text, source, layout)
+    first = next(records, None)
+    if first is None or (layout.header is not None and first[0] < layout.header):
+        raise InputError(
+            "there is no header on the line that should hold it"
+            if layout.header
+            else "the file holds no rows",
+            where=source if layout.header is None else f"{source}, line {layout.header}",
+            cure="Check the header line, and the text that marks comments.",
+        )
+    if layout.header is None:
+        names = tuple(str(number) for number in range(1, len(first[1]) + 1))
+        rows = [first, *records]
+    else:
+        names = tuple(first[1])
+        rows = list(records)
+    if not rows:
+        raise InputError(
+            "the file holds a header and no rows", where=source, cure="Check that it was exported whole."
+        )
+    for line, row in rows:
+        if len(row) != len(names):
+            raise _ragged(f"{source}, line {line}", len(row), len(names), layout)
+    return Cells(
+        source=source,
+        header=None if layout.header is None else first[0],
+        names=names,
+        lines=tuple(line for line, _ in rows),
+        columns=tuple(zip(*(row for _, row in rows), strict=True)),
+        decimal=layout.decimal,
+    )
+
+
+def _ragged(where: str, came: int, wanted: int, layout: Layout) -> InputError:
+    if came < wanted:
+        cure = "Check for a missing cell."
+    elif layout.delimiter is None:
+        cure = "A name with blanks in it is split: export the file with another separator."
+    elif layout.delimiter == ",":
+        cure = "Check for decimal commas, or for a comma in a name without quotes around it."
+    else:
+        cure = "Check for a separator inside a name without quotes around it."
+    what = f"the row has not as many cells as {'the first row' if layout.header is None else 'the header'}"
+    return InputError(what, where=where, came=f"{came} cells", allowed=f"{wanted} cells", cure=cure)
+
+
+def _records(text: str, source: str, layout: Layout) -> Iterator[tuple[int, list[str]]]:
+    """Yield the line number and the cells of each line that is neither blank nor a comment."""
+    current = 0
+    start = layout.first_row or (layout.header or 0) + 1
+
+    def lines() -> Iterator[str]:
+        nonlocal current
+        for number, line in enumerate(io.StringIO(text, newline=""), 1):
+            is_comment = layout.comment is not None and line.lstrip().startswith(layout.comment)
+            if number == layout.header:
+                current = number
+                yield line.lstrip().removeprefix(layout.comment or "") if is_comment else line
+            elif number >= start and not is_comment:
+                current = number
+                yield line
+
+    if layout.delimiter is None:
+        yield from ((current, cells) for line in lines() if (cells := line.split()))
+        return
+    reader = csv.reader(lines(), delimiter=layout.delimiter, skipinitialspace=True, strict=True)
+    try:
+        for record in reader:
+            cells = [cell.strip() for cell in record]
+            if len(cells) > 1 or (cells and cells[0]):
+                yield current, cells
+    except csv.Error as error:
+        raise InputError(
+            f"the quotes do not fit together ({error})",
+            where=f"{source}, line {current}",
+            cure="Close every quote, and write a quote inside a quoted cell twice.",
+        ) from error

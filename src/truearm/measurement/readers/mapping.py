@@ -1,0 +1,211 @@
+"""Mapping files: what the columns of somebody's table mean."""
+
+from __future__ import annotations
+
+import codecs
+import re
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints, model_validator
+from pydantic import field_validator as validator_of
+
+from truearm.measurement.readers.cells import Layout
+
+_DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "whitespace": None}
+
+
+def _number_as_text(value: object) -> object:
+    return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
+
+
+def _none_as_null(value: object) -> object:
+    return None if value == "none" else value
+
+
+Text = Annotated[str, StringConstraints(min_length=1, strip_whitespace=True)]
+#: A column by its name; by its number, counted from 1, where the file has no header.
+Column = Annotated[Text, BeforeValidator(_number_as_text)]
+Line = Annotated[int, Field(ge=1, strict=True)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=True)]
+
+
+class _Entry(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class LayoutEntry(_Entry):
+    """How the text of a file is laid out; what is left out describes a plain CSV with a header."""
+
+    delimiter: Literal["comma", "semicolon", "tab", "whitespace"] = "comma"
+    decimal: Literal["point", "comma"] = "point"
+    header: Annotated[Line | None, BeforeValidator(_none_as_null)] = 1
+    first_row: Line | None = None
+    comment: Text | None = None
+    encoding: str = "utf-8"
+
+    @validator_of("encoding")
+    @classmethod
+    def _known(cls, name: str) -> str:
+        try:
+            return codecs.lookup(name).name
+        except LookupError:
+            raise ValueError(
+                "there is no such encoding; usual ones are utf-8, utf-16, cp1252, latin-1"
+            ) from None
+
+    @model_validator(mode="after")
+    def _header_first(self) -> LayoutEntry:
+        if self.first_row is not None and self.first_row <= (self.header or 0):
+            raise ValueError("first_row must be below the header")
+        return self
+
+    @property
+    def layout(self) -> Layout:
+        """Return it as the reader of cells takes it."""
+        decimal = "," if self.decimal == "comma" else "."
+        return Layout(_DELIMITERS[self.delimiter], decimal, self.header, self.first_row, self.comment)
+
+
+class ConfigurationEntry(_Entry):
+    """Where the label of the configuration is."""
+
+    column: Column | None = None
+    each: Literal["row"] | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> ConfigurationEntry:
+        if (self.column is None) == (self.each is None):
+            raise ValueError("give either column: NAME, or each: row for one configuration a row")
+        return self
+
+
+class NamesEntry(_Entry):
+    """A column whose text holds the label of the configuration, the name of the target, or both."""
+
+    column: Column
+    pattern: str
+    others: Literal["refuse", "skip"] = "refuse"
+
+    @validator_of("pattern")
+    @classmethod
+    def _compiles(cls, pattern: str) -> str:
+        try:
+            groups = set(re.compile(pattern).groupindex)
+        except re.error as error:
+            raise ValueError(f"this is not a regular expression ({error})") from None
+        if not groups or groups - {"configuration", "target"}:
+            raise ValueError("the named groups must be (?P<configuration>..), (?P<target>..) or both")
+        return pattern
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Return what the pattern finds."""
+        return tuple(re.compile(self.pattern).groupindex)
+
+
+class ReadingEntry(_Entry):
+    """The columns of one target; several of them make a wide table."""
+
+    target: Text | None = None
+    target_column: Column | None = None
+    x: Column
+    y: Column
+    z: Column
+    qw: Column | None = None
+    qx: Column | None = None
+    qy: Column | None = None
+    qz: Column | None = None
+
+    @model_validator(mode="after")
+    def _whole_quaternion(self) -> ReadingEntry:
+        if None in (q := [self.qw, self.qx, self.qy, self.qz]) and any(q):
+            raise ValueError("give all of qw, qx, qy, qz, or none of them")
+        return self
+
+    @property
+    def position(self) -> dict[str, str]:
+        """Return the columns of the position."""
+        return {"x": self.x, "y": self.y, "z": self.z}
+
+    @property
+    def quaternion(self) -> dict[str, str]:
+        """Return the columns of the quaternion, nothing if there is none."""
+        named = {"qw": self.qw, "qx": self.qx, "qy": self.qy, "qz": self.qz}
+        return {name: column for name, column in named.items() if column is not None}
+
+
+class JointsEntry(_Entry):
+    """The columns of the joints, in the order of the robot, in the table or in a second file."""
+
+    columns: list[Column] = Field(min_length=1)
+    unit: Literal["deg", "rad", "mm", "m", "um", "in"] | None = None
+    units: list[Literal["deg", "rad", "mm", "m", "um", "in"]] | None = None
+    file: Text | None = None
+    key: Column | None = None
+    layout: LayoutEntry | None = None
+
+    @model_validator(mode="after")
+    def _consistent(self) -> JointsEntry:
+        if (self.unit is None) == (self.units is None):
+            raise ValueError("give either unit: for all joints, or units: with one for each joint")
+        if self.units is not None and len(self.units) != len(self.columns):
+            raise ValueError(f"there are {len(self.columns)} columns and {len(self.units)} units")
+        if self.file is None and (self.key is not None or self.layout is not None):
+            raise ValueError("key and layout belong to a second file; name it with file:")
+        return self
+
+    @property
+    def unit_of_each(self) -> list[str]:
+        """Return the unit of each joint."""
+        return [*self.units] if self.units is not None else [str(self.unit)] * len(self.columns)
+
+
+class SigmaEntry(_Entry):
+    """A standard deviation for all positions."""
+
+    value: Positive
+    unit: Literal["mm", "m", "um", "in"]
+
+
+class SigmaRotEntry(_Entry):
+    """A standard deviation for all orientations."""
+
+    value: Positive
+    unit: Literal["mrad", "rad", "deg"]
+
+
+class MappingFile(_Entry):
+    """Schema ``truearm-mapping/1``."""
+
+    truearm: Literal["truearm-mapping/1"]
+    layout: LayoutEntry = LayoutEntry()
+    configuration: ConfigurationEntry | None = None
+    names: NamesEntry | None = None
+    length_unit: Literal["mm", "m", "um", "in"]
+    readings: list[ReadingEntry] = Field(min_length=1)
+    references: list[Text] = []
+    joints: JointsEntry
+    sigma: SigmaEntry | None = None
+    sigma_rot: SigmaRotEntry | None = None
+
+    @model_validator(mode="after")
+    def _everything_once(self) -> MappingFile:
+        groups = () if self.names is None else self.names.groups
+        if (self.configuration is not None) == ("configuration" in groups):
+            raise ValueError(
+                "the configuration must come from one place: the entry configuration, or the group "
+                "(?P<configuration>..) in the pattern of names"
+            )
+        for number, entry in enumerate(self.readings, 1):
+            sources = [entry.target is not None, entry.target_column is not None, "target" in groups]
+            if sum(sources) != 1:
+                raise ValueError(
+                    f"the target of readings[{number}] must come from one place: target, target_column, or "
+                    "the group (?P<target>..) in the pattern of names"
+                )
+        fixed = [entry.target for entry in self.readings]
+        if len(fixed) > 1 and (None in fixed or len(set(fixed)) < len(fixed)):
+            raise ValueError("several readings a row need target: with a different name in each of them")
+        if self.sigma_rot is not None and not any(entry.quaternion for entry in self.readings):
+            raise ValueError("sigma_rot is given, and no reading has an orientation (qw, qx, qy, qz)")
+        return self

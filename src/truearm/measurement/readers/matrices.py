@@ -1,0 +1,143 @@
+"""Importer for plain matrices: one file for the joints, one a target, one configuration a row."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from truearm.errors import InputError
+from truearm.files import read_text
+from truearm.measurement.dataset import Dataset, IntArray
+from truearm.modeling.chain import Array
+from truearm.units import ANGLE_UNITS, LENGTH_UNITS, checked_unit, to_si
+
+
+def read_matrices(
+    joints: Path,
+    targets: Mapping[str, Path],
+    references: Mapping[str, Path],
+    angle_unit: str,
+    length_unit: str,
+) -> tuple[Dataset, Mapping[str, int]]:
+    """Read matrices of joints and positions; row n of every file is configuration ``n``.
+
+    Numbers are white-space separated, there is no header, and what follows a ``#`` is a comment. This is the
+    only importer in which zeros stand for nothing: a row of zeros, or one with a NaN, in the file of a target
+    or a reference point is a missing reading. All configurations stay, even where all readings are missing.
+
+    Parameters
+    ----------
+    joints
+        Joint readings, one column a joint; all joints are revolute.
+    targets, references
+        Name and file of each point on the tool and of each fixed point beside the robot; columns x, y, z.
+    angle_unit, length_unit
+        Units of the joints and of the positions.
+
+    Returns
+    -------
+    Dataset
+        The readings, configuration by configuration.
+    Mapping
+        How many readings are missing, by name.
+    """
+    checked_unit(angle_unit, ANGLE_UNITS, "--angle-unit")
+    checked_unit(length_unit, LENGTH_UNITS, "--length-unit")
+    if not targets:
+        raise InputError("no target is given", where="--target", cure="Give at least one --target NAME=FILE.")
+    for name in (*targets, *references):
+        if not name or len(name.splitlines()) > 1 or name != name.strip():
+            raise InputError(
+                "a point needs a name",
+                where="--target, --reference",
+                came=name,
+                allowed="NAME=FILE",
+                cure="Write the name before the = sign, without blanks around it.",
+            )
+    for name in references:
+        if name in targets:
+            raise InputError(
+                f"{name!r} is given as a target and as a reference",
+                where="--reference",
+                came=name,
+                cure="Give the point on the robot and the one beside it different names.",
+            )
+    values = _matrix(joints, None, angle_unit, missing=False)
+    positions = {}
+    for name, path in (*targets.items(), *references.items()):
+        positions[name] = _matrix(path, 3, length_unit, missing=True)
+        if len(positions[name]) != len(values):
+            raise InputError(
+                f"the file has not as many rows as {joints}",
+                where=str(path),
+                came=f"{len(positions[name])} rows",
+                allowed=f"{len(values)} rows",
+                cure="Row n is configuration n in every file: write zeros or NaN where a reading is missing.",
+            )
+
+    def part(names: tuple[str, ...], beside: Dataset | None) -> Dataset:
+        configuration: IntArray = np.repeat(np.arange(len(values), dtype=np.intp), len(names))
+        return Dataset(
+            source=str(joints),
+            labels=tuple(str(number) for number in range(1, len(values) + 1)),
+            joints=values,
+            joint_kinds=("revolute",) * values.shape[1],
+            targets=names,
+            configuration=configuration,
+            target=np.tile(np.arange(len(names), dtype=np.intp), len(values)),
+            position=np.stack([positions[name] for name in names], axis=1).reshape(-1, 3),
+            references=beside,
+        )
+
+    dataset = part(tuple(targets), part(tuple(references), None) if references else None)
+    return dataset, {name: int(np.isnan(p).any(axis=1).sum()) for name, p in positions.items()}
+
+
+def _matrix(path: Path, width: int | None, unit: str, *, missing: bool) -> Array:
+    """Return a matrix of numbers in SI units, ``(rows, columns)``; missing readings are rows of NaN."""
+    rows: list[list[float]] = []
+    first = 0
+    for line, text in enumerate(read_text(path).splitlines(), 1):
+        cells = text.partition("#")[0].split()
+        if not cells:
+            continue
+        where = f"{path}, line {line}"
+        row = [_number(cell, f"{where}, column {c}", missing=missing) for c, cell in enumerate(cells, 1)]
+        first = first or line
+        wanted = width or (len(rows[0]) if rows else len(row))
+        if len(row) != wanted:
+            raise InputError(
+                "a position has three numbers" if width else f"the row is not as long as line {first}",
+                where=where,
+                came=f"{len(row)} numbers",
+                allowed=f"{wanted} numbers",
+                cure="Write one configuration a row.",
+            )
+        if missing and (not any(row) or any(math.isnan(v) for v in row)):
+            row = [math.nan] * wanted
+        rows.append([to_si(value, unit) for value in row])
+    if not rows:
+        raise InputError("the file holds no rows", where=str(path), cure="Check that it was exported whole.")
+    return np.array(rows)
+
+
+def _number(cell: str, where: str, *, missing: bool) -> float:
+    try:
+        value = float(cell) if cell.isascii() and "_" not in cell else None
+    except ValueError:
+        value = None
+    if value is not None and (math.isfinite(value) or (missing and math.isnan(value))):
+        return value
+    allowed = "a finite number, or NaN for a missing reading" if missing else "a finite number"
+    if "," in cell or ";" in cell:
+        cure = "Separate numbers by blanks and write decimal points, or use `truearm import table`."
+    elif value is None:
+        cure = "The file must hold numbers only; begin a heading with #."
+    elif missing:
+        cure = "Write a row of zeros or NaN where there is no reading."
+    else:
+        cure = "Every configuration needs all joints: remove the row from all files."
+    raise InputError("a number belongs here", where=where, came=cell, allowed=allowed, cure=cure)

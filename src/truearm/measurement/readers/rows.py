@@ -1,0 +1,209 @@
+"""From readings row by row to a dataset: what every reader checks in the same way."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.errors import InputError
+from truearm.measurement.dataset import Dataset, IntArray
+from truearm.measurement.readers.cells import Cells
+from truearm.modeling.chain import Array
+
+#: How far the norm of a quaternion may be from 1; files round quaternions to four digits or more.
+QUATERNION_TOLERANCE = 1e-3
+
+
+@dataclass(frozen=True)
+class Configurations:
+    """Configurations in order of first appearance.
+
+    Attributes
+    ----------
+    labels
+        Their names.
+    joints
+        Joint readings [rad; m for prismatic joints], ``(configurations, joints)``.
+    kinds
+        ``revolute`` or ``prismatic`` for each joint.
+    of_row
+        Configuration of each row they were found in, ``(rows,)``.
+    """
+
+    labels: tuple[str, ...]
+    joints: Array
+    kinds: tuple[str, ...]
+    of_row: IntArray
+
+
+def found_configurations(
+    cells: Cells, labels: Sequence[str], columns: Sequence[int], units: Sequence[str]
+) -> Configurations:
+    """Gather the configurations of a table in which every row has a label and all joints.
+
+    The joints must be identical on all rows of a configuration.
+    """
+    joints = np.column_stack([cells.numbers(c, unit) for c, unit in zip(columns, units, strict=True)])
+    place: dict[str, int] = {}
+    of_row = np.array([place.setdefault(label, len(place)) for label in labels], dtype=np.intp)
+    _, first = np.unique(of_row, return_index=True)
+    differs = joints != joints[first[of_row]]
+    if differs.any():
+        row, joint = (int(i) for i in np.argwhere(differs)[0])
+        before, column = int(first[of_row[row]]), columns[joint]
+        raise InputError(
+            f"the joints of configuration {labels[row]!r} differ from those on line {cells.lines[before]}",
+            where=cells.place(row, column),
+            came=cells.columns[column][row],
+            allowed=f"{cells.columns[column][before]}, as on line {cells.lines[before]}",
+            cure="A configuration is one standstill of the robot: give other joints another label.",
+        )
+    kinds = tuple("revolute" if unit in ("deg", "rad") else "prismatic" for unit in units)
+    return Configurations(tuple(place), joints[first], kinds, of_row)
+
+
+@dataclass(frozen=True)
+class Readings:
+    """Readings as a file has them, in file order.
+
+    Attributes
+    ----------
+    source
+        The file, for messages.
+    lines
+        Line of each reading.
+    configuration
+        Index of its configuration, ``(readings,)``.
+    targets
+        Name of its target.
+    reference
+        Whether that is a reference point, ``(readings,)``.
+    position
+        [m], ``(readings, 3)``, NaN where a coordinate is missing.
+    quaternion
+        (w, x, y, z), ``(readings, 4)``, NaN where it is missing; None if the file has none.
+    sigma, sigma_rot
+        Declared standard deviations [m], [rad], ``(readings,)``, NaN where missing; None if there are none.
+    """
+
+    source: str
+    lines: Sequence[int]
+    configuration: IntArray
+    targets: Sequence[str]
+    reference: NDArray[np.bool_]
+    position: Array
+    quaternion: Array | None = None
+    sigma: Array | None = None
+    sigma_rot: Array | None = None
+
+
+def dataset_of(readings: Readings, configurations: Configurations) -> Dataset:
+    """Check the readings and return them as a dataset, reference points beside the targets.
+
+    A position or a quaternion of which a part is missing is missing. Quaternions are normalised.
+    """
+    _refuse_both_roles(readings)
+    if readings.reference.all():
+        raise InputError(
+            "all rows are reference points, there is no target",
+            where=readings.source,
+            cure="Give the points on the robot the role `target`.",
+        )
+    position = np.where(np.isnan(readings.position).any(axis=1, keepdims=True), np.nan, readings.position)
+    quaternion = _unit_quaternions(readings)
+    references = None
+    if readings.reference.any():
+        references = _part(readings, configurations, readings.reference, position, quaternion)
+    targets = _part(readings, configurations, ~readings.reference, position, quaternion)
+    return replace(targets, references=references)
+
+
+def _part(
+    readings: Readings,
+    configurations: Configurations,
+    chosen: NDArray[np.bool_],
+    position: Array,
+    quaternion: Array | None,
+) -> Dataset:
+    place: dict[str, int] = {}
+    rows: IntArray = np.flatnonzero(chosen)
+    names = [readings.targets[row] for row in rows.tolist()]
+    target = np.array([place.setdefault(name, len(place)) for name in names], dtype=np.intp)
+    has_position = _whole(position)
+    has_orientation: NDArray[np.bool_] = np.zeros(len(position), dtype=bool)
+    if quaternion is not None:
+        has_orientation = _whole(quaternion)
+        quaternion = quaternion[rows] if has_orientation[rows].any() else None
+    return Dataset(
+        source=readings.source,
+        labels=configurations.labels,
+        joints=configurations.joints,
+        joint_kinds=configurations.kinds,
+        targets=tuple(place),
+        configuration=readings.configuration[rows],
+        target=target,
+        position=position[rows],
+        quaternion=quaternion,
+        sigma=_declared(readings, rows, readings.sigma, has_position, "sigma"),
+        sigma_rot=_declared(readings, rows, readings.sigma_rot, has_orientation, "sigma_rot"),
+    )
+
+
+def _whole(values: Array) -> NDArray[np.bool_]:
+    return np.asarray(np.isfinite(values).all(axis=1))
+
+
+def _declared(
+    readings: Readings, rows: IntArray, sigma: Array | None, exists: NDArray[np.bool_], column: str
+) -> Array | None:
+    """Return the standard deviations of some rows, refusing them if only some of the readings have one."""
+    if sigma is None or np.isnan(sigma[rows]).all():
+        return None
+    lacking = rows[exists[rows] & np.isnan(sigma[rows])]
+    if len(lacking):
+        raise InputError(
+            f"this reading has no {column}, and others have one",
+            where=f"{readings.source}, line {readings.lines[lacking[0]]}, column {column}",
+            allowed=f"{column} for all readings, or for none",
+            cure="Fill the column, or leave it out.",
+        )
+    return sigma[rows]
+
+
+def _refuse_both_roles(readings: Readings) -> None:
+    first: dict[str, int] = {}
+    for row, name in enumerate(readings.targets):
+        before = first.setdefault(name, row)
+        if readings.reference[row] != readings.reference[before]:
+            raise InputError(
+                f"{name!r} is a target on one line and a reference point on another",
+                where=f"{readings.source}, lines {readings.lines[before]} and {readings.lines[row]}",
+                allowed="one role for each name",
+                cure="Give the point on the robot and the one beside it different names.",
+            )
+
+
+def _unit_quaternions(readings: Readings) -> Array | None:
+    """Return quaternions of length 1.
+
+    One that is already there to rounding stays as it is, so that reading what was written changes nothing.
+    """
+    q = readings.quaternion
+    if q is None:
+        return None
+    norm = np.sqrt((q * q).sum(axis=1))
+    bad = np.flatnonzero(np.abs(norm - 1.0) > QUATERNION_TOLERANCE)
+    if len(bad):
+        raise InputError(
+            "the quaternion (qw, qx, qy, qz) has not length 1",
+            where=f"{readings.source}, line {readings.lines[bad[0]]}, columns qw qx qy qz",
+            came=f"length {norm[bad[0]]:.6g}",
+            allowed=f"1 within {QUATERNION_TOLERANCE:g}",
+            cure="Check the order of the columns, and that all digits were exported.",
+        )
+    rounded = np.abs(norm - 1.0) <= 1e-15
+    made: Array = np.where(np.isnan(norm)[:, None], np.nan, np.where(rounded[:, None], q, q / norm[:, None]))
+    return made

@@ -1,0 +1,88 @@
+"""Where the truth of a simulated robot comes from."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from truearm.errors import InputError, nearest_names
+from truearm.measurement.twin import Twin
+from truearm.modeling.chain import Array
+from truearm.modeling.robot import Robot, Tool
+from truearm.modeling.transform import Transform, rotation_from_quaternion
+from truearm.robots import load_robot
+
+#: Three reflectors about 150 mm apart, like the triangular artefact of Nubiola, section 2.2.1.
+DEFAULT_TOOL = Tool({"1": (0.0, 0.0, 0.125), "2": (0.075, 0.0937, 0.215), "3": (0.150, 0.0, 0.125)})
+
+#: Where a simulated instrument sees the robot stand: 2.6 m away, a little lower, turned by a third of a turn.
+STATION = Transform((2.4, 0.9, -0.5), (math.cos(math.pi / 3), 0.0, 0.0, math.sin(math.pi / 3)))
+
+
+def truth_names(robot: Robot) -> tuple[str, ...]:
+    """Return the truths a robot can be simulated with by name."""
+    return ("nominal", "random", *robot.truths)
+
+
+def truth_twin(robot: Robot, truth: str, rng: np.random.Generator) -> Twin:
+    """Return the twin of a robot.
+
+    Parameters
+    ----------
+    robot
+        The nominal robot.
+    truth
+        ``nominal``; ``random``, geometry and joint zeros drawn from their priors; the name of one of the robot
+        file's truths; or a robot file, whose own base and targets are used if it has targets.
+    rng
+        For ``random``.
+
+    Raises
+    ------
+    InputError
+        If there is no such truth, or the file is of another kind of robot.
+    """
+    tool = next(iter(robot.tools.values()), DEFAULT_TOOL)
+    if truth in robot.truths:
+        published = robot.truths[truth]
+        true = robot.with_values(published.values)
+        return Twin(_stationed(true, tool), published.compliance, payload=(tool.mass, tool.cog))
+    if truth == "nominal":
+        return Twin(_stationed(robot, tool))
+    if truth == "random":
+        drawn = {
+            p.name: p.value + p.prior * float(rng.standard_normal())
+            for p in robot.parameters.values()
+            if p.group in ("geometry", "joint zero")
+        }
+        return Twin(_stationed(robot.with_values(drawn), tool))
+    if not Path(truth).suffix and not Path(truth).exists():
+        known = truth_names(robot)
+        near = nearest_names(truth, known)
+        raise InputError(
+            f"{robot.name} has no truth of this name",
+            where="--truth",
+            came=truth,
+            allowed=f"{', '.join(known)}, or a robot file",
+            cure=f"Did you mean {' or '.join(near)}?" if near else None,
+        )
+    other = load_robot(truth)
+    if [j.kind for j in other.joints] != [j.kind for j in robot.joints]:
+        raise InputError(
+            f"this robot has other joints than {robot.name}",
+            where=truth,
+            came=f"{len(other.joints)} joints",
+            allowed=f"{len(robot.joints)}, of the same kinds",
+        )
+    return Twin(other if other.targets else _stationed(other, tool))
+
+
+def _stationed(robot: Robot, tool: Tool) -> Robot:
+    """Return the robot with its base as it is, seen from the station, carrying the tool."""
+    base, R = robot.base, rotation_from_quaternion(np.array(STATION.quaternion))
+    moved: Array = R @ np.array(base.translation) + np.array(STATION.translation)
+    placed = robot.with_frames(Transform.from_matrix(R @ base.rotation, moved), tool.targets)
+    return replace(placed, history=(*robot.history, "simulated truth"))

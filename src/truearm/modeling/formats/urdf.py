@@ -1,0 +1,515 @@
+"""URDF: a serial chain in, the user's own file with calibrated joint origins out.
+
+Reading finds one chain of moving joints in the tree and folds the fixed joints between them into the next
+moving joint's origin. Writing goes back into the bytes the user gave: only the ``<origin>`` of moving joints
+changes, and only where its numbers do. A URDF holds every geometric parameter and every joint zero exactly,
+because an origin is a full rigid transform; what it cannot hold is returned in words.
+
+Source of the format: ROS, URDF XML specification (joint, link, inertial). Angles are roll, pitch, yaw about
+fixed axes, ``Rz(yaw) Ry(pitch) Rx(roll)``; an origin that is not given is the identity, an axis that is not
+given is x.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from truearm.errors import InputError
+from truearm.files import read_bytes
+from truearm.modeling.chain import Array, Element
+from truearm.modeling.conventions import JointKind
+from truearm.modeling.formats.urdf_tree import (
+    KIND,
+    ZERO,
+    Tree,
+    Triple,
+    UrdfJoint,
+    child_tag,
+    numbers,
+    origin,
+    placement,
+    product,
+    read_tree,
+    triple,
+)
+from truearm.modeling.robot import Joint, LinkMass, Robot
+from truearm.modeling.transform import Transform
+
+#: What robot files take as the name of a robot or a joint.
+_NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
+#: How far the length of an axis may be from 1: files print five digits, but 0 0 2 means something else.
+_AXIS_TOLERANCE: Final = 1e-3
+#: How far the robot's nominal rows may be from the file's [m, rad]: more than digits, less than any change.
+_SAME_FILE: Final = 1e-9
+
+
+def read_urdf(path: Path, tip: str | None = None) -> Robot:
+    """Read the serial chain of a URDF file.
+
+    The base frame is the root link. A link's mass takes in the links fixed to it, on and off the chain; what
+    moves off the chain, a gripper's fingers, is left out.
+
+    Parameters
+    ----------
+    tip
+        Link at the end of the chain. If None, the moving joints must lie on one path, and the end is the link
+        ``tool0`` or else ``flange`` fixed behind the last of them, or else that joint's own link.
+    """
+    tree = read_tree(read_bytes(path), str(path))
+    way = tree.way(_only_end(tree, path) if tip is None else tree.known(tip, str(path)))
+    links, tail = _links(tree.where, way)
+    if not links:
+        raise InputError(
+            f"no joint moves between the root {tree.root} and the link {tip}",
+            where=tree.where,
+            cure="Name a link further out.",
+        )
+    masses = (_mass(tree, number, link.joint.child) for number, link in enumerate(links, 1))
+    return Robot(
+        name=_robot_name(tree.name, path),
+        title=tree.name or path.stem,
+        source=f"URDF file {path.name}",
+        convention_name="urdf",
+        joints=tuple(Joint(link.joint.name, link.kind, link.row, link.limits) for link in links),
+        flange=Transform.from_matrix(tail[:3, :3], tail[:3, 3]),
+        masses=tuple(mass for mass in masses if mass is not None),
+    )
+
+
+def calibrated_urdf(source: bytes, robot: Robot) -> tuple[bytes, list[str]]:
+    """Return the URDF that `robot` was read from with its calibrated geometry and joint zeros.
+
+    Parameters
+    ----------
+    source
+        Content of the file the robot was read from. All its bytes stay but the numbers that change.
+
+    Returns
+    -------
+    content, left_out
+        The new file, and in words what a URDF cannot hold.
+    """
+    where = "the URDF to calibrate"
+    tree = read_tree(source, where)
+    edits: list[tuple[int, int, bytes]] = []
+    for link, own in zip(_own_links(tree, robot), robot.link_elements, strict=True):
+        elements = [replace(e, variable=None) for e in own]
+        changed = {e.turns for e in elements if e.parameter and robot.values[e.parameter] != e.value}
+        if not changed:
+            continue
+        place = np.linalg.inv(link.prefix) @ product(elements, robot.values)
+        xyz, rpy = triple(place[:3, 3]), roll_pitch_yaw(place[:3, :3], link.rpy)
+        edits += _origin_edits(
+            source, link.joint, xyz if False in changed else None, rpy if True in changed else None
+        )
+    for start, end, text in sorted(edits, reverse=True):
+        source = source[:start] + text + source[end:]
+    return source, _left_out(robot)
+
+
+def urdf_text(robot: Robot) -> tuple[str, list[str]]:
+    """Return a new URDF with the kinematics of `robot` as it is now, whatever its convention.
+
+    Links are ``base_link``, ``link_1`` ... and ``tool0``. The constant transforms between two joint variables
+    are multiplied into one origin. The base link is the base frame: where it stands in the world is left out.
+
+    Returns
+    -------
+    text, left_out
+        The file, and in words what a URDF cannot hold or the robot does not say.
+    """
+    names = [*(joint.name for joint in robot.joints), "tool0_joint"]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError("a URDF cannot have two joints of one name", where=robot.name, came=name)
+    origins, behind = _collapsed(robot)
+    left_out = _left_out(robot)
+    lines = [
+        '<?xml version="1.0" encoding="UTF-8"?>',
+        f"<robot name={quoteattr(robot.name)}>",
+        '  <link name="base_link"/>',
+    ]
+    for number, (joint, place) in enumerate(zip(robot.joints, origins[:-1], strict=True), 1):
+        parent = f"link_{number - 1}" if number > 1 else "base_link"
+        lines += _link_lines(robot, number, behind[number - 1])
+        lines += _joint_lines(joint, parent, f"link_{number}", place, _limit(robot.name, joint))
+    lines += ['  <link name="tool0"/>']
+    lines += _joint_lines(None, f"link_{len(robot.joints)}", "tool0", origins[-1], [])
+    if any(joint.limits for joint in robot.joints):
+        left_out.append("Effort and velocity limits are not known and stand as 0.")
+    if robot.masses:
+        left_out.append("Inertia tensors are not known and stand as 0.")
+    return "\n".join([*lines, "</robot>", ""]), left_out
+
+
+def roll_pitch_yaw(R: Array, near: Triple = ZERO) -> Triple:
+    """Return the angles [rad] of ``R = Rz(yaw) Ry(pitch) Rx(roll)``, ``(3, 3)``, those nearest `near`.
+
+    Yaw comes first and the others from ``Rz(-yaw) R``. Where pitch is 90 deg only the sum or the difference
+    of roll and yaw is defined: there yaw is taken from `near`, and roll makes up for it.
+    """
+    lying = math.hypot(R[0, 0], R[1, 0])
+    first = math.atan2(R[1, 0], R[0, 0]) if lying > 1e-14 else near[2]
+    solutions = []
+    for yaw in (first, first + math.pi):
+        c, s = math.cos(yaw), math.sin(yaw)
+        pitch = math.atan2(-R[2, 0], c * R[0, 0] + s * R[1, 0])
+        roll = math.atan2(s * R[0, 2] - c * R[1, 2], c * R[1, 1] - s * R[0, 1])
+        turns = (round((a - n) / (2 * math.pi)) for a, n in zip((roll, pitch, yaw), near, strict=True))
+        solutions.append(triple(a - 2 * math.pi * k for a, k in zip((roll, pitch, yaw), turns, strict=True)))
+    return min(solutions, key=lambda angles: sum(abs(a - n) for a, n in zip(angles, near, strict=True)))
+
+
+# -- the chain ----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Link:
+    """A moving joint of the chain.
+
+    Attributes
+    ----------
+    prefix
+        From the link behind the moving joint before to this joint's parent link, ``(4, 4)``.
+    rpy
+        Angles of the joint's own origin [rad].
+    row
+        Row of convention ``urdf``: prefix and origin in one.
+    """
+
+    joint: UrdfJoint
+    prefix: Array
+    rpy: Triple
+    row: Mapping[str, float]
+    limits: tuple[float, float] | None
+
+    @property
+    def kind(self) -> JointKind:
+        return KIND[self.joint.type]
+
+
+def _links(where: str, way: Sequence[UrdfJoint]) -> tuple[list[_Link], Array]:
+    """Return the moving joints on a way, and the transform from the last of them to its end ``(4, 4)``."""
+    links: list[_Link] = []
+    prefix = np.eye(4)
+    for joint in way:
+        xyz, rpy = origin(joint.tag, joint.where)
+        if joint.type == "fixed":
+            prefix = prefix @ placement(xyz, rpy)
+            continue
+        _refuse_unfit(joint)
+        place = prefix @ placement(xyz, rpy)
+        # The file's own angles stay where nothing turns before them: 1.5708 is then still 1.5708.
+        turned = not np.array_equal(prefix[:3, :3], np.eye(3))
+        angles = roll_pitch_yaw(place[:3, :3], rpy) if turned else rpy
+        row = dict(zip(("x", "y", "z"), triple(place[:3, 3]), strict=True))
+        row |= dict(zip(("roll", "pitch", "yaw"), angles, strict=True))
+        row |= dict(zip(("axis_x", "axis_y", "axis_z"), _axis(joint), strict=True))
+        links.append(_Link(joint, prefix, rpy, row, _limits(joint)))
+        prefix = np.eye(4)
+    return links, prefix
+
+
+def _only_end(tree: Tree, path: Path) -> str:
+    """Return the end of the one path on which all moving joints lie."""
+    moving = [joint for joint in tree.joints.values() if joint.type != "fixed"]
+    ways = [[step for step in tree.way(joint.child) if step.type != "fixed"] for joint in moving]
+    if not ways:
+        raise InputError(
+            "there is no moving joint", where=tree.where, allowed=f"a joint of type {', '.join(KIND)}"
+        )
+    passed = {joint.name for way in ways for joint in way[:-1]}
+    outermost = [way for way in ways if way[-1].name not in passed]
+    if len(outermost) == 1:
+        return tree.end(outermost[0][-1])
+    common = [steps[0] for steps in zip(*outermost, strict=False) if len({step.name for step in steps}) == 1]
+    tips = [tree.end(joint) for joint in (*common[-1:], *(way[-1] for way in outermost))]
+    raise InputError(
+        "the moving joints branch, and one chain is needed",
+        where=tree.where,
+        came=f"several outermost joints: {', '.join(way[-1].name for way in outermost)}",
+        allowed=f"a chain that ends at a link you name, such as {', '.join(tips)}",
+        cure=f"Name the end of the chain: {path.name}#{tips[0]}",
+    )
+
+
+def _refuse_unfit(joint: UrdfJoint) -> None:
+    if joint.type not in KIND:
+        raise InputError(
+            "a joint of this type cannot be in a serial chain",
+            where=joint.where,
+            came=joint.type,
+            allowed=", ".join((*KIND, "fixed")),
+        )
+    if child_tag(joint.tag, "mimic", joint.where) is not None:
+        raise InputError(
+            "a joint that mimics another has no reading of its own",
+            where=joint.where,
+            cure="End the chain before it, with #LINK behind the file name, or delete <mimic>.",
+        )
+    if not _NAME.fullmatch(joint.name):
+        raise InputError(
+            "the joint's name cannot stand in a robot file",
+            where=joint.where,
+            came=joint.name,
+            allowed="letters, digits, _ . and -, starting with a letter or digit",
+            cure="Rename the joint.",
+        )
+
+
+def _axis(joint: UrdfJoint) -> Triple:
+    tag = child_tag(joint.tag, "axis", joint.where)
+    axis = triple((numbers(tag, "xyz", 3, joint.where) if tag else None) or (1.0, 0.0, 0.0))
+    length = math.hypot(*axis)
+    if abs(length - 1.0) > _AXIS_TOLERANCE:
+        unit = " ".join(f"{a / length:.12g}" for a in axis) if length else None
+        raise InputError(
+            "the joint's axis is not a unit vector",
+            where=joint.where,
+            came=" ".join(map(repr, axis)),
+            cure=f"The unit vector along it is {unit}." if unit else "Give the direction of the axis.",
+        )
+    return triple(a / length for a in axis)
+
+
+def _limits(joint: UrdfJoint) -> tuple[float, float] | None:
+    if joint.type == "continuous":
+        return None
+    cure = (
+        "Give the joint's limits, or make it continuous."
+        if joint.type == "revolute"
+        else "Give the joint's limits."
+    )
+    tag = child_tag(joint.tag, "limit", joint.where)
+    if tag is None:
+        raise InputError(f"a {joint.type} joint must have a <limit>", where=joint.where, cure=cure)
+    low, high = ((numbers(tag, side, 1, joint.where) or (0.0,))[0] for side in ("lower", "upper"))
+    if not low < high:
+        raise InputError(
+            "the lower limit must be below the upper one",
+            where=joint.where,
+            came=f"lower {low!r}, upper {high!r} (0 where not given)",
+            cure=cure,
+        )
+    return low, high
+
+
+def _mass(tree: Tree, number: int, link: str) -> LinkMass | None:
+    """Return the mass of a link with all that is fixed to it, centre of gravity in the link's frame."""
+    total, moment = 0.0, np.zeros(3)
+    for name, frame in tree.fixed_behind(link):
+        tag = tree.links[name]
+        where = f"{tree.where}, line {tag.line}, link {name}"
+        inertial = child_tag(tag, "inertial", where)
+        if inertial is None:
+            continue
+        entry = child_tag(inertial, "mass", where)
+        value = None if entry is None else numbers(entry, "value", 1, where)
+        if value is None:
+            raise InputError('the <inertial> has no <mass value="..."/>', where=where)
+        if value[0] < 0:
+            raise InputError("a mass cannot be negative", where=where, came=value[0])
+        total += value[0]
+        moment += value[0] * (frame[:3, :3] @ origin(inertial, where)[0] + frame[:3, 3])
+    return LinkMass(number, total, triple(moment / total)) if total else None
+
+
+def _robot_name(name: str, path: Path) -> str:
+    for candidate in (name, path.stem):
+        if _NAME.fullmatch(candidate):
+            return candidate
+    raise InputError(
+        "neither the robot's name nor the file's can name a robot",
+        where=str(path),
+        came=f"{name!r} and {path.stem!r}",
+        allowed="letters, digits, _ . and -, starting with a letter or digit",
+        cure="Rename the file.",
+    )
+
+
+# -- the user's file, calibrated ----------------------------------------------------------------------------
+
+# In well-formed XML a start tag ends at the first > outside quotes.
+_START_TAG: Final = re.compile(
+    rb"""<[^\s/>]+(?P<attributes>(?:\s+[^\s=]+\s*=\s*(?:"[^"]*"|'[^']*'))*)\s*/?>"""
+)
+_ATTRIBUTE: Final = re.compile(rb"""\s+(?P<name>[^\s=]+)\s*=\s*["'](?P<value>(?<=")[^"]*|(?<=')[^']*)["']""")
+
+
+def _own_links(tree: Tree, robot: Robot) -> list[_Link]:
+    """Return the chain of `robot` in the file, or refuse a file that is not the robot's own."""
+
+    def refuse(what: str, came: object = None, allowed: str | None = None) -> InputError:
+        cure = "Give the URDF that the robot was read from; for another robot a new URDF can be written."
+        return InputError(
+            f"the file is not the one this robot was read from: {what}",
+            where=tree.where,
+            came=came,
+            allowed=allowed,
+            cure=cure,
+        )
+
+    if robot.convention_name != "urdf":
+        raise refuse(f"robot {robot.name} is of convention {robot.convention_name}")
+    last = robot.joints[-1].name
+    if last not in tree.joints:
+        raise refuse(f"it has no joint {last}")
+    links, _ = _links(tree.where, tree.way(tree.joints[last].child))
+    names = [link.joint.name for link in links]
+    if names != [joint.name for joint in robot.joints]:
+        raise refuse("other joints move", ", ".join(names), ", ".join(joint.name for joint in robot.joints))
+    for link, joint in zip(links, robot.joints, strict=True):
+        if link.kind != joint.kind:
+            raise refuse(f"joint {joint.name} is {link.kind}")
+        for column, value in link.row.items():
+            if abs(value - joint.row.get(column, 0.0)) > _SAME_FILE:
+                raise refuse(
+                    f"{column} of joint {joint.name} differs", value, repr(joint.row.get(column, 0.0))
+                )
+    return links
+
+
+def _origin_edits(
+    source: bytes, joint: UrdfJoint, xyz: Triple | None, rpy: Triple | None
+) -> list[tuple[int, int, bytes]]:
+    """Return what to put where in the bytes so that the joint has this origin; None keeps what it has."""
+    new = {name: value for name, value in ((b"xyz", xyz), (b"rpy", rpy)) if value is not None}
+    tag = child_tag(joint.tag, "origin", joint.where)
+    found = _START_TAG.match(source, (tag or joint.tag).start)
+    assert found is not None  # the parser found a start tag here
+    if tag is None:
+        return [(found.end(), found.end(), b"<origin" + _attributes(new) + b"/>")]
+    edits = []
+    for attribute in _ATTRIBUTE.finditer(source, *found.span("attributes")):
+        value = new.pop(attribute["name"], None)
+        if value is not None:
+            edits.append((*attribute.span("value"), _respelled(attribute["value"], value)))
+    if new:
+        end = found.end("attributes")
+        edits.append((end, end, _attributes(new)))
+    return edits
+
+
+def _attributes(values: Mapping[bytes, Triple]) -> bytes:
+    return b"".join(
+        b' %s="%s"' % (name, " ".join(map(repr, value)).encode()) for name, value in values.items()
+    )
+
+
+def _respelled(old: bytes, values: Triple) -> bytes:
+    """Return three numbers in the spacing of `old`; a number that is the same keeps its spelling."""
+    words = [repr(value).encode() for value in values]
+    if b"&" in old:  # a character reference stands for some of the spacing
+        return b" ".join(words)
+    same = [float(word) == value for word, value in zip(old.split(), values, strict=True)]
+    following = iter(zip(same, words, strict=True))
+
+    def respell(match: re.Match[bytes]) -> bytes:
+        keep, word = next(following)
+        return match[0] if keep else word
+
+    return re.sub(rb"\S+", respell, old)
+
+
+def _left_out(robot: Robot) -> list[str]:
+    """Say what of this robot a URDF cannot hold."""
+    said = []
+    for effect in robot.effects:
+        names = [name for name, plain in effect.nominal.items() if robot.values[name] != plain]
+        if names:
+            said.append(f"A URDF cannot hold the joint effect {effect.name}; left out: {', '.join(names)}.")
+    base = [name for name, p in robot.parameters.items() if p.group == "base" and p.value != 0.0]
+    if base or robot.base_quaternion != Transform().quaternion:
+        names = [*(["base_quaternion"] if robot.base_quaternion != Transform().quaternion else []), *base]
+        said.append(
+            "A URDF cannot hold where the base stands in the instrument's frame; "
+            f"left out: {', '.join(names)}."
+        )
+    if robot.targets:
+        names = [target.name for target in robot.targets]
+        said.append(f"A URDF cannot hold the targets on the flange; left out: {', '.join(names)}.")
+    return said
+
+
+# -- a new file ---------------------------------------------------------------------------------------------
+
+
+def _collapsed(robot: Robot) -> tuple[list[Array], list[Array]]:
+    """Return the constant transforms around the joint variables of `robot`, each ``(4, 4)``.
+
+    Returns
+    -------
+    origins
+        From one joint variable to the next, from the base on and to the flange at last. A joint's own value
+        (its zero) belongs to the one before it, because the joint turns about that very axis.
+    behind
+        From each joint variable to the end of its link, in whose frame its centre of gravity is given.
+    """
+    origins, behind = [], []
+    pending: list[Element] = []
+    for link in robot.link_elements:
+        moving = next(i for i, element in enumerate(link) if element.variable is not None)
+        own_zero = replace(link[moving], variable=None)
+        origins.append(product([*pending, *link[:moving], own_zero], robot.values))
+        pending = list(link[moving + 1 :])
+        behind.append(product(pending, robot.values))
+    return [*origins, product([*pending, *robot.flange_elements], robot.values)], behind
+
+
+def _joint_lines(joint: Joint | None, parent: str, child: str, origin: Array, limit: list[str]) -> list[str]:
+    """Return the lines of one joint; None is the fixed one at the end."""
+    if joint is None:
+        head = '  <joint name="tool0_joint" type="fixed">'
+    else:
+        type_ = joint.kind if limit else "continuous"
+        axis = (
+            joint.row.get(f"axis_{a}", default) for a, default in zip("xyz", (0.0, 0.0, 1.0), strict=True)
+        )
+        limit = [f'    <axis xyz="{_written(axis)}"/>', *limit]
+        head = f'  <joint name={quoteattr(joint.name)} type="{type_}">'
+    place = f'xyz="{_written(origin[:3, 3])}" rpy="{_written(roll_pitch_yaw(origin[:3, :3]))}"'
+    ends = [f'    <parent link="{parent}"/>', f'    <child link="{child}"/>']
+    return [head, f"    <origin {place}/>", *ends, *limit, "  </joint>"]
+
+
+def _limit(where: str, joint: Joint) -> list[str]:
+    if joint.limits is None:
+        if joint.kind == "prismatic":
+            raise InputError(
+                "a URDF must have the limits of a prismatic joint",
+                where=f"{where}, joint {joint.name}",
+                cure="Give the joint its limits in the robot file.",
+            )
+        return []
+    low, high = joint.limits
+    return [f'    <limit lower="{low!r}" upper="{high!r}" effort="0" velocity="0"/>']
+
+
+def _link_lines(robot: Robot, number: int, behind: Array) -> list[str]:
+    masses = [m for m in robot.masses if m.joint == number and m.mass > 0]
+    if not masses:
+        return [f'  <link name="link_{number}"/>']
+    weights = [m.mass for m in masses]
+    cog = behind[:3, :3] @ np.average([m.cog for m in masses], axis=0, weights=weights) + behind[:3, 3]
+    return [
+        f'  <link name="link_{number}">',
+        "    <inertial>",
+        f'      <origin xyz="{_written(cog)}"/>',
+        f'      <mass value="{sum(weights)!r}"/>',
+        '      <inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/>',
+        "    </inertial>",
+        "  </link>",
+    ]
+
+
+def _written(values: Iterable[float]) -> str:
+    """Return numbers as text; the roundings of right angles are written as the zeros they stand for."""
+    return " ".join(repr(0.0 if abs(v) < 1e-15 else float(v)) for v in values)

@@ -1,0 +1,398 @@
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+from truearm.errors import InputError
+from truearm.modeling.formats.robot_file import RobotFile, read_robot, robot_from_file, robot_text
+from truearm.modeling.robot import Robot
+from truearm.modeling.transform import Transform
+from truearm.robots import load_robot
+from truearm.units import to_si, written
+
+PLAIN = """\
+truearm: truearm-robot/1
+name: plain
+title: Plain arm
+source: made up for this test
+units: {length: mm, angle: deg}
+convention: modified-hayati
+joints:
+  - {name: axis_1, alpha: 0, a: 0, theta_offset: 0, d: 290, limits: [-165, 165]}
+  - {name: axis_2, alpha: -90, a: 10, theta_offset: -90, d: 0}
+  - {name: axis_3, alpha: 0, beta: 0, a: 270, theta_offset: 0, d: 0}
+flange: {translation: [0, 0, 5], quaternion: [1, 0, 0, 0]}
+masses:
+  - {link: 2, mass: 4.2, cog: [140, 0, 0]}
+tools:
+  ball: {targets: {"1": [0, 0, 125]}, mass: 2.7, cog: [50, 25, 100]}
+truths:
+  printed: {source: a table, values: {a_3: 270.2}, compliance: {2: 0.03e-3}}
+"""
+
+URDF_LIKE = """\
+truearm: truearm-robot/1
+name: sliding
+units: {length: m, angle: rad}
+convention: urdf
+joints:
+  - {axis: [0, 0, 1]}
+  - {type: prismatic, axis: [0.577350269, 0.577350269, 0.577350269], x: 0.1, roll: 0.2, limits: [-0.1, 0.1]}
+"""
+
+
+def read(tmp_path: Path, text: str) -> Robot:
+    path = tmp_path / "robot.yaml"
+    path.write_text(text, encoding="utf-8")
+    return read_robot(path)
+
+
+def refusal(tmp_path: Path, text: str) -> str:
+    with pytest.raises(InputError) as caught:
+        read(tmp_path, text)
+    message = str(caught.value)
+    assert "robot.yaml" in message
+    return message
+
+
+def changed(old: str, new: str) -> str:
+    assert PLAIN.count(old) == 1
+    return PLAIN.replace(old, new)
+
+
+# -- refusals --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        pytest.param(
+            changed("title:", "titel:"), ["titel", "not known here", "Did you mean title"], id="unknown key"
+        ),
+        pytest.param(
+            changed("axis_2, alpha:", "axis_2, alpa:"),
+            [
+                "joints[2]",
+                "modified-hayati",
+                "got 'alpa'",
+                "allowed: name, type, limits, alpha, beta",
+                "Did you mean alpha",
+            ],
+            id="unknown column",
+        ),
+        pytest.param(
+            changed("mass: 2.7", "weight: 2.7"),
+            ["tools.ball.weight", "not known here"],
+            id="unknown in a tool",
+        ),
+        pytest.param(
+            changed("a: 270", "a: long"),
+            ["joints[3].a", "a number belongs here", "got 'long'"],
+            id="text in a row",
+        ),
+        pytest.param(
+            changed("a: 270", "a: '270'"), ["joints[3].a", "a number belongs here", "got '270'"], id="quoted"
+        ),
+        pytest.param(
+            changed("a: 270", "a: true"),
+            ["joints[3].a", "a number belongs here", "got True"],
+            id="true in a row",
+        ),
+        pytest.param(
+            changed("mass: 4.2", "mass: '4.2'"),
+            ["masses[1].mass", "valid number", "got '4.2'"],
+            id="text mass",
+        ),
+        pytest.param(
+            changed("mass: 4.2", "mass: true"), ["masses[1].mass", "valid number", "got True"], id="true mass"
+        ),
+        pytest.param(
+            changed("mass: 4.2", "mass: -1"),
+            ["masses[1].mass", "greater than or equal to 0", "got -1"],
+            id="mass < 0",
+        ),
+        pytest.param(
+            changed("link: 2", "link: '2'"), ["masses[1].link", "valid integer", "got '2'"], id="text link"
+        ),
+        pytest.param(
+            changed("link: 2", "link: 4"),
+            ["masses", "no such link", "got 4", "allowed: 1 to 3"],
+            id="no such link",
+        ),
+        pytest.param(
+            changed("{2: 0.03e-3}", "{4: 0.03e-3}"),
+            ["truths.printed.compliance", "no such joint", "got 4", "allowed: 1 to 3"],
+            id="no such joint",
+        ),
+        pytest.param(changed("name: plain\n", ""), ["robot.yaml, name", "missing"], id="missing"),
+        pytest.param(changed("length: mm, ", ""), ["units.length", "missing"], id="missing unit"),
+        pytest.param(
+            changed("length: mm", "length: cm"),
+            ["units.length", "got 'cm'", "'mm', 'm', 'um' or 'in'"],
+            id="wrong unit",
+        ),
+        pytest.param(
+            changed("truearm-robot/1", "truearm-robot/2"),
+            ["robot.yaml, truearm", "'truearm-robot/1'", "got 'truearm-robot/2'"],
+            id="wrong schema",
+        ),
+        pytest.param(
+            changed("modified-hayati", "craig"),
+            ["convention", "got 'craig'", "'modified-dh'"],
+            id="unknown convention",
+        ),
+        pytest.param(
+            changed("a: 270", "a: .nan"),
+            ["joints[3].a", "a number belongs here", "got nan"],
+            id="nan in a row",
+        ),
+        pytest.param(
+            changed("mass: 4.2", "mass: .nan"), ["masses[1].mass", "finite", "got nan"], id="nan mass"
+        ),
+        pytest.param(
+            changed("[-165, 165]", "[-.inf, 165]"),
+            ["joints[1].limits[1]", "finite", "got -inf"],
+            id="infinite",
+        ),
+        pytest.param("  \n", ["the file is empty"], id="empty"),
+        pytest.param("# nothing\n", ["must hold named entries"], id="comment only"),
+        pytest.param("- a\n- b\n", ["must hold named entries", "got 'list'"], id="a list"),
+        pytest.param(PLAIN + "name: other\n", ["line 19", "duplicate key", "name"], id="duplicate key"),
+        pytest.param(PLAIN + "joints: [\n", ["line 20", "not valid YAML"], id="invalid YAML"),
+        pytest.param("a: b\n c: d: e\n", ["line 2", "not valid YAML", "mapping values"], id="bad nesting"),
+        pytest.param(
+            changed("[-165, 165]", "[165, -165]"),
+            ["joints[1].limits", "lower limit must be below", "got [165.0, -165.0]"],
+            id="limits reversed",
+        ),
+        pytest.param(
+            PLAIN + "effects: [gian]\n", ["no joint effect 'gian'", "allowed: gain"], id="unknown effect"
+        ),
+        pytest.param(
+            changed("{a_3: 270.2}", "{aa_3: 270.2}"),
+            ["truths.printed", "no such parameter", "got 'aa_3'", "Did you mean a_3"],
+            id="unknown parameter of a truth",
+        ),
+        pytest.param(
+            PLAIN + "parameters: {gain_1: {nominal: 1, value: 1, prior: 0.1, unit: '1'}}\n",
+            ["parameters", "no such parameter", "got 'gain_1'"],
+            id="parameter of an absent effect",
+        ),
+        pytest.param(
+            PLAIN + "parameters: {a_3: {nominal: 270, value: 270, prior: 1, unit: m}}\n",
+            ["parameters.a_3", "unit differs", "got 'm'", "allowed: mm"],
+            id="other unit",
+        ),
+        pytest.param(
+            PLAIN + "parameters: {a_3: {nominal: 270, value: 270, prior: 0, unit: mm}}\n",
+            ["parameters.a_3.prior", "greater than 0", "got 0"],
+            id="prior of zero",
+        ),
+        pytest.param(
+            changed("[1, 0, 0, 0]", "[1, 1, 0, 0]"),
+            ["flange.quaternion", "must have length 1", "1.41421"],
+            id="bad quaternion of the flange",
+        ),
+        pytest.param(
+            PLAIN + "base_quaternion: [0, 0, 0, 0]\n",
+            ["base_quaternion", "must have length 1"],
+            id="base quaternion zero",
+        ),
+        pytest.param(
+            PLAIN + "targets: [{name: tip, quaternion: [2, 0, 0, 0]}]\n",
+            ["targets[1].quaternion", "must have length 1", "has 2"],
+            id="bad quaternion of a target",
+        ),
+        pytest.param(
+            URDF_LIKE.replace("[0, 0, 1]", "[0, 0, 2]"),
+            ["joints[1].axis", "length 1", "got [0, 0, 2]"],
+            id="axis not of length 1",
+        ),
+    ],
+)
+def test_refused(tmp_path: Path, text: str, parts: list[str]) -> None:
+    message = refusal(tmp_path, text)
+    for part in parts:
+        assert part in message, message
+
+
+def test_folder_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError) as caught:
+        read_robot(tmp_path)
+    assert str(caught.value) == f"{tmp_path}: this is a folder, a file is needed."
+
+
+def test_missing_file_names_the_near_one(tmp_path: Path) -> None:
+    (tmp_path / "robot.yaml").write_text(PLAIN, encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        read_robot(tmp_path / "robto.yaml")
+    assert "robto.yaml: there is no such file" in str(caught.value)
+    assert "Did you mean robot.yaml?" in str(caught.value)
+
+
+def test_text_that_is_not_utf8_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "robot.yaml"
+    path.write_bytes(PLAIN.replace("Plain arm", "Größe").encode("latin-1"))
+    with pytest.raises(InputError, match="not UTF-8"):
+        read_robot(path)
+
+
+# -- reading ---------------------------------------------------------------------------------------------------
+
+
+def test_plain_file_is_read(tmp_path: Path) -> None:
+    robot = read(tmp_path, PLAIN)
+    assert [joint.name for joint in robot.joints] == ["axis_1", "axis_2", "axis_3"]
+    assert robot.joints[0].limits == (math.radians(-165), math.radians(165))
+    assert robot.joints[1].limits is None
+    assert robot.values["a_3"] == 0.27
+    assert robot.values["theta_offset_2"] == -math.pi / 2
+    assert "beta_3" in robot.parameters
+    assert "beta_2" not in robot.parameters
+    assert robot.truths["printed"].values == {"a_3": 0.2702}
+    assert robot.truths["printed"].compliance == {2: 0.03e-3}
+    assert robot.tools["ball"].targets == {"1": (0.0, 0.0, 0.125)}
+
+
+@pytest.mark.parametrize("number", ["1e-3", "1E-3", "1.0e-3", "0.001", "+1e-3"])
+def test_exponent_is_a_number(tmp_path: Path, number: str) -> None:
+    assert read(tmp_path, changed("a: 270", f"a: {number}")).values["a_3"] == 1e-6
+
+
+def test_units_of_the_file_count(tmp_path: Path) -> None:
+    in_metres = PLAIN.replace("{length: mm, angle: deg}", "{length: m, angle: rad}")
+    robot = read(tmp_path, in_metres)
+    assert robot.values["a_3"] == 270
+    assert robot.values["alpha_2"] == -90
+
+
+def test_axis_is_made_a_unit_vector(tmp_path: Path) -> None:
+    robot = read(tmp_path, URDF_LIKE)
+    _, rotation = robot.with_values({"d_offset_2": 0.05}).poses(np.array([[0.3, 0.0]]))
+    assert_allclose(rotation[0] @ rotation[0].T, np.eye(3), rtol=0, atol=1e-15)
+    moved, _ = robot.poses(np.array([[0.0, 0.0], [0.0, 0.1]]))
+    assert math.dist(*moved.tolist()) == pytest.approx(0.1, rel=1e-14)
+
+
+# -- writing ---------------------------------------------------------------------------------------------------
+
+
+def ulps(a: float, b: float) -> float:
+    return abs(a - b) / math.ulp(max(abs(a), abs(b)))
+
+
+@given(st.floats(-1e4, 1e4), st.sampled_from(["mm", "deg"]))
+def test_written_number_reads_back_to_2_ulp(value: float, unit: str) -> None:
+    once = to_si(written(value, unit), unit)
+    assert ulps(once, value) <= 2
+    assert written(once, unit) == written(value, unit)
+
+
+@given(st.floats(-1e4, 1e4))
+def test_number_of_a_file_is_written_as_it_stood(value: float) -> None:
+    for unit in ("mm", "deg"):
+        short = float(f"{value:.12g}")
+        assert written(to_si(short, unit), unit) == short
+
+
+@given(
+    lengths=st.lists(st.floats(-5, 5), min_size=3, max_size=3),
+    angles=st.lists(st.floats(-4, 4), min_size=2, max_size=2),
+)
+def test_values_of_a_robot_read_back_to_2_ulp(lengths: list[float], angles: list[float]) -> None:
+    names = ["a_3", "d_4", "base_x", "theta_offset_5", "alpha_6"]
+    robot = load_robot("irb120").with_values(dict(zip(names, lengths + angles, strict=True)))
+    again = parsed(robot_text(robot))
+    for name in names:
+        assert ulps(again.values[name], robot.values[name]) <= 2
+    assert robot_text(again) == robot_text(robot)
+
+
+def parsed(text: str) -> Robot:
+    from ruamel.yaml import YAML
+
+    return robot_from_file(RobotFile.model_validate(YAML(typ="safe", pure=True).load(text)), "text")
+
+
+def calibrated() -> Robot:
+    """A robot with everything that a calibration leaves in its file."""
+    rng = np.random.default_rng(0)
+    w, x, y, z = (float(v) for v in rng.normal(size=4) / 2)
+    size = math.hypot(w, x, y, z)
+    base = Transform((1.23456789, -0.5, 0.1), (w / size, x / size, y / size, z / size))
+    tool = Transform((0.01, 0.02, 0.123), (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0))
+    robot = (
+        load_robot("irb120").with_effects(["gain"]).with_frames(base, {"tip": tool, "1": (0.0, 0.05, 1 / 3)})
+    )
+    moved = [
+        replace(
+            p,
+            value=p.value + p.prior * float(rng.normal()),
+            deviation=p.prior * 0.01,
+            informed=float(rng.uniform()),
+        )
+        for p in robot.parameters.values()
+    ]
+    return replace(
+        robot.with_parameters(moved),
+        priors={"m": 5e-4, "rad": math.radians(0.05)},
+        history=(
+            "truearm calibrate: 38 poses, 0.146 mm",
+            "a second line: with a colon, and 'quotes' # and more",
+        ),
+    )
+
+
+def test_calibrated_robot_round_trips(tmp_path: Path) -> None:
+    robot = calibrated()
+    text = robot_text(robot)
+    again = read(tmp_path, text)
+    assert robot_text(again) == text
+    assert again.history == robot.history
+    assert again.effect_names == ("gain",)
+    assert again.base_quaternion == robot.base_quaternion
+    assert again.targets == robot.targets
+    assert set(again.known) == set(robot.known)
+    for name, parameter in robot.parameters.items():
+        other = again.parameters[name]
+        assert (other.unit, other.group, other.informed) == (
+            parameter.unit,
+            parameter.group,
+            parameter.informed,
+        )
+        assert other.deviation is not None
+        assert parameter.deviation is not None
+        assert ulps(other.deviation, parameter.deviation) <= 2
+        assert ulps(other.value, parameter.value) <= 2
+        assert ulps(other.nominal, parameter.nominal) <= 2
+        assert ulps(other.prior, parameter.prior) <= 2
+    q = robot.random_configurations(5, np.random.default_rng(1))
+    for target in (None, "tip", "1"):
+        for actual, expected in zip(again.poses(q, target), robot.poses(q, target), strict=True):
+            assert_allclose(actual, expected, rtol=0, atol=1e-14)
+
+
+def test_urdf_like_robot_round_trips(tmp_path: Path) -> None:
+    robot = read(tmp_path, URDF_LIKE)
+    text = robot_text(robot)
+    again = read(tmp_path, text)
+    assert robot_text(again) == text
+    assert again.joints[1].kind == "prismatic"
+    assert again.joints[1].limits == (-0.1, 0.1)
+    q = np.array([[0.3, 0.05]])
+    assert_allclose(again.poses(q)[0], robot.poses(q)[0], rtol=0, atol=1e-15)
+
+
+def test_two_targets_of_one_name_are_refused(tmp_path: Path) -> None:
+    robot = read(tmp_path, PLAIN.split("truths:")[0] + "targets: [{name: '1'}, {name: target_1}]\n")
+    with pytest.raises(InputError, match="same name") as caught:
+        _ = robot.parameters
+    assert "target_1_x" in str(caught.value)
+    assert "Rename the target" in str(caught.value)

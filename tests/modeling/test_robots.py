@@ -1,0 +1,184 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from truearm.modeling.chain import Array
+from truearm.modeling.conventions import parallel_joints_without_beta
+from truearm.modeling.formats.robot_file import read_robot, robot_text
+from truearm.modeling.robot import Robot
+from truearm.robots import library, load_robot
+
+IDS = ("irb120", "irb1600", "katana450", "kr5", "li3", "lrmate200ic", "puma560", "ur10", "ur5")
+
+
+def position(robot: Robot, degrees: list[float]) -> Array:
+    """Flange position [mm]."""
+    return robot.poses(np.radians([degrees]))[0][0] * 1e3
+
+
+def test_library_holds_these_robots() -> None:
+    assert library() == IDS
+
+
+@pytest.mark.parametrize("robot_id", IDS)
+def test_robot_round_trips(robot_id: str, tmp_path: Path) -> None:
+    robot = load_robot(robot_id)
+    path = tmp_path / "robot.yaml"
+    path.write_text(robot_text(robot), encoding="utf-8")
+    again = read_robot(path)
+    assert robot_text(again) == path.read_text(encoding="utf-8")
+    assert again == robot
+    q = robot.random_configurations(5, np.random.default_rng(0))
+    for actual, expected in zip(again.poses(q), robot.poses(q), strict=True):
+        assert_allclose(actual, expected, rtol=0, atol=0)
+
+
+@pytest.mark.parametrize("robot_id", IDS)
+def test_robot_says_what_it_is(robot_id: str) -> None:
+    robot = load_robot(robot_id)
+    assert robot.name == robot_id
+    assert len(robot.source) > 20
+    assert robot.title != robot.name
+    assert all(joint.limits is not None for joint in robot.joints)
+    assert all(truth.source for truth in robot.truths.values())
+
+
+@pytest.mark.parametrize("robot_id", IDS)
+def test_parallel_joints_have_beta(robot_id: str) -> None:
+    robot = load_robot(robot_id)
+    assert parallel_joints_without_beta(robot.convention, [joint.row for joint in robot.joints]) == []
+
+
+@pytest.mark.parametrize("robot_id", IDS)
+def test_truth_is_near_the_nominal_robot(robot_id: str) -> None:
+    # No published robot is off by more than 5 mm or 0.5 deg in one parameter; the IRB 120's d_1 is part of base_z.
+    robot = load_robot(robot_id)
+    for truth in robot.truths.values():
+        for name, value in truth.values.items():
+            nominal = robot.parameters[name]
+            if nominal.group == "base" or name == "d_1":
+                continue
+            assert abs(value - nominal.value) < {"m": 5e-3, "rad": np.radians(0.5)}[nominal.unit], name
+
+
+def test_invented_numbers_say_so() -> None:
+    assert "invented" in load_robot("li3").source.lower()
+    assert "invented" in load_robot("li3").title.lower()
+
+
+@pytest.mark.parametrize(
+    ("robot_id", "degrees", "millimetres"),
+    [
+        # ABB product specifications, robot in its zero pose.
+        ("irb120", [0, 0, 0, 0, 0, 0], [302 + 72, 0, 290 + 270 + 70]),
+        ("irb1600", [0, 0, 0, 0, 0, 0], [150 + 600 + 65, 0, 486.5 + 700]),
+        # Reach of the IRB 1600-6/1.45: wrist centre 1450 mm from axis 1, arm stretched out level.
+        ("irb1600", [0, 90, -90, 0, 0, 0], [1450 + 65, 0, 486.5]),
+        # FANUC dimension drawing: 330 + 300 + 75 high, 75 + 320 + 80 out.
+        ("lrmate200ic", [0, 0, 0, 0, 0, 0], [475, 0, 705]),
+        # KR5 paper, section 3, and KUKA's drawing for the arm stretched out.
+        ("kr5", [0, -90, 90, 0, 0, 0], [915, 0, 1120]),
+        ("kr5", [0, 0, 0, 0, 0, 0], [180 + 600 + 620 + 115, 0, 400 + 120]),
+        # KUKA turns axis 1 clockwise, seen from above.
+        ("kr5", [90, -90, 90, 0, 0, 0], [0, -915, 1120]),
+        # Published for the UR5 by its controller at (0, 0, 0, 0, 0, 0).
+        ("ur5", [0, 0, 0, 0, 0, 0], [-817.25, -191.45, -5.491]),
+        ("ur10", [0, 0, 0, 0, 0, 0], [-1184.3, -256.141, 11.6]),
+        # UR robots point straight up here ("home"): d1 - a2 - a3 + d5.
+        ("ur5", [0, -90, 0, -90, 0, 0], [0, -191.45, 89.159 + 425 + 392.25 + 94.65]),
+    ],
+)
+def test_known_position(robot_id: str, degrees: list[float], millimetres: list[float]) -> None:
+    assert_allclose(position(load_robot(robot_id), degrees), millimetres, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("degrees", "printed"),
+    [
+        ([0, 0, 0, 0, 0, 0], [[1, 0, 0, 0.4521], [0, 1, 0, -0.1500], [0, 0, 1, 0.4318]]),
+        ([0, 45, 180, 0, 45, 0], [[0, 0, 1, 0.5963], [0, 1, 0, -0.1501], [-1, 0, 0, -0.0144]]),
+    ],
+)
+def test_puma_agrees_with_corke(degrees: list[float], printed: list[list[float]]) -> None:
+    # P. Corke, Robotics, Vision and Control, section 7.2: the forward kinematics of qz and qn, to four digits.
+    place, rotation = load_robot("puma560").poses(np.radians([degrees]))
+    expected = np.array(printed)
+    assert_allclose(place[0], expected[:, 3], rtol=0, atol=6e-5)
+    assert_allclose(rotation[0], expected[:, :3], rtol=0, atol=1e-12)
+
+
+def test_katana_reaches_as_far_as_its_links() -> None:
+    # Links 2 and 3 level and joint 4 down by 90 deg put link 4 in line too; link 5 stands square on it.
+    robot = load_robot("katana450")
+    assert_allclose(position(robot, [0, 0, 0, -90, 0]), [190 + 139 + 147.3, -200, 0], rtol=0, atol=1e-9)
+    assert_allclose(position(robot, [0, 90, 0, -90, -90]), [200, 0, 190 + 139 + 147.3], rtol=0, atol=1e-9)
+
+
+def test_katana_tool_link_is_row_6_of_its_table() -> None:
+    # Rx(90) Tz(200) behind frame 5.
+    flange = load_robot("katana450").flange
+    assert_allclose(flange.rotation, [[1, 0, 0], [0, 0, -1], [0, 1, 0]], rtol=0, atol=1e-15)
+    assert_allclose(flange.translation, flange.rotation @ [0, 0, 0.2], rtol=0, atol=1e-15)
+
+
+def test_li3_reaches_about_450_mm() -> None:
+    assert_allclose(position(load_robot("li3"), [0, 0, 0]), [450, -50, 200], rtol=0, atol=1e-9)
+
+
+# KR5 paper, Table 3: ebeta, egamma [deg], ex, ey, ez [mm].
+KR5_ERRORS = (
+    (-0.0331, 0.0218, -0.3702, -0.7174, -0.0005),
+    (0.1813, 0.0068, -0.4168, 0.3069, 0.0014),
+    (-0.0069, 0.0034, 0.9521, 0.5143, 0.0001),
+    (-0.0295, 0.0031, 0.3414, -0.2313, 0.0002),
+    (-0.0198, 0.0361, 0.4848, 0.3526, 0.0004),
+    (-0.0129, 0.0772, -0.4767, -0.4767, 0.0007),
+)
+# Table 1: translation [mm], axis and angle [deg] of P_1 to P_7.
+KR5_LINKS = (
+    ((0, 0, 225), "x", 180),
+    ((180, 120, -175), "x", 90),
+    ((600, 0, -15), "z", -90),
+    ((120, 413.5, 135), "x", 90),
+    ((0, 0, -206.5), "x", -90),
+    ((0, 108.8, 0), "x", 90),
+    ((0, 0, -6.2), "y", 180),
+)
+
+
+def turn(axis: str, degrees: float) -> Array:
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    matrix = np.eye(4)
+    i, j = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}[axis]
+    matrix[i, i] = matrix[j, j] = c
+    matrix[i, j], matrix[j, i] = -s, s
+    return matrix
+
+
+def shift(x: float, y: float, z: float) -> Array:
+    matrix = np.eye(4)
+    matrix[:3, 3] = x, y, z
+    return matrix
+
+
+@pytest.mark.parametrize("with_errors", [False, True])
+def test_kr5_is_the_product_of_the_paper(with_errors: bool) -> None:
+    # Equation 3, A1 ... A7, and equation 7, A1 E1 ... A6 E6 A7, as matrices.
+    nominal = load_robot("kr5")
+    robot = nominal.with_values(nominal.truths["axis-tests"].values) if with_errors else nominal
+    for degrees in np.degrees(nominal.random_configurations(20, np.random.default_rng(0))):
+        expected = np.eye(4)
+        for i, (translation, axis, angle) in enumerate(KR5_LINKS):
+            if i > 0:
+                expected = expected @ turn("z", degrees[i - 1])
+            expected = expected @ shift(*translation) @ turn(axis, angle)
+            if with_errors and i < len(KR5_ERRORS):
+                ebeta, egamma, ex, ey, ez = KR5_ERRORS[i]
+                expected = expected @ shift(ex, ey, ez) @ turn("x", egamma) @ turn("y", ebeta)
+        place, rotation = robot.poses(np.radians([degrees]))
+        assert_allclose(place[0] * 1e3, expected[:3, 3], rtol=0, atol=1e-9)
+        assert_allclose(rotation[0], expected[:3, :3], rtol=0, atol=1e-12)

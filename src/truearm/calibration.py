@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.errors import InputError, nearest_names
-from truearm.files import read_bytes, write_files, writable_folder
+from truearm.files import read_bytes, writable_folder, write_files
 from truearm.identification.bounds import Bounds, read_bounds
 from truearm.identification.fit import Fit, Redundant, Status, check_targets, identify, place
 from truearm.identification.losses import LOSSES, Loss
-from truearm.identification.models import MODELS, Model
+from truearm.identification.models import MODELS
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.readers.canonical import read_csv
 from truearm.measurement.statistics import Errors, Spread, errors_of
@@ -246,9 +246,7 @@ def calibrate(
     progress("placing the nominal robot")
     nominal = place(robot, first)
     progress(f"identifying the {chosen.name} model on {count} configurations")
-    fit = identify(
-        robot, first, chosen, loss=loss, redundancy=redundancy, bounds=bounds, bounds_file=bounds_file
-    )
+    fit = identify(robot, first, chosen, loss=loss, redundancy=redundancy, bounds=bounds, bounds_file=bounds_file)
     progress("judging it")
     judged = first if second is None else second
     validation = None if second is None else errors_of(fit.robot, second)

@@ -131,7 +131,9 @@ def write_files(folder: Path, files: Mapping[str, str]) -> None:
         for temporary_path, target in staged:
             temporary_path.replace(target)
     except OSError as error:
-        raise InputError(f"the file cannot be written ({error.strerror})", where=str(error.filename or folder)) from error
+        raise InputError(
+            f"the file cannot be written ({error.strerror})", where=str(error.filename or folder)
+        ) from error
     finally:
         for temporary_path, _ in staged:
             temporary_path.unlink(missing_ok=True)

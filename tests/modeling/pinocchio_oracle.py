@@ -26,9 +26,7 @@ def _placement(pin: Any, element: Element, amount: float) -> Any:
 
 def _joint(pin: Any, element: Element) -> Any:
     if element.axis is not None:
-        unaligned = (
-            pin.JointModelRevoluteUnaligned if element.motion == "R" else pin.JointModelPrismaticUnaligned
-        )
+        unaligned = pin.JointModelRevoluteUnaligned if element.motion == "R" else pin.JointModelPrismaticUnaligned
         return unaligned(_axis(element))
     kinds = {
         "Rx": pin.JointModelRX,
@@ -50,9 +48,7 @@ class PinocchioChain:
         parent, placement = 0, pin.SE3.Identity()
         variables: list[int] = []
         for element in chain.elements:
-            amount = (
-                element.value if element.parameter is None else values.get(element.parameter, element.value)
-            )
+            amount = element.value if element.parameter is None else values.get(element.parameter, element.value)
             placement = placement * _placement(pin, element, amount)
             if element.variable is not None:
                 parent = model.addJoint(parent, _joint(pin, element), placement, f"joint_{len(variables)}")
@@ -62,16 +58,14 @@ class PinocchioChain:
         self._pin, self._model, self._variables = pin, model, variables
 
     def tip(self, variables: Array) -> tuple[Array, Array, Array]:
-        """Return position (3,), rotation (3, 3) and Jacobian (6, joints), linear rows first, of the tip in the world.
+        """Return position (3,), rotation (3, 3) and Jacobian (6, joints), linear rows first, in the world.
 
         A column of the Jacobian belongs to an element with a variable, in the order of the chain.
         """
         pin, model = self._pin, self._model
         data = model.createData()
         q = np.array([variables[i] for i in self._variables], float)
-        jacobian = np.array(
-            pin.computeFrameJacobian(model, data, q, self._tip, pin.LOCAL_WORLD_ALIGNED)
-        ).reshape(6, -1)
+        jacobian = np.array(pin.computeFrameJacobian(model, data, q, self._tip, pin.LOCAL_WORLD_ALIGNED)).reshape(6, -1)
         pin.framesForwardKinematics(model, data, q)
         place = data.oMf[self._tip]
         return np.array(place.translation), np.array(place.rotation), jacobian

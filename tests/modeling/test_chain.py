@@ -71,7 +71,7 @@ def compare_with_pinocchio(
         assert_allclose(jacobian[i], expected_jacobian, rtol=0, atol=1e-12)
 
 
-# -- against Pinocchio -----------------------------------------------------------------------------------------
+# -- against Pinocchio -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("seed", range(30))
@@ -100,12 +100,10 @@ def test_library_robot_agrees_with_pinocchio(robot_id: str, seed: int) -> None:
         behind = robot.target("tip").chain.elements if target else ()
         chain = Chain((*robot.trunk.elements, *behind))
         position, rotation = robot.poses(q, target)
-        compare_with_pinocchio(
-            chain, dict(robot.values), q.T, position, rotation, robot.joint_jacobian(q, target)
-        )
+        compare_with_pinocchio(chain, dict(robot.values), q.T, position, rotation, robot.joint_jacobian(q, target))
 
 
-# -- derivatives -----------------------------------------------------------------------------------------------
+# -- derivatives -----------------------------------------------------------------------------------------
 
 
 def random_robot(convention: Convention, effects: tuple[str, ...], rng: np.random.Generator) -> Robot:
@@ -151,9 +149,7 @@ def check_derivatives(robot: Robot, rng: np.random.Generator) -> None:
             ahead = robot.sweep(q, target, {**robot.values, name: robot.values[name] + h})
             behind = robot.sweep(q, target, {**robot.values, name: robot.values[name] - h})
             turn = (ahead.matrix() - behind.matrix()) @ np.swapaxes(sweep.matrix(), 1, 2)
-            assert_allclose(
-                linear[i], (ahead.position - behind.position) / (2 * h), rtol=0, atol=1e-9, err_msg=name
-            )
+            assert_allclose(linear[i], (ahead.position - behind.position) / (2 * h), rtol=0, atol=1e-9, err_msg=name)
             assert_allclose(angular[i], vee(turn) / (2 * h), rtol=0, atol=1e-9, err_msg=name)
 
 
@@ -191,12 +187,10 @@ def test_derivative_by_the_parameters_of_another_target_is_zero() -> None:
     assert not angular.any()
 
 
-# -- trial axis ------------------------------------------------------------------------------------------------
+# -- trial axis ------------------------------------------------------------------------------------------
 
 
-def trial_values(
-    robot: Robot, names: list[str], trials: int, rng: np.random.Generator
-) -> dict[str, float | Array]:
+def trial_values(robot: Robot, names: list[str], trials: int, rng: np.random.Generator) -> dict[str, float | Array]:
     return {
         name: value + 0.01 * rng.normal(size=(trials, 1)) if name in names else value
         for name, value in robot.values.items()
@@ -238,7 +232,7 @@ def test_trials_of_one_parameter_equal_trials_alone(name: str) -> None:
     check_trials(random_robot(CONVENTIONS[0], tuple(effect.name for effect in EFFECTS), rng), [name], rng)
 
 
-# -- the chain itself ------------------------------------------------------------------------------------------
+# -- the chain itself ------------------------------------------------------------------------------------
 
 
 def test_parameter_given_twice_is_refused() -> None:

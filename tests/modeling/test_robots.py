@@ -17,7 +17,8 @@ IDS = ("irb120", "irb1600", "katana450", "kr5", "li3", "lrmate200ic", "puma560",
 
 def position(robot: Robot, degrees: list[float]) -> Array:
     """Flange position [mm]."""
-    return robot.poses(np.radians([degrees]))[0][0] * 1e3
+    positions, _ = robot.poses(np.radians([degrees]))
+    return np.array(positions[0] * 1e3)
 
 
 def test_library_holds_these_robots() -> None:
@@ -55,7 +56,7 @@ def test_parallel_joints_have_beta(robot_id: str) -> None:
 
 @pytest.mark.parametrize("robot_id", IDS)
 def test_truth_is_near_the_nominal_robot(robot_id: str) -> None:
-    # No published robot is off by more than 5 mm or 0.5 deg in one parameter; the IRB 120's d_1 is part of base_z.
+    # Nothing published is off by more than 5 mm or 0.5 deg; the IRB 120's d_1 stands in base_z.
     robot = load_robot(robot_id)
     for truth in robot.truths.values():
         for name, value in truth.values.items():
@@ -104,7 +105,7 @@ def test_known_position(robot_id: str, degrees: list[float], millimetres: list[f
     ],
 )
 def test_puma_agrees_with_corke(degrees: list[float], printed: list[list[float]]) -> None:
-    # P. Corke, Robotics, Vision and Control, section 7.2: the forward kinematics of qz and qn, to four digits.
+    # P. Corke, Robotics, Vision and Control, section 7.2: forward kinematics of qz and qn, to four digits.
     place, rotation = load_robot("puma560").poses(np.radians([degrees]))
     expected = np.array(printed)
     assert_allclose(place[0], expected[:, 3], rtol=0, atol=6e-5)
@@ -112,10 +113,11 @@ def test_puma_agrees_with_corke(degrees: list[float], printed: list[list[float]]
 
 
 def test_katana_reaches_as_far_as_its_links() -> None:
-    # Links 2 and 3 level and joint 4 down by 90 deg put link 4 in line too; link 5 stands square on it.
+    # Joint 4 at -90 deg puts links 2 to 4 in one line; the tool link stands square on it. The second pose is
+    # the first one standing up, with the tool turned to the front.
     robot = load_robot("katana450")
     assert_allclose(position(robot, [0, 0, 0, -90, 0]), [190 + 139 + 147.3, -200, 0], rtol=0, atol=1e-9)
-    assert_allclose(position(robot, [0, 90, 0, -90, -90]), [200, 0, 190 + 139 + 147.3], rtol=0, atol=1e-9)
+    assert_allclose(position(robot, [0, 90, 0, -90, 90]), [200, 0, 190 + 139 + 147.3], rtol=0, atol=1e-9)
 
 
 def test_katana_tool_link_is_row_6_of_its_table() -> None:

@@ -25,7 +25,7 @@ def simulate(
     import numpy as np
 
     from truearm.cli.output import progress
-    from truearm.files import write_text, writable_folder
+    from truearm.files import writable_folder, write_text
     from truearm.measurement.readers.canonical import csv_text
     from truearm.measurement.truths import truth_twin
     from truearm.measurement.twin import measure

@@ -68,7 +68,7 @@ def bound_vectors(bounds: Bounds, free: FreeParameters, where: str) -> tuple[Arr
         for i in _places(name, free, f"{where}, between"):
             unit = shown[free.parameters[i].unit]
             low[i], high[i] = max(low[i], to_si(lowest, unit)), min(high[i], to_si(highest, unit))
-    for i in np.flatnonzero(low > high):
+    for i in np.flatnonzero(low > high).tolist():
         raise InputError(
             "the bounds leave no value", where=f"{where}, {free.names[i]}", cure="The lower one must not be higher."
         )

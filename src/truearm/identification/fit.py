@@ -105,7 +105,7 @@ class Fit:
         """Correlation matrix of the free parameters."""
         deviation = np.sqrt(np.diag(self.covariance))
         safe = np.where(deviation > 0, deviation, 1.0)
-        return self.covariance / np.outer(safe, safe)
+        return np.asarray(self.covariance / np.outer(safe, safe))
 
 
 def identify(
@@ -152,26 +152,20 @@ def identify(
         dropped = find_redundancies(problem, free.start)
     steps = 0
     for _ in range(6):
-        names = [r.dropped for r in dropped]
-        kept = problem.free.without(names)
+        held = [r.dropped for r in dropped]
+        kept = problem.free.without(held)
         limits = None if check_bounds is None else _limits_of(check_bounds, free, kept)
-        reduced = replace(problem, free=kept)
-        solution, reduced = _solve_with_noise(reduced, loss, limits)
+        solution, reduced = _solve_with_noise(replace(problem, free=kept), loss, limits)
         steps += solution.steps
         if redundancy == "prior":
             break
         # What is redundant at the nominal robot need not be at the real one: look again there.
-        whole = np.array([dict(zip(kept.names, solution.vector, strict=True)).get(n, p.nominal) for n, p in
-                          zip(free.names, free.parameters, strict=True)])
-        again = find_redundancies(problem, whole)
-        settled = {r.dropped for r in again} == set(names)
-        dropped = again
-        if settled:
+        found = dict(zip(kept.names, solution.vector, strict=True))
+        there = FreeParameters(tuple(replace(p, value=float(found.get(p.name, p.nominal))) for p in free.parameters))
+        problem = replace(problem, free=there)
+        dropped = find_redundancies(problem, there.start, held)
+        if [r.dropped for r in dropped] == held:
             break
-        free_now = tuple(
-            replace(p, value=float(v)) for p, v in zip(free.parameters, whole, strict=True)
-        )
-        problem = replace(problem, free=FreeParameters(free_now))
     return _fit(reduced, solution, start, model, loss, dropped, limits, steps)
 
 
@@ -185,9 +179,7 @@ def _limits_of(limits: tuple[Array, Array], free: FreeParameters, kept: FreePara
     return limits[0][places], limits[1][places]
 
 
-def _solve_with_noise(
-    problem: Problem, loss: Loss, limits: tuple[Array, Array] | None
-) -> tuple[Solution, Problem]:
+def _solve_with_noise(problem: Problem, loss: Loss, limits: tuple[Array, Array] | None) -> tuple[Solution, Problem]:
     """Solve; where the file declares no deviations, let the residuals say them and solve again."""
     solution = solve(problem, loss, limits)
     undeclared = {b.observation.name for b in problem.blocks if b.observation.declared_sigma(problem.data) is None}
@@ -260,17 +252,20 @@ def _fit(
     at_bound: tuple[str, ...] = ()
     if limits is not None:
         near = 1e-9 * free.prior
-        at_bound = tuple(n for n, v, lo, hi, e in zip(free.names, x, *limits, near, strict=True)
-                         if v <= lo + e or v >= hi - e)
+        at_bound = tuple(
+            n for n, v, lo, hi, e in zip(free.names, x, *limits, near, strict=True) if v <= lo + e or v >= hi - e
+        )
     identified = [
         replace(start.parameters[n], value=float(v), deviation=float(d), informed=float(i))
         for n, v, d, i in zip(free.names, x, deviation, informed, strict=True)
     ]
     robot = start.with_parameters(identified)
     frames = FRAMES.free(robot)
-    looked_at = FreeParameters(
-        tuple(robot.parameters[n] for n in {*frames.names, *(r.dropped for r in dropped), *free.names})
-    ) if dropped else frames
+    looked_at = (
+        FreeParameters(tuple(robot.parameters[n] for n in {*frames.names, *(r.dropped for r in dropped), *free.names}))
+        if dropped
+        else frames
+    )
     unseen = unseen_but_felt(robot, problem.data, looked_at)
     weight = np.full(len(problem.data.target), np.nan)
     first = 0

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from truearm.errors import InputError
-from truearm.measurement.dataset import Dataset
+from truearm.measurement.dataset import Dataset, IntArray
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform, rotation_from_quaternion
@@ -50,16 +50,16 @@ def initial_frames(robot: Robot, data: Dataset) -> Robot:
     y = data.position[readings] - centre
 
     # R' y - p_c = R_c t + u: left side linear in the nine entries of R, right side in the targets and u.
-    known = np.zeros((len(readings), 3, 3 * len(seen) + 3))
+    blocks = np.zeros((len(readings), 3, 3 * len(seen) + 3))
     for column, t in enumerate(seen):
         mine = what == t
-        known[mine, :, 3 * column : 3 * column + 3] = R[where[mine]]
-    known[:, :, -3:] = np.eye(3)
-    known = known.reshape(-1, known.shape[2])
-    turned = np.zeros((len(readings), 3, 9))
+        blocks[mine, :, 3 * column : 3 * column + 3] = R[where[mine]]
+    blocks[:, :, -3:] = np.eye(3)
+    known = blocks.reshape(-1, blocks.shape[2])
+    entries = np.zeros((len(readings), 3, 9))
     for i in range(3):
-        turned[:, i, i::3] = y  # (R' y)_i = sum_j R_ji y_j with vec(R) row by row
-    turned = turned.reshape(-1, 9)
+        entries[:, i, i::3] = y  # (R' y)_i = sum_j R_ji y_j with vec(R) row by row
+    turned = entries.reshape(-1, 9)
     left = p[where].reshape(-1)
     basis = _column_space(known)
     M = turned - basis @ (basis.T @ turned)
@@ -75,7 +75,7 @@ def initial_frames(robot: Robot, data: Dataset) -> Robot:
         m = np.concatenate([m, _ARM * after.reshape(-1)])
 
     base = _nearest_rotation(M.T @ M, M.T @ m)
-    solution = np.linalg.lstsq(known, turned @ base.reshape(-1) - left, rcond=1e-10)[0]
+    solution = np.asarray(np.linalg.lstsq(known, turned @ base.reshape(-1) - left, rcond=1e-10)[0], dtype=np.float64)
     places: dict[str, Transform | Array] = {}
     for column, t in enumerate(seen):
         point = solution[3 * column : 3 * column + 3]
@@ -95,7 +95,7 @@ def _column_space(A: Array) -> Array:
     return U[:, s > 1e-10 * s[0]]
 
 
-def _orientations(data: Dataset, target: int) -> tuple[Array, Array]:
+def _orientations(data: Dataset, target: int) -> tuple[IntArray, Array]:
     """Return configuration indices and rotations of the orientation readings of a target."""
     mine = np.flatnonzero(data.has_orientation & (data.target == target))
     if data.quaternion is None or len(mine) == 0:
@@ -135,7 +135,7 @@ def _nearest_rotation(G: Array, g: Array) -> Array:
         best = np.where(better[:, None, None], moved, best)
         if not better.any() or size[better].max() < 1e-12:
             break
-    return best[np.argmin(_cost(G, g, best))]
+    return np.asarray(best[np.argmin(_cost(G, g, best))])
 
 
 _GENERATORS = np.array(
@@ -149,7 +149,7 @@ _GENERATORS = np.array(
 
 def _cost(G: Array, g: Array, R: Array) -> Array:
     r = R.reshape(-1, 9)
-    return np.einsum("ni,ij,nj->n", r, G, r) - 2 * r @ g
+    return np.asarray(np.einsum("ni,ij,nj->n", r, G, r) - 2 * r @ g)
 
 
 def _rotations(w: Array) -> Array:
@@ -167,6 +167,4 @@ def _even_quaternions(count: int) -> Array:
     d = 2 * np.pi * s
     alpha, beta = d / phi, d / psi
     inner, outer = np.sqrt(t), np.sqrt(1 - t)
-    return np.stack(
-        [inner * np.sin(alpha), inner * np.cos(alpha), outer * np.sin(beta), outer * np.cos(beta)], axis=1
-    )
+    return np.stack([inner * np.sin(alpha), inner * np.cos(alpha), outer * np.sin(beta), outer * np.cos(beta)], axis=1)

@@ -1,12 +1,16 @@
 """Which parameters cannot be told apart, and in which combination (Nubiola, section 2.5.1; Patel, section 2.3).
 
-Columns are looked at in a fixed order (base, targets, joint zeros, geometry from base to tip): a column that the
-earlier ones already span is redundant, and its coordinates in them are the combination. Columns are scaled by the
-parameters' priors, that is to physical size, never by their own norm: a column of rounding noise must stay noise.
+Columns are looked at in a fixed order (base, targets, joint zeros, geometry from base to tip), first for those
+that stand well apart from the earlier ones, then for those that stand less and less apart; what the others span
+exactly is redundant, and its coordinates in them are the combination. Taking the first that fits in one pass would
+keep, between two axes that are nearly parallel, the slide that is almost spanned and hold the tilt that is not:
+the classical weakness of DH parameters again. Columns are scaled by the parameters' priors, that is to physical
+size, never by their own norm alone: a column of rounding noise must stay noise.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -19,8 +23,8 @@ from truearm.modeling.parameters import FreeParameters, Parameter
 from truearm.modeling.robot import Robot
 
 _ORDER: Final = ("base", "target", "gain", "joint zero", "geometry")
-_SPANNED: Final = 1e-7  # share of a column outside the span of the earlier ones
-_MEMBER: Final = 1e-9  # share of a prior below which a parameter takes no part in a combination
+_APART: Final = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)  # share of a column outside the span of the others
+_MEMBER: Final = 1e-9  # priors per prior below which a parameter takes no part in a combination
 _SHOWN: Final = 0.02
 
 
@@ -43,36 +47,68 @@ class Redundancy:
     combination: str
 
 
-def find_redundancies(problem: Problem, vector: Array) -> tuple[Redundancy, ...]:
-    """Return the redundant parameters of a problem at `vector`, with their combinations."""
-    _, J = problem.linearised(vector)
-    prior = problem.free.prior
-    A = J * prior
-    order = sorted(range(len(prior)), key=lambda i: _ORDER.index(problem.free.parameters[i].group))
+def find_redundancies(problem: Problem, vector: Array, held: Sequence[str] = ()) -> tuple[Redundancy, ...]:
+    """Return the redundant parameters of a problem at `vector`, with their combinations.
+
+    Parameters
+    ----------
+    held
+        Parameters that are redundant elsewhere. If as many are redundant here, these stay the ones that are held.
+    """
+    A = problem.linearised(vector)[1] * problem.free.prior
+    names = problem.free.names
+    kept = _independent(A, range(len(names)), problem.free)
+    dropped = [i for i in _in_order(problem.free) if i not in kept]
+    if held:
+        rest = [i for i, name in enumerate(names) if name not in held]
+        if len(kept) == len(rest) == len(_independent(A, rest, problem.free)):
+            kept, dropped = rest, [names.index(name) for name in held]
+    if not dropped:
+        return ()
+    # The direction bends: a parameter may take part only away from `vector`, so one prior along it is looked at too.
+    here = _combinations(A, dropped, kept)
+    along = vector + problem.free.prior * here.sum(axis=0)
+    away = _combinations(problem.linearised(along)[1] * problem.free.prior, dropped, kept)
+    return tuple(_redundancy(problem.free, i, at, there) for i, at, there in zip(dropped, here, away, strict=True))
+
+
+def _in_order(free: FreeParameters) -> list[int]:
+    return sorted(range(len(free.parameters)), key=lambda i: _ORDER.index(free.parameters[i].group))
+
+
+def _independent(A: Array, among: Iterable[int], free: FreeParameters) -> list[int]:
+    """Return columns of A that span all of those `among`, the ones that stand well apart first."""
     norms = np.linalg.norm(A, axis=0)
-    nothing = 1e-12 * norms.max()
+    left = [i for i in _in_order(free) if i in set(among) and norms[i] > 1e-12 * norms.max()]
+    rests = {i: A[:, i].copy() for i in left}
     kept: list[int] = []
-    basis = np.empty((len(A), 0))
-    found = []
-    for i in order:
-        column = A[:, i]
-        rest = column - basis @ (basis.T @ column)
-        rest -= basis @ (basis.T @ rest)
-        left = float(np.linalg.norm(rest))
-        if left > max(_SPANNED * norms[i], nothing):
-            basis = np.column_stack([basis, rest / left])
+    for apart in _APART:
+        for i in list(left):
+            size = float(np.linalg.norm(rests[i]))
+            if size <= apart * norms[i]:
+                continue
+            direction = rests[i] / size
             kept.append(i)
-            continue
-        weights = np.linalg.lstsq(A[:, kept], column, rcond=None)[0] if norms[i] > nothing else np.zeros(len(kept))
-        # Moving i by one prior and the kept ones by -weights priors changes nothing; stated in SI per SI.
-        members = {problem.free.names[i]: 1.0}
-        members |= {
-            problem.free.names[k]: float(-w * prior[k] / prior[i])
-            for k, w in zip(kept, weights, strict=True)
-            if abs(w) * min(1.0, prior[k] / prior[i]) > _MEMBER
-        }
-        found.append(Redundancy(problem.free.names[i], members, _in_words(members, problem.free)))
-    return tuple(found)
+            left.remove(i)
+            for k in left:  # twice, against rounding
+                rests[k] -= direction * (direction @ rests[k])
+                rests[k] -= direction * (direction @ rests[k])
+    return kept
+
+
+def _combinations(A: Array, dropped: Sequence[int], kept: Sequence[int]) -> Array:
+    """Return the directions, in priors, that move each dropped parameter by one and change no reading."""
+    directions = np.zeros((len(dropped), A.shape[1]))
+    directions[np.arange(len(dropped)), list(dropped)] = 1.0
+    directions[:, list(kept)] = -np.linalg.lstsq(A[:, list(kept)], A[:, list(dropped)], rcond=None)[0].T
+    return directions
+
+
+def _redundancy(free: FreeParameters, dropped: int, here: Array, away: Array) -> Redundancy:
+    involved = [dropped]
+    involved += [i for i in range(len(here)) if i != dropped and max(abs(here[i]), abs(away[i])) > _MEMBER]
+    members = {free.names[i]: float(here[i] * free.prior[i] / free.prior[dropped]) for i in involved}
+    return Redundancy(free.names[dropped], members, _in_words(members, free))
 
 
 def _in_words(members: dict[str, float], free: FreeParameters) -> str:

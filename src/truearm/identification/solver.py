@@ -113,7 +113,7 @@ def _next_scale(loss: Loss, norms: Array, scale: float | None, step: int) -> flo
 
 
 def _norms(r: Array) -> Array:
-    return np.linalg.norm(r.reshape(-1, 3), axis=1)
+    return np.asarray(np.linalg.norm(r.reshape(-1, 3), axis=1))
 
 
 def _cost(problem: Problem, x: Array, r: Array, w: Array) -> float:
@@ -128,7 +128,7 @@ def _triangle(problem: Problem, x: Array, r: Array, J: Array, w: Array) -> tuple
     if problem.priors:
         prior, weight = problem.prior_rows(x)
         stacked = np.concatenate([stacked, np.column_stack([np.diag(weight), prior])])
-    triangle = np.linalg.qr(stacked, mode="r")
+    triangle = np.asarray(np.linalg.qr(stacked, mode="r"), dtype=np.float64)
     return triangle[:, :-1], triangle[:, -1]
 
 

@@ -65,14 +65,14 @@ class Dataset:
     @property
     def has_position(self) -> NDArray[np.bool_]:
         """Which readings hold a position."""
-        return np.isfinite(self.position).all(axis=1)
+        return np.asarray(np.isfinite(self.position).all(axis=1))
 
     @property
     def has_orientation(self) -> NDArray[np.bool_]:
         """Which readings hold an orientation."""
         if self.quaternion is None:
             return np.zeros(len(self.target), dtype=bool)
-        return np.isfinite(self.quaternion).all(axis=1)
+        return np.asarray(np.isfinite(self.quaternion).all(axis=1))
 
     def of_configurations(self, indices: Sequence[int] | IntArray) -> Dataset:
         """Return the readings at some configurations, with these in the given order."""

@@ -110,7 +110,8 @@ class Orientation(Observation):
         safe = np.where(small, 1.0, angle)
         second = np.where(small, 1 / 12, 1 / safe**2 - (1 + np.cos(safe)) / (2 * safe * np.sin(safe)))
         inverse = np.eye(3) - 0.5 * cross + second * (cross @ cross)
-        return inverse @ np.moveaxis(angular, (0, 1, 2), (2, 1, 0))
+        moved: Array = inverse @ np.moveaxis(angular, (0, 1, 2), (2, 1, 0))
+        return moved
 
 
 OBSERVATIONS: Final = (Position(), Orientation())

@@ -74,7 +74,7 @@ class Errors:
 
 
 def _norms(errors: Array) -> Array:
-    return np.linalg.norm(errors[np.isfinite(errors).all(axis=1)], axis=1)
+    return np.asarray(np.linalg.norm(errors[np.isfinite(errors).all(axis=1)], axis=1))
 
 
 def errors_of(robot: Robot, data: Dataset) -> Errors:

@@ -1,0 +1,1 @@
+"""The robot model: chain, conventions, parameters, effects, formats."""

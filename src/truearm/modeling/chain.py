@@ -162,7 +162,7 @@ class Chain:
         """
         given = values or {}
         columns, position = list(start.rotation), start.position
-        if position.ndim == 2 and any(np.ndim(value) == 2 for value in given.values()):
+        if position.ndim == 2 and any(isinstance(value, np.ndarray) for value in given.values()):
             columns, position = [column[:, None, :] for column in columns], position[:, None, :]
         axes, origins = list(start.axes), list(start.origins)
         for element in self.elements:
@@ -176,7 +176,8 @@ class Chain:
                 axis = columns[k]
             else:
                 k = -1
-                axis = sum(a * column for a, column in zip(element.axis, columns, strict=True))
+                x, y, z = element.axis
+                axis = x * columns[0] + y * columns[1] + z * columns[2]
             axes.append(axis)
             origins.append(position)
             if not element.turns:

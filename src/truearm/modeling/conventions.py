@@ -142,9 +142,7 @@ CONVENTIONS: Final = (
         "translations",
         (("x", "Tx"), ("y", "Ty"), ("z", "Tz"), ("rx", "Rx"), ("ry", "Ry"), (JOINT, "Rz")),
     ),
-    OriginConvention(
-        "urdf", (("x", "Tx"), ("y", "Ty"), ("z", "Tz"), ("yaw", "Rz"), ("pitch", "Ry"), ("roll", "Rx"))
-    ),
+    OriginConvention("urdf", (("x", "Tx"), ("y", "Ty"), ("z", "Tz"), ("yaw", "Rz"), ("pitch", "Ry"), ("roll", "Rx"))),
 )
 
 

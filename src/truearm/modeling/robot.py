@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Final
 
 import numpy as np
 
 from truearm.errors import InputError, nearest_names
-from truearm.modeling.chain import Array, Chain, Element, Sweep
+from truearm.modeling.chain import Array, Chain, Element, Motion, Sweep
 from truearm.modeling.conventions import Convention, JointKind, convention
 from truearm.modeling.effects import EFFECTS, Effect
 from truearm.modeling.parameters import Group, Parameter, Unit, parameter
-from truearm.modeling.transform import Transform, fixed_rotation
+from truearm.modeling.transform import IDENTITY, Transform, fixed_rotation
 
 Values = Mapping[str, float | Array]
 
@@ -128,8 +129,8 @@ class Tool:
     cog: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
-_SLIDES = (("x", "Tx"), ("y", "Ty"), ("z", "Tz"))
-_TURNS = (("rx", "Rx"), ("ry", "Ry"), ("rz", "Rz"))
+_SLIDES: Final[tuple[tuple[str, Motion], ...]] = (("x", "Tx"), ("y", "Ty"), ("z", "Tz"))
+_TURNS: Final[tuple[tuple[str, Motion], ...]] = (("rx", "Rx"), ("ry", "Ry"), ("rz", "Rz"))
 
 
 @dataclass(frozen=True)
@@ -174,7 +175,7 @@ class Robot:
     source: str
     convention_name: str
     joints: tuple[Joint, ...]
-    flange: Transform = Transform()
+    flange: Transform = IDENTITY
     masses: tuple[LinkMass, ...] = ()
     base_quaternion: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
     targets: tuple[Target, ...] = ()
@@ -413,7 +414,7 @@ class Robot:
         return [places[i] for i in range(len(self.joints))]
 
     def random_configurations(self, count: int, rng: np.random.Generator) -> Array:
-        """Return joint readings ``(count, joints)`` drawn evenly within the limits; half a turn or 1 m where unknown."""
+        """Return joint readings ``(count, joints)`` drawn evenly within the limits (or a turn, or 1 m)."""
         default = {"revolute": (-np.pi, np.pi), "prismatic": (-0.5, 0.5)}
         low, high = np.array([j.limits or default[j.kind] for j in self.joints]).T
         return rng.uniform(low, high, (count, len(self.joints)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Final
 
 import numpy as np
 
@@ -43,7 +44,8 @@ def quaternion_from_rotation(R: Array) -> Array:
     best = np.argmax(np.concatenate([t[..., None], d], -1), -1)
     q = np.take_along_axis(candidates, best[..., None, None], -2)[..., 0, :]
     q = q / np.linalg.norm(q, axis=-1, keepdims=True)
-    return np.where(q[..., :1] < 0, -q, q)
+    positive: Array = np.where(q[..., :1] < 0, -q, q)
+    return positive
 
 
 def rotation_vector(R: Array) -> Array:
@@ -89,3 +91,6 @@ class Transform:
     def rotation(self) -> Array:
         """Rotation matrix ``(3, 3)``."""
         return rotation_from_quaternion(np.array(self.quaternion))
+
+
+IDENTITY: Final = Transform()

@@ -149,7 +149,7 @@ def _refuse_missing(cells: Cells, columns: dict[str, _Column]) -> None:
                 where=where,
                 came=", ".join(f"joint_{n}" for n in numbers) or None,
                 allowed="joint_1, joint_2, .. without a gap",
-                cure=f"Add joint_{number} with its unit, such as joint_{number} [deg], or renumber.",
+                cure=f"Add joint_{number} [deg], or with the unit it has, or renumber.",
             )
     for name in ("configuration", "target", *_POSITION):
         if name not in columns:
@@ -222,9 +222,7 @@ def csv_text(dataset: Dataset, length_unit: str = "mm", angle_unit: str = "deg")
         *([f"sigma [{length_unit}]"] if with_sigma else []),
         *(["sigma_rot [mrad]"] if with_sigma_rot else []),
     ]
-    joints = [
-        [_shown(v, unit) for v, unit in zip(row, units, strict=True)] for row in dataset.joints.tolist()
-    ]
+    joints = [[_shown(v, unit) for v, unit in zip(row, units, strict=True)] for row in dataset.joints.tolist()]
     rows: list[list[list[str]]] = [[] for _ in dataset.labels]
     for part, role in zip(parts, _ROLES, strict=False):
         for reading, configuration in enumerate(part.configuration.tolist()):

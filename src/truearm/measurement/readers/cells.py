@@ -21,6 +21,8 @@ from truearm.units import to_si
 
 _NUMBER: Final = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _WITH_COMMA: Final = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
+#: Makes a decimal comma a point, and a point what is no part of a number.
+_SWAPPED: Final = str.maketrans(".,", ",.")
 _NOT_FINITE: Final = re.compile(r"[+-]?(?:nan|inf|infinity)", re.IGNORECASE)
 
 
@@ -116,18 +118,21 @@ class Cells:
             Whether all numbers must be above zero.
         """
         cells = self.columns[column]
-        if self.decimal == "," and not any("." in cell for cell in cells):
-            cells = tuple(cell.replace(",", ".") for cell in cells)
-        for row, cell in enumerate(cells):
-            if not _NUMBER.fullmatch(cell) and not (missing and not cell):
-                raise self._not_a_number(row, column, missing=missing)
-        values = np.array([to_si(float(cell), unit) if cell else np.nan for cell in cells])
+        if self.decimal == ",":
+            cells = tuple(cell.translate(_SWAPPED) for cell in cells)
+        parsed = {"": np.nan}
+        for cell in dict.fromkeys(cells):
+            if _NUMBER.fullmatch(cell):
+                parsed[cell] = to_si(float(cell), unit)
+            elif cell or not missing:
+                raise self._not_a_number(cells.index(cell), column, missing=missing)
+        values = np.array([parsed[cell] for cell in cells])
         infinite = np.flatnonzero(np.isinf(values))
         if len(infinite):
             raise InputError(
                 "the number is too large",
                 where=self.place(int(infinite[0]), column),
-                came=cells[infinite[0]],
+                came=self.columns[column][infinite[0]],
                 cure="Correct the cell.",
             )
         if positive and (values <= 0).any():
@@ -135,7 +140,7 @@ class Cells:
             raise InputError(
                 "a standard deviation must be above zero",
                 where=self.place(row, column),
-                came=cells[row],
+                came=self.columns[column][row],
                 allowed="a number above 0, or nothing",
                 cure="Write what the instrument is good for, or leave the whole column out.",
             )
@@ -178,14 +183,8 @@ def read_cells(text: str, source: str, layout: Layout) -> Cells:
     """
     records = _records(text, source, layout)
     first = next(records, None)
-    if first is None or (layout.header is not None and first[0] < layout.header):
-        raise InputError(
-            "there is no header on the line that should hold it"
-            if layout.header
-            else "the file holds no rows",
-            where=source if layout.header is None else f"{source}, line {layout.header}",
-            cure="Check the header line, and the text that marks comments.",
-        )
+    if first is None:
+        raise _no_header(source, layout.header)
     if layout.header is None:
         names = tuple(str(number) for number in range(1, len(first[1]) + 1))
         rows = [first, *records]
@@ -193,9 +192,7 @@ def read_cells(text: str, source: str, layout: Layout) -> Cells:
         names = tuple(first[1])
         rows = list(records)
     if not rows:
-        raise InputError(
-            "the file holds a header and no rows", where=source, cure="Check that it was exported whole."
-        )
+        raise InputError("the file holds a header and no rows", where=source, cure="Check that it was exported whole.")
     for line, row in rows:
         if len(row) != len(names):
             raise _ragged(f"{source}, line {line}", len(row), len(names), layout)
@@ -206,6 +203,14 @@ def read_cells(text: str, source: str, layout: Layout) -> Cells:
         lines=tuple(line for line, _ in rows),
         columns=tuple(zip(*(row for _, row in rows), strict=True)),
         decimal=layout.decimal,
+    )
+
+
+def _no_header(source: str, line: int | None) -> InputError:
+    return InputError(
+        "the file holds no rows" if line is None else "the line that should hold the header is empty",
+        where=source if line is None else f"{source}, line {line}",
+        cure="Check the number of the header line, and the text that marks comments.",
     )
 
 
@@ -233,7 +238,10 @@ def _records(text: str, source: str, layout: Layout) -> Iterator[tuple[int, list
             is_comment = layout.comment is not None and line.lstrip().startswith(layout.comment)
             if number == layout.header:
                 current = number
-                yield line.lstrip().removeprefix(layout.comment or "") if is_comment else line
+                heading = line.lstrip().removeprefix(layout.comment or "") if is_comment else line
+                if not heading.strip():
+                    raise _no_header(source, number)
+                yield heading
             elif number >= start and not is_comment:
                 current = number
                 yield line

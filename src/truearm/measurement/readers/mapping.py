@@ -49,9 +49,7 @@ class LayoutEntry(_Entry):
         try:
             return codecs.lookup(name).name
         except LookupError:
-            raise ValueError(
-                "there is no such encoding; usual ones are utf-8, utf-16, cp1252, latin-1"
-            ) from None
+            raise ValueError("there is no such encoding; usual ones are utf-8, utf-16, cp1252, latin-1") from None
 
     @model_validator(mode="after")
     def _header_first(self) -> LayoutEntry:

@@ -41,9 +41,7 @@ def read_table(path: Path, mapping: Path) -> Dataset:
         cells, found = _split_names(cells, content.names, mapping)
     labels = found.get("configuration") or [str(number) for number in range(1, len(cells.lines) + 1)]
     if content.configuration is not None and content.configuration.column is not None:
-        labels = list(
-            cells.texts(_place(cells, content.configuration.column, mapping, "configuration.column"))
-        )
+        labels = list(cells.texts(_place(cells, content.configuration.column, mapping, "configuration.column")))
     configurations, of_row = _configurations(cells, labels, content.joints, mapping)
     targets = _targets(cells, content, found.get("target"), mapping)
     entries = len(content.readings)
@@ -122,7 +120,9 @@ def _split_names(cells: Cells, entry: NamesEntry, mapping: Path) -> tuple[Cells,
     pattern = re.compile(entry.pattern)
     texts = cells.texts(place)
     matches = [pattern.fullmatch(text) for text in texts]
-    whole = [match is not None and all(match.groupdict().values()) for match in matches]
+    whole = [
+        match is not None and all((found or "").strip() for found in match.groupdict().values()) for match in matches
+    ]
     if not all(whole) and entry.others == "refuse":
         row = whole.index(False)
         raise InputError(
@@ -158,8 +158,7 @@ def _configurations(
     else:
         table, row_labels = _read(mapping.parent / entry.file, entry.layout or LayoutEntry()), []
     places = [
-        _place(table, column, mapping, f"joints.columns[{number}]")
-        for number, column in enumerate(entry.columns, 1)
+        _place(table, column, mapping, f"joints.columns[{number}]") for number, column in enumerate(entry.columns, 1)
     ]
     if entry.key is not None:
         row_labels = list(table.texts(_place(table, entry.key, mapping, "joints.key")))
@@ -203,9 +202,7 @@ def _quaternions(cells: Cells, content: MappingFile, mapping: Path) -> Array | N
         return None
     nothing = np.full((len(cells.lines), 4), np.nan)
     parts = [
-        _columns(cells, entry.quaternion, "1", mapping, f"readings[{number}]")
-        if entry.quaternion
-        else nothing
+        _columns(cells, entry.quaternion, "1", mapping, f"readings[{number}]") if entry.quaternion else nothing
         for number, entry in enumerate(content.readings, 1)
     ]
     return np.stack(parts, axis=1).reshape(-1, 4)

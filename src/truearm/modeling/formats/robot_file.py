@@ -263,25 +263,30 @@ def robot_text(robot: Robot) -> str:
     from ruamel.yaml import YAML
     from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
-    def flow(content: Mapping[str, Any] | list[Any]) -> CommentedMap | CommentedSeq:
-        made = CommentedMap(content) if isinstance(content, Mapping) else CommentedSeq(content)
+    def flow(content: Mapping[str, Any]) -> CommentedMap:
+        made = CommentedMap(content)
+        made.fa.set_flow_style()
+        return made
+
+    def listed(content: list[Any]) -> CommentedSeq:
+        made = CommentedSeq(content)
         made.fa.set_flow_style()
         return made
 
     def mm(values: tuple[float, float, float]) -> CommentedSeq:
-        return flow([written(v, "mm") for v in values])
+        return listed([written(v, "mm") for v in values])
 
     shown = {"m": "mm", "rad": "deg", "1": "1"}
-    units = {c: u for kind in ("revolute", "prismatic") for c, u in robot.convention.row_units(kind).items()}  # type: ignore[arg-type]
+    units = robot.convention.row_units("revolute") | robot.convention.row_units("prismatic")
 
     def joint(j: Joint) -> CommentedMap:
         row: dict[str, Any] = {"name": j.name, "type": j.kind}
         if "axis_x" in j.row:
-            row["axis"] = flow([j.row[f"axis_{a}"] for a in "xyz"])
+            row["axis"] = listed([j.row[f"axis_{a}"] for a in "xyz"])
         row |= {c: written(v, shown[units[c]]) for c, v in j.row.items() if not c.startswith("axis_")}
         if j.limits:
-            row["limits"] = flow([written(v, "deg" if j.kind == "revolute" else "mm") for v in j.limits])
-        return flow(row)  # type: ignore[return-value]
+            row["limits"] = listed([written(v, "deg" if j.kind == "revolute" else "mm") for v in j.limits])
+        return flow(row)
 
     content: dict[str, Any] = {
         "truearm": SCHEMA,
@@ -295,7 +300,7 @@ def robot_text(robot: Robot) -> str:
     if robot.flange != Transform():
         content["flange"] = {
             "translation": mm(robot.flange.translation),
-            "quaternion": flow(list(robot.flange.quaternion)),
+            "quaternion": listed(list(robot.flange.quaternion)),
         }
     if robot.masses:
         content["masses"] = [flow({"link": m.joint, "mass": m.mass, "cog": mm(m.cog)}) for m in robot.masses]
@@ -319,10 +324,10 @@ def robot_text(robot: Robot) -> str:
     if robot.effect_names:
         content["effects"] = list(robot.effect_names)
     if robot.base_quaternion != (1.0, 0.0, 0.0, 0.0):
-        content["base_quaternion"] = flow(list(robot.base_quaternion))
+        content["base_quaternion"] = listed(list(robot.base_quaternion))
     if robot.targets:
         content["targets"] = [
-            flow({"name": t.name} | ({"quaternion": flow(list(t.quaternion))} if t.quaternion else {}))
+            flow({"name": t.name} | ({"quaternion": listed(list(t.quaternion))} if t.quaternion else {}))
             for t in robot.targets
         ]
     if robot.known:

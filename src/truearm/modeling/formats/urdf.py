@@ -107,9 +107,7 @@ def calibrated_urdf(source: bytes, robot: Robot) -> tuple[bytes, list[str]]:
             continue
         place = np.linalg.inv(link.prefix) @ product(elements, robot.values)
         xyz, rpy = triple(place[:3, 3]), roll_pitch_yaw(place[:3, :3], link.rpy)
-        edits += _origin_edits(
-            source, link.joint, xyz if False in changed else None, rpy if True in changed else None
-        )
+        edits += _origin_edits(source, link.joint, xyz if False in changed else None, rpy if True in changed else None)
     for start, end, text in sorted(edits, reverse=True):
         source = source[:start] + text + source[end:]
     return source, _left_out(robot)
@@ -223,9 +221,7 @@ def _only_end(tree: Tree, path: Path) -> str:
     moving = [joint for joint in tree.joints.values() if joint.type != "fixed"]
     ways = [[step for step in tree.way(joint.child) if step.type != "fixed"] for joint in moving]
     if not ways:
-        raise InputError(
-            "there is no moving joint", where=tree.where, allowed=f"a joint of type {', '.join(KIND)}"
-        )
+        raise InputError("there is no moving joint", where=tree.where, allowed=f"a joint of type {', '.join(KIND)}")
     passed = {joint.name for way in ways for joint in way[:-1]}
     outermost = [way for way in ways if way[-1].name not in passed]
     if len(outermost) == 1:
@@ -283,11 +279,7 @@ def _axis(joint: UrdfJoint) -> Triple:
 def _limits(joint: UrdfJoint) -> tuple[float, float] | None:
     if joint.type == "continuous":
         return None
-    cure = (
-        "Give the joint's limits, or make it continuous."
-        if joint.type == "revolute"
-        else "Give the joint's limits."
-    )
+    cure = "Give the joint's limits, or make it continuous." if joint.type == "revolute" else "Give the joint's limits."
     tag = child_tag(joint.tag, "limit", joint.where)
     if tag is None:
         raise InputError(f"a {joint.type} joint must have a <limit>", where=joint.where, cure=cure)
@@ -338,9 +330,7 @@ def _robot_name(name: str, path: Path) -> str:
 # -- the user's file, calibrated ----------------------------------------------------------------------------
 
 # In well-formed XML a start tag ends at the first > outside quotes.
-_START_TAG: Final = re.compile(
-    rb"""<[^\s/>]+(?P<attributes>(?:\s+[^\s=]+\s*=\s*(?:"[^"]*"|'[^']*'))*)\s*/?>"""
-)
+_START_TAG: Final = re.compile(rb"""<[^\s/>]+(?P<attributes>(?:\s+[^\s=]+\s*=\s*(?:"[^"]*"|'[^']*'))*)\s*/?>""")
 _ATTRIBUTE: Final = re.compile(rb"""\s+(?P<name>[^\s=]+)\s*=\s*["'](?P<value>(?<=")[^"]*|(?<=')[^']*)["']""")
 
 
@@ -371,9 +361,7 @@ def _own_links(tree: Tree, robot: Robot) -> list[_Link]:
             raise refuse(f"joint {joint.name} is {link.kind}")
         for column, value in link.row.items():
             if abs(value - joint.row.get(column, 0.0)) > _SAME_FILE:
-                raise refuse(
-                    f"{column} of joint {joint.name} differs", value, repr(joint.row.get(column, 0.0))
-                )
+                raise refuse(f"{column} of joint {joint.name} differs", value, repr(joint.row.get(column, 0.0)))
     return links
 
 
@@ -399,9 +387,7 @@ def _origin_edits(
 
 
 def _attributes(values: Mapping[bytes, Triple]) -> bytes:
-    return b"".join(
-        b' %s="%s"' % (name, " ".join(map(repr, value)).encode()) for name, value in values.items()
-    )
+    return b"".join(b' %s="%s"' % (name, " ".join(map(repr, value)).encode()) for name, value in values.items())
 
 
 def _respelled(old: bytes, values: Triple) -> bytes:
@@ -430,8 +416,7 @@ def _left_out(robot: Robot) -> list[str]:
     if base or robot.base_quaternion != Transform().quaternion:
         names = [*(["base_quaternion"] if robot.base_quaternion != Transform().quaternion else []), *base]
         said.append(
-            "A URDF cannot hold where the base stands in the instrument's frame; "
-            f"left out: {', '.join(names)}."
+            f"A URDF cannot hold where the base stands in the instrument's frame; left out: {', '.join(names)}."
         )
     if robot.targets:
         names = [target.name for target in robot.targets]
@@ -470,9 +455,7 @@ def _joint_lines(joint: Joint | None, parent: str, child: str, origin: Array, li
         head = '  <joint name="tool0_joint" type="fixed">'
     else:
         type_ = joint.kind if limit else "continuous"
-        axis = (
-            joint.row.get(f"axis_{a}", default) for a, default in zip("xyz", (0.0, 0.0, 1.0), strict=True)
-        )
+        axis = (joint.row.get(f"axis_{a}", default) for a, default in zip("xyz", (0.0, 0.0, 1.0), strict=True))
         limit = [f'    <axis xyz="{_written(axis)}"/>', *limit]
         head = f'  <joint name={quoteattr(joint.name)} type="{type_}">'
     place = f'xyz="{_written(origin[:3, 3])}" rpy="{_written(roll_pitch_yaw(origin[:3, :3]))}"'

@@ -125,9 +125,7 @@ def _parse(content: bytes, where: str) -> Tag:
     if not content.strip():
         raise InputError("the file is empty", where=where)
     if b"\0" in content:
-        raise InputError(
-            "the file is not UTF-8 text (it has zero bytes)", where=where, cure="Save it as UTF-8."
-        )
+        raise InputError("the file is not UTF-8 text (it has zero bytes)", where=where, cure="Save it as UTF-8.")
     parser = expat.ParserCreate()
     top: list[Tag] = []
     stack: list[Tag] = []
@@ -145,9 +143,7 @@ def _parse(content: bytes, where: str) -> Tag:
 
     def doctype(*_: object) -> None:
         # Entities would make text that stands nowhere in the bytes, and could make it without end.
-        raise InputError(
-            "a document type (<!DOCTYPE>) has no place in a URDF", where=where, cure="Delete it."
-        )
+        raise InputError("a document type (<!DOCTYPE>) has no place in a URDF", where=where, cure="Delete it.")
 
     parser.StartElementHandler = start
     parser.EndElementHandler = lambda _: stack.pop()
@@ -158,9 +154,7 @@ def _parse(content: bytes, where: str) -> Tag:
         raise
     except expat.ExpatError as error:
         reason = expat.ErrorString(error.code)
-        raise InputError(
-            f"this is not valid XML ({reason})", where=f"{where}, line {error.lineno}"
-        ) from error
+        raise InputError(f"this is not valid XML ({reason})", where=f"{where}, line {error.lineno}") from error
     except (LookupError, ValueError) as error:
         raise InputError(
             f"the encoding that the file declares cannot be read ({error})",
@@ -174,9 +168,7 @@ def read_tree(content: bytes, where: str) -> Tree:
     """Read the content of a URDF file; `where` names it in messages."""
     robot = _parse(content, where)
     if robot.name != "robot":
-        raise InputError(
-            "this is not a URDF", where=where, came=f"<{robot.name}>", allowed="<robot> around it all"
-        )
+        raise InputError("this is not a URDF", where=where, came=f"<{robot.name}>", allowed="<robot> around it all")
     links: dict[str, Tag] = {}
     joints: dict[str, UrdfJoint] = {}
     for tag in robot.children:
@@ -201,9 +193,7 @@ def read_tree(content: bytes, where: str) -> Tree:
 def _urdf_joint(tag: Tag, name: str, where: str) -> UrdfJoint:
     type_ = tag.attributes.get("type")
     if type_ not in _TYPES:
-        raise InputError(
-            "a joint's type is not one of URDF's", where=where, came=type_, allowed=", ".join(_TYPES)
-        )
+        raise InputError("a joint's type is not one of URDF's", where=where, came=type_, allowed=", ".join(_TYPES))
     ends = []
     for end in ("parent", "child"):
         found = child_tag(tag, end, where)
@@ -238,9 +228,7 @@ def _root(tree: Tree) -> str:
         reached += tree.children(link)
     lost = [link for link in tree.links if link not in reached]
     if lost:
-        raise InputError(
-            "the links form a loop that no root leads to", where=tree.where, came=", ".join(lost)
-        )
+        raise InputError("the links form a loop that no root leads to", where=tree.where, came=", ".join(lost))
     if not roots:
         raise InputError("there is no <link>", where=tree.where)
     return roots[0]

@@ -1,0 +1,314 @@
+"""What the report shows in pictures, as plain Plotly figures: dictionaries, so that Plotly need not be imported."""
+
+from __future__ import annotations
+
+import html
+import math
+from collections.abc import Sequence
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.identification.fit import Fit
+from truearm.measurement.dataset import Dataset
+from truearm.modeling.chain import Array
+from truearm.modeling.transform import Transform
+from truearm.reporting.numbers import rounded, rounded_to, significant
+
+Figure = dict[str, Any]
+
+BEFORE: Final = "#b8ab97"
+AFTER: Final = "#1d5f8a"
+_MARK: Final = "#b3261e"
+_INK: Final = "#2b2f33"
+_GRID: Final = "#e4e6e8"
+_FONT: Final = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"
+_ERROR_SCALE: Final = [[0.0, "#c3d5e3"], [0.5, "#2c6f9c"], [0.75, "#4b3a63"], [1.0, "#b3261e"]]
+_SIGNED_SCALE: Final = [[0.0, "#b3261e"], [0.5, "#ffffff"], [1.0, AFTER]]
+_AXIS_COLOURS: Final = ("#b3261e", "#3b7d3b", "#2456a6")
+
+_CAMERA: Final = {"eye": {"x": 1.45, "y": 1.45, "z": 0.75}, "center": {"x": 0, "y": 0, "z": -0.15}}
+
+_BINS: Final = 40
+# Largest error over median error after, beyond which equal bins would crowd everything into the first one.
+_LOGARITHMIC: Final = 12.0
+#: A robust loss that leaves a reading less than this share of its weight did not believe it.
+DOUBTED: Final = 0.5
+
+
+def histogram(before: Array, after: Array, unit: str, what: str) -> Figure:
+    """Show how errors are spread before and after, in the same bins.
+
+    Parameters
+    ----------
+    before, after
+        Error norms in `unit`.
+    what
+        The quantity, for the axis: ``position error``.
+    """
+    both = np.concatenate([before, after])
+    top = max(float(both.max()), 1e-9)
+    logarithmic = top > _LOGARITHMIC * float(np.median(after))
+    if logarithmic:
+        low = max(float(both.min()), 1e-9 * top)
+        edges = np.geomspace(low * (1 - 1e-9), top * (1 + 1e-9), _BINS + 1)
+    else:
+        edges = np.linspace(0.0, top * (1 + 1e-9), _BINS + 1)
+    ranges = [f"{a:.3g} to {b:.3g} {unit}" for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    traces = [
+        {
+            "type": "bar",
+            "name": f"{name}, mean {significant(float(np.mean(errors)))} {unit}",
+            "x": rounded((edges[:-1] + edges[1:]) / 2, 6),
+            "width": rounded(np.diff(edges), 6),
+            "y": np.histogram(np.clip(errors, edges[0], edges[-1]), edges)[0].tolist(),
+            "customdata": ranges,
+            "marker": {"color": colour, "line": {"width": 0}},
+            "opacity": 0.75,
+            "hovertemplate": f"{name}<br>%{{customdata}}: %{{y}} readings<extra></extra>",
+        }
+        for name, errors, colour in (("before", before, BEFORE), ("after", after, AFTER))
+    ]
+    x = _axis(f"{what} [{unit}]")
+    if logarithmic:
+        x = _logarithmic_axis(f"{what} [{unit}]", float(edges[0]), float(edges[-1]))
+    return _figure(traces, 330, xaxis=x, yaxis=_axis("readings"), barmode="overlay", bargap=0)
+
+
+def workspace(part: Dataset, base: Transform, before: Array, after: Array) -> Figure:
+    """Show where readings were taken, coloured by their position error, with a switch between before and after.
+
+    Parameters
+    ----------
+    part
+        The readings.
+    base
+        ``T_world_base``.
+    before, after
+        Position error of each reading [mm], NaN where none was read.
+    """
+    kept = np.isfinite(before) & np.isfinite(after)
+    before, after = before[kept], after[kept]
+    points = (part.position[kept] - np.array(base.translation)) @ base.rotation * 1e3
+    names = [
+        [html.escape(part.labels[c]), html.escape(part.targets[t]), b, a]
+        for c, t, b, a in zip(
+            part.configuration[kept], part.target[kept], rounded(before, 3), rounded(after, 3), strict=True
+        )
+    ]
+    high_before, high_after = _colour_end(before), _colour_end(after)
+    views = (
+        ("Before", before, high_before),
+        ("After, same scale", after, high_before),
+        ("After, own scale", after, high_after),
+    )
+    cloud = {
+        "type": "scatter3d",
+        "mode": "markers",
+        "x": rounded_to(points[:, 0], 1),
+        "y": rounded_to(points[:, 1], 1),
+        "z": rounded_to(points[:, 2], 1),
+        "customdata": names,
+        "marker": {
+            "size": 4,
+            "color": rounded(after, 3),
+            "colorscale": _ERROR_SCALE,
+            "cmin": 0,
+            "cmax": high_after,
+            "line": {"width": 0},
+            "colorbar": {"title": {"text": "error [mm]"}, "thickness": 14, "len": 0.75, "outlinewidth": 0},
+        },
+        "hovertemplate": "configuration %{customdata[0]}, target %{customdata[1]}<br>"
+        "before %{customdata[2]} mm, after %{customdata[3]} mm<br>"
+        "x %{x:.0f}, y %{y:.0f}, z %{z:.0f} mm<extra></extra>",
+        "showlegend": False,
+    }
+    reach = float(np.linalg.norm(points, axis=1).max())
+    buttons = [
+        {
+            "label": label,
+            "method": "restyle",
+            "args": [{"marker.color": [rounded(errors, 3)], "marker.cmax": [high]}, [0]],
+        }
+        for label, errors, high in views
+    ]
+    menu = {
+        "type": "buttons",
+        "direction": "right",
+        "buttons": buttons,
+        "active": 2,
+        "showactive": True,
+        "x": 0,
+        "xanchor": "left",
+        "y": 1,
+        "yanchor": "bottom",
+        "pad": {"b": 6},
+        "bgcolor": "#ffffff",
+        "bordercolor": "#c8ccd0",
+    }
+    scene = {name: _scene_axis(f"{name[0]} [mm]") for name in ("xaxis", "yaxis", "zaxis")}
+    return _figure(
+        [cloud, *_base_axes(0.25 * reach)],
+        640,
+        scene={"aspectmode": "data", "camera": _CAMERA, **scene},
+        updatemenus=[menu],
+        margin={"l": 0, "r": 0, "t": 50, "b": 0},
+    )
+
+
+def residuals(
+    data: Dataset, parts: Sequence[tuple[str, NDArray[np.intp], Array]], doubted: NDArray[np.bool_]
+) -> Figure:
+    """Show the position error after calibration of every configuration, mean over its targets, as measured.
+
+    Parameters
+    ----------
+    data
+        All readings.
+    parts
+        Training and then held-out: name, indices of the configurations, position error of each reading [mm].
+    doubted
+        Which training readings the loss doubted.
+    """
+    looks = ({"symbol": "circle-open", "size": 6}, {"symbol": "diamond", "size": 6})
+    traces: list[Figure] = []
+    for (name, indices, errors), look in zip(parts, looks, strict=False):
+        if len(indices) == 0:
+            continue
+        place = data.of_configurations(indices).configuration
+        read = np.isfinite(errors)
+        count = np.bincount(place[read], minlength=len(indices))
+        total = np.bincount(place[read], errors[read], minlength=len(indices))
+        order = np.argsort(indices)
+        order = order[count[order] > 0]
+        traces.append(
+            {
+                "type": "scatter",
+                "mode": "markers",
+                "name": name,
+                "x": (indices[order] + 1).tolist(),
+                "y": rounded(total[order] / count[order], 4),
+                "customdata": [html.escape(data.labels[i]) for i in indices[order]],
+                "marker": {"color": AFTER, **look},
+                "hovertemplate": f"configuration %{{customdata}}, {name}<br>mean over targets "
+                "%{y:.3g} mm<extra></extra>",
+            }
+        )
+    _, training, errors = parts[0]
+    marked = np.flatnonzero(doubted & np.isfinite(errors))
+    if len(marked):
+        part = data.of_configurations(training)
+        configuration = part.configuration[marked]
+        traces.append(
+            {
+                "type": "scatter",
+                "mode": "markers",
+                "name": "single readings with less than half weight",
+                "x": (training[configuration] + 1).tolist(),
+                "y": rounded(errors[marked], 4),
+                "customdata": [
+                    [html.escape(part.labels[c]), html.escape(part.targets[t])]
+                    for c, t in zip(configuration, part.target[marked], strict=True)
+                ],
+                "marker": {"color": _MARK, "symbol": "x-thin", "size": 8, "line": {"color": _MARK, "width": 1.5}},
+                "hovertemplate": "configuration %{customdata[0]}, target %{customdata[1]}<br>"
+                "less than half weight, %{y:.3g} mm<extra></extra>",
+            }
+        )
+    shown = np.concatenate([np.asarray(trace["y"], float) for trace in traces]) if traces else np.ones(1)
+    y = _axis("position error [mm]")
+    if shown.max() > 2 * _LOGARITHMIC * float(np.median(shown)) and shown.min() > 0:
+        y = _logarithmic_axis("position error [mm]", float(shown.min()), float(shown.max()))
+    else:
+        y["rangemode"] = "tozero"
+    return _figure(traces, 360, xaxis=_axis("configuration, in measuring order"), yaxis=y)
+
+
+def correlation_map(fit: Fit) -> Figure:
+    """Show the correlations of the free parameters."""
+    names = [html.escape(name) for name in fit.free.names]
+    size = min(18.0, 860.0 / max(len(names), 1))
+    ticks = {"tickfont": {"size": max(5, min(11, round(0.68 * size)))}, "ticks": "", "dtick": 1, "showgrid": False}
+    trace = {
+        "type": "heatmap",
+        "x": names,
+        "y": names,
+        "z": rounded_to(fit.correlations, 2),
+        "zmin": -1,
+        "zmax": 1,
+        "xgap": 0.5,
+        "ygap": 0.5,
+        "colorscale": _SIGNED_SCALE,
+        "colorbar": {"thickness": 14, "outlinewidth": 0, "tickvals": [-1, -0.5, 0, 0.5, 1]},
+        "hovertemplate": "%{y}, %{x}: %{z:.2f}<extra></extra>",
+    }
+    return _figure(
+        [trace],
+        max(260, round(size * len(names)) + 130),
+        xaxis={"automargin": True, "tickangle": -90, "constrain": "domain", **ticks},
+        yaxis={"automargin": True, "autorange": "reversed", "scaleanchor": "x", "constrain": "domain", **ticks},
+    )
+
+
+def _colour_end(errors: Array) -> float:
+    """Return where the colours end: at the largest error, unless outliers would then hide all other differences."""
+    end = min(float(errors.max()), 2.0 * float(np.percentile(errors, 90)))
+    return float(f"{max(end, 1e-9):.2g}")
+
+
+def _base_axes(length: float) -> list[Figure]:
+    return [
+        {
+            "type": "scatter3d",
+            "mode": "lines+text",
+            **{axis: [0, length if axis == name else 0] for axis in "xyz"},
+            "text": ["base" if name == "x" else "", name],
+            "textposition": "bottom center" if name == "x" else "top center",
+            "textfont": {"color": colour, "size": 12},
+            "line": {"color": colour, "width": 5},
+            "hoverinfo": "skip",
+            "showlegend": False,
+        }
+        for name, colour in zip("xyz", _AXIS_COLOURS, strict=True)
+    ]
+
+
+def _axis(title: str) -> Figure:
+    return {
+        "title": {"text": title},
+        "gridcolor": _GRID,
+        "zeroline": False,
+        "linecolor": "#9aa0a6",
+        "showline": True,
+        "automargin": True,
+    }
+
+
+def _logarithmic_axis(title: str, low: float, high: float) -> Figure:
+    """Make an axis with ticks at 1, 2 and 5 in every decade, or at whole decades where there are many."""
+    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    steps = (1, 2, 5) if len(decades) <= 5 else (1,)
+    ticks = [float(f"{step}e{decade}") for decade in decades for step in steps]
+    return _axis(f"{title}, logarithmic") | {
+        "type": "log",
+        "tickvals": ticks,
+        "ticktext": [f"{tick:g}" for tick in ticks],
+    }
+
+
+def _scene_axis(title: str) -> Figure:
+    return {"title": {"text": title}, "gridcolor": "#d5d8db", "showbackground": False, "zeroline": False}
+
+
+def _figure(traces: list[Figure], height: int, **layout: Any) -> Figure:
+    common = {
+        "height": height,
+        "font": {"family": _FONT, "size": 13, "color": _INK},
+        "paper_bgcolor": "#ffffff",
+        "plot_bgcolor": "#ffffff",
+        "margin": {"l": 60, "r": 20, "t": 36, "b": 50},
+        "legend": {"orientation": "h", "x": 0, "y": 1.02, "xanchor": "left", "yanchor": "bottom"},
+        "hoverlabel": {"bgcolor": "#ffffff", "bordercolor": "#9aa0a6", "font": {"color": _INK}},
+    }
+    return {"data": traces, "layout": {**common, **layout}}

@@ -1,0 +1,258 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tests.simulated import campaign, more_of
+
+from truearm.identification.bounds import Bounds
+from truearm.identification.fit import Fit, Status, identify
+from truearm.identification.losses import Loss
+from truearm.identification.models import MODELS, Model
+from truearm.identification.problem import Problem
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.statistics import errors_of
+from truearm.measurement.truths import truth_twin
+from truearm.modeling.chain import Array
+from truearm.modeling.transform import Transform, rotation_from_quaternion
+from truearm.robots import load_robot
+
+BY_NAME = {m.name: m for m in MODELS}
+GEOMETRIC = BY_NAME["geometric"]
+
+
+@pytest.mark.parametrize("model", MODELS, ids=lambda m: m.name)
+@pytest.mark.parametrize("with_orientation", [False, True])
+def test_the_jacobian_of_every_model_agrees_with_central_differences(model: Model, with_orientation: bool) -> None:
+    rng = np.random.default_rng(4)
+    robot = model.prepared(load_robot("irb120"))
+    frame = Transform((0.1, 0.02, 0.15), (0.6, 0.0, 0.8, 0.0))
+    robot = robot.with_frames(Transform((1.0, 0.2, -0.3), (0.5, 0.5, 0.5, 0.5)), {"1": frame, "2": (0.1, 0.1, 0.1)})
+    free = model.free(robot)
+    q = robot.random_configurations(7, rng)
+    quaternion = None
+    if with_orientation:
+        quaternion = np.concatenate([rng.normal(size=(7, 4)), np.full((7, 4), np.nan)])
+        quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
+    data = Dataset(
+        "made",
+        tuple("abcdefg"),
+        q,
+        ("revolute",) * 6,
+        ("1", "2"),
+        np.tile(np.arange(7), 2),
+        np.repeat([0, 1], 7),
+        rng.normal(size=(14, 3)),
+        quaternion,
+    )
+    problem = Problem(robot, data, free, {"position": 1.0, "orientation": 1.0})
+    x = free.start + 1e-2 * rng.normal(size=len(free.names))
+    _, J = problem.linearised(x)
+    h = 1e-6
+    for i, name in enumerate(free.names):
+        step = np.zeros(len(x))
+        step[i] = h
+        central = (problem.residual(x + step) - problem.residual(x - step)) / (2 * h)
+        np.testing.assert_allclose(J[:, i], central, atol=2e-8, err_msg=name)
+
+
+def test_intervals_contain_the_truth_as_often_as_they_say() -> None:
+    """1000 calibrations with truths drawn from the priors, 95 % intervals of the identifiable parameters pooled."""
+    rng = np.random.default_rng(2024)
+    robot = load_robot("irb120")
+    q = robot.random_configurations(30, rng)
+    sigma = 0.05e-3
+    _, like = campaign("irb120", 30, sigma, 0)
+    like = replace(like, joints=q)
+    inside: list[bool] = []
+    for _ in range(1000):
+        twin = truth_twin(robot, "random", rng).robot
+        position = np.stack([twin.poses(q, t.name)[0] for t in twin.targets], axis=1).reshape(-1, 3)
+        data = replace(like, position=position + sigma * rng.standard_normal(position.shape))
+        fit = identify(robot, data, GEOMETRIC)
+        for p in fit.robot.parameters.values():
+            if p.group in ("geometry", "joint zero") and p.informed is not None and p.informed > 0.5:
+                assert p.deviation is not None
+                inside.append(abs(p.value - twin.values[p.name]) < 1.959964 * p.deviation)
+    assert len(inside) > 15_000
+    assert 0.93 <= np.mean(inside) <= 0.97
+
+
+@pytest.mark.parametrize("loss", ["linear", "huber", "cauchy", "l1"])
+def test_every_loss_finds_the_truth_without_noise(loss: Loss) -> None:
+    twin, data = campaign("puma560", 40, 0.0, 3)
+    fit = identify(load_robot("puma560"), data, GEOMETRIC, loss=loss)
+    assert fit.status is Status.CONVERGED
+    assert errors_of(fit.robot, more_of(twin, 50, 0.0, 4)).position_norms.max() < 1e-8
+
+
+@pytest.mark.parametrize("loss", ["huber", "cauchy", "l1"])
+def test_robust_losses_survive_mistaken_readings(loss: Loss) -> None:
+    twin, data = campaign("irb120", 60, 0.05e-3, 8)
+    rng = np.random.default_rng(0)
+    wrong = rng.choice(len(data.target), len(data.target) // 20, replace=False)
+    shift = rng.normal(size=(len(wrong), 3))
+    position = data.position.copy()
+    position[wrong] += 5e-3 * shift / np.linalg.norm(shift, axis=1, keepdims=True)
+    clean, dirty = more_of(twin, 100, 0.0, 9), replace(data, position=position)
+
+    def held_out(data: Dataset, loss: Loss) -> float:
+        fit = identify(load_robot("irb120"), data, GEOMETRIC, loss=loss)
+        return float(errors_of(fit.robot, clean).position_norms.mean())
+
+    untouched = held_out(data, "linear")
+    assert held_out(dirty, "linear") > 3 * untouched
+    assert held_out(dirty, loss) < 1.5 * untouched
+    fit = identify(load_robot("irb120"), dirty, GEOMETRIC, loss="cauchy")
+    doubted = set(np.flatnonzero(fit.weight < 0.1).tolist())
+    assert set(wrong.tolist()) <= doubted
+
+
+def test_the_sum_of_distances_is_minimal() -> None:
+    """No small step in any parameter, or along random directions, lowers the sum of distances."""
+    _, data = campaign("li3", 25, 0.3e-3, 1)
+    bounds = Bounds.model_validate(
+        {
+            "truearm": "truearm-bounds/1",
+            "units": {"length": "mm", "angle": "deg"},
+            "within": {"d": 5, "a": 5, "alpha": 2, "theta_offset": 2, "beta": 2},
+        }
+    )
+    fit = identify(load_robot("li3"), data, GEOMETRIC, loss="l1", redundancy="drop", bounds=bounds)
+    problem = Problem(fit.robot, data, fit.free, {"position": 1e-3}, priors=False)
+    problem = replace(problem, data=replace(data, sigma=None))
+    x = np.array([fit.robot.values[n] for n in fit.free.names])
+
+    def total(vector: Array) -> float:
+        return float(np.linalg.norm(problem.residual(vector).reshape(-1, 3), axis=1).sum())
+
+    best = total(x)
+    rng = np.random.default_rng(0)
+    _, J = problem.linearised(x)
+    scale = 1.0 / np.linalg.norm(J, axis=0)
+    for _ in range(300):
+        assert total(x + 1e-2 * scale * rng.normal(size=len(x))) >= best * (1 - 1e-6)
+    least_squares = identify(load_robot("li3"), data, GEOMETRIC, redundancy="drop")
+    other = replace(problem, free=least_squares.free)
+    assert (
+        best
+        < np.linalg.norm(
+            other.residual(np.array([least_squares.robot.values[n] for n in least_squares.free.names])).reshape(-1, 3),
+            axis=1,
+        ).sum()
+    )
+
+
+def test_bounds_hold_and_are_reported() -> None:
+    _, data = campaign("irb120", 50, 0.05e-3, 6)
+    free = identify(load_robot("irb120"), data, GEOMETRIC)
+    off = abs(free.robot.values["a_3"] - 0.270)
+    tight = Bounds.model_validate(
+        {"truearm": "truearm-bounds/1", "units": {"length": "m", "angle": "rad"}, "within": {"a_3": off / 2, "d_4": 1}}
+    )
+    fit = identify(load_robot("irb120"), data, GEOMETRIC, bounds=tight)
+    assert fit.status is Status.AT_BOUND
+    assert fit.at_bound == ("a_3",)
+    assert abs(fit.robot.values["a_3"] - 0.270) <= off / 2 * (1 + 1e-12)
+    wide = Bounds.model_validate(
+        {"truearm": "truearm-bounds/1", "units": {"length": "mm", "angle": "deg"}, "within": {"a": 50, "d": 50}}
+    )
+    same = identify(load_robot("irb120"), data, GEOMETRIC, bounds=wide)
+    assert same.status is Status.CONVERGED
+    for name in free.free.names:
+        assert same.robot.values[name] == pytest.approx(free.robot.values[name], abs=1e-8), name
+
+
+def _same(a: Fit, b: Fit, q: Array, tolerance: float) -> None:
+    for target in a.robot.targets:
+        np.testing.assert_allclose(
+            a.robot.poses(q, target.name)[0], b.robot.poses(q, target.name)[0], atol=tolerance, rtol=0
+        )
+
+
+def test_the_order_of_readings_does_not_matter() -> None:
+    twin, data = campaign("ur5", 25, 0.05e-3, 6)
+    order = np.random.default_rng(1).permutation(25)
+    q = twin.robot.random_configurations(20, np.random.default_rng(2))
+    a = identify(load_robot("ur5"), data, GEOMETRIC)
+    b = identify(load_robot("ur5"), data.of_configurations(order), GEOMETRIC)
+    _same(a, b, q, 1e-10)
+
+
+@settings(max_examples=10, deadline=None)
+@given(
+    translation=st.tuples(*[st.floats(-5, 5)] * 3),
+    quaternion=st.tuples(*[st.floats(-1, 1)] * 4).filter(lambda q: sum(v * v for v in q) > 0.1),
+)
+def test_moving_the_instrument_moves_the_base_and_nothing_else(
+    translation: tuple[float, ...], quaternion: tuple[float, ...]
+) -> None:
+    _, data = campaign("irb120", 25, 0.05e-3, 6)
+    R = rotation_from_quaternion(np.array(quaternion) / np.linalg.norm(quaternion))
+    moved = replace(data, position=data.position @ R.T + np.array(translation))
+    a = identify(load_robot("irb120"), data, GEOMETRIC)
+    b = identify(load_robot("irb120"), moved, GEOMETRIC)
+    for p in a.robot.parameters.values():
+        if p.group in ("geometry", "joint zero"):
+            assert b.robot.values[p.name] == pytest.approx(p.value, abs=1e-8), p.name
+    errors = [errors_of(f.robot, d).position_norms for f, d in ((a, data), (b, moved))]
+    np.testing.assert_allclose(errors[0], errors[1], atol=1e-9)
+
+
+def test_measuring_everything_twice_narrows_the_deviations() -> None:
+    _, data = campaign("irb120", 30, 0.05e-3, 6)
+    assert data.sigma is not None
+    twice = replace(
+        data,
+        configuration=np.tile(data.configuration, 2),
+        target=np.tile(data.target, 2),
+        position=np.tile(data.position, (2, 1)),
+        sigma=np.tile(data.sigma, 2),
+    )
+    a, b = (identify(load_robot("irb120"), d, GEOMETRIC).robot.parameters for d in (data, twice))
+    for name in ("theta_offset_2", "a_3", "alpha_4"):
+        assert a[name].deviation == pytest.approx(np.sqrt(2) * b[name].deviation, rel=0.02)  # type: ignore[operator]
+
+
+def test_undeclared_noise_is_estimated_from_the_residuals() -> None:
+    _, data = campaign("irb120", 80, 0.2e-3, 6)
+    fit = identify(load_robot("irb120"), replace(data, sigma=None), GEOMETRIC)
+    assert not fit.declared
+    assert fit.sigma["position"] == pytest.approx(0.2e-3, rel=0.06)
+
+
+def test_residuals_beyond_the_declared_noise_widen_the_deviations() -> None:
+    _, data = campaign("irb120", 80, 0.2e-3, 6)
+    honest = identify(load_robot("irb120"), data, GEOMETRIC)
+    assert honest.excess == 1.0
+    boastful = identify(load_robot("irb120"), replace(data, sigma=np.full(len(data.target), 0.05e-3)), GEOMETRIC)
+    assert boastful.excess == pytest.approx(4.0, rel=0.1)
+
+
+def test_what_the_data_do_not_know_keeps_its_prior() -> None:
+    _, data = campaign("irb120", 40, 0.05e-3, 6)
+    p = identify(load_robot("irb120"), data, GEOMETRIC).robot.parameters
+    assert p["d_1"].informed == pytest.approx(0.0, abs=1e-3)  # with base_z
+    assert p["d_2"].informed == pytest.approx(0.5, abs=0.02)  # with d_3
+    assert p["a_3"].informed is not None
+    assert p["a_3"].informed > 0.99
+
+
+def _refit(change: Callable[[Dataset], Dataset]) -> Fit:
+    _, data = campaign("irb120", 20, 0.05e-3, 6)
+    return identify(load_robot("irb120"), change(data), GEOMETRIC)
+
+
+def test_missing_readings_are_left_out() -> None:
+    def with_gaps(data: Dataset) -> Dataset:
+        position = data.position.copy()
+        position[[3, 17, 40]] = np.nan
+        return replace(data, position=position)
+
+    fit = _refit(with_gaps)
+    assert fit.status is Status.CONVERGED
+    assert np.flatnonzero(np.isnan(fit.weight)).tolist() == [3, 17, 40]

@@ -1,0 +1,438 @@
+"""The canonical CSV: what it means, what is refused, and that writing what was read changes nothing."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import re
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from truearm.errors import InputError
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.readers.canonical import csv_text, read_csv
+
+HEADER = "configuration,joint_1 [deg],joint_2 [deg],target,x [mm],y [mm],z [mm]"
+PLAIN = f"""{HEADER}
+P1,10,-20.5,tcp,1000,2,3
+P1,10.0,-20.5,side,1001,2,3
+P2,0,90,tcp,1e3,,3
+"""
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> WriteFile:
+    return WriteFile(tmp_path)
+
+
+class WriteFile:
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def __call__(self, content: str | bytes) -> Path:
+        path = self.folder / "data.csv"
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+        return path
+
+
+def same(a: Dataset, b: Dataset) -> bool:
+    """Whether two datasets agree to the last bit in everything but their source."""
+
+    def equal(left: object, right: object) -> bool:
+        if left is None or right is None:
+            return left is right
+        if isinstance(left, Dataset) and isinstance(right, Dataset):
+            return same(left, right)
+        if isinstance(left, np.ndarray) and isinstance(right, np.ndarray):
+            return left.dtype == right.dtype and np.array_equal(left, right, equal_nan=True)
+        return left == right
+
+    return all(equal(value, vars(b)[name]) for name, value in vars(a).items() if name != "source")
+
+
+# -- meaning ---------------------------------------------------------------------------------------------
+
+
+def test_reads_configurations_targets_and_si_units(write: WriteFile) -> None:
+    data = read_csv(write(PLAIN))
+    assert data.labels == ("P1", "P2")
+    assert data.targets == ("tcp", "side")
+    assert data.joint_kinds == ("revolute", "revolute")
+    assert data.joints.tolist() == [[math.radians(10), math.radians(-20.5)], [0.0, math.radians(90)]]
+    assert data.configuration.tolist() == [0, 0, 1]
+    assert data.target.tolist() == [0, 1, 0]
+    assert data.position[:2].tolist() == [[1.0, 0.002, 0.003], [1.001, 0.002, 0.003]]
+    assert data.source.endswith("data.csv")
+    assert (data.quaternion, data.sigma, data.sigma_rot, data.references) == (None, None, None, None)
+
+
+def test_an_empty_coordinate_is_a_missing_position_and_the_row_stays(write: WriteFile) -> None:
+    data = read_csv(write(PLAIN))
+    assert data.has_position.tolist() == [True, True, False]
+    assert np.isnan(data.position[2]).all()
+    assert csv_text(data).splitlines()[-1] == "P2,0.0,90.0,tcp,,,"
+
+
+def test_columns_come_in_any_order(write: WriteFile) -> None:
+    data = read_csv(write("z [mm],target,joint_2 [deg],y [mm],configuration,x [mm],joint_1 [deg]\n3,t,2,2,c,1,1"))
+    assert data.position.tolist() == [[0.001, 0.002, 0.003]]
+    assert data.joints.tolist() == [[math.radians(1), math.radians(2)]]
+
+
+@pytest.mark.parametrize(("unit", "metres"), [("mm", 0.0015), ("m", 1.5), ("um", 1.5e-6), ("in", 1.5 * 0.0254)])
+def test_length_units(write: WriteFile, unit: str, metres: float) -> None:
+    data = read_csv(
+        write(f"configuration,joint_1 [{unit}],target,x [{unit}],y [mm],z [m],sigma [{unit}]\nc,1.5,t,1.5,2,3,1.5\n")
+    )
+    assert data.joint_kinds == ("prismatic",)
+    assert data.joints[0, 0] == pytest.approx(metres, rel=1e-15)
+    assert data.position[0].tolist() == pytest.approx([metres, 0.002, 3.0], rel=1e-15)
+    assert data.sigma is not None
+    assert data.sigma[0] == pytest.approx(metres, rel=1e-15)
+
+
+@pytest.mark.parametrize(("unit", "radians"), [("mrad", 2e-3), ("rad", 2.0), ("deg", math.radians(2))])
+def test_rotation_sigma_units(write: WriteFile, unit: str, radians: float) -> None:
+    header = HEADER.replace("[deg]", "[rad]")
+    data = read_csv(write(f"{header},qw,qx,qy,qz,sigma_rot [{unit}]\nc,1,2,t,1,2,3,1,0,0,0,2\n"))
+    assert data.joints.tolist() == [[1.0, 2.0]]
+    assert data.sigma_rot is not None
+    assert data.sigma_rot[0] == pytest.approx(radians, rel=1e-15)
+
+
+def test_quaternions_are_normalised_and_may_be_missing(write: WriteFile) -> None:
+    rows = "a,1,2,t,1,2,3,0.5,0.5,0.5,0.5005\na,1,2,u,1,2,3,,0,0,0\n"
+    data = read_csv(write(f"{HEADER},qw,qx,qy,qz\n{rows}"))
+    assert data.quaternion is not None
+    assert np.linalg.norm(data.quaternion[0]) == pytest.approx(1.0, abs=1e-15)
+    assert np.isnan(data.quaternion[1]).all()
+    assert data.has_orientation.tolist() == [True, False]
+    assert data.has_position.tolist() == [True, True]
+
+
+def test_quaternion_columns_without_any_entry_are_no_orientation(write: WriteFile) -> None:
+    assert read_csv(write(f"{HEADER},qw,qx,qy,qz\na,1,2,t,1,2,3,,,,\n")).quaternion is None
+
+
+def test_references_stand_beside_the_targets(write: WriteFile) -> None:
+    rows = "a,1,2,b1,target,1,2,3\na,1,2,base,reference,4,5,6\nb,3,4,base,reference,,5,6\n"
+    data = read_csv(write(f"{HEADER.replace('target', 'target,role')}\n{rows}"))
+    assert (data.targets, data.labels, len(data.target)) == (("b1",), ("a", "b"), 1)
+    assert data.references is not None
+    assert (data.references.targets, data.references.labels) == (("base",), ("a", "b"))
+    assert data.references.configuration.tolist() == [0, 1]
+    assert data.references.has_position.tolist() == [True, False]
+    assert data.references.position[0].tolist() == [0.004, 0.005, 0.006]
+
+
+def test_sigma_may_lack_where_there_is_no_reading_and_for_the_references(write: WriteFile) -> None:
+    rows = "a,1,2,t,target,1,2,3,0.01\na,1,2,u,target,,2,3,\na,1,2,base,reference,1,2,3,\n"
+    data = read_csv(write(f"{HEADER.replace('target', 'target,role')},sigma [mm]\n{rows}"))
+    assert data.sigma is not None
+    assert data.sigma[0] == pytest.approx(1e-5)
+    assert np.isnan(data.sigma[1])
+    assert data.references is not None
+    assert data.references.sigma is None
+
+
+def test_an_empty_sigma_column_declares_nothing(write: WriteFile) -> None:
+    assert read_csv(write(f"{HEADER},sigma [mm]\na,1,2,t,1,2,3,\n")).sigma is None
+
+
+def test_windows_files_quotes_blank_lines_and_blanks(write: WriteFile) -> None:
+    content = PLAIN.replace("tcp", '"big, ""red"" ball"').replace(",2,3", " , 2 ,3 ").replace("\n", "\r\n")
+    data = read_csv(write(b"\xef\xbb\xbf\r\n" + content.encode() + b"\r\n\r\n"))
+    assert data.targets == ('big, "red" ball', "side")
+    assert data.position[0].tolist() == [1.0, 0.002, 0.003]
+
+
+def test_a_target_may_be_measured_twice_at_a_configuration(write: WriteFile) -> None:
+    assert len(read_csv(write(f"{HEADER}\na,1,2,t,1,2,3\na,1,2,t,1,2,3.1\n")).target) == 2
+
+
+# -- refusals --------------------------------------------------------------------------------------------
+
+Q = ",qw,qx,qy,qz"
+
+
+@pytest.mark.parametrize(
+    ("content", "parts"),
+    [
+        ("", ["the file is empty"]),
+        ("  \n\n", ["the file is empty"]),
+        (HEADER, ["a header and no rows", "exported whole"]),
+        (PLAIN.replace(",", ";"), ["line 1", "not separated by commas", "semicolons", "import table"]),
+        (PLAIN.replace(",", "\t"), ["line 1", "tabs", "allowed: commas", "Save the file with commas"]),
+        (PLAIN.replace(",", " "), ["line 1", "blanks", "import table"]),
+        (PLAIN.replace(",", "|"), ["line 1", "vertical bars"]),
+        (
+            PLAIN.replace("x [mm]", "x"),
+            ["line 1, column 5, x", "no unit is given", "mm, m, um, in", "never guessed"],
+        ),
+        (PLAIN.replace("x [mm]", "x []"), ["no unit is given"]),
+        (PLAIN.replace("x [mm]", "x [cm]"), ["line 1, column 5", "'cm'", "allowed: mm, m, um, in"]),
+        (PLAIN.replace("x [mm]", "x [deg]"), ["'deg'", "allowed: mm, m, um, in"]),
+        (
+            PLAIN.replace("joint_1 [deg]", "joint_1"),
+            ["column 2, joint_1", "no unit", "deg, rad, mm, m, um, in"],
+        ),
+        (PLAIN.replace("joint_1 [deg]", "joint_1 [mrad]"), ["'mrad'", "deg, rad, mm"]),
+        (f"{HEADER}{Q},sigma_rot [mm]\na,1,2,t,1,2,3,1,0,0,0,1\n", ["'mm'", "mrad, rad, deg"]),
+        (
+            PLAIN.replace("target", "target [mm]"),
+            ["column 4", "takes no unit", "allowed: target", "Remove the unit"],
+        ),
+        (
+            PLAIN.replace("target", "taget"),
+            ["line 1, column 4", "not known", "'taget'", "Did you mean target?"],
+        ),
+        (PLAIN.replace("x [mm]", "X [mm]"), ["'X [mm]'", "Did you mean x [mm]?"]),
+        (PLAIN.replace("x [mm]", "x (mm)"), ["'x (mm)'", "Did you mean x [mm]?"]),
+        (PLAIN.replace("x [mm]", "x [mm] [mm]"), ["'x [mm] [mm]'", "Did you mean x [mm]?"]),
+        (PLAIN.replace("joint_1 [", "Joint 1 ["), ["'Joint 1 [deg]'", "Did you mean joint_1 [deg]?"]),
+        (
+            PLAIN.replace("target", "???"),
+            ["'???'", "allowed: configuration, joint_1 [deg] ..", "leave it out"],
+        ),
+        (PLAIN.replace("target", ""), ["column 4", "the column has no name"]),
+        (
+            PLAIN.replace("y [mm]", "x [m]"),
+            ["column 6 as well as column 5", "column x is there twice", "Remove one"],
+        ),
+        (PLAIN.replace("joint_2", "joint_1"), ["joint_1 is there twice"]),
+        (
+            PLAIN.replace("joint_2", "joint_3"),
+            ["joint_2 is missing", "joint_1, joint_3", "without a gap", "Add joint_2"],
+        ),
+        (PLAIN.replace("joint_1", "joint_3"), ["joint_1 is missing", "joint_2, joint_3"]),
+        (PLAIN.replace("joint_1", "joint_0"), ["'joint_0 [deg]'", "not known"]),
+        (f"{HEADER}{Q[:-3]}\na,1,2,t,1,2,3,1,0,0\n", ["line 1", "not complete", "qw, qx, qy", "Add qz"]),
+        (
+            f"{HEADER},sigma_rot [mrad]\na,1,2,t,1,2,3,1\n",
+            ["sigma_rot", "no orientation", "remove sigma_rot"],
+        ),
+        (PLAIN + "P3,1\n", ["line 5", "not as many cells", "2 cells", "allowed: 7 cells", "missing cell"]),
+        (PLAIN + "P3,1,2,tcp,1,5,2,3\n", ["line 5", "8 cells", "decimal commas"]),
+        (
+            PLAIN.replace(",2,3", ',"2,5",3'),
+            ["line 2, column y [mm]", "decimal comma", "'2,5'", "decimal: comma"],
+        ),
+        (
+            PLAIN.replace("1001", "1001?"),
+            ["line 3, column x [mm]", "a number belongs here", "'1001?'", "finite"],
+        ),
+        (PLAIN.replace("1001", "1_001"), ["line 3, column x [mm]", "'1_001'"]),
+        (PLAIN.replace("1001", "١"), ["line 3, column x [mm]", "a number belongs here"]),
+        (PLAIN.replace("1001", "NaN"), ["line 3, column x [mm]", "NaN and infinity", "Leave the cell empty"]),
+        (PLAIN.replace("1001", "-inf"), ["NaN and infinity", "'-inf'"]),
+        (PLAIN.replace("1001", "1e999"), ["line 3, column x [mm]", "too large", "'1e999'"]),
+        (
+            PLAIN.replace("10.0", "nan"),
+            ["line 3, column joint_1 [deg]", "NaN and infinity", "Fill in the number"],
+        ),
+        (
+            PLAIN.replace("10.0", ""),
+            ["line 3, column joint_1 [deg]", "the cell is empty", "allowed: a number"],
+        ),
+        (
+            PLAIN.replace("side", ""),
+            ["line 3, column target", "the cell is empty", "Only readings may be missing"],
+        ),
+        (PLAIN.replace("P2", " "), ["line 4, column configuration", "the cell is empty"]),
+        (PLAIN.replace("P2", '"P\n2"'), ["line 5, column configuration", "line break", "quote"]),
+        (
+            PLAIN.replace("10.0", "10.1"),
+            ["line 3", "joint_1 [deg]", "'P1'", "'10.1'", "10, as on line 2", "another label"],
+        ),
+        (PLAIN.replace("side", '"side'), ["quotes do not fit", "Close every quote"]),
+        (PLAIN.replace("side", '"si"de"'), ["line 3", "quotes do not fit"]),
+        (
+            f"{HEADER},role\na,1,2,t,1,2,3,base\n",
+            ["line 2, column role", "'base'", "target or reference", "beside"],
+        ),
+        (f"{HEADER},role\na,1,2,t,1,2,3,\n", ["line 2, column role", "the cell is empty"]),
+        (f"{HEADER},role\na,1,2,t,1,2,3,reference\n", ["all rows are reference points"]),
+        (
+            f"{HEADER},role\na,1,2,t,1,2,3,target\nb,1,2,t,1,2,3,reference\n",
+            ["lines 2 and 3", "'t' is a target on one line and a reference", "different names"],
+        ),
+        (
+            f"{HEADER}{Q}\na,1,2,t,1,2,3,1,0,0,0.1\n",
+            ["line 2, columns qw qx qy qz", "length 1.00499", "1 within 0.001"],
+        ),
+        (f"{HEADER}{Q}\na,1,2,t,1,2,3,0,0,0,0\n", ["length 0"]),
+        (
+            f"{HEADER},sigma [mm]\na,1,2,t,1,2,3,0\n",
+            ["line 2, column sigma [mm]", "above zero", "'0'", "column out"],
+        ),
+        (f"{HEADER},sigma [mm]\na,1,2,t,1,2,3,1\na,1,2,u,1,2,3,-1\n", ["line 3, column sigma [mm]", "'-1'"]),
+        (
+            f"{HEADER},sigma [mm]\na,1,2,t,1,2,3,1\na,1,2,u,1,2,3,\n",
+            [
+                "line 3, column sigma",
+                "no sigma, and others have one",
+                "for all readings, or for none",
+                "Fill",
+            ],
+        ),
+        (
+            f"{HEADER}{Q},sigma_rot [mrad]\na,1,2,t,1,2,3,1,0,0,0,1\na,1,2,u,1,2,3,1,0,0,0,\n",
+            ["line 3, column sigma_rot", "for all readings, or for none"],
+        ),
+    ],
+)
+def test_refusals_name_the_place_what_came_what_is_allowed_and_the_cure(
+    write: WriteFile, content: str, parts: list[str]
+) -> None:
+    with pytest.raises(InputError) as caught:
+        read_csv(write(content))
+    for part in ["data.csv", *parts]:
+        assert part in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["configuration", "joint_1 [deg]", "target", "x [mm]", "y [mm]", "z [mm]"])
+def test_each_required_column_is_asked_for(write: WriteFile, name: str) -> None:
+    header = ",".join(n for n in HEADER.replace("joint_2 [deg],", "").split(",") if n != name)
+    with pytest.raises(InputError, match=re.escape(f"Add {name}")) as caught:
+        read_csv(write(f"{header}\n1,2,3,4,5\n"))
+    assert "is missing" in str(caught.value)
+
+
+def test_a_file_in_another_encoding_is_refused(write: WriteFile) -> None:
+    with pytest.raises(InputError, match="Save it as UTF-8"):
+        read_csv(write(PLAIN.encode("utf-16")))
+
+
+def test_a_file_that_is_not_there_is_refused_with_the_nearest(write: WriteFile) -> None:
+    path = write(PLAIN)
+    with pytest.raises(InputError, match=r"Did you mean data\.csv"):
+        read_csv(path.with_name("date.csv"))
+
+
+def test_writing_refuses_units_and_configurations_without_readings(write: WriteFile) -> None:
+    data = read_csv(write(PLAIN))
+    with pytest.raises(InputError, match=r"length unit: .*'cm'; allowed: mm, m, um, in"):
+        csv_text(data, length_unit="cm")
+    with pytest.raises(InputError, match=r"angle unit: .*'grad'; allowed: deg, rad"):
+        csv_text(data, angle_unit="grad")
+    unseen = Dataset(**(vars(data) | {"configuration": np.zeros(3, dtype=np.intp)}))
+    with pytest.raises(InputError, match=r"configuration P2: .*no reading.* missing readings"):
+        csv_text(unseen)
+
+
+# -- writing ---------------------------------------------------------------------------------------------
+
+
+def test_written_text_is_as_expected(write: WriteFile) -> None:
+    rows = "a,0.1,-3,t,target,0.1,2,3,1,0,0,0,0.02,0.5\na,0.1,-3,base,reference,1,2,3,,,,,0.02,\n"
+    header = f"{HEADER.replace('joint_2 [deg]', 'joint_2 [mm]').replace('target', 'target,role')}{Q}"
+    text = csv_text(read_csv(write(f"{header},sigma [mm],sigma_rot [mrad]\n{rows}")))
+    assert text == (
+        "configuration,joint_1 [deg],joint_2 [mm],target,role,x [mm],y [mm],z [mm],qw,qx,qy,qz,"
+        "sigma [mm],sigma_rot [mrad]\n"
+        "a,0.1,-3.0,t,target,0.1,2.0,3.0,1.0,0.0,0.0,0.0,0.02,0.5\n"
+        "a,0.1,-3.0,base,reference,1.0,2.0,3.0,,,,,0.02,\n"
+    )
+
+
+def test_written_configuration_by_configuration(write: WriteFile) -> None:
+    data = read_csv(write(f"{HEADER}\na,1,2,t,1,2,3\nb,3,4,t,1,2,3\na,1,2,u,1,2,3\n"))
+    assert [line[0] for line in csv_text(data).splitlines()[1:]] == ["a", "a", "b"]
+
+
+def _lengths(scale: float) -> st.SearchStrategy[float]:
+    return st.floats(-scale, scale, allow_subnormal=False).map(lambda v: v if abs(v) > 1e-9 else 0.0)
+
+
+_NAMES = st.text(st.characters(codec="utf-8", exclude_categories=("C", "Z")) | st.just(" "), min_size=1).filter(
+    lambda name: name == name.strip() != ""
+)
+
+
+@st.composite
+def datasets(draw: st.DrawFn) -> Dataset:
+    """Datasets of any content, configuration by configuration, as a file can hold them."""
+    labels = tuple(draw(st.lists(_NAMES, min_size=1, max_size=4, unique=True)))
+    names = draw(st.lists(_NAMES, min_size=2, max_size=5, unique=True))
+    kinds = tuple(draw(st.lists(st.sampled_from(["revolute", "prismatic"]), min_size=1, max_size=3)))
+    joints = np.array([[draw(_lengths(7.0)) for _ in kinds] for _ in labels])
+    oriented, sigma, sigma_rot = draw(st.booleans()), draw(st.booleans()), draw(st.booleans())
+
+    def part(targets: tuple[str, ...], references: Dataset | None) -> Dataset:
+        count = len(labels) * len(targets)
+        position = np.array([[draw(_lengths(100.0)) for _ in range(3)] for _ in range(count)])
+        q = np.array([[draw(st.floats(0.1, 1.0)) for _ in range(4)] for _ in range(count)])
+        q /= np.linalg.norm(q, axis=1, keepdims=True)
+        position[np.array(draw(st.lists(st.booleans(), min_size=count, max_size=count)))] = np.nan
+        q[np.array(draw(st.lists(st.booleans(), min_size=count, max_size=count)))] = np.nan
+        spread = np.array([draw(st.floats(1e-7, 1.0)) for _ in range(count)])
+        return Dataset(
+            source="drawn",
+            labels=labels,
+            joints=joints,
+            joint_kinds=kinds,
+            targets=targets,
+            configuration=np.repeat(np.arange(len(labels), dtype=np.intp), len(targets)),
+            target=np.tile(np.arange(len(targets), dtype=np.intp), len(labels)),
+            position=position,
+            quaternion=q if oriented and not np.isnan(q).all() else None,
+            sigma=spread if sigma else None,
+            sigma_rot=spread if oriented and sigma_rot else None,
+            references=references,
+        )
+
+    beside = part(tuple(names[-1:]), None) if draw(st.booleans()) else None
+    return part(tuple(names[:-1]), beside)
+
+
+@settings(max_examples=150, deadline=None)
+@given(datasets(), st.sampled_from(["mm", "m", "um", "in"]), st.sampled_from(["deg", "rad"]))
+def test_writing_what_was_read_changes_nothing(drawn: Dataset, length: str, angle: str) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "data.csv"
+        path.write_text(csv_text(drawn, length, angle), encoding="utf-8", newline="")
+        read = read_csv(path)
+        path.write_text(written := csv_text(read, length, angle), encoding="utf-8", newline="")
+        again = read_csv(path)
+    assert same(read, again)
+    assert csv_text(again, length, angle) == written
+    assert (read.labels, read.targets, read.joint_kinds) == (drawn.labels, drawn.targets, drawn.joint_kinds)
+    np.testing.assert_allclose(read.joints, drawn.joints, rtol=1e-15)
+    np.testing.assert_allclose(read.position, drawn.position, rtol=1e-15)
+    assert (read.quaternion is None) == (drawn.quaternion is None)
+    if read.quaternion is not None and drawn.quaternion is not None:
+        np.testing.assert_allclose(read.quaternion, drawn.quaternion, rtol=1e-14)
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.text(max_size=200) | st.text(st.sampled_from('a1.,;"\n\r\t -e'), max_size=60).map(lambda t: f"{HEADER}\n{t}"))
+def test_any_text_is_read_or_refused_and_nothing_else(text: str) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "data.csv"
+        path.write_bytes(text.encode("utf-8", "surrogatepass"))
+        with contextlib.suppress(InputError):
+            read_csv(path)
+
+
+def test_it_is_fast(write: WriteFile) -> None:
+    generator = np.random.default_rng(1)
+    numbers = generator.normal(size=(1500, 9))
+    numbers[:, :6] = np.repeat(numbers[::3, :6], 3, axis=0)
+    header = ",".join(["configuration", *(f"joint_{n} [deg]" for n in range(1, 7)), "target", "x [mm],y [mm],z [mm]"])
+    rows = [
+        f"{row // 3}," + ",".join(map(repr, values[:6])) + f",t{row % 3}," + ",".join(map(repr, values[6:])) + ",0.02"
+        for row, values in enumerate(numbers.tolist())
+    ]
+    path = write("\n".join([f"{header},sigma [mm]", *rows]))
+    taken = []
+    for _ in range(5):
+        start = time.perf_counter()
+        assert read_csv(path).configurations == 500
+        taken.append(time.perf_counter() - start)
+    assert min(taken) < 0.05

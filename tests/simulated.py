@@ -1,0 +1,24 @@
+"""Simulated campaigns for tests: the twin's truth, seen only through readings."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.truths import truth_twin
+from truearm.measurement.twin import Twin, measure
+from truearm.robots import load_robot
+
+
+def campaign(robot: str, poses: int, noise: float, seed: int, truth: str = "random") -> tuple[Twin, Dataset]:
+    """Return a twin and what an instrument read of it; noise in metres."""
+    rng = np.random.default_rng(seed)
+    nominal = load_robot(robot)
+    twin = truth_twin(nominal, truth, rng)
+    return twin, measure(twin, nominal.random_configurations(poses, rng), noise, rng)
+
+
+def more_of(twin: Twin, poses: int, noise: float, seed: int) -> Dataset:
+    """Return readings of the same twin at other configurations."""
+    rng = np.random.default_rng(seed)
+    return measure(twin, twin.robot.random_configurations(poses, rng), noise, rng)

@@ -87,7 +87,7 @@ class Calibration:
     @cached_property
     def robot(self) -> Robot:
         """The calibrated robot, base and targets included."""
-        return replace(self.fit.robot, history=(*self.fit.robot.history, self.history))
+        return replace(self.fit.robot, history=(*self.fit.robot.history, self.history), tools={}, truths={})
 
     @property
     def status(self) -> Status:
@@ -147,7 +147,7 @@ class Calibration:
 
         folder = writable_folder(Path(folder))
         progress("drawing the report")
-        urdf = calibrated_urdf(self.urdf, self.robot)[0].decode() if self.urdf else urdf_text(self.robot)[0]
+        urdf = calibrated_urdf(self.urdf, self.robot)[0] if self.urdf else urdf_text(self.robot)[0]
         report = Report(
             fit=self.fit,
             data=self.data,
@@ -160,7 +160,7 @@ class Calibration:
             command=self.command,
             history=self.history,
         )
-        files = {
+        files: dict[str, str | bytes] = {
             "calibrated.yaml": robot_text(self.robot),
             "result.json": json.dumps(self.result(), indent=2, allow_nan=False) + "\n",
             "report.html": report_html(report),

@@ -113,7 +113,7 @@ def writable_folder(folder: Path) -> Path:
     return folder
 
 
-def write_files(folder: Path, files: Mapping[str, str]) -> None:
+def write_files(folder: Path, files: Mapping[str, str | bytes]) -> None:
     """Write several files into a folder; they are put in place only once all of them are on disk."""
     writable_folder(folder)
     staged: list[tuple[Path, Path]] = []
@@ -125,8 +125,8 @@ def write_files(folder: Path, files: Mapping[str, str]) -> None:
                 raise InputError("this is a folder, a file is to be written here", where=str(target))
             handle, temporary = tempfile.mkstemp(prefix=f".{name}.", dir=folder)
             staged.append((Path(temporary), target))
-            with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as stream:
-                stream.write(text)
+            with os.fdopen(handle, "wb") as stream:
+                stream.write(text if isinstance(text, bytes) else text.encode())
             Path(temporary).chmod(0o666 & ~_umask())
         for temporary_path, target in staged:
             temporary_path.replace(target)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from typing import Annotated
 
@@ -15,6 +16,10 @@ from truearm.cli.starting import demo, example, new_robot
 from truearm.cli.validate import validate
 from truearm.errors import InputError
 from truearm.version import __version__
+
+# A calibration's matrices are small: a second BLAS thread gains nothing on a quiet machine and waits for its turn on
+# a busy one. NumPy reads this when it is first imported, which is after here.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 app = typer.Typer(
     name="truearm",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
@@ -28,13 +29,11 @@ _ERROR_SCALE: Final = [[0.0, "#c3d5e3"], [0.5, "#2c6f9c"], [0.75, "#4b3a63"], [1
 _SIGNED_SCALE: Final = [[0.0, "#b3261e"], [0.5, "#ffffff"], [1.0, AFTER]]
 _AXIS_COLOURS: Final = ("#b3261e", "#3b7d3b", "#2456a6")
 
-_CAMERA: Final = {"eye": {"x": 1.45, "y": 1.45, "z": 0.75}, "center": {"x": 0, "y": 0, "z": -0.15}}
+_CAMERA: Final = {"eye": {"x": 1.55, "y": 1.55, "z": 0.8}, "center": {"x": 0, "y": 0, "z": -0.15}}
 
 _BINS: Final = 40
 # Largest error over median error after, beyond which equal bins would crowd everything into the first one.
 _LOGARITHMIC: Final = 12.0
-#: A robust loss that leaves a reading less than this share of its weight did not believe it.
-DOUBTED: Final = 0.5
 
 
 def histogram(before: Array, after: Array, unit: str, what: str) -> Figure:
@@ -55,7 +54,7 @@ def histogram(before: Array, after: Array, unit: str, what: str) -> Figure:
         edges = np.geomspace(low * (1 - 1e-9), top * (1 + 1e-9), _BINS + 1)
     else:
         edges = np.linspace(0.0, top * (1 + 1e-9), _BINS + 1)
-    ranges = [f"{a:.3g} to {b:.3g} {unit}" for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    ranges = [f"{a:.3g} to {b:.3g} {unit}" for a, b in pairwise(edges)]
     traces = [
         {
             "type": "bar",
@@ -204,7 +203,7 @@ def residuals(
             {
                 "type": "scatter",
                 "mode": "markers",
-                "name": "single readings with less than half weight",
+                "name": "single readings that the loss doubted",
                 "x": (training[configuration] + 1).tolist(),
                 "y": rounded(errors[marked], 4),
                 "customdata": [
@@ -213,7 +212,7 @@ def residuals(
                 ],
                 "marker": {"color": _MARK, "symbol": "x-thin", "size": 8, "line": {"color": _MARK, "width": 1.5}},
                 "hovertemplate": "configuration %{customdata[0]}, target %{customdata[1]}<br>"
-                "less than half weight, %{y:.3g} mm<extra></extra>",
+                "less than half of a typical weight, %{y:.3g} mm<extra></extra>",
             }
         )
     shown = np.concatenate([np.asarray(trace["y"], float) for trace in traces]) if traces else np.ones(1)
@@ -298,7 +297,13 @@ def _logarithmic_axis(title: str, low: float, high: float) -> Figure:
 
 
 def _scene_axis(title: str) -> Figure:
-    return {"title": {"text": title}, "gridcolor": "#d5d8db", "showbackground": False, "zeroline": False}
+    return {
+        "title": {"text": title},
+        "gridcolor": "#d5d8db",
+        "showbackground": False,
+        "zeroline": False,
+        "showspikes": False,
+    }
 
 
 def _figure(traces: list[Figure], height: int, **layout: Any) -> Figure:

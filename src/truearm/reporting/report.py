@@ -25,7 +25,6 @@ from truearm.notices import Notice
 from truearm.reporting.figures import (
     AFTER,
     BEFORE,
-    DOUBTED,
     Figure,
     correlation_map,
     histogram,
@@ -44,6 +43,8 @@ from truearm.reporting.tables import (
 from truearm.version import __version__
 
 _FRAMES: Final = ("base", "target")
+#: A reading whose weight is less than this share of the median weight was not believed.
+_DOUBTED: Final = 0.5
 #: Characters that could end a script element or a line of JavaScript, as JSON escapes them.
 _UNSAFE: Final = {ord(c): f"\\u{ord(c):04x}" for c in "<>&\u2028\u2029"}
 
@@ -129,13 +130,12 @@ class Report:
         return drawn
 
     def _doubted(self) -> NDArray[np.bool_]:
-        """Return which training readings a robust loss left less than half their weight."""
+        """Return which training readings a robust loss left less than half the weight of a typical one.
+
+        The weights of ``l1`` are 1 over the residual, so a weight says something only beside the others.
+        """
         weight = self.fit.weight
-        used = weight[np.isfinite(weight)]
-        # Huber and Cauchy leave a good reading 1. The weights of l1 are 1 over the residual and exceed 1, so
-        # there a typical reading is the measure.
-        full = float(np.median(used)) if len(used) and used.max() > 1.0 + 1e-9 else 1.0
-        doubted: NDArray[np.bool_] = np.nan_to_num(weight, nan=full) < DOUBTED * full
+        doubted: NDArray[np.bool_] = weight < _DOUBTED * np.nanmedian(weight)
         return doubted
 
 

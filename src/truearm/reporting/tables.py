@@ -205,5 +205,5 @@ def parameter_sentence(rows: Sequence[ParameterRow]) -> str:
     sentence = ", ".join(f"{count} {words.get(status, status)}" for status, count in found.items())
     believed = sum(row.believed for row in rows)
     if believed:
-        sentence += f"; the readings say next to nothing about {believed} of them, which stay at their start"
+        sentence += f"; of the identified, the readings say next to nothing about {believed}"
     return f"{sentence}."

@@ -1,0 +1,17 @@
+from importlib.metadata import version as installed_version
+
+project = "truearm"
+author = "the truearm developers"
+copyright = author  # noqa: A001
+release = version = installed_version("truearm")
+
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+source_suffix = {".md": "markdown"}
+exclude_patterns = ["_build"]
+html_theme = "furo"
+html_title = "truearm"
+myst_enable_extensions = ["colon_fence", "dollarmath"]
+myst_heading_anchors = 3
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"
+napoleon_google_docstring = False

@@ -1,0 +1,221 @@
+"""What others rely on: names, files, JSON keys and exit codes of the command."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.cli.conftest import Truearm
+
+import truearm as package
+from truearm.measurement.readers.canonical import csv_text, read_csv
+from truearm.robots import load_robot
+
+IDS = ["irb120", "irb1600", "katana450", "kr5", "li3", "lrmate200ic", "puma560", "ur10", "ur5"]
+
+
+def test_version_and_help_need_no_scipy_and_no_numpy() -> None:
+    script = (
+        "import sys\nfrom truearm.cli import main\nsys.argv = ['truearm', {!r}]\n"
+        "try:\n    main()\nexcept SystemExit:\n    pass\n"
+        "print([m for m in ('scipy', 'numpy', 'plotly', 'pydantic') if m in sys.modules])"
+    )
+    for option in ("--version", "--help"):
+        done = subprocess.run([sys.executable, "-c", script.format(option)], capture_output=True, text=True, check=True)
+        assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_version(truearm: Truearm) -> None:
+    assert truearm("--version").out.strip() == f"truearm {package.__version__}"
+
+
+def test_robots(truearm: Truearm) -> None:
+    listed = json.loads(truearm("robots", "--json").out)
+    assert sorted(r["id"] for r in listed) == IDS
+    plain = truearm("robots").out
+    assert all(robot_id in plain for robot_id in IDS)
+
+
+@pytest.mark.parametrize("robot_id", IDS)
+def test_show(truearm: Truearm, robot_id: str) -> None:
+    shown = json.loads(truearm("show", robot_id, "--json").out)
+    assert shown["name"] == robot_id
+    assert shown["source"]
+    assert len(shown["joints"]) == len(load_robot(robot_id).joints)
+    assert truearm("show", robot_id).code == 0
+
+
+def test_calibrate_writes_its_files_and_prints_one_object(truearm: Truearm, small: Path, tmp_path: Path) -> None:
+    out = tmp_path / "new" / "result"
+    run = truearm("calibrate", "irb120", small / "data.csv", "--model", "geometric", "--out", out, "--json")
+    assert run.code == 0
+    summary = json.loads(run.out)
+    assert list(summary) == ["status", "warnings", "nominal", "train", "validation"]
+    assert summary["status"] == "converged"
+    assert (summary["train"]["configurations"], summary["validation"]["configurations"]) == (28, 12)
+    assert summary["nominal"]["configurations"] == 12
+    for part in ("nominal", "train", "validation"):
+        assert list(summary[part]["position_mm"]) == ["mean", "rms", "p95", "max"]
+    assert summary["validation"]["position_mm"]["mean"] < summary["nominal"]["position_mm"]["mean"] / 3
+    assert sorted(p.name for p in out.iterdir()) == [
+        "calibrated.urdf",
+        "calibrated.yaml",
+        "report.html",
+        "result.json",
+    ]
+    result = json.loads((out / "result.json").read_text())
+    assert {k: result[k] for k in summary} == summary
+    assert result["truearm"] == "truearm-result/1"
+    rows = {row["name"]: row for row in result["parameters"]}
+    assert list(rows["theta_offset_2"]) == ["name", "unit", "nominal", "value", "deviation", "informed", "status"]
+    assert rows["theta_offset_2"]["nominal"] == pytest.approx(-90)
+    assert rows["a_3"]["unit"] == "mm"
+    assert rows["a_3"]["informed"] > 0.9
+
+
+def test_the_split_is_the_documented_one(small: Path) -> None:
+    run = package.calibrate("irb120", small / "data.csv", train=25, seed=7)
+    order = np.random.default_rng(7).permutation(40)
+    assert run.training.tolist() == order[:25].tolist()
+    assert run.held_out.tolist() == order[25:].tolist()
+
+
+def test_runs_are_reproducible_byte_for_byte(truearm: Truearm, small: Path, tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        truearm("calibrate", "irb120", small / "data.csv", "--out", tmp_path / name)
+    for file in ("calibrated.yaml", "result.json", "calibrated.urdf", "report.html"):
+        assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes()
+
+
+def test_validate_works_on_new_data_in_the_same_frames(truearm: Truearm, small: Path, tmp_path: Path) -> None:
+    data = read_csv(small / "data.csv")
+    first, second = tmp_path / "first.csv", tmp_path / "second.csv"
+    first.write_text(csv_text(data.of_configurations(np.arange(30))))
+    second.write_text(csv_text(data.of_configurations(np.arange(30, 40))))
+    truearm("calibrate", "irb120", first, "--train", "all", "--out", tmp_path / "out")
+    summary = json.loads(truearm("validate", tmp_path / "out" / "calibrated.yaml", second, "--json").out)
+    assert summary["configurations"] == 10
+    assert summary["position_mm"]["mean"] < 0.2
+    assert "mean 0." in truearm("validate", tmp_path / "out" / "calibrated.yaml", second).out
+
+
+def test_a_calibrated_robot_is_a_robot_like_any_other(truearm: Truearm, small: Path, tmp_path: Path) -> None:
+    truearm("calibrate", "irb120", small / "data.csv", "--out", tmp_path)
+    again = json.loads(
+        truearm(
+            "calibrate", tmp_path / "calibrated.yaml", small / "data.csv", "--out", tmp_path / "again", "--json"
+        ).out
+    )
+    assert again["nominal"]["position_mm"]["mean"] == pytest.approx(again["validation"]["position_mm"]["mean"], rel=0.1)
+    shown = json.loads(truearm("show", tmp_path / "again" / "calibrated.yaml", "--json").out)
+    assert len(shown["history"]) == 2
+    assert "40 configurations of data.csv (sha256" in shown["history"][0]
+
+
+def test_nothing_held_out_is_said_plainly(truearm: Truearm, small: Path, tmp_path: Path) -> None:
+    run = truearm("calibrate", "irb120", small / "data.csv", "--train", "all", "--out", tmp_path, "--json")
+    summary = json.loads(run.out)
+    assert summary["validation"] is None
+    assert summary["warnings"][0]["code"] == "nothing-held-out"
+    assert (
+        "Nothing was held out"
+        in truearm("calibrate", "irb120", small / "data.csv", "--train", "all", "--out", tmp_path).out
+    )
+
+
+@pytest.mark.parametrize("model", ["offsets", "joints", "geometric"])
+@pytest.mark.parametrize("redundancy", ["prior", "drop"])
+def test_every_model(truearm: Truearm, small: Path, tmp_path: Path, model: str, redundancy: str) -> None:
+    run = truearm(
+        "calibrate", "irb120", small / "data.csv", "--model", model, "--redundancy", redundancy, "--out", tmp_path,
+        "--json",
+    )  # fmt: skip
+    assert run.code == 0, run.err
+    codes = {w["code"] for w in json.loads(run.out)["warnings"]}
+    assert ("redundant" in codes) == (redundancy == "drop")
+    assert ("urdf-partial" in codes) == (model == "joints")
+    names = {row["name"] for row in json.loads((tmp_path / "result.json").read_text())["parameters"]}
+    assert ("gain_1" in names) == (model == "joints")
+
+
+def test_bounds_and_losses(truearm: Truearm, small: Path, tmp_path: Path) -> None:
+    bounds = tmp_path / "bounds.yaml"
+    bounds.write_text(
+        "truearm: truearm-bounds/1\nunits: {length: mm, angle: deg}\nwithin: {a_3: 1e-3, theta_offset: 2}\n"
+    )
+    for loss in ("linear", "huber", "cauchy", "l1"):
+        run = truearm(
+            "calibrate", "irb120", small / "data.csv", "--loss", loss, "--bounds", bounds, "--out", tmp_path, "--json"
+        )
+        assert run.code == 0, run.err
+        assert json.loads(run.out)["status"] == "at-bound"
+        a_3 = next(r for r in json.loads((tmp_path / "result.json").read_text())["parameters"] if r["name"] == "a_3")
+        assert a_3["status"] == "at-bound"
+        assert abs(a_3["value"] - 270) <= 1e-3 + 1e-9
+
+
+def test_simulate_is_seeded_and_declares_its_noise(truearm: Truearm, tmp_path: Path) -> None:
+    for name, seed in (("a", 3), ("b", 3), ("c", 4)):
+        run = truearm(
+            "simulate", "ur5", "--truth", "random", "--poses", 20, "--noise", 0.1, "--seed", seed,
+            "--out", tmp_path / f"{name}.csv",
+        )  # fmt: skip
+        assert run.code == 0
+    assert (tmp_path / "a.csv").read_text() == (tmp_path / "b.csv").read_text() != (tmp_path / "c.csv").read_text()
+    data = read_csv(tmp_path / "a.csv")
+    assert data.configurations == 20
+    assert data.sigma == pytest.approx(1e-4)
+
+
+def test_simulating_a_calibrated_robot_keeps_its_frames(truearm: Truearm, small: Path, tmp_path: Path) -> None:
+    truearm("calibrate", "irb120", small / "data.csv", "--out", tmp_path)
+    truth = tmp_path / "calibrated.yaml"
+    truearm("simulate", "irb120", "--truth", truth, "--poses", 30, "--noise", 0.05, "--out", tmp_path / "sim.csv")
+    summary = json.loads(truearm("validate", truth, tmp_path / "sim.csv", "--json").out)
+    assert summary["position_mm"]["rms"] == pytest.approx(0.05 * 3**0.5, rel=0.15)
+
+
+def test_too_alike_data_end_with_exit_code_3(truearm: Truearm, small: Path, tmp_path: Path) -> None:
+    data = read_csv(small / "data.csv")
+    text = csv_text(data.of_configurations([0, 1]))
+    (tmp_path / "two.csv").write_text(text)
+    run = truearm("calibrate", "irb120", tmp_path / "two.csv", "--train", "1", "--out", tmp_path / "out", "--json")
+    assert run.code == 3
+    summary = json.loads(run.out)
+    assert summary["status"] == "rank-loss"
+    assert "rank-loss" in {w["code"] for w in summary["warnings"]}
+
+
+def test_example_is_a_session_that_runs(truearm: Truearm, tmp_path: Path) -> None:
+    folder = tmp_path / "session"
+    listed = truearm("example", folder).out.split()
+    assert sorted(Path(p).name for p in listed) == ["check.csv", "measurements.csv", "my_robot.yaml", "session.sh"]
+    assert truearm("show", folder / "my_robot.yaml").code == 0
+    run = truearm("calibrate", folder / "my_robot.yaml", folder / "measurements.csv", "--out", folder / "result")
+    assert run.code == 0
+    check = json.loads(truearm("validate", folder / "result" / "calibrated.yaml", folder / "check.csv", "--json").out)
+    assert check["position_mm"]["mean"] < 0.15
+
+
+def test_new_robot_is_a_robot(truearm: Truearm, tmp_path: Path) -> None:
+    assert truearm("new-robot", tmp_path / "mine.yaml").code == 0
+    assert truearm("show", tmp_path / "mine.yaml").code == 0
+
+
+def test_demo_ends_by_naming_its_report(truearm: Truearm, tmp_path: Path) -> None:
+    run = truearm("demo", "--out", tmp_path / "demo")
+    assert run.code == 0
+    assert str(tmp_path / "demo" / "report.html") in run.out.splitlines()[-1]
+    result = json.loads((tmp_path / "demo" / "result.json").read_text())
+    noise = 0.03 * (8 / np.pi) ** 0.5
+    assert 2 * noise < result["validation"]["position_mm"]["mean"] < result["nominal"]["position_mm"]["mean"] / 2
+
+
+def test_python_and_command_say_the_same(truearm: Truearm, small: Path, tmp_path: Path) -> None:
+    printed = json.loads(truearm("calibrate", "irb120", small / "data.csv", "--out", tmp_path, "--json").out)
+    robot, data = package.load_robot("irb120"), package.load_data(small / "data.csv")
+    assert package.calibrate(robot, data).summary() == printed

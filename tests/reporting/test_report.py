@@ -1,0 +1,433 @@
+"""The report says what the numbers are, needs nothing but itself, and trusts no name."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from dataclasses import replace
+from functools import cache
+from html.parser import HTMLParser
+from typing import Any, Final
+
+import numpy as np
+import pytest
+
+from truearm.identification.fit import Redundant, identify, place
+from truearm.identification.losses import Loss
+from truearm.identification.models import MODELS
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.statistics import errors_of
+from truearm.measurement.twin import Twin, measure
+from truearm.modeling.robot import Robot
+from truearm.modeling.transform import Transform, quaternion_from_rotation
+from truearm.notices import Notice
+from truearm.reporting.numbers import significant
+from truearm.reporting.report import Report, json_for_script, report_html
+from truearm.robots import load_robot
+
+HOSTILE: Final = "</script><b>"
+MODEL_BY_NAME: Final = {model.name: model for model in MODELS}
+VOID: Final = {"meta", "br", "link", "img", "input", "hr"}
+
+
+def true_robot(names: tuple[str, ...], poses: bool) -> Robot:
+    robot = load_robot("irb120")
+    truth = robot.truths["tracker-triangular"].values
+    places = list(robot.tools["triangular"].targets.values())
+    quaternion = (0.5, 0.5, 0.5, 0.5)
+    targets = {n: Transform(p, quaternion) if poses else p for n, p in zip(names, places, strict=False)}
+    base = Transform((0.4, -0.3, 0.29), (0.6, 0.0, 0.0, 0.8))
+    return robot.with_values(truth).with_frames(base, targets).with_values(truth)
+
+
+def readings(names: tuple[str, ...], poses: bool, noise: float) -> Dataset:
+    rng = np.random.default_rng(3)
+    true = true_robot(names, poses)
+    twin = Twin(true)
+    data = measure(twin, true.random_configurations(40, rng), noise, rng, source="some/folder/cell <7>.csv")
+    if not poses:
+        return data
+    frames = [twin.target_frames(q) for q in data.joints]
+    quaternion = np.array([quaternion_from_rotation(at[name][:3, :3]) for at in frames for name in names])
+    return replace(data, quaternion=quaternion, sigma_rot=np.full(len(quaternion), 1e-4))
+
+
+@cache
+def made(
+    names: tuple[str, ...] = ("1", "2", "3"),
+    *,
+    poses: bool = False,
+    train: int = 28,
+    model: str = "geometric",
+    loss: Loss = "linear",
+    redundancy: Redundant = "prior",
+    noise: float = 5e-5,
+    outlier: bool = False,
+) -> Report:
+    data = readings(names, poses, noise)
+    order = np.random.default_rng(0).permutation(data.configurations)
+    training, held_out = order[:train], order[train:]
+    if outlier:
+        reading = np.flatnonzero(data.configuration == training[4])[1]
+        position = data.position.copy()
+        position[reading] += [0.02, -0.01, 0.03]
+        data = replace(data, position=position)
+    robot = load_robot("irb120")
+    first = data.of_configurations(training)
+    fit = identify(robot, first, MODEL_BY_NAME[model], loss=loss, redundancy=redundancy)
+    judged = data.of_configurations(held_out) if len(held_out) else first
+    return Report(
+        fit=fit,
+        data=data,
+        training=training,
+        held_out=held_out,
+        nominal=errors_of(place(robot, first).robot, judged),
+        train=errors_of(fit.robot, first),
+        validation=errors_of(fit.robot, judged) if len(held_out) else None,
+        warnings=(Notice("odd", "Residuals are <i>odd</i> & large."),),
+        command="truearm calibrate irb120 'cell <7>.csv' --seed 0",
+        history="calibrated by truearm: 28 of 40 configurations of cell <7>.csv (sha256 0123456789ab)",
+    )
+
+
+class Page(HTMLParser):
+    """Collects what a page holds and fails where its elements do not nest."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.elements: list[tuple[str, dict[str, str | None]]] = []
+        self.scripts: list[str] = []
+        self.words: list[str] = []
+        self.feed(html)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.elements.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self.open.append(tag)
+        if tag == "script":
+            self.scripts.append("")
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open, f"</{tag}> closes nothing"
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if self.open and self.open[-1] == "script":
+            self.scripts[-1] += data
+        elif not self.open or self.open[-1] != "style":
+            self.words.append(data)
+
+    @property
+    def text(self) -> str:
+        return re.sub(r"\s+", " ", " ".join(self.words))
+
+    @property
+    def figures(self) -> dict[str, Any]:
+        (place,) = (i for i, attrs in enumerate(a for t, a in self.elements if t == "script") if "id" in attrs)
+        figures: dict[str, Any] = json.loads(self.scripts[place])
+        return figures
+
+
+@cache
+def page(report: Report) -> Page:
+    return Page(report_html(report))
+
+
+def cells(html: str) -> list[tuple[float, str]]:
+    """Return every number cell as its value and its text."""
+    return [(float(v), t) for v, t in re.findall(r'<td class="n" data-value="([^"]+)">([^<]*)</td>', html)]
+
+
+# -- the page ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("options", [{}, {"train": 40}, {"poses": True, "model": "offsets"}, {"redundancy": "drop"}])
+def test_elements_nest_and_nothing_is_fetched(options: dict[str, Any]) -> None:
+    shown = page(made(**options))
+    for tag, attributes in shown.elements:
+        assert tag not in ("link", "img", "iframe", "object", "embed")
+        assert not {"src", "href", "action", "data", "srcset"} & set(attributes)
+    policy = next(a["content"] for t, a in shown.elements if a.get("http-equiv") == "Content-Security-Policy")
+    assert policy is not None
+    assert policy.startswith("default-src 'none'")
+    assert "http" not in policy
+    assert sum("plotly.js v" in script for script in shown.scripts) == 1
+    assert "showSendToCloud: false" in shown.scripts[-1]
+
+
+def test_every_place_has_its_figure() -> None:
+    shown = page(made(poses=True))
+    places = {a["id"] for t, a in shown.elements if t == "div" and a.get("class") == "figure"}
+    assert places == set(shown.figures)
+    assert places == {"position-histogram", "orientation-histogram", "workspace", "residuals", "correlations"}
+
+
+def test_the_same_report_is_the_same_page() -> None:
+    assert report_html(made()) == report_html(made())
+
+
+def test_plotly_itself_is_not_imported() -> None:
+    code = "import sys, truearm.reporting.report; sys.exit('plotly.graph_objects' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_names_are_text() -> None:
+    report = made(("a", HOSTILE), poses=True, model="offsets")
+    html = report_html(report)
+    shown = page(report)
+    assert HOSTILE not in html
+    assert all(tag not in ("b", "i") for tag, _ in shown.elements)
+    assert f"a, {HOSTILE}" in shown.text
+    assert f"target_{HOSTILE}_rx" in shown.text
+    assert "Residuals are <i>odd</i> & large." in shown.text
+    assert "Data: cell <7>.csv" in shown.text
+    # Plotly reads tags in its texts, so they reach it as entities.
+    assert {row[1] for row in shown.figures["workspace"]["data"][0]["customdata"]} == {
+        "a",
+        "&lt;/script&gt;&lt;b&gt;",
+    }
+
+
+def test_json_cannot_leave_its_script() -> None:
+    text = json_for_script({"x": "</script><!--&\u2028é"})
+    assert not set("<>&\u2028") & set(text)
+    assert json.loads(text) == {"x": "</script><!--&\u2028é"}
+    with pytest.raises(ValueError, match="Out of range"):
+        json_for_script([float("nan")])
+
+
+# -- the numbers -------------------------------------------------------------------------------------------
+
+
+def test_errors_are_those_of_the_statistics() -> None:
+    report = made(poses=True)
+    assert report.validation is not None
+    shown = cells(report_html(report))[:24]
+    expected = []
+    for kind in ("position_spread", "orientation_spread"):
+        for errors in (report.nominal, report.validation, report.train):
+            spread = getattr(errors, kind)
+            expected += [spread.mean, spread.rms, spread.p95, spread.max]
+    assert [value for value, _ in shown] == pytest.approx([1e3 * value for value in expected], rel=1e-12)
+    for value, text in shown:
+        assert float(text) == pytest.approx(value, rel=5e-3)
+
+
+def test_the_first_figure_is_the_held_out_error() -> None:
+    report = made()
+    assert report.validation is not None
+    before, after = report.nominal.position_spread, report.validation.position_spread
+    assert before is not None
+    assert after is not None
+    text = page(report).text
+    assert f"{significant(before.mean * 1e3)} → {significant(after.mean * 1e3)} mm" in text
+    assert "on the 12 configurations that the fit has not seen" in text
+    assert f"the largest is {significant(after.max * 1e3)} mm (before: {significant(before.max * 1e3)} mm)" in text
+    assert "28 for training, 12 held out" in text
+    assert report.fit.status.advice in text
+    assert "Nothing was held out" not in text
+    assert "orientation" not in text.split("Warnings")[0]
+
+
+def test_nothing_held_out_is_said() -> None:
+    text = page(made(train=40)).text
+    assert "Nothing was held out." in text
+    assert "Mean position error on the 40 training configurations" in text
+    assert "has not seen" not in text
+    assert "Held-out" not in text
+    assert "40 for training, 0 held out" in text
+
+
+def test_orientation_is_shown_in_mrad() -> None:
+    text = page(made(poses=True)).text
+    assert "Mean orientation error on the 12 configurations" in text
+    assert "Orientation error of single readings [mrad]" in text
+    assert re.search(r"orientation 0\.\d+ mrad rotation axis declared in the data", text)
+
+
+def test_held_out_readings_without_position() -> None:
+    report = made(poses=True, model="offsets")
+    hidden = np.isin(report.data.configuration, report.held_out)
+    data = replace(report.data, position=np.where(hidden[:, None], np.nan, report.data.position))
+    judged = data.of_configurations(report.held_out)
+    blind = replace(
+        report,
+        data=data,
+        nominal=errors_of(report.fit.start, judged),
+        validation=errors_of(report.fit.robot, judged),
+    )
+    shown = Page(report_html(blind))
+    assert "workspace" not in shown.figures
+    assert "Mean position error" not in shown.text
+    assert "Mean orientation error" in shown.text
+
+
+def test_parameters_in_their_units() -> None:
+    report = made()
+    text = page(report).text
+    for name, unit, scale in (("a_3", "mm", 1e3), ("theta_offset_2", "deg", 180 / np.pi)):
+        p, start = report.fit.robot.parameters[name], report.fit.start.parameters[name]
+        digits = 3 if unit == "mm" else 4
+        change = (p.value - start.value) * scale
+        row = f"{start.value * scale:.{digits}f} {p.value * scale:.{digits}f} {change:+.{digits}f}"
+        assert f"{unit} {row}" in text
+    assert "of the identified, the readings say next to nothing about" in text
+    assert "believed" in report_html(report)
+    assert "Base and targets (15 parameters)" in text
+
+
+def test_fixed_parameters_have_no_change() -> None:
+    html = report_html(made(poses=True, model="offsets"))
+    row = re.search(r'<tr class="fixed">(.*?)</tr>', html)
+    assert row is not None
+    assert row[1].endswith("<td>fixed</td>")
+    assert "bar" not in row[1]
+
+
+def test_drop_names_every_combination() -> None:
+    report = made(redundancy="drop")
+    text = page(report).text
+    assert report.fit.redundancies
+    for redundancy in report.fit.redundancies:
+        assert f"{redundancy.dropped} held: {redundancy.combination}" in text
+    assert text.count("held: redundant") == len(report.fit.redundancies)
+    assert f"{len(report.fit.redundancies)} held because they are redundant" in text
+    assert "Redundant combinations" not in page(made()).text
+
+
+def test_bounds_and_rank_loss_are_marked() -> None:
+    report = made()
+    fit = replace(report.fit, at_bound=("a_3",), unseen=("d_4",))
+    html = report_html(replace(report, fit=fit))
+    assert re.search(r'<tr class="at-bound"><td><code>a_3</code>.*<td>at bound</td></tr>', html)
+    assert re.search(r'<tr class="not-determined"><td><code>d_4</code>.*<td>not determined</td></tr>', html)
+
+
+def test_warnings_or_none() -> None:
+    assert "Warnings None." in Page(report_html(replace(made(), warnings=()))).text
+
+
+@pytest.mark.parametrize(
+    ("declared", "excess", "words"),
+    [
+        (True, 1.0, "no larger than the declared deviations allow"),
+        (True, 2.345, "2.35 times as large as the declared deviations allow"),
+        (False, 1.0, "estimated from the training residuals"),
+    ],
+)
+def test_noise_in_a_sentence(declared: bool, excess: float, words: str) -> None:
+    report = made()
+    text = Page(report_html(replace(report, fit=replace(report.fit, declared=declared, excess=excess)))).text
+    assert words in text
+    assert f"position 0.0500 mm coordinate {'declared' if declared else 'estimated'}" in text
+
+
+def test_how_to_run_it_again() -> None:
+    report = made()
+    text = page(report).text
+    assert report.command in text
+    assert report.history in text
+    assert f"NumPy {np.__version__}" in text
+
+
+# -- the pictures ------------------------------------------------------------------------------------------
+
+
+def test_histograms_count_every_reading_in_the_same_bins() -> None:
+    report = made(poses=True)
+    for name in ("position-histogram", "orientation-histogram"):
+        before, after = page(report).figures[name]["data"]
+        assert before["x"] == after["x"]
+        assert before["width"] == after["width"]
+        assert sum(before["y"]) == sum(after["y"]) == 36
+
+
+def test_exact_data_can_be_drawn() -> None:
+    figures = page(made(noise=0.0, model="geometric", train=40)).figures
+    assert sum(figures["position-histogram"]["data"][1]["y"]) == 120
+
+
+def test_workspace_is_in_the_base_frame_in_mm() -> None:
+    report = made()
+    cloud = page(report).figures["workspace"]["data"][0]
+    part = report.judged_part
+    shown = np.array([cloud["x"], cloud["y"], cloud["z"]]).T
+    at_origin = replace(report.fit.robot, base_quaternion=(1.0, 0.0, 0.0, 0.0)).with_values(
+        {f"base_{axis}": 0.0 for axis in ("x", "y", "z", "rx", "ry", "rz")}
+    )
+    predicted = np.array([at_origin.poses(part.joints, name)[0] for name in part.targets])
+    expected = predicted[part.target, part.configuration] * 1e3
+    assert np.abs(shown - expected).max() < 0.5  # noise and rounding
+    assert report.validation is not None
+    errors = np.linalg.norm(report.validation.position, axis=1) * 1e3
+    assert cloud["marker"]["color"] == pytest.approx(errors, rel=5e-3)
+    assert [row[0] for row in cloud["customdata"]] == [part.labels[i] for i in part.configuration]
+    before, same, own = (
+        button["args"][0] for button in page(report).figures["workspace"]["layout"]["updatemenus"][0]["buttons"]
+    )
+    nominal = np.linalg.norm(report.nominal.position, axis=1) * 1e3
+    assert before["marker.color"][0] == pytest.approx(nominal, rel=5e-3)
+    assert before["marker.cmax"] == same["marker.cmax"] > own["marker.cmax"]
+
+
+def test_residuals_are_means_over_targets_in_measuring_order() -> None:
+    report = made()
+    assert report.validation is not None
+    training, held_out = page(report).figures["residuals"]["data"]
+    assert training["x"] == sorted((report.training + 1).tolist())
+    assert held_out["x"] == sorted((report.held_out + 1).tolist())
+    errors = errors_of(report.fit.robot, report.data)
+    means = np.linalg.norm(errors.position, axis=1).reshape(-1, 3).mean(axis=1) * 1e3
+    for trace in (training, held_out):
+        assert trace["y"] == pytest.approx(means[np.array(trace["x"]) - 1], rel=1e-3)
+
+
+@pytest.mark.parametrize("loss", ["huber", "cauchy", "l1"])
+def test_doubted_readings_are_marked(loss: Loss) -> None:
+    report = made(loss=loss, outlier=True)
+    marks = page(report).figures["residuals"]["data"][2]
+    worst = int(np.argmax(marks["y"]))
+    assert marks["x"][worst] == report.training[4] + 1
+    assert marks["customdata"][worst] == [str(report.training[4] + 1), "2"]
+    assert 20 < marks["y"][worst] < 60
+    assert len(marks["y"]) < 12
+
+
+def test_correlations_of_all_free_parameters() -> None:
+    report = made()
+    drawn = page(report).figures["correlations"]["data"][0]
+    assert tuple(drawn["x"]) == tuple(drawn["y"]) == report.fit.free.names
+    assert np.abs(np.array(drawn["z"]) - report.fit.correlations).max() < 0.006
+    pairs = re.findall(
+        r"<tr><td><code>(\S+)</code></td><td><code>(\S+)</code></td><td class=\"n\">([+-]\S+)<", report_html(report)
+    )
+    assert len(pairs) == 10
+    off = np.triu(np.abs(report.fit.correlations), 1)
+    names = report.fit.free.names
+    listed = [off[names.index(a), names.index(b)] for a, b, _ in pairs]
+    assert listed == sorted(off.ravel().tolist(), reverse=True)[:10]
+
+
+# -- digits ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.0, "0"),
+        (0.199_4, "0.199"),
+        (0.0790, "0.0790"),
+        (0.999_6, "1.00"),
+        (12.34, "12.3"),
+        (1234.5, "1234"),
+        (1e-9, "< 0.0001"),
+        (float("nan"), "–"),
+    ],
+)
+def test_three_digits(value: float, text: str) -> None:
+    assert significant(value) == text

@@ -1,0 +1,128 @@
+"""Figures on real measurements that nobody here made."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ruamel.yaml import YAML
+
+from truearm.calibration import Calibration, calibrate
+from truearm.identification.losses import Loss
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.readers.canonical import csv_text, read_csv
+from truearm.measurement.readers.matrices import read_matrices
+from truearm.measurement.statistics import errors_of
+from truearm.modeling.robot import Robot
+from truearm.robots import load_robot
+
+SEEDS = range(10)
+
+
+@pytest.fixture(scope="module")
+def irb120(measured_data: Path) -> Dataset:
+    folder = measured_data / "irb120-faro"
+    targets = {str(i): folder / f"target_{i}.txt" for i in (1, 2, 3)}
+    data, missing = read_matrices(folder / "joints_commanded.txt", targets, {}, "deg", "mm")
+    assert set(missing.values()) == {0}
+    return data
+
+
+def mean_mm(calibration: Calibration) -> float:
+    assert calibration.validation is not None
+    return 1e3 * float(calibration.validation.position_norms.mean())
+
+
+@pytest.mark.parametrize(("train", "median", "worst"), [(300, 0.22, 0.24), (50, 0.28, 0.30)])
+def test_the_geometric_model_on_the_irb120(irb120: Dataset, train: int, median: float, worst: float) -> None:
+    runs = [calibrate("irb120", irb120, train=train, seed=seed) for seed in SEEDS]
+    held_out = [mean_mm(run) for run in runs]
+    nominal = [1e3 * float(run.nominal.position_norms.mean()) for run in runs]
+    assert np.median(held_out) <= median
+    assert max(held_out) <= worst
+    assert np.median(nominal) == pytest.approx(0.71, abs=0.01)
+    assert all(run.status.value == "converged" for run in runs)
+
+
+def test_levels_one_and_two_come_in_order(irb120: Dataset) -> None:
+    means = [mean_mm(calibrate("irb120", irb120, model=m, train=300)) for m in ("offsets", "joints", "geometric")]
+    assert means[0] > means[1] > means[2]
+
+
+@pytest.mark.parametrize("loss", ["cauchy"])
+def test_one_reading_in_twenty_wrong_by_5_mm(irb120: Dataset, loss: Loss) -> None:
+    n = irb120.configurations
+    for seed in (0, 1, 2):
+        rng = np.random.default_rng(100 + seed)
+        wrong = rng.choice(len(irb120.target), len(irb120.target) // 20, replace=False)
+        shift = rng.normal(size=(len(wrong), 3))
+        position = irb120.position.copy()
+        position[wrong] += 5e-3 * shift / np.linalg.norm(shift, axis=1, keepdims=True)
+        dirty = replace(irb120, position=position)
+        held_out = irb120.of_configurations(np.random.default_rng(seed).permutation(n)[300:])
+
+        def clean_mean(run: Calibration, held_out: Dataset = held_out) -> float:
+            return float(errors_of(run.robot, held_out).position_norms.mean())
+
+        undisturbed = clean_mean(calibrate("irb120", irb120, train=300, seed=seed))
+        robust = clean_mean(calibrate("irb120", dirty, train=300, seed=seed, loss=loss))
+        assert robust <= 1.15 * undisturbed
+
+
+POSITIONER = """\
+truearm: truearm-robot/1
+name: positioner
+units: {length: m, angle: deg}
+convention: standard-dh
+joints:
+  - {d: 0, theta_offset: 0, a: 0, alpha: -90}
+  - {d: -0.475, theta_offset: -90, a: 0, alpha: 0}
+"""
+
+
+@pytest.fixture(scope="module")
+def positioner(measured_data: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Robot, Path]:
+    folder = tmp_path_factory.mktemp("positioner")
+    entries = YAML(typ="safe").load((measured_data / "positioner" / "measurements.yaml").read_text())
+    rows = [
+        "configuration,joint_1 [rad],joint_2 [rad],target,x [m],y [m],z [m],qw,qx,qy,qz,sigma [mm],sigma_rot [mrad]"
+    ]
+    for label, entry in entries.items():
+        pose = entry["pose"]
+        numbers = [pose[k] for k in ("x", "y", "z", "qw", "qx", "qy", "qz")]
+        joints = entry["target_joints"]
+        rows.append(",".join([label, *map(repr, joints), "board", *map(repr, numbers), "1", "1"]))
+    (folder / "positioner.csv").write_text("\n".join(rows) + "\n")
+    (folder / "positioner.yaml").write_text(POSITIONER)
+    return load_robot(folder / "positioner.yaml"), folder / "positioner.csv"
+
+
+def test_poses_of_the_positioner_on_all_data(positioner: tuple[Robot, Path]) -> None:
+    robot, data = positioner
+    run = calibrate(robot, data, train="all")
+    assert run.train.position_norms.mean() <= 0.39e-3
+    assert run.train.orientation_norms.mean() <= 0.81e-3
+    assert run.nominal.position_norms.mean() == pytest.approx(0.42e-3, abs=0.01e-3)
+    assert run.nominal.orientation_norms.mean() == pytest.approx(0.81e-3, abs=0.01e-3)
+    assert run.validation is None
+    assert run.warnings[0].code == "nothing-held-out"
+
+
+def test_poses_of_the_positioner_held_out(positioner: tuple[Robot, Path]) -> None:
+    robot, data = positioner
+    runs = [calibrate(robot, data, seed=seed) for seed in SEEDS]
+    position = [1e3 * float(run.validation.position_norms.mean()) for run in runs if run.validation]
+    orientation = [1e3 * float(run.validation.orientation_norms.mean()) for run in runs if run.validation]
+    assert len(position) == len(runs)
+    assert np.median(position) <= 0.42
+    assert np.median(orientation) <= 0.86
+
+
+def test_a_measured_file_is_written_as_it_was_read(positioner: tuple[Robot, Path], tmp_path: Path) -> None:
+    _, path = positioner
+    text = csv_text(read_csv(path))
+    again = tmp_path / "again.csv"
+    again.write_text(text)
+    assert csv_text(read_csv(again)) == text

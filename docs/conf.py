@@ -2,7 +2,7 @@ from importlib.metadata import version as installed_version
 
 project = "truearm"
 author = "the truearm developers"
-copyright = author  # noqa: A001
+copyright = author
 release = version = installed_version("truearm")
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]

@@ -28,7 +28,7 @@ from truearm.modeling.formats.robot_file import robot_text
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.robots import load_robot
-from truearm.units import from_si
+from truearm.units import SHOWN_AS, from_si
 from truearm.version import __version__
 
 Train = int | Literal["all"] | None
@@ -109,17 +109,9 @@ class Calibration:
         return {"truearm": "truearm-result/1", **self.summary(), "parameters": list(self._parameters())}
 
     def _parameters(self) -> Sequence[dict[str, Any]]:
-        free, dropped = set(self.fit.free.names), {r.dropped for r in self.fit.redundancies}
-        shown = {"m": "mm", "rad": "deg", "1": "1"}
         rows = []
         for p in self.robot.parameters.values():
-            unit = shown[p.unit]
-            if p.name in dropped:
-                status = "dropped"
-            elif p.name not in free:
-                status = "fixed"
-            else:
-                status = "at-bound" if p.name in self.fit.at_bound else "identified"
+            unit = SHOWN_AS[p.unit]
             rows.append(
                 {
                     "name": p.name,
@@ -128,7 +120,7 @@ class Calibration:
                     "value": from_si(p.value, unit),
                     "deviation": None if p.deviation is None else from_si(p.deviation, unit),
                     "informed": p.informed,
-                    "status": status,
+                    "status": self.fit.standing(p.name),
                 }
             )
         return rows

@@ -45,7 +45,11 @@ def test_unknown_robot_offers_the_nearest(truearm: Truearm, small: Path, tmp_pat
 @pytest.mark.parametrize("command", ["show", "calibrate", "validate"])
 def test_missing_files_are_named(truearm: Truearm, small: Path, tmp_path: Path, command: str) -> None:
     missing = tmp_path / "no" / "robot.yaml"
-    more = {"show": [], "calibrate": [small / "data.csv", "--out", tmp_path], "validate": [small / "data.csv"]}
+    more: dict[str, list[object]] = {
+        "show": [],
+        "calibrate": [small / "data.csv", "--out", tmp_path],
+        "validate": [small / "data.csv"],
+    }
     assert f"{missing}: there is no such file" in refused(truearm, command, missing, *more[command])
 
 

@@ -215,7 +215,7 @@ def test_measuring_everything_twice_narrows_the_deviations() -> None:
     )
     a, b = (identify(load_robot("irb120"), d, GEOMETRIC).robot.parameters for d in (data, twice))
     for name in ("theta_offset_2", "a_3", "alpha_4"):
-        assert a[name].deviation == pytest.approx(np.sqrt(2) * b[name].deviation, rel=0.02)  # type: ignore[operator]
+        assert a[name].deviation == pytest.approx(np.sqrt(2) * b[name].deviation, rel=0.02)
 
 
 def test_undeclared_noise_is_estimated_from_the_residuals() -> None:

@@ -58,9 +58,9 @@ def show(
 def _content(robot: Robot) -> dict[str, Any]:
     import numpy as np
 
-    from truearm.units import from_si
+    from truearm.units import SHOWN_AS, from_si
 
-    shown = {"m": "mm", "rad": "deg", "1": "1"}
+    shown = SHOWN_AS
     base = robot.base
     position, _ = robot.poses(np.zeros((1, len(robot.joints))))
     joints = []

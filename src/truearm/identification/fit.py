@@ -23,6 +23,10 @@ from truearm.modeling.robot import Robot
 
 Redundant = Literal["prior", "drop"]
 
+#: ``uninformed``: the data removed less than 5 % of the prior variance, so the value is still the nominal one by belief.
+Standing = Literal["identified", "uninformed", "at-bound", "not-determined", "dropped", "fixed"]
+_UNINFORMED: Final = 0.05
+
 #: Noise assumed for readings that declare none, until their own residuals say better [m, rad].
 _FIRST_NOISE: Final = {"position": 1e-4, "orientation": 1e-4}
 _NOISE_FLOOR: Final = 1e-9
@@ -75,12 +79,13 @@ class Fit:
     sigma
         Standard deviation of a reading [m or rad] by observation, declared (root mean square) or estimated.
     declared
-        Whether the file declared it.
+        Whether the file declared all of them.
     excess
         How much larger the residuals are than the declared deviations allow; 1 if they agree or nothing was
         declared. The covariance contains it.
     weight
         What the loss left of each reading, ``(readings,)``, in the order of the dataset; NaN where none was used.
+        For ``l1``, which has no full weight, relative to the median reading.
     steps
         Steps of the solver, over all stages.
     """
@@ -99,6 +104,19 @@ class Fit:
     excess: float
     weight: Array
     steps: int
+
+    def standing(self, name: str) -> Standing:
+        """Return how much the value of a parameter is worth."""
+        if any(name == r.dropped for r in self.redundancies):
+            return "dropped"
+        if name not in self.free.names:
+            return "fixed"
+        if name in self.unseen:
+            return "not-determined"
+        if name in self.at_bound:
+            return "at-bound"
+        informed = self.robot.parameters[name].informed
+        return "uninformed" if informed is not None and informed < _UNINFORMED else "identified"
 
     @property
     def correlations(self) -> Array:
@@ -241,12 +259,12 @@ def _fit(
     free, x = problem.free, solution.vector
     weighted = np.ones_like(solution.weight) if loss == "l1" else solution.weight
     A = solution.jacobian * free.prior * np.repeat(np.sqrt(weighted), 3)[:, None]
-    information = A.T @ A + (np.eye(len(x)) if problem.priors else 0.0)
     noise = _noise(problem, solution, loss)
     declared = all(b.observation.declared_sigma(problem.data) is not None for b in problem.blocks)
     excess = _excess(noise) if declared else 1.0
     spread = excess / np.sqrt(_L1_EFFICIENCY) if loss == "l1" else excess
-    covariance = np.linalg.pinv(information, rcond=1e-15, hermitian=True) * spread**2 * np.outer(free.prior, free.prior)
+    information = A.T @ A / spread**2 + (np.eye(len(x)) if problem.priors else 0.0)
+    covariance = np.linalg.pinv(information, rcond=1e-15, hermitian=True) * np.outer(free.prior, free.prior)
     deviation = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     informed = np.clip(1.0 - (deviation / free.prior) ** 2, 0.0, 1.0)
     at_bound: tuple[str, ...] = ()
@@ -267,10 +285,11 @@ def _fit(
         else frames
     )
     unseen = unseen_but_felt(robot, problem.data, looked_at)
+    used = solution.weight / np.median(solution.weight) if loss == "l1" else solution.weight
     weight = np.full(len(problem.data.target), np.nan)
     first = 0
     for block in problem.blocks:
-        part = solution.weight[first : first + len(block.readings)]
+        part = used[first : first + len(block.readings)]
         weight[block.readings] = np.fmin(weight[block.readings], part)
         first += len(block.readings)
     if not solution.converged:

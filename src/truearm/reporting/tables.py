@@ -8,16 +8,14 @@ from typing import Final
 
 import numpy as np
 
-from truearm.identification.fit import Fit
+from truearm.identification.fit import Fit, Standing
 from truearm.measurement.statistics import Errors, Spread
-from truearm.modeling.parameters import Parameter
 from truearm.reporting.numbers import significant
 from truearm.units import SHOWN_AS, from_si
 
 #: Decimals of a parameter value: a micrometre, two micrometres at a metre, a millionth.
 _DECIMALS: Final = {"mm": 3, "deg": 4, "1": 6}
 #: Informed share below which an estimate is the prior's, not the data's.
-_BELIEVED: Final = 0.05
 _PAIRS: Final = 10
 _SIGMA_SHOWN: Final = {"position": ("mm", 1e3), "orientation": ("mrad", 1e3)}
 
@@ -77,12 +75,17 @@ class ParameterRow:
     estimate: float
     deviation: float | None
     informed: float | None
-    status: str
+    standing: Standing
+
+    @property
+    def status(self) -> str:
+        """The standing as it is printed."""
+        return {"dropped": "held: redundant"}.get(self.standing, self.standing.replace("-", " "))
 
     @property
     def believed(self) -> bool:
         """Whether the estimate is what was believed before, for lack of readings that say otherwise."""
-        return self.informed is not None and self.informed < _BELIEVED
+        return self.standing == "uninformed"
 
     @property
     def change(self) -> float:
@@ -110,17 +113,7 @@ class ParameterRow:
 
 def parameter_rows(fit: Fit) -> tuple[ParameterRow, ...]:
     """Return a row for every parameter of the robot, in the robot's order."""
-    free, dropped = set(fit.free.names), {r.dropped for r in fit.redundancies}
-
-    def status(p: Parameter) -> str:
-        if p.name in dropped:
-            return "held: redundant"
-        if p.name not in free:
-            return "fixed"
-        if p.name in fit.unseen:
-            return "not determined"
-        return "at bound" if p.name in fit.at_bound else "identified"
-
+    free = set(fit.free.names)
     rows = []
     for p in fit.robot.parameters.values():
         unit, was_free = SHOWN_AS[p.unit], p.name in free
@@ -133,7 +126,7 @@ def parameter_rows(fit: Fit) -> tuple[ParameterRow, ...]:
                 estimate=from_si(p.value, unit),
                 deviation=from_si(p.deviation, unit) if was_free and p.deviation is not None else None,
                 informed=p.informed if was_free else None,
-                status=status(p),
+                standing=fit.standing(p.name),
             )
         )
     return tuple(rows)

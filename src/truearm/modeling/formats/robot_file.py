@@ -22,7 +22,7 @@ from truearm.modeling.effects import EFFECTS
 from truearm.modeling.parameters import Parameter
 from truearm.modeling.robot import Joint, LinkMass, Robot, Target, Tool, Truth
 from truearm.modeling.transform import Transform
-from truearm.units import to_si, written
+from truearm.units import SHOWN_AS, to_si, written
 
 SCHEMA = "truearm-robot/1"
 
@@ -276,7 +276,7 @@ def robot_text(robot: Robot) -> str:
     def mm(values: tuple[float, float, float]) -> CommentedSeq:
         return listed([written(v, "mm") for v in values])
 
-    shown = {"m": "mm", "rad": "deg", "1": "1"}
+    shown = SHOWN_AS
     units = robot.convention.row_units("revolute") | robot.convention.row_units("prismatic")
 
     def joint(j: Joint) -> CommentedMap:

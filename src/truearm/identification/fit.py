@@ -23,7 +23,7 @@ from truearm.modeling.robot import Robot
 
 Redundant = Literal["prior", "drop"]
 
-#: ``uninformed``: the data removed less than 5 % of the prior variance, so the value is still the nominal one by belief.
+#: ``uninformed``: the data removed less than 5 % of the prior variance, so the value is still a belief.
 Standing = Literal["identified", "uninformed", "at-bound", "not-determined", "dropped", "fixed"]
 _UNINFORMED: Final = 0.05
 

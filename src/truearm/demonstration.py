@@ -35,7 +35,8 @@ def demonstration(folder: Path, progress: Callable[[str], None] = lambda _: None
     twin = truth_twin(robot, "tracker-triangular", rng)
     twin = replace(twin, gear={2: (math.radians(0.006), 0.4), 3: (math.radians(0.006), 1.9)})
     progress("measuring the twin with a simulated laser tracker")
-    data = measure(twin, rng.uniform(*np.radians(_REGION), (200, 6)), 0.03e-3, rng)
+    low, high = np.radians(_REGION)
+    data = measure(twin, rng.uniform(low, high, (200, 6)), 0.03e-3, rng)
     path = folder / "measurements.csv"
     write_files(folder, {path.name: csv_text(data)})
     calibration = calibrate("irb120", path, progress=progress)

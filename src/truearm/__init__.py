@@ -18,14 +18,15 @@ from truearm.errors import InputError
 from truearm.version import __version__
 
 if TYPE_CHECKING:
-    from truearm.calibration import Calibration, calibrate, load_data, validate
+    from truearm.calibration import Calibration, calibrate, check, load_data, validate
     from truearm.robots import load_robot
 
-__all__ = ["Calibration", "InputError", "__version__", "calibrate", "load_data", "load_robot", "validate"]
+__all__ = ["Calibration", "InputError", "__version__", "calibrate", "check", "load_data", "load_robot", "validate"]
 
 _HOME = {
     "Calibration": "truearm.calibration",
     "calibrate": "truearm.calibration",
+    "check": "truearm.calibration",
     "load_data": "truearm.calibration",
     "validate": "truearm.calibration",
     "load_robot": "truearm.robots",

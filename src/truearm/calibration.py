@@ -20,9 +20,13 @@ from truearm.identification.bounds import Bounds, read_bounds
 from truearm.identification.fit import Fit, Redundant, Status, check_targets, identify, place
 from truearm.identification.losses import LOSSES, Loss
 from truearm.identification.models import MODELS
+from truearm.identification.plausibility import check_against
+from truearm.identification.settling import check_settling
+from truearm.measurement.checks import check_data
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.readers.canonical import read_csv
 from truearm.measurement.statistics import Errors, Spread, errors_of
+from truearm.measurement.table_motion import without_table_motion
 from truearm.modeling.conventions import parallel_joints_without_beta
 from truearm.modeling.formats.robot_file import robot_text
 from truearm.modeling.robot import Robot
@@ -231,10 +235,13 @@ def calibrate(
     count = _train_count(train, n, data.source)
     order = np.random.default_rng(seed).permutation(n)
     training, held_out = order[:count], order[count:]
+    check_targets(data.of_configurations(training), data.of_configurations(held_out))
+
+    progress("checking the data")
+    noticed = check(data, robot)
+    data = without_table_motion(data)
     first = data.of_configurations(training)
     second = data.of_configurations(held_out) if len(held_out) else None
-    check_targets(first, second)
-
     progress("placing the nominal robot")
     nominal = place(robot, first)
     progress(f"identifying the {chosen.name} model on {count} configurations")
@@ -256,7 +263,7 @@ def calibrate(
         nominal=errors_of(nominal.robot, judged),
         train=errors_of(fit.robot, first),
         validation=validation,
-        warnings=tuple(_warnings(fit, second is None)),
+        warnings=(*_warnings(fit, second is None), *noticed, *check_settling(fit, data)),
         data=data,
         training=training,
         held_out=held_out,
@@ -264,6 +271,30 @@ def calibrate(
         history=history,
         urdf=urdf,
     )
+
+
+def check(data: Dataset | str | Path, robot: Robot | str | Path | None = None) -> tuple[Notice, ...]:
+    """Say what is wrong with measurements before they are believed.
+
+    Parameters
+    ----------
+    data
+        Readings, or a canonical CSV file.
+    robot
+        The nominal robot, or what :func:`load_robot` takes. With it, units, joint order and signs, limits and single
+        readings are checked too.
+
+    Returns
+    -------
+    One notice for each kind of fault; none for believable data.
+    """
+    data = load_data(data) if isinstance(data, str | Path) else data
+    if robot is None:
+        return tuple(check_data(data))
+    robot = load_robot(robot) if isinstance(robot, str | Path) else robot
+    check_joints(robot, data)
+    against, suspects = check_against(robot, without_table_motion(data))
+    return (*check_data(data, suspects), *against)
 
 
 def validate(robot: Robot | str | Path, data: Dataset | str | Path) -> Errors:

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from truearm.cli.calibrate import calibrate
+from truearm.cli.check import check
 from truearm.cli.importing import app as importing
 from truearm.cli.library import robots, show
 from truearm.cli.simulate import simulate
@@ -46,6 +47,7 @@ def _root(
     pass
 
 
+app.command()(check)
 app.command()(calibrate)
 app.command()(validate)
 app.command()(simulate)

@@ -321,7 +321,7 @@ def _excess(noise: dict[str, tuple[float, float]]) -> float:
     return float(np.sqrt(ratio)) if ratio > allowed else 1.0
 
 
-def check_targets(training: Dataset, held_out: Dataset | None) -> None:
+def check_targets(training: Dataset, held_out: Dataset) -> None:
     """Refuse held-out readings of targets that the training data never saw.
 
     Raises
@@ -329,8 +329,6 @@ def check_targets(training: Dataset, held_out: Dataset | None) -> None:
     InputError
         Naming the target.
     """
-    if held_out is None:
-        return
     seen = set(training.target[training.has_position].tolist())
     for index in dict.fromkeys(held_out.target[held_out.has_position | held_out.has_orientation].tolist()):
         if index not in seen:

@@ -373,7 +373,7 @@ class Robot:
         Rates are those of the true joint variables.
         """
         sweep = self.sweep(q, target)
-        return np.moveaxis(np.concatenate(sweep.derivatives(self._moving), axis=1), (0, 1), (2, 1))
+        return np.moveaxis(np.concatenate(sweep.derivatives(self.moving), axis=1), (0, 1), (2, 1))
 
     def derivatives(
         self, sweep: Sweep, q: Array, names: Sequence[str], values: Values | None = None
@@ -398,7 +398,7 @@ class Robot:
         rows = [i for i, name in enumerate(names) if name in places]
         linear[rows], angular[rows] = sweep.derivatives([places[names[i]] for i in rows])
         if self.effects and len(rows) < len(names):
-            by_joint = sweep.derivatives(self._moving)
+            by_joint = sweep.derivatives(self.moving)
             readings = np.asarray(q, float).T
             rates = {n: r for effect in self.effects for n, r in effect.derivative(readings, values).items()}
             for i, name in enumerate(names):
@@ -408,7 +408,7 @@ class Robot:
         return linear, angular
 
     @cached_property
-    def _moving(self) -> list[int]:
+    def moving(self) -> list[int]:
         """Index of the element that each joint variable moves."""
         places = {e.variable: i for i, e in enumerate(self.trunk.elements) if e.variable is not None}
         return [places[i] for i in range(len(self.joints))]

@@ -1,0 +1,231 @@
+"""Is the data believable for this robot: units, joint order and signs, limits, and readings far off.
+
+The nominal robot is placed by the closed form. Where that fails badly, the slips that people make are tried one by
+one; one that makes the same data fit several times better is what happened.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Final
+
+import numpy as np
+
+from truearm.identification.fit import identify
+from truearm.identification.frames import initial_frames
+from truearm.identification.models import MODELS
+from truearm.measurement.checks import Suspect, Suspicion, constellation, judged
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.statistics import errors_of
+from truearm.modeling.chain import Array
+from truearm.modeling.robot import Robot
+from truearm.notices import Notice
+from truearm.units import from_si
+
+#: A nominal robot that is placed better than this needs no explanation [m].
+_GOOD: Final = 3e-3
+#: A slip explains the data if they fit this many times better with it mended.
+_BETTER: Final = 4.0
+#: Configurations looked at; more tell nothing new.
+_ENOUGH: Final = 60
+#: A reading is doubted beyond this many median residuals, and at least so far off [m].
+_FAR: Final = 20.0
+_FAR_AT_LEAST: Final = 1e-3
+#: A joint may be this far beyond its limit by rounding [rad or m].
+_OVER: Final = math.radians(0.05)
+
+
+@dataclass(frozen=True, eq=False)
+class _Slip:
+    code: str
+    words: str
+    data: Dataset
+
+
+def check_against(robot: Robot, data: Dataset) -> tuple[list[Notice], list[Suspect]]:
+    """Return what is wrong with a dataset if it was measured on this robot, and the readings that are far off.
+
+    Parameters
+    ----------
+    robot
+        The nominal robot, with as many joints as the data; its base and targets are left out of account.
+    """
+    found = _beyond_limits(robot, data)
+    slips = _slips(robot, data)
+    if slips or not data.has_position.any():
+        return [*slips, *found], []
+    return found, _far_off(robot, data)
+
+
+def _beyond_limits(robot: Robot, data: Dataset) -> list[Notice]:
+    words, count = [], 0
+    for i, joint in enumerate(robot.joints):
+        if joint.limits is None:
+            continue
+        low, high = joint.limits
+        out = (data.joints[:, i] < low - _OVER) | (data.joints[:, i] > high + _OVER)
+        if out.any():
+            count += int(out.sum())
+            unit = "deg" if joint.kind == "revolute" else "mm"
+            worst = data.joints[np.argmax(np.maximum(data.joints[:, i] - high, low - data.joints[:, i])), i]
+            first = data.labels[int(np.argmax(out))]
+            words.append(
+                f"joint {i + 1} at {int(out.sum())} configurations (first: {first}; farthest {from_si(worst, unit):.1f}"
+                f" {unit}; limits {from_si(low, unit):g} to {from_si(high, unit):g})"
+            )
+    if not words:
+        return []
+    return [
+        Notice(
+            "beyond-limits",
+            f"Joint readings lie beyond the limits of {robot.name}: {'; '.join(words)}. Check units, joint order and "
+            "the limits in the robot file.",
+        )
+    ]
+
+
+def _slips(robot: Robot, data: Dataset) -> list[Notice]:
+    some = _some(data)
+    misfit = {t: _misfit(robot, _only(some, t)) for t in range(len(some.targets)) if _seen(some, t)}
+    least = min(misfit.values())
+    bad = [t for t, size in misfit.items() if size > max(_GOOD, _BETTER * least)]
+    if not bad:
+        if least <= _GOOD:
+            return []
+        best = _best(robot, some, [*_joint_slips(some), *_length_slips(some)])
+        return [] if best is None else [Notice(best.code, f"{best.words}.")]
+    # The other targets fit with the same joints, so these are right.
+    found = []
+    for t in bad:
+        best = _best(robot, _only(some, t), list(_length_slips(_only(some, t))))
+        if best is not None:
+            found.append(Notice(best.code, f"Target {some.targets[t]}: {best.words}."))
+    return found
+
+
+def _best(robot: Robot, data: Dataset, slips: list[_Slip]) -> _Slip | None:
+    """Return the slip that explains the data, None if none does."""
+    shares = [_misfit(robot, slip.data) / _spread(slip.data) for slip in slips]
+    best = int(np.argmin(shares))
+    return slips[best] if shares[best] * _BETTER < _misfit(robot, data) / _spread(data) else None
+
+
+def _misfit(robot: Robot, data: Dataset) -> float:
+    """Return the median distance that the placed nominal robot leaves [m]."""
+    return float(np.median(errors_of(initial_frames(robot, data), data).position_norms))
+
+
+def _spread(data: Dataset) -> float:
+    """Return how far the readings lie apart [m]: positions that shrink fit better, but not in proportion."""
+    return float(np.sqrt(np.mean(np.var(data.position[data.has_position], axis=0)))) + 1e-12
+
+
+def _length_slips(data: Dataset) -> Iterator[_Slip]:
+    for factor, words in (
+        (1e-3, "a thousand times too large, as if mm were called m"),
+        (1e3, "a thousand times too small, as if m were called mm"),
+        (25.4, "25.4 times too small, as if inches were called mm"),
+        (1 / 25.4, "25.4 times too large, as if mm were called inches"),
+    ):
+        words = f"The positions are {words}. Mend the unit in the header"
+        yield _Slip("unit-length", words, replace(data, position=data.position * factor))
+
+
+def _joint_slips(data: Dataset) -> Iterator[_Slip]:
+    count = data.joints.shape[1]
+    turning = [i for i in range(count) if data.joint_kinds[i] == "revolute"]
+
+    def with_joints(joints: Array) -> Dataset:
+        return replace(data, joints=joints)
+
+    groups = [turning, *([i] for i in turning)]
+    for factor, words in (
+        (math.pi / 180, "degrees are called rad"),
+        (180 / math.pi, "radians are called deg"),
+    ):
+        for group in groups:
+            joints = data.joints.copy()
+            joints[:, group] *= factor
+            which = "The joints" if len(group) > 1 else f"Joint {group[0] + 1}"
+            yield _Slip("unit-angle", f"{which}: {words}. Mend the unit in the header", with_joints(joints))
+    for size in (1, 2, 3):
+        for group in map(list, combinations(range(count), size)):
+            joints = data.joints.copy()
+            joints[:, group] *= -1
+            which = " and ".join(str(i + 1) for i in group)
+            words = f"The sign of joint {which} is opposite to the robot's: the data fit with it turned. "
+            yield _Slip("joint-sign", words + "Turn it in the data or mend the robot file", with_joints(joints))
+    for a, b in combinations(range(count), 2):
+        joints = data.joints.copy()
+        joints[:, [a, b]] = joints[:, [b, a]]
+        words = f"Joints {a + 1} and {b + 1} are in the wrong order: the data fit with the columns exchanged. "
+        yield _Slip("joint-sign", words + "Exchange their columns", with_joints(joints))
+
+
+def _some(data: Dataset) -> Dataset:
+    if data.configurations <= _ENOUGH:
+        return data
+    return data.of_configurations(np.linspace(0, data.configurations - 1, _ENOUGH).astype(np.intp))
+
+
+def _only(data: Dataset, target: int) -> Dataset:
+    kept = (data.target == target) & data.has_position
+
+    def part(values: Array | None) -> Array | None:
+        return None if values is None else values[kept]
+
+    return replace(
+        data,
+        configuration=data.configuration[kept],
+        target=np.zeros(int(kept.sum()), dtype=np.intp),
+        targets=(data.targets[target],),
+        position=data.position[kept],
+        quaternion=part(data.quaternion),
+        sigma=part(data.sigma),
+        sigma_rot=part(data.sigma_rot),
+    )
+
+
+def _seen(data: Dataset, target: int) -> bool:
+    return bool((data.has_position & (data.target == target)).any())
+
+
+def _far_off(robot: Robot, data: Dataset) -> list[Suspect]:
+    """Doubt readings that a robust geometric fit leaves far off."""
+    geometric = next(m for m in MODELS if m.name == "geometric")
+    fit = identify(robot, data, geometric, loss="cauchy")
+    errors = errors_of(fit.robot, data)
+    off = np.linalg.norm(errors.position, axis=1)
+    allowed = max(_FAR_AT_LEAST, _FAR * float(np.nanmedian(off)))
+    doubted = np.flatnonzero(np.nan_to_num(off) > allowed)
+    if len(doubted) == 0:
+        return []
+    predicted = np.stack([fit.robot.poses(data.joints, name)[0] for name in data.targets], axis=1)
+    points = constellation(data)
+    suspects = []
+    for c in dict.fromkeys(data.configuration[doubted].tolist()):
+        mine = [r for r in doubted.tolist() if data.configuration[r] == c]
+        label = data.labels[c]
+        for reading in mine:
+            t = int(data.target[reading])
+            at = data.position[reading]
+            gaps = np.linalg.norm(predicted[c] - at, axis=1)
+            nearest = int(np.argmin(gaps))
+            name = data.targets[t]
+            if nearest != t and gaps[nearest] <= allowed:
+                other = data.targets[nearest]
+                exchanged = np.linalg.norm(points[c, nearest] - predicted[c, t]) <= allowed
+                code: Suspicion = "targets-swapped" if exchanged else "target-mistaken"
+                suspects.append(Suspect(code, label, name, f"is target {other}"))
+                continue
+            known = {}
+            if c > 0:
+                known[f"target {name} at the configuration before"] = points[c - 1, t]
+            if data.references is not None:
+                usual = np.nanmedian(constellation(data.references), axis=0)
+                known |= {f"reference {n}": p for n, p in zip(data.references.targets, usual, strict=True)}
+            suspects.append(judged(at, label, name, float(off[reading]), known))
+    return suspects

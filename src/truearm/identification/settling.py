@@ -1,0 +1,100 @@
+"""Were the joints at rest when they were read: residuals explained by the direction each joint arrived from.
+
+If readings were taken before the robot settled, or if a joint stops short by friction, the true joint differs from
+the reading by a small angle with the sign of the last move. These angles, one a joint, are fitted to what the
+identified model leaves over, after removing what its own parameters could still take.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from truearm.identification.fit import Fit
+from truearm.identification.problem import Problem
+from truearm.measurement.dataset import Dataset
+from truearm.modeling.chain import Array
+from truearm.notices import Notice
+
+_SHARE: Final = 0.05
+_MOST: Final = 2 / 3
+
+
+@dataclass(frozen=True, eq=False)
+class Settling:
+    """What the arrival direction explains.
+
+    Attributes
+    ----------
+    share
+        Part of the residual's root mean square that it explains, corrected for the number of joints.
+    angles
+        Angle by which each joint lags behind its reading, with the sign of the last move [rad; m].
+    """
+
+    share: float
+    angles: Array
+
+    @property
+    def fires(self) -> bool:
+        """Whether it explains at least 5 % with one sign on most joints."""
+        positive = int((self.angles > 0).sum())
+        same = max(positive, len(self.angles) - positive)
+        return self.share >= _SHARE and same > _MOST * len(self.angles)
+
+
+def settling(fit: Fit, data: Dataset) -> Settling | None:
+    """Return what arrival directions explain of the residuals of a fit; None where too few readings are left.
+
+    Parameters
+    ----------
+    data
+        All readings, with the configurations in the order in which they were measured.
+    """
+    noise = {name: fit.sigma.get(name, 1.0) for name in ("position", "orientation")}
+    problem = Problem(fit.robot, data, fit.free, noise)
+    r, J = problem.linearised(np.array([fit.robot.values[name] for name in fit.free.names]))
+    arrived = np.sign(np.diff(data.joints, axis=0, prepend=data.joints[:1]))
+    H = np.concatenate(
+        [
+            block.observation.jacobian(
+                block.observation.residual(sweep, data, block.readings),
+                linear[:, :, where] * arrived[where].T[:, None, :],
+                angular[:, :, where] * arrived[where].T[:, None, :],
+            )
+            / block.sigma[:, None, None]
+            for block in problem.blocks
+            for where in [data.configuration[block.readings]]
+            for sweep in [fit.robot.sweep(data.joints, block.target)]
+            for linear, angular in [sweep.derivatives(fit.robot.moving)]
+        ]
+    ).reshape(len(r), -1)
+    U, s, _ = np.linalg.svd(J * fit.free.prior, full_matrices=False)
+    basis = U[:, s > 1e-8 * s[0]]
+    free = len(r) - basis.shape[1]
+    if free < 4 * H.shape[1]:
+        return None
+    left, moved = r - basis @ (basis.T @ r), H - basis @ (basis.T @ H)
+    angles = np.linalg.lstsq(moved, left, rcond=1e-10)[0]
+    before = float(left @ left) / free
+    after = float(np.sum((left - moved @ angles) ** 2)) / (free - H.shape[1])
+    return Settling(1.0 - float(np.sqrt(after / before)) if before > 0 else 0.0, -angles)
+
+
+def check_settling(fit: Fit, data: Dataset) -> list[Notice]:
+    """Return a notice if the joints were not at rest."""
+    found = settling(fit, data)
+    if found is None or not found.fires:
+        return []
+    shown = ", ".join(f"{np.rad2deg(a):+.3f}" for a in found.angles)
+    return [
+        Notice(
+            "joints-not-settled",
+            f"The direction from which each joint arrived explains {found.share:.0%} of the residuals (true joint "
+            f"against reading, times the sign of the last move: {shown} deg). Either the joints were read before "
+            "the robot had settled (use the commanded joints, or read later), or the joints have hysteresis "
+            "(arrive from one side only).",
+        )
+    ]

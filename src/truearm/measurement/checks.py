@@ -1,0 +1,316 @@
+"""Is the data believable on its own: before any robot is asked.
+
+Targets on a rigid tool keep their distances, reference points beside the robot keep their places, and no two
+readings of a real instrument agree to the last digit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import permutations
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.measurement.dataset import Dataset
+from truearm.modeling.chain import Array
+from truearm.notices import Notice
+
+Suspicion = Literal["outliers", "targets-swapped", "target-mistaken"]
+
+#: A distance, or a place, that holds better than this is never doubted [m].
+_HOLDS: Final = 1e-4
+#: How many robust deviations a distance or a place may be off.
+_DEVIATIONS: Final = 10.0
+#: A reading this close to another known point was taken from it [m].
+_SAME_POINT: Final = 1e-3
+#: A reading this far off was taken from another reflector, even an unknown one [m].
+_ANOTHER: Final = 0.02
+_NAMED: Final = 6
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """A reading that cannot be what it says.
+
+    Attributes
+    ----------
+    code
+        What it seems to be.
+    configuration, target
+        Label and name.
+    words
+        What it looks like, for example ``is target 2``.
+    """
+
+    code: Suspicion
+    configuration: str
+    target: str
+    words: str = ""
+
+
+def check_data(data: Dataset, suspects: Iterable[Suspect] | None = None) -> list[Notice]:
+    """Return what is wrong with a dataset without asking a robot.
+
+    Parameters
+    ----------
+    suspects
+        Readings that are doubted for another reason as well, reported together with those found here.
+    """
+    found = [*_missing(data), *_duplicates(data)]
+    found += suspect_notices([*rigid_suspects(data), *reference_suspects(data), *(suspects or ())])
+    return found + _moved(data)
+
+
+def suspect_notices(suspects: Sequence[Suspect]) -> list[Notice]:
+    """Return one notice for each kind of suspicion."""
+    advice = {
+        "outliers": (
+            "readings are far from where they must be",
+            "Measure them again or leave them out; --loss cauchy lets them count little.",
+        ),
+        "targets-swapped": (
+            "targets of the same configuration were taken for each other",
+            "Exchange their names in the file.",
+        ),
+        "target-mistaken": (
+            "readings were taken from another point than they name",
+            "Leave these cells empty, or measure them again.",
+        ),
+    }
+    notices = []
+    for code, (what, cure) in advice.items():
+        mine = list(dict.fromkeys(s for s in suspects if s.code == code))
+        distinct = {(s.configuration, s.target): s for s in reversed(mine)}
+        if distinct:
+            ordered = [s for s in mine if distinct.get((s.configuration, s.target)) is s]
+            words = [f"{s.configuration}/{s.target}{f' ({s.words})' if s.words else ''}" for s in ordered]
+            message = f"{len(ordered)} {what} (configuration/target): {_listed(words)}. {cure}"
+            notices.append(Notice(code, message))
+    return notices
+
+
+def constellation(data: Dataset) -> Array:
+    """Return positions by configuration and target, ``(configurations, targets, 3)``; NaN where there is none.
+
+    Of a target that was read more than once at a configuration, the mean.
+    """
+    total = np.zeros((data.configurations, len(data.targets), 3))
+    count = np.zeros((data.configurations, len(data.targets), 1))
+    there = data.has_position
+    place = (data.configuration[there], data.target[there])
+    np.add.at(total, place, data.position[there])
+    np.add.at(count, place, 1.0)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(total / count)
+
+
+def rigid_suspects(data: Dataset) -> list[Suspect]:
+    """Doubt readings whose distances to the other targets of their configuration do not hold.
+
+    Three or more targets tell which reading is wrong; of two, both are doubted.
+    """
+    points = constellation(data)
+    count = len(data.targets)
+    if count < 2:
+        return []
+    distance = np.linalg.norm(points[:, :, None] - points[:, None], axis=3)
+    usual = _nanmedian(distance)
+    off = abs(distance - usual)
+    i, j = np.triu_indices(count, 1)
+    allowed = max(_HOLDS, _DEVIATIONS * 1.4826 * float(_nanmedian(off[:, i, j].reshape(-1))))
+    known = _fixed_points(data)
+    suspects: list[Suspect] = []
+    for c in np.flatnonzero((off > allowed).any(axis=(1, 2))).tolist():
+        suspects += _blamed(data, points, c, off[c], usual, allowed, known)
+    return suspects
+
+
+def _blamed(
+    data: Dataset, points: Array, c: int, off: Array, usual: Array, allowed: float, known: dict[str, Array]
+) -> list[Suspect]:
+    here, label, names = points[c], data.labels[c], data.targets
+    seen = [t for t in range(len(names)) if np.isfinite(here[t]).all()]
+    swap = _swap(here, seen, usual, allowed)
+    if swap:
+        return [Suspect("targets-swapped", label, names[a], f"is target {names[b]}") for a, b in swap]
+    wrong = [t for t in seen if (off[t, [o for o in seen if o != t]] > allowed).all()]
+    if len(seen) > 2 and len(wrong) > 1:
+        wrong = [max(wrong, key=lambda t: float(np.sum(off[t, seen])))]
+    doubted = wrong or [t for t in seen if (off[t, seen] > allowed).any()]
+    others = {f"target {names[t]}": here[t] for t in seen if t not in doubted}
+    before = {f"target {names[t]} at the configuration before": points[c - 1, t] for t in doubted if c > 0}
+    suspects = []
+    for t in doubted:
+        size = float(np.max(off[t, seen]))
+        suspects.append(judged(here[t], label, names[t], size, known | others | before))
+    return suspects
+
+
+def judged(point: Array, label: str, target: str, size: float, known: dict[str, Array]) -> Suspect:
+    """Say what a wrong reading is: another known point, another reflector, or an outlier.
+
+    Parameters
+    ----------
+    point
+        The reading [m], ``(3,)``.
+    label, target
+        Its configuration and target.
+    size
+        How far it is off [m].
+    known
+        Points that it could have been taken from [m].
+    """
+    gaps = {name: float(np.linalg.norm(point - place)) for name, place in known.items() if np.isfinite(place).all()}
+    nearest = min(gaps, key=lambda name: gaps[name]) if gaps else None
+    if nearest is not None and gaps[nearest] < _SAME_POINT < size:
+        return Suspect("target-mistaken", label, target, f"is {nearest}")
+    if size > _ANOTHER:
+        return Suspect("target-mistaken", label, target, f"{size * 1e3:.0f} mm off")
+    return Suspect("outliers", label, target, f"{size * 1e3:.1f} mm off")
+
+
+def _swap(here: Array, seen: Sequence[int], usual: Array, allowed: float) -> list[tuple[int, int]]:
+    """Return the exchange of names under which all distances hold, fewest first; nothing if there is none."""
+    if not 3 <= len(seen) <= 6:
+        return []
+    orders = sorted(permutations(seen), key=lambda order: sum(a != b for a, b in zip(seen, order, strict=True)))
+    fitting = []
+    for order in orders[1:]:
+        points = here[list(order)]
+        distance = np.linalg.norm(points[:, None] - points[None], axis=2)
+        misfit = float(abs(distance - usual[np.ix_(seen, seen)]).max())
+        if misfit <= allowed:
+            # seen[k] really is the reading named order[k]
+            fitting.append((misfit, [(b, a) for a, b in zip(seen, order, strict=True) if a != b]))
+    return min(fitting, key=lambda entry: entry[0])[1] if fitting else []
+
+
+def _fixed_points(data: Dataset) -> dict[str, Array]:
+    if data.references is None:
+        return {}
+    usual = _nanmedian(constellation(data.references))
+    return {f"reference {name}": place for name, place in zip(data.references.targets, usual, strict=True)}
+
+
+# -- reference points --------------------------------------------------------------------------------------
+
+
+def reference_suspects(data: Dataset) -> list[Suspect]:
+    """Doubt readings of reference points that were taken from a target, or from another reference point."""
+    return [suspect for _, _, suspect in _mistaken_references(data)]
+
+
+def clean_references(data: Dataset) -> Array | None:
+    """Return the reference points, ``(configurations, points, 3)``, without mistaken readings; None without any."""
+    if data.references is None:
+        return None
+    points = constellation(data.references)
+    for c, t, _ in _mistaken_references(data):
+        points[c, t] = np.nan
+    return points
+
+
+def _mistaken_references(data: Dataset) -> list[tuple[int, int, Suspect]]:
+    if data.references is None:
+        return []
+    points, targets = constellation(data.references), constellation(data)
+    usual, off, allowed = _places(points)
+    names = data.references.targets
+    found = []
+    for c, t in np.argwhere(off > max(allowed, _SAME_POINT)).tolist():
+        known = {f"target {n}": p for n, p in zip(data.targets, targets[c], strict=True)}
+        known |= {f"reference {n}": p for k, (n, p) in enumerate(zip(names, usual, strict=True)) if k != t}
+        gaps = {name: float(np.linalg.norm(points[c, t] - place)) for name, place in known.items()}
+        nearest = min(gaps, key=lambda name: gaps[name] if np.isfinite(gaps[name]) else np.inf)
+        neighbours = [k for k in (c - 1, c + 1) if 0 <= k < data.configurations and np.isfinite(off[k, t])]
+        alone = bool(neighbours) and all(off[k, t] <= allowed for k in neighbours)
+        if gaps[nearest] < _SAME_POINT:
+            found.append((c, t, Suspect("target-mistaken", data.labels[c], names[t], f"is {nearest}")))
+        elif alone and off[c, t] > _ANOTHER:
+            words = f"{off[c, t] * 1e3:.0f} mm off"
+            found.append((c, t, Suspect("target-mistaken", data.labels[c], names[t], words)))
+    return found
+
+
+def _places(points: Array) -> tuple[Array, Array, float]:
+    """Return usual places, how far each reading is from them, and how far it may be."""
+    usual = _nanmedian(points)
+    off = np.linalg.norm(points - usual, axis=2)
+    return usual, off, max(_HOLDS, _DEVIATIONS * float(_nanmedian(off.reshape(-1))))
+
+
+def _moved(data: Dataset) -> list[Notice]:
+    points = clean_references(data)
+    if points is None or data.references is None:
+        return []
+    _, off, allowed = _places(points)
+    moved: NDArray[np.bool_] = np.asarray(off > allowed)
+    if not moved.any():
+        return []
+    where = np.flatnonzero(moved.any(axis=1))
+    names = [n for n, is_moved in zip(data.references.targets, np.any(moved, axis=0).tolist(), strict=True) if is_moved]
+    return [
+        Notice(
+            "reference-moved",
+            f"Reference points moved by up to {float(np.nanmax(off)) * 1e3:.2f} mm ({', '.join(names)}; "
+            f"{len(where)} configurations: {_listed([data.labels[c] for c in where])}). The robot's table or the "
+            "instrument moved: where three points moved together the motion is removed, elsewhere leave these "
+            "configurations out or measure them again.",
+        )
+    ]
+
+
+# -- bookkeeping -------------------------------------------------------------------------------------------
+
+
+def _missing(data: Dataset) -> list[Notice]:
+    counts = {}
+    for part in [data] if data.references is None else [data, data.references]:
+        empty = ~(part.has_position | part.has_orientation)
+        read = {(c, t) for c, t in zip(part.configuration.tolist(), part.target.tolist(), strict=True)}
+        for t, name in enumerate(part.targets):
+            absent = part.configurations - sum((c, t) in read for c in range(part.configurations))
+            counts[name] = int((empty & (part.target == t)).sum()) + absent
+    total = sum(counts.values())
+    if total == 0:
+        return []
+    words = ", ".join(f"{name} {count}" for name, count in counts.items() if count)
+    return [Notice("missing", f"{total} readings are missing ({words}). They are left out; nothing needs to be done.")]
+
+
+def _duplicates(data: Dataset) -> list[Notice]:
+    found = []
+    for part in [data] if data.references is None else [data, data.references]:
+        first: dict[tuple[int, bytes], int] = {}
+        for reading in np.flatnonzero(part.has_position).tolist():
+            key = (int(part.target[reading]), part.position[reading].tobytes())
+            other = first.setdefault(key, reading)
+            if other != reading:
+                a, b = (part.labels[part.configuration[r]] for r in (other, reading))
+                found.append(f"{part.targets[key[0]]} at {a} and {b}")
+    if not found:
+        return []
+    return [
+        Notice(
+            "duplicates",
+            f"{len(found)} readings repeat another one to the last digit (target at configurations): "
+            f"{_listed(found)}. Rows were copied, or the instrument stood still: remove them, they count twice.",
+        )
+    ]
+
+
+def _listed(words: Sequence[str]) -> str:
+    more = len(words) - _NAMED
+    return ", ".join(words[:_NAMED]) + (f" and {more} more" if more > 0 else "")
+
+
+def _nanmedian(values: Array) -> Array:
+    """Median along the first axis without NaN, NaN where there is nothing."""
+    import warnings
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)
+        return np.asarray(np.nanmedian(values, axis=0))

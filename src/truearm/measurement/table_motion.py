@@ -1,0 +1,52 @@
+"""The motion of the robot's table, seen in reference points that were measured along with the targets."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from truearm.measurement.checks import clean_references
+from truearm.measurement.dataset import Dataset
+from truearm.modeling.chain import Array
+from truearm.modeling.transform import quaternion_from_rotation, rotation_from_quaternion
+
+_HOLDS = 1e-4  # references that keep their distances better than this moved together [m]
+
+
+def without_table_motion(data: Dataset) -> Dataset:
+    """Return the data as if the table had stood still.
+
+    At each configuration with three or more reference points that kept their distances, the rigid motion from
+    there to their mean places (Kabsch 1976) is applied to the readings of the targets. Other configurations stay.
+    """
+    points = clean_references(data)
+    if points is None:
+        return data
+    there = np.asarray(np.isfinite(points).all(axis=2))
+    complete = np.asarray(there.all(axis=1))
+    if points.shape[1] < 3 or not complete.any():
+        return data
+    usual = points[complete].mean(axis=0)
+    position = data.position.copy()
+    quaternion = None if data.quaternion is None else data.quaternion.copy()
+    for c in np.flatnonzero(there.sum(axis=1) >= 3).tolist():
+        seen = there[c]
+        R, shift, misfit = _rigid(points[c, seen], usual[seen])
+        if misfit > _HOLDS:
+            continue
+        mine = data.configuration == c
+        position[mine] = position[mine] @ R.T + shift
+        if quaternion is not None:
+            turned = mine & data.has_orientation
+            quaternion[turned] = quaternion_from_rotation(R @ rotation_from_quaternion(quaternion[turned]))
+    return replace(data, position=position, quaternion=quaternion)
+
+
+def _rigid(a: Array, b: Array) -> tuple[Array, Array, float]:
+    """Return R and t with R a + t nearest to b, both ``(k, 3)``, and the largest distance left."""
+    centre_a, centre_b = a.mean(axis=0), b.mean(axis=0)
+    U, _, Vt = np.linalg.svd((b - centre_b).T @ (a - centre_a))
+    R = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
+    shift = centre_b - R @ centre_a
+    return R, shift, float(np.linalg.norm(a @ R.T + shift - b, axis=1).max())

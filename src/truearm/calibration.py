@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from truearm.errors import InputError, nearest_names
 from truearm.files import read_bytes, writable_folder, write_files
 from truearm.identification.bounds import Bounds, read_bounds
-from truearm.identification.fit import Fit, Redundant, Status, check_targets, identify, place
+from truearm.identification.fit import Fit, Redundant, Status, identify, place
 from truearm.identification.losses import LOSSES, Loss
 from truearm.identification.models import MODELS
 from truearm.identification.plausibility import check_against
@@ -36,6 +36,9 @@ from truearm.units import SHOWN_AS, from_si
 from truearm.version import __version__
 
 Train = int | Literal["all"] | None
+
+#: Priors that a parameter may move before the robot, its units or its joint order are doubted.
+_FAR: Final = 6.0
 
 
 def load_data(path: str | Path) -> Dataset:
@@ -110,7 +113,13 @@ class Calibration:
 
     def result(self) -> dict[str, Any]:
         """Return what ``result.json`` holds: the summary and every parameter."""
-        return {"truearm": "truearm-result/1", **self.summary(), "parameters": list(self._parameters())}
+        return {
+            "truearm": "truearm-result/1",
+            **self.summary(),
+            "command": self.command,
+            "history": self.history,
+            "parameters": list(self._parameters()),
+        }
 
     def _parameters(self) -> Sequence[dict[str, Any]]:
         rows = []
@@ -132,7 +141,7 @@ class Calibration:
     def save(self, folder: str | Path, progress: Callable[[str], None] = lambda _: None) -> tuple[Path, ...]:
         """Write ``calibrated.yaml``, ``result.json``, ``report.html`` and ``calibrated.urdf`` into a folder.
 
-        All of them or none: an earlier result stays until the new one is complete.
+        An earlier result stays until the new files are complete on disk; only then are they put in its place.
 
         Returns
         -------
@@ -235,7 +244,9 @@ def calibrate(
     count = _train_count(train, n, data.source)
     order = np.random.default_rng(seed).permutation(n)
     training, held_out = order[:count], order[count:]
-    check_targets(data.of_configurations(training), data.of_configurations(held_out))
+    if not data.has_position.any():
+        raise InputError("there is no position reading at all", where=data.source, cure="Fill in x, y and z.")
+    _check_split(data.of_configurations(training), data.of_configurations(held_out))
 
     progress("checking the data")
     noticed = check(data, robot)
@@ -243,12 +254,13 @@ def calibrate(
     first = data.of_configurations(training)
     second = data.of_configurations(held_out) if len(held_out) else None
     progress("placing the nominal robot")
-    nominal = place(robot, first)
+    nominal = place(robot, first, loss)
     progress(f"identifying the {chosen.name} model on {count} configurations")
     fit = identify(robot, first, chosen, loss=loss, redundancy=redundancy, bounds=bounds, bounds_file=bounds_file)
     progress("judging it")
     judged = first if second is None else second
     validation = None if second is None else errors_of(fit.robot, second)
+    before = errors_of(nominal.robot, judged)
     words += [data.source, "--model", chosen.name, "--train", "all" if second is None else str(count)]
     words += ["--seed", str(seed)]
     words += ["--loss", loss] if loss != "linear" else []
@@ -260,10 +272,14 @@ def calibrate(
     )
     return Calibration(
         fit=fit,
-        nominal=errors_of(nominal.robot, judged),
+        nominal=before,
         train=errors_of(fit.robot, first),
         validation=validation,
-        warnings=(*_warnings(fit, second is None), *noticed, *check_settling(fit, data)),
+        warnings=(
+            *_warnings(fit, second is None, _not_better(before, validation)),
+            *noticed,
+            *check_settling(fit, data),
+        ),
         data=data,
         training=training,
         held_out=held_out,
@@ -316,8 +332,8 @@ def validate(robot: Robot | str | Path, data: Dataset | str | Path) -> Errors:
     check_joints(robot, data)
     for name in data.targets:
         robot.target(name)
-    if not data.has_position.any():
-        raise InputError("there is no position reading at all", where=data.source, cure="Fill in x, y and z.")
+    if not (data.has_position | data.has_orientation).any():
+        raise InputError("there is no reading at all", where=data.source, cure="Fill in x, y and z.")
     return errors_of(robot, data)
 
 
@@ -368,6 +384,26 @@ def _scaled(spread: Spread, scale: float) -> dict[str, float]:
     }
 
 
+def _check_split(training: Dataset, held_out: Dataset) -> None:
+    """Refuse a held-out part that holds nothing, or readings of targets that the training part does not place."""
+    if held_out.configurations and not (held_out.has_position | held_out.has_orientation).any():
+        raise InputError(
+            "the held-out part has no reading at all",
+            where=held_out.source,
+            cure="Lower --train, change --seed, or measure again where readings are missing.",
+        )
+    placed = set(training.target[training.has_position].tolist())
+    for part, name in ((training, "training"), (held_out, "held-out")):
+        for index in dict.fromkeys(part.target[part.has_position | part.has_orientation].tolist()):
+            if index not in placed:
+                raise InputError(
+                    f"a target of the {name} part has no position in the training part",
+                    where=training.source,
+                    came=training.targets[index],
+                    cure="Raise --train, change --seed, or leave the target out.",
+                )
+
+
 def _train_count(train: Train, n: int, where: str) -> int:
     if train == "all":
         return n
@@ -401,8 +437,15 @@ def _chosen(name: str, known: Mapping[str, Any], option: str) -> Any:
     )
 
 
-def _warnings(fit: Fit, nothing_held_out: bool) -> list[Notice]:
+def _not_better(before: Errors, after: Errors | None) -> bool:
+    if after is None or before.position_spread is None or after.position_spread is None:
+        return False
+    return after.position_spread.mean > before.position_spread.mean
+
+
+def _warnings(fit: Fit, nothing_held_out: bool, not_better: bool) -> list[Notice]:
     found = []
+    robot = fit.robot
     if nothing_held_out:
         found.append(
             Notice(
@@ -411,7 +454,6 @@ def _warnings(fit: Fit, nothing_held_out: bool) -> list[Notice]:
                 "Leave --train out to see the error on configurations the fit has not seen.",
             )
         )
-    robot = fit.robot
     if "joint zero" in fit.model.groups and "geometry" in fit.model.groups:
         pairs = parallel_joints_without_beta(robot.convention, [dict(j.row) for j in robot.joints])
         if pairs:
@@ -445,7 +487,29 @@ def _warnings(fit: Fit, nothing_held_out: bool) -> list[Notice]:
             Notice(
                 "redundant",
                 "Held at their nominal values, because the readings cannot tell the combination in brackets "
-                f"apart: {combinations}. Predictions are not affected.",
+                f"apart: {combinations}." + ("" if fit.unseen else " Predictions are not affected."),
+            )
+        )
+    far = [
+        p.name
+        for p in robot.parameters.values()
+        if p.group not in ("base", "target") and abs(p.value - p.nominal) > _FAR * p.prior
+    ]
+    if far:
+        found.append(
+            Notice(
+                "far-from-nominal",
+                f"{', '.join(far[:8])}{' and others' if len(far) > 8 else ''} moved by more than {_FAR:g} times what "
+                "the nominal values are believed to be good for. Is it this robot, in these units, with its joints in "
+                "this order? If so, say in the robot file what its numbers are good for (priors).",
+            )
+        )
+    if not_better:
+        found.append(
+            Notice(
+                "not-better",
+                "On configurations the fit has not seen, the calibrated robot is no better than the nominal one: "
+                "there are too few readings for this model, or something is wrong with them.",
             )
         )
     if fit.excess > 1.0:

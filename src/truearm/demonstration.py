@@ -13,7 +13,7 @@ import numpy as np
 
 from truearm.calibration import Calibration, calibrate
 from truearm.errors import InputError
-from truearm.files import read_yaml, write_files
+from truearm.files import exists, read_bytes, read_yaml, write_files
 from truearm.measurement.readers.canonical import csv_text
 from truearm.measurement.truths import truth_twin
 from truearm.measurement.twin import measure
@@ -29,6 +29,11 @@ def demonstration(folder: Path, progress: Callable[[str], None] = lambda _: None
 
     The truth is the robot that Nubiola's thesis identified (Tables 2.6 and 2.7), with its compliance, and with gears
     that run out of true by 0.006 deg: both are beyond the geometric model, so the report has a remainder to show.
+
+    Raises
+    ------
+    InputError
+        If the folder holds other measurements: they are not overwritten.
     """
     rng = np.random.default_rng(20240)
     robot = load_robot("irb120")
@@ -38,7 +43,12 @@ def demonstration(folder: Path, progress: Callable[[str], None] = lambda _: None
     low, high = np.radians(_REGION)
     data = measure(twin, rng.uniform(low, high, (200, 6)), 0.03e-3, rng)
     path = folder / "measurements.csv"
-    write_files(folder, {path.name: csv_text(data)})
+    text = csv_text(data)
+    if exists(path) and read_bytes(path) != text.encode():
+        raise InputError(
+            "these are other measurements, and they are not overwritten", where=str(path), cure="Choose another --out."
+        )
+    write_files(folder, {path.name: text})
     calibration = calibrate("irb120", path, progress=progress)
     calibration.save(folder, progress)
     return calibration
@@ -57,7 +67,7 @@ def new_robot(path: Path) -> None:
     InputError
         If the file exists: nothing is overwritten.
     """
-    if path.exists():
+    if exists(path):
         raise InputError("this exists already and is not overwritten", where=str(path), cure="Choose another name.")
     write_files(path.parent, {path.name: template()})
 
@@ -73,7 +83,7 @@ def example(folder: Path) -> tuple[Path, ...]:
     rng = np.random.default_rng(7)
     with_template = {"my_robot.yaml": template()}
     for name in (*with_template, "measurements.csv", "check.csv", "session.sh"):
-        if (folder / name).exists():
+        if exists(folder / name):
             raise InputError(
                 "this exists already and is not overwritten", where=str(folder / name), cure="Choose another folder."
             )
@@ -93,8 +103,9 @@ def example(folder: Path) -> tuple[Path, ...]:
 _SESSION = """\
 #!/bin/sh
 # A whole session. my_robot.yaml is the nominal robot, measurements.csv what a tracker saw at 60 configurations,
-# check.csv what it saw at 15 others on another day.
+# check.csv what it saw at 15 others.
 set -e
+cd "$(dirname "$0")"
 truearm show my_robot.yaml
 truearm calibrate my_robot.yaml measurements.csv --model geometric --out result
 truearm validate result/calibrated.yaml check.csv

@@ -7,6 +7,8 @@ ever guessed from magnitudes.
 from __future__ import annotations
 
 import math
+import re
+from functools import cache
 from typing import Final
 
 from truearm.errors import InputError
@@ -24,11 +26,16 @@ SMALL_ANGLE_UNITS: Final = ("mrad", "rad", "deg")
 SHOWN_AS: Final = {"m": "mm", "rad": "deg", "1": "1"}
 
 
-def si_factor(unit: str) -> float:
-    """Return how much SI one `unit` is, for scaling whole arrays."""
-    if unit in _PER_SI:
-        return 1.0 / _PER_SI[unit]
-    return _SI_PER[unit]
+#: No length or angle that is meant is larger, nor anything else in a file [m, rad, 1].
+_LARGEST: Final = 1e6
+#: Lowest and highest standard deviation that is meant, of an angle [rad] and of anything else [m, 1].
+_DEVIATION: Final = {True: (1e-9, 10.0), False: (1e-9, 1e3)}
+_NUMBER: Final = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
+
+
+def as_number(text: str) -> float | None:
+    """Return the number that `text` is, None if it is none: digits, a decimal point, an exponent, nothing else."""
+    return float(text) if _NUMBER.fullmatch(text) else None
 
 
 def to_si(value: float, unit: str) -> float:
@@ -43,6 +50,35 @@ def from_si(value: float, unit: str) -> float:
     if unit in _PER_SI:
         return value * _PER_SI[unit]
     return value / _SI_PER[unit]
+
+
+@cache
+def believable(unit: str, *, deviation: bool = False) -> tuple[float, float]:
+    """Return the lowest and highest number in `unit` that can be meant, as a value or as a standard deviation."""
+    low, high = _DEVIATION[unit in SMALL_ANGLE_UNITS] if deviation else (-_LARGEST, _LARGEST)
+    return float(f"{from_si(low, unit):.9g}"), float(f"{from_si(high, unit):.9g}")
+
+
+def sized_si(value: float, unit: str, where: str, *, came: object = None, deviation: bool = False) -> float:
+    """Convert one number to metres or radians, or refuse one that is out of all proportion.
+
+    Parameters
+    ----------
+    came
+        The number as the file has it.
+    deviation
+        Whether it is a standard deviation, which can be too small as well.
+    """
+    low, high = believable(unit, deviation=deviation)
+    if low <= value <= high:
+        return to_si(value, unit)
+    raise InputError(
+        f"the number is too {'small' if deviation and value < low else 'large'} to be meant",
+        where=where,
+        came=value if came is None else came,
+        allowed=f"{low:.6g} to {high:.6g}{'' if unit == '1' else f' {unit}'}",
+        cure="Correct the number, or its unit.",
+    )
 
 
 def written(value: float, unit: str) -> float:

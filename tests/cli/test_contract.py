@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -35,7 +37,8 @@ def test_version(truearm: Truearm) -> None:
 
 def test_robots(truearm: Truearm) -> None:
     listed = json.loads(truearm("robots", "--json").out)
-    assert sorted(r["id"] for r in listed) == IDS
+    assert list(listed) == ["robots"]
+    assert sorted(r["id"] for r in listed["robots"]) == IDS
     plain = truearm("robots").out
     assert all(robot_id in plain for robot_id in IDS)
 
@@ -46,7 +49,9 @@ def test_show(truearm: Truearm, robot_id: str) -> None:
     assert shown["name"] == robot_id
     assert shown["source"]
     assert len(shown["joints"]) == len(load_robot(robot_id).joints)
-    assert truearm("show", robot_id).code == 0
+    plain = truearm("show", robot_id)
+    assert plain.code == 0
+    assert "lengths in mm, angles in deg" in plain.out
 
 
 def test_calibrate_writes_its_files_and_prints_one_object(truearm: Truearm, small: Path, tmp_path: Path) -> None:
@@ -201,6 +206,17 @@ def test_example_is_a_session_that_runs(truearm: Truearm, tmp_path: Path) -> Non
     assert check["position_mm"]["mean"] < 0.15
 
 
+def test_the_session_runs_from_anywhere(truearm: Truearm, tmp_path: Path) -> None:
+    folder, elsewhere = tmp_path / "session", tmp_path / "elsewhere"
+    truearm("example", folder)
+    elsewhere.mkdir()
+    environment = {**os.environ, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
+    subprocess.run(["sh", folder / "session.sh"], cwd=elsewhere, env=environment, capture_output=True, check=True)
+    assert (folder / "result" / "report.html").exists()
+    assert not list(elsewhere.iterdir())
+    assert "at 15 others." in (folder / "session.sh").read_text()
+
+
 def test_new_robot_is_a_robot(truearm: Truearm, tmp_path: Path) -> None:
     assert truearm("new-robot", tmp_path / "mine.yaml").code == 0
     assert truearm("show", tmp_path / "mine.yaml").code == 0
@@ -213,9 +229,51 @@ def test_demo_ends_by_naming_its_report(truearm: Truearm, tmp_path: Path) -> Non
     result = json.loads((tmp_path / "demo" / "result.json").read_text())
     noise = 0.03 * (8 / np.pi) ** 0.5
     assert 2 * noise < result["validation"]["position_mm"]["mean"] < result["nominal"]["position_mm"]["mean"] / 2
+    assert truearm("demo", "--out", tmp_path / "demo").code == 0
+
+
+def test_a_demo_that_does_not_converge_ends_like_a_calibration(
+    truearm: Truearm, small: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    data = read_csv(small / "data.csv").of_configurations([0, 1])
+    run = package.calibrate("irb120", data, train=1)
+    assert run.status.value == "rank-loss"
+    monkeypatch.setattr("truearm.demonstration.demonstration", lambda *_: run)
+    assert truearm("demo", "--out", tmp_path / "demo").code == 3
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a shell script")
+def test_the_demo_script_stays_where_it_is_called(tmp_path: Path) -> None:
+    clone, here = tmp_path / "my clone", tmp_path / "here"
+    for folder in (clone / "script", clone / ".venv" / "bin", here):
+        folder.mkdir(parents=True)
+    script = clone / "script" / "demo"
+    script.write_text((Path(__file__).parents[2] / "script" / "demo").read_text())
+    (clone / "script" / "bootstrap").write_text("#!/bin/sh\ncd /\n")
+    (clone / ".venv" / "bin" / "truearm").write_text('#!/bin/sh\necho "$@" > ran\n')
+    for made in (*clone.glob("script/*"), *clone.glob(".venv/bin/*")):
+        made.chmod(0o755)
+    environment = {**os.environ, "CDPATH": str(tmp_path)}
+    subprocess.run(["sh", "../my clone/script/demo", "--out", "x y"], cwd=here, env=environment, check=True)
+    assert (here / "ran").read_text() == "demo --out x y\n"
 
 
 def test_python_and_command_say_the_same(truearm: Truearm, small: Path, tmp_path: Path) -> None:
     printed = json.loads(truearm("calibrate", "irb120", small / "data.csv", "--out", tmp_path, "--json").out)
     robot, data = package.load_robot("irb120"), package.load_data(small / "data.csv")
     assert package.calibrate(robot, data).summary() == printed
+
+
+def test_the_wrong_robot_is_doubted(truearm: Truearm, small: Path, tmp_path: Path) -> None:
+    run = truearm("calibrate", "irb1600", small / "data.csv", "--out", tmp_path, "--json")
+    codes = {w["code"]: w["message"] for w in json.loads(run.out)["warnings"]}
+    assert "Is it this robot" in codes["far-from-nominal"]
+
+
+def test_too_few_readings_for_a_model_are_said(truearm: Truearm, small: Path, tmp_path: Path) -> None:
+    data = read_csv(small / "data.csv")
+    noisy = replace(data, position=data.position + np.random.default_rng(0).normal(0.0, 20e-3, data.position.shape))
+    (tmp_path / "data.csv").write_text(csv_text(noisy.of_configurations(np.arange(12))))
+    words = ["calibrate", "irb120", tmp_path / "data.csv", "--redundancy", "drop", "--out", tmp_path / "out", "--json"]
+    found = {w["code"] for seed in range(5) for w in json.loads(truearm(*words, "--seed", seed).out)["warnings"]}
+    assert "not-better" in found

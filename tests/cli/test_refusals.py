@@ -247,6 +247,93 @@ def test_existing_files_are_not_overwritten(truearm: Truearm, tmp_path: Path) ->
     assert {p.read_text() for p in tmp_path.iterdir()} == {"mine"}
 
 
+def test_a_demo_does_not_overwrite_measurements(truearm: Truearm, tmp_path: Path) -> None:
+    (tmp_path / "measurements.csv").write_text("mine")
+    message = refused(truearm, "demo", "--out", tmp_path)
+    assert "measurements.csv: these are other measurements, and they are not overwritten" in message
+    assert (tmp_path / "measurements.csv").read_text() == "mine"
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+@pytest.mark.parametrize("noise", ["inf", "nan", "-1", "1e-9", "1e9"])
+def test_noise_that_nothing_has(truearm: Truearm, tmp_path: Path, noise: str) -> None:
+    words = ["--truth", "nominal", "--poses", 5, f"--noise={noise}", "--out", tmp_path / "x.csv"]
+    assert "--noise" in refused(truearm, "simulate", "irb120", *words)
+    assert not (tmp_path / "x.csv").exists()
+
+
+@pytest.mark.parametrize("text", ["", "  "])
+def test_no_robot_at_all(truearm: Truearm, text: str) -> None:
+    assert "ROBOT: no robot is given" in refused(truearm, "show", text)
+
+
+LONG = "a" * 300
+
+
+def test_names_that_no_file_system_takes(truearm: Truearm, small: Path, tmp_path: Path) -> None:
+    simulated = ["simulate", "irb120", "--truth", "nominal", "--poses", 5, "--noise", 0, "--out"]
+    assert "there is no such robot" in refused(truearm, "show", LONG)
+    assert "irb120 has no truth of this name" in refused(
+        truearm, "simulate", "irb120", "--truth", LONG, *simulated[4:], tmp_path / "x.csv"
+    )
+    for words in (
+        ["show", f"{LONG}.yaml"],
+        ["show", f"{LONG}.urdf"],
+        ["check", tmp_path / LONG],
+        ["calibrate", "irb120", small / "data.csv", "--out", tmp_path / LONG],
+        ["calibrate", "irb120", small / "data.csv", "--out", tmp_path / LONG / "below"],
+        ["demo", "--out", tmp_path / LONG],
+        ["example", tmp_path / LONG],
+        ["new-robot", tmp_path / LONG],
+        [*simulated, tmp_path / LONG],
+    ):
+        assert "File name too long" in refused(truearm, *words)
+
+
+def test_links_that_lead_nowhere(truearm: Truearm, small: Path, tmp_path: Path) -> None:
+    link = tmp_path / "link"
+    link.symlink_to("nowhere.csv")
+    for words in (
+        ["check", link],
+        ["calibrate", "irb120", small / "data.csv", "--out", link],
+        ["calibrate", "irb120", small / "data.csv", "--out", link / "below"],
+        ["simulate", "irb120", "--truth", "nominal", "--poses", 5, "--noise", 0, "--out", link],
+        ["example", link],
+        ["new-robot", link],
+    ):
+        message = refused(truearm, *words)
+        assert f"{link}: this is a link, and there is nothing where it points to; got 'nowhere.csv'" in message
+    assert link.is_symlink()
+
+
+def test_an_output_that_is_an_input(truearm: Truearm, small: Path, tmp_path: Path) -> None:
+    files = {
+        "joints.txt": "1 2\n3 4\n",
+        "a.txt": "1 2 3\n4 5 6\n",
+        "b.txt": "1 2 3\n4 5 7\n",
+        "table.csv": "P,X,Y,Z\na,1,2,3\n",
+        "joints.csv": "P,q\na,1\n",
+        "map.yaml": "truearm: truearm-mapping/1\nconfiguration: {column: P}\nlength_unit: mm\n"
+        "readings: [{target: t, x: X, y: Y, z: Z}]\n"
+        "joints: {file: joints.csv, key: P, columns: [q], unit: deg}\n",
+    }
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    (tmp_path / "link").symlink_to("joints.txt")
+    matrices = ["import", "matrices", "--angle-unit", "deg", "--length-unit", "mm", "--joints", tmp_path / "joints.txt"]
+    matrices += ["--target", f"a={tmp_path / 'a.txt'}", "--reference", f"b={tmp_path / 'b.txt'}", "--out"]
+    table = ["import", "table", tmp_path / "table.csv", "--map", tmp_path / "map.yaml", "--out"]
+    for words, names in ((matrices, ("joints.txt", "a.txt", "b.txt", "link")), (table, [*files][3:])):
+        for name in names:
+            out = tmp_path / ".." / tmp_path.name / name
+            assert f"{name}: this file is read, and would be overwritten" in refused(truearm, *words, out)
+        assert truearm(*words, tmp_path / "new.csv").code == 0
+    assert {name: (tmp_path / name).read_text() for name in files} == files
+    truearm("new-robot", tmp_path / "r.yaml")
+    words = ["--poses", 5, "--noise", 0, "--out", tmp_path / "r.yaml"]
+    assert "would be overwritten" in refused(truearm, "simulate", tmp_path / "r.yaml", "--truth", "nominal", *words)
+
+
 def test_unknown_truth(truearm: Truearm, tmp_path: Path) -> None:
     words = ["--poses", 5, "--noise", 0.1, "--out", tmp_path / "x.csv"]
     message = refused(truearm, "simulate", "irb120", "--truth", "tracker-triangle", *words)

@@ -18,7 +18,7 @@ from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of
 from truearm.measurement.truths import truth_twin
 from truearm.modeling.chain import Array
-from truearm.modeling.transform import Transform, rotation_from_quaternion
+from truearm.modeling.transform import Transform, quaternion_from_rotation, rotation_from_quaternion
 from truearm.robots import load_robot
 
 BY_NAME = {m.name: m for m in MODELS}
@@ -256,3 +256,37 @@ def test_missing_readings_are_left_out() -> None:
     fit = _refit(with_gaps)
     assert fit.status is Status.CONVERGED
     assert np.flatnonzero(np.isnan(fit.weight)).tolist() == [3, 17, 40]
+
+
+def test_a_parameter_at_its_bound_is_not_uncertain() -> None:
+    _, data = campaign("irb120", 40, 0.05e-3, 2)
+    held = Bounds.model_validate(
+        {"truearm": "truearm-bounds/1", "units": {"length": "mm", "angle": "deg"}, "within": {"a_3": 0}}
+    )
+    fit = identify(load_robot("irb120"), data, GEOMETRIC, bounds=held)
+    a_3 = fit.robot.parameters["a_3"]
+    assert (a_3.value, a_3.deviation, a_3.informed) == (a_3.nominal, None, None)
+    assert fit.covariance[fit.free.names.index("a_3")].tolist() == [0.0] * len(fit.free.names)
+
+
+def test_declared_positions_are_checked_beside_undeclared_orientations() -> None:
+    rng = np.random.default_rng(3)
+    twin, data = campaign("irb120", 60, 0.0, 3)
+    robot = twin.robot.with_frames(twin.robot.base, {"t": Transform((0.1, 0.0, 0.1), (0.6, 0.8, 0.0, 0.0))})
+    position, R = robot.poses(data.joints, "t")
+    poses = replace(
+        data, targets=("t",), configuration=np.arange(60), target=np.zeros(60, dtype=np.intp),
+        position=position + rng.normal(0.0, 1e-4, (60, 3)), quaternion=quaternion_from_rotation(R),
+        sigma=np.full(60, 5e-6),
+    )  # fmt: skip
+    fit = identify(load_robot("irb120"), poses, GEOMETRIC)
+    assert not fit.declared
+    assert fit.excess > 5
+
+
+def test_a_point_has_no_orientation_to_be_judged() -> None:
+    twin, data = campaign("irb120", 10, 0.0, 3)
+    turned = replace(data, quaternion=np.tile([0.0, 1.0, 0.0, 0.0], (len(data.target), 1)))
+    errors = errors_of(twin.robot, turned)
+    assert errors.orientation_spread is None
+    assert errors.position_norms.max() < 1e-9

@@ -1,13 +1,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import get_args
 
 import numpy as np
 import pytest
 from tests.simulated import campaign, more_of
 
 from truearm.errors import InputError
-from truearm.identification.fit import Fit, Status, identify
+from truearm.identification.bounds import Bounds
+from truearm.identification.fit import Fit, Redundant, Status, identify
 from truearm.identification.models import MODELS
 from truearm.measurement.statistics import errors_of
 from truearm.robots import library, load_robot
@@ -90,3 +92,44 @@ def test_too_few_equations_without_priors_are_refused() -> None:
         InputError, match=r"fewer equations than unknowns.*36 equations for 40 unknown.*at least 14.*redundancy prior"
     ):
         identify(load_robot("irb120"), data, GEOMETRIC, redundancy="drop")
+
+
+@pytest.mark.parametrize("still", [[0], [5], [3, 4, 5]])
+def test_a_joint_that_never_moved_is_a_loss_of_rank(still: list[int]) -> None:
+    twin, data = campaign("irb120", 40, 0.05e-3, 2)
+    joints = data.joints.copy()
+    joints[:, still] = 0.3
+    positions = np.stack([twin.robot.poses(joints, t)[0] for t in data.targets], axis=1).reshape(-1, 3)
+    for redundancy in get_args(Redundant):
+        fit = identify(load_robot("irb120"), replace(data, joints=joints, position=positions), GEOMETRIC,
+                       redundancy=redundancy)  # fmt: skip
+        assert fit.status is Status.RANK_LOSS, redundancy
+        assert fit.unseen
+        assert all(fit.standing(name) == "not-determined" for name in fit.unseen)
+
+
+def test_a_single_target_on_the_last_axis_leaves_honest_deviations() -> None:
+    for seed in range(4):
+        twin, data = campaign("irb120", 50, 0.05e-3, seed)
+        one = data.target == 0
+        assert data.sigma is not None
+        single = replace(
+            data, targets=("1",), configuration=data.configuration[one], target=data.target[one],
+            position=data.position[one], sigma=data.sigma[one],
+        )  # fmt: skip
+        fit = identify(load_robot("irb120"), single, GEOMETRIC, redundancy="drop")
+        assert fit.status is Status.CONVERGED
+        # to first order the held parameters' errors are absorbed by the named members; the others must be honest
+        named = {member for r in fit.redundancies for member in r.members}
+        for p in fit.robot.parameters.values():
+            if p.deviation is not None and p.name not in named and not p.name.startswith("base_r"):
+                assert abs(p.value - twin.robot.values[p.name]) < 5 * p.deviation, p.name
+
+
+def test_bounds_that_a_held_parameter_cannot_keep_are_refused() -> None:
+    _, data = campaign("irb120", 40, 0.05e-3, 2)
+    bounds = Bounds.model_validate(
+        {"truearm": "truearm-bounds/1", "units": {"length": "mm", "angle": "deg"}, "between": {"d_3": [1, 2]}}
+    )
+    with pytest.raises(InputError, match=r"my.yaml, d_3: the bounds exclude the nominal value of a redundant"):
+        identify(load_robot("irb120"), data, GEOMETRIC, redundancy="drop", bounds=bounds, bounds_file="my.yaml")

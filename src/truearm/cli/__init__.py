@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import sys
-from typing import Annotated
+from contextlib import suppress
+from typing import Annotated, NoReturn
 
 import typer
 
@@ -60,9 +61,39 @@ app.command()(demo)
 
 
 def main() -> None:
-    """Run the command; refused input ends with one message and exit code 2."""
+    """Run the command; what cannot be used ends with one message and exit code 2."""
     try:
-        app(prog_name="truearm")
+        try:
+            app(prog_name="truearm")
+        finally:
+            sys.stdout.flush()
     except InputError as error:
-        print(f"truearm: {error}", file=sys.stderr)  # noqa: T201
-        sys.exit(2)
+        _end(f"truearm: {error}")
+    except BrokenPipeError:  # whoever read the output has seen enough
+        _drop_output()
+        sys.exit(1)
+    except OSError as error:
+        _drop_output()
+        _end(f"truearm: {error.filename or 'output'}: {error.strerror or error}.")
+    except UnicodeError as error:
+        _end(f"truearm: a text cannot be written ({error}).")
+    except KeyboardInterrupt:
+        sys.exit(130)
+    except ValueError as error:
+        from numpy.linalg import LinAlgError
+
+        if not isinstance(error, LinAlgError):
+            raise
+        _end(f"truearm: the equations cannot be solved ({error}). Look at the data with 'truearm check'.")
+
+
+def _end(message: str) -> NoReturn:
+    print(message, file=sys.stderr)  # noqa: T201
+    sys.exit(2)
+
+
+def _drop_output() -> None:
+    """Let go of output that could not be written: Python would try, and fail, once more when it ends."""
+    with suppress(OSError):  # where standard output is no file
+        output = sys.stdout.fileno()
+        os.dup2(os.open(os.devnull, os.O_WRONLY), output)

@@ -41,7 +41,6 @@ def calibrate(
     """
     from truearm.calibration import calibrate as run
     from truearm.files import writable_folder
-    from truearm.identification.fit import Status
 
     writable_folder(out)
     with progress() as say:
@@ -62,8 +61,7 @@ def calibrate(
     else:
         print_calibration(calibration)
         typer.echo(f"Written to {out}: calibrated.yaml, result.json, report.html, calibrated.urdf")
-    if calibration.status not in (Status.CONVERGED, Status.AT_BOUND):
-        raise typer.Exit(3)
+    exit_unless_finished(calibration)
 
 
 def print_calibration(calibration: Calibration) -> None:
@@ -82,6 +80,14 @@ def print_calibration(calibration: Calibration) -> None:
     typer.echo(f"Status: {summary['status']}. {calibration.status.advice}")
     for warning in summary["warnings"]:
         typer.echo(f"Warning ({warning['code']}): {warning['message']}")
+
+
+def exit_unless_finished(calibration: Calibration) -> None:
+    """End with exit code 3 if the fit did not come to a good end."""
+    from truearm.identification.fit import Status
+
+    if calibration.status not in (Status.CONVERGED, Status.AT_BOUND):
+        raise typer.Exit(3)
 
 
 def _train(text: str | None) -> Train:

@@ -25,13 +25,13 @@ def matrices(
     ] = None,
 ) -> None:
     """White-space separated matrices, one configuration a row. A row of zeros or NaN is a missing reading."""
-    from truearm.files import write_text
+    from truearm.files import refuse_overwriting, write_text
     from truearm.measurement.readers.canonical import csv_text
     from truearm.measurement.readers.matrices import read_matrices
 
-    data, missing = read_matrices(
-        joints, _named(target, "--target"), _named(reference or [], "--reference"), angle_unit, length_unit
-    )
+    targets, references = _named(target, "--target"), _named(reference or [], "--reference")
+    refuse_overwriting(out, [joints, *targets.values(), *references.values()])
+    data, missing = read_matrices(joints, targets, references, angle_unit, length_unit)
     write_text(out, csv_text(data))
     typer.echo(f"{data.configurations} configurations, targets {', '.join(data.targets)}: {out}")
     for name, count in missing.items():
@@ -45,10 +45,11 @@ def table(
     out: Annotated[Path, typer.Option("--out", metavar="DATA.csv", help="File to write.")],
 ) -> None:
     """Any table of points, by a mapping that says which column is what (the guide has complete ones)."""
-    from truearm.files import write_text
+    from truearm.files import refuse_overwriting, write_text
     from truearm.measurement.readers.canonical import csv_text
-    from truearm.measurement.readers.table import read_table
+    from truearm.measurement.readers.table import files_read, read_table
 
+    refuse_overwriting(out, files_read(file, mapping))
     data = read_table(file, mapping)
     write_text(out, csv_text(data))
     typer.echo(f"{data.configurations} configurations, targets {', '.join(data.targets)}: {out}")

@@ -18,7 +18,8 @@ def robots(json: Json = False) -> None:
 
     found = [load_robot(robot_id) for robot_id in library()]
     if json:
-        print_json([{"id": r.name, "title": r.title, "joints": len(r.joints), "source": r.source} for r in found])
+        rows = [{"id": r.name, "title": r.title, "joints": len(r.joints), "source": r.source} for r in found]
+        print_json({"robots": rows})
         return
     width = max(len(r.name) for r in found)
     for r in found:
@@ -39,7 +40,7 @@ def show(
         return
     typer.echo(f"{loaded.title} ({loaded.name})")
     typer.echo(f"Source: {loaded.source}")
-    typer.echo(f"Convention: {loaded.convention_name}")
+    typer.echo(f"Convention: {loaded.convention_name}, lengths in mm, angles in deg")
     for joint in content["joints"]:
         row = "  ".join(f"{name} {value:g}" for name, value in joint["values"].items())
         limits = "  limits {:g} to {:g}".format(*joint["limits"]) if joint["limits"] else ""
@@ -58,6 +59,7 @@ def show(
 def _content(robot: Robot) -> dict[str, Any]:
     import numpy as np
 
+    from truearm.measurement.truths import truth_names
     from truearm.units import SHOWN_AS, from_si
 
     shown = SHOWN_AS
@@ -87,7 +89,7 @@ def _content(robot: Robot) -> dict[str, Any]:
         "effects": list(robot.effect_names),
         "masses_kg": {f"link {m.joint}": m.mass for m in robot.masses},
         "tools": list(robot.tools),
-        "truths": ["nominal", "random", *robot.truths],
+        "truths": list(truth_names(robot)),
         "targets": [target.name for target in robot.targets],
         "history": list(robot.history),
     }

@@ -25,18 +25,21 @@ def simulate(
     import numpy as np
 
     from truearm.cli.output import progress
-    from truearm.files import writable_folder, write_text
+    from truearm.files import refuse_overwriting, writable_file, write_text
     from truearm.measurement.readers.canonical import csv_text
     from truearm.measurement.truths import truth_twin
     from truearm.measurement.twin import measure
-    from truearm.robots import load_robot
+    from truearm.robots import load_robot, urdf_source
+    from truearm.units import sized_si
 
-    writable_folder(out.parent)
+    sigma = sized_si(noise, "mm", "--noise", deviation=True) if noise else 0.0
+    writable_file(out)
+    refuse_overwriting(out, [(urdf_source(name) or (Path(name), None))[0] for name in (robot, truth)])
     rng = np.random.default_rng(seed)
     nominal = load_robot(robot)
     twin = truth_twin(nominal, truth, rng)
     with progress() as say:
         say(f"measuring {poses} configurations")
-        data = measure(twin, nominal.random_configurations(poses, rng), noise / 1e3, rng)
+        data = measure(twin, nominal.random_configurations(poses, rng), sigma, rng)
     write_text(out, csv_text(data))
     typer.echo(f"{poses} configurations of {nominal.name} ({truth}), {len(data.targets)} targets: {out}")

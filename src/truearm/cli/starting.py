@@ -14,7 +14,7 @@ def demo(
     ),
 ) -> None:
     """Run the main job on a built-in digital twin of an ABB IRB 120."""
-    from truearm.cli.calibrate import print_calibration
+    from truearm.cli.calibrate import exit_unless_finished, print_calibration
     from truearm.cli.output import progress
     from truearm.demonstration import demonstration
 
@@ -22,6 +22,7 @@ def demo(
         calibration = demonstration(out, say)
     print_calibration(calibration)
     typer.echo(f"The report is {out / 'report.html'}; open it in a browser.")
+    exit_unless_finished(calibration)
 
 
 def example(folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder to write into.")]) -> None:

@@ -7,6 +7,7 @@ from enum import Enum
 from typing import Final, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truearm.errors import InputError
 from truearm.identification.bounds import Bounds, bound_vectors
@@ -46,7 +47,7 @@ class Status(Enum):
     def advice(self) -> str:
         """What to do about it."""
         return {
-            Status.CONVERGED: "Nothing: judge the fit by its held-out error.",
+            Status.CONVERGED: "Judge the fit by its held-out error.",
             Status.AT_BOUND: "A parameter stopped at a bound: widen the bound if it was a guess.",
             Status.RANK_LOSS: "The data are too alike to determine everything that predictions depend on: "
             "measure configurations that move every joint.",
@@ -82,7 +83,7 @@ class Fit:
         Whether the file declared all of them.
     excess
         How much larger the residuals are than the declared deviations allow; 1 if they agree or nothing was
-        declared. The covariance contains it.
+        declared. The covariance contains it. Parameters at a bound are not uncertain in it.
     weight
         What the loss left of each reading, ``(readings,)``, in the order of the dataset; NaN where none was used.
         For ``l1``, which has no full weight, relative to the median reading.
@@ -107,12 +108,12 @@ class Fit:
 
     def standing(self, name: str) -> Standing:
         """Return how much the value of a parameter is worth."""
+        if name in self.unseen:
+            return "not-determined"
         if any(name == r.dropped for r in self.redundancies):
             return "dropped"
         if name not in self.free.names:
             return "fixed"
-        if name in self.unseen:
-            return "not-determined"
         if name in self.at_bound:
             return "at-bound"
         informed = self.robot.parameters[name].informed
@@ -158,7 +159,8 @@ def identify(
     Raises
     ------
     InputError
-        For data without positions, bounds on unknown parameters, or too few equations without priors.
+        For data without positions, bounds on unknown parameters, bounds that a redundant parameter cannot keep, or
+        too few equations without priors.
     """
     start = initial_frames(model.prepared(robot), data)
     free = model.free(start)
@@ -171,6 +173,8 @@ def identify(
     steps = 0
     for _ in range(6):
         held = [r.dropped for r in dropped]
+        if check_bounds is not None:
+            _check_held(held, free, check_bounds, bounds_file)
         kept = problem.free.without(held)
         limits = None if check_bounds is None else _limits_of(check_bounds, free, kept)
         solution, reduced = _solve_with_noise(replace(problem, free=kept), loss, limits)
@@ -184,12 +188,25 @@ def identify(
         dropped = find_redundancies(problem, there.start, held)
         if [r.dropped for r in dropped] == held:
             break
+    else:
+        solution = replace(solution, converged=False)
+        dropped = tuple(r for r in dropped if r.dropped in held)
     return _fit(reduced, solution, start, model, loss, dropped, limits, steps)
 
 
-def place(robot: Robot, data: Dataset) -> Fit:
+def place(robot: Robot, data: Dataset, loss: Loss = "linear") -> Fit:
     """Fit only the base and the targets: the uncalibrated robot in the frames of the data."""
-    return identify(robot, data, FRAMES)
+    return identify(robot, data, FRAMES, loss=loss)
+
+
+def _check_held(held: list[str], free: FreeParameters, limits: tuple[Array, Array], where: str) -> None:
+    for name, p, low, high in zip(free.names, free.parameters, *limits, strict=True):
+        if name in held and not low <= p.nominal <= high:
+            raise InputError(
+                "the bounds exclude the nominal value of a redundant parameter, where --redundancy drop holds it",
+                where=f"{where}, {name}",
+                cure="Leave this bound out, or use --redundancy prior.",
+            )
 
 
 def _limits_of(limits: tuple[Array, Array], free: FreeParameters, kept: FreeParameters) -> tuple[Array, Array]:
@@ -257,33 +274,28 @@ def _fit(
     steps: int,
 ) -> Fit:
     free, x = problem.free, solution.vector
+    at_bound = np.zeros(len(x), dtype=bool)
+    if limits is not None:
+        near = 1e-9 * free.prior
+        at_bound = (x <= limits[0] + near) | (x >= limits[1] - near)
     weighted = np.ones_like(solution.weight) if loss == "l1" else solution.weight
     A = solution.jacobian * free.prior * np.repeat(np.sqrt(weighted), 3)[:, None]
     noise = _noise(problem, solution, loss)
-    declared = all(b.observation.declared_sigma(problem.data) is not None for b in problem.blocks)
-    excess = _excess(noise) if declared else 1.0
+    declared = {b.observation.name for b in problem.blocks if b.observation.declared_sigma(problem.data) is not None}
+    excess = _excess({name: noise[name] for name in noise if name in declared}) if declared else 1.0
     spread = excess / np.sqrt(_L1_EFFICIENCY) if loss == "l1" else excess
-    information = A.T @ A / spread**2 + (np.eye(len(x)) if problem.priors else 0.0)
-    covariance = np.linalg.pinv(information, rcond=1e-15, hermitian=True) * np.outer(free.prior, free.prior)
-    deviation = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    covariance = _covariance(A / spread, ~at_bound, problem.priors) * np.outer(free.prior, free.prior)
+    deviation = np.sqrt(np.diag(covariance))
     informed = np.clip(1.0 - (deviation / free.prior) ** 2, 0.0, 1.0)
-    at_bound: tuple[str, ...] = ()
-    if limits is not None:
-        near = 1e-9 * free.prior
-        at_bound = tuple(
-            n for n, v, lo, hi, e in zip(free.names, x, *limits, near, strict=True) if v <= lo + e or v >= hi - e
-        )
     identified = [
-        replace(start.parameters[n], value=float(v), deviation=float(d), informed=float(i))
-        for n, v, d, i in zip(free.names, x, deviation, informed, strict=True)
+        replace(start.parameters[n], value=float(v))
+        if bound
+        else replace(start.parameters[n], value=float(v), deviation=float(d), informed=float(i))
+        for n, v, d, i, bound in zip(free.names, x, deviation, informed, at_bound, strict=True)
     ]
     robot = start.with_parameters(identified)
-    frames = FRAMES.free(robot)
-    looked_at = (
-        FreeParameters(tuple(robot.parameters[n] for n in {*frames.names, *(r.dropped for r in dropped), *free.names}))
-        if dropped
-        else frames
-    )
+    held = tuple(robot.parameters[r.dropped] for r in dropped)
+    looked_at = FreeParameters((*(robot.parameters[n] for n in free.names), *held))
     unseen = unseen_but_felt(robot, problem.data, looked_at)
     used = solution.weight / np.median(solution.weight) if loss == "l1" else solution.weight
     weight = np.full(len(problem.data.target), np.nan)
@@ -296,7 +308,7 @@ def _fit(
         status = Status.NOT_CONVERGED
     elif unseen:
         status = Status.RANK_LOSS
-    elif at_bound:
+    elif at_bound.any():
         status = Status.AT_BOUND
     else:
         status = Status.CONVERGED
@@ -305,8 +317,38 @@ def _fit(
         values = np.concatenate([b.sigma for b in problem.blocks if b.observation.name == name])
         sigma[name] = float(np.sqrt(np.mean(values**2)))
     return Fit(
-        robot, start, model, status, free, covariance, dropped, at_bound, unseen, sigma, declared, excess, weight, steps
+        robot=robot,
+        start=start,
+        model=model,
+        status=status,
+        free=free,
+        covariance=covariance,
+        redundancies=dropped,
+        at_bound=tuple(n for n, bound in zip(free.names, at_bound, strict=True) if bound),
+        unseen=unseen,
+        sigma=sigma,
+        declared=declared == set(noise),
+        excess=excess,
+        weight=weight,
+        steps=steps,
     )
+
+
+def _covariance(A: Array, uncertain: NDArray[np.bool_], priors: bool) -> Array:
+    """Return the covariance of parameters scaled by their priors, zero for those that are not uncertain.
+
+    Parameters
+    ----------
+    A
+        Whitened Jacobian per prior, ``(rows, parameters)``.
+    """
+    count = int(uncertain.sum())
+    rows = np.concatenate([A[:, uncertain], np.eye(count)]) if priors else A[:, uncertain]
+    _, s, Vt = np.linalg.svd(np.asarray(np.linalg.qr(rows, mode="r"), dtype=np.float64))
+    spread = Vt.T / np.maximum(s, 1e-12 * s[0])
+    covariance = np.zeros((A.shape[1], A.shape[1]))
+    covariance[np.ix_(uncertain, uncertain)] = spread @ spread.T
+    return covariance
 
 
 def _excess(noise: dict[str, tuple[float, float]]) -> float:
@@ -319,22 +361,3 @@ def _excess(noise: dict[str, tuple[float, float]]) -> float:
     k = 2.0 / (9.0 * freedom)
     allowed = (1.0 - k + 3.09 * np.sqrt(k)) ** 3
     return float(np.sqrt(ratio)) if ratio > allowed else 1.0
-
-
-def check_targets(training: Dataset, held_out: Dataset) -> None:
-    """Refuse held-out readings of targets that the training data never saw.
-
-    Raises
-    ------
-    InputError
-        Naming the target.
-    """
-    seen = set(training.target[training.has_position].tolist())
-    for index in dict.fromkeys(held_out.target[held_out.has_position | held_out.has_orientation].tolist()):
-        if index not in seen:
-            raise InputError(
-                "a target of the held-out part has no reading in the training part",
-                where=training.source,
-                came=training.targets[index],
-                cure="Raise --train, change --seed, or leave the target out.",
-            )

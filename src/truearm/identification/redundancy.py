@@ -4,7 +4,8 @@ Columns are looked at in a fixed order (base, targets, joint zeros, geometry fro
 that stand well apart from the earlier ones, then for those that stand less and less apart; what the others span
 exactly is redundant, and its coordinates in them are the combination. Taking the first that fits in one pass would
 keep, between two axes that are nearly parallel, the slide that is almost spanned and hold the tilt that is not:
-the classical weakness of DH parameters again. Columns are scaled by the parameters' priors, that is to physical
+the classical weakness of DH parameters again. A column of whitened readings that is shorter than a third of a prior
+tells nothing either. Columns are scaled by the parameters' priors, that is to physical
 size, never by their own norm alone: a column of rounding noise must stay noise.
 """
 
@@ -26,6 +27,10 @@ _ORDER: Final = ("base", "target", "gain", "joint zero", "geometry")
 _APART: Final = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)  # share of a column outside the span of the others
 _MEMBER: Final = 1e-9  # priors per prior below which a parameter takes no part in a combination
 _SHOWN: Final = 0.02
+_KNOWS_NOTHING: Final = 0.3  # readings that tell a parameter no better than to three priors do not tell it
+_UNSEEN: Final = 1e-8  # share of the best seen direction
+_FELT: Final = 1e-6  # share of the largest effect of a parameter
+_INVOLVED: Final = 0.1  # share of a parameter in the lost directions
 
 
 @dataclass(frozen=True)
@@ -85,7 +90,7 @@ def _independent(A: Array, among: Iterable[int], free: FreeParameters) -> list[i
     for apart in _APART:
         for i in list(left):
             size = float(np.linalg.norm(rests[i]))
-            if size <= apart * norms[i]:
+            if size <= max(apart * norms[i], _KNOWS_NOTHING):
                 continue
             direction = rests[i] / size
             kept.append(i)
@@ -150,9 +155,12 @@ def unseen_but_felt(robot: Robot, data: Dataset, free: FreeParameters, seed: int
     noise = {"position": 1.0, "orientation": 1.0}
     plain = Problem(robot, _unit_noise(data), free, noise, priors=False)
     A = plain.linearised(free.start)[1] * free.prior
-    _, s, Vt = np.linalg.svd(A, full_matrices=True)
-    seen = int((s > 1e-8 * s[0]).sum()) if len(s) else 0
-    unseen = Vt[seen:]
+    count = A.shape[1]
+    triangle = np.zeros((count, count))
+    reduced = np.asarray(np.linalg.qr(A, mode="r"), dtype=np.float64)
+    triangle[: len(reduced)] = reduced
+    _, s, Vt = np.linalg.svd(triangle)
+    unseen = Vt[s <= _UNSEEN * s[0]]
     if len(unseen) == 0:
         return ()
     q = robot.random_configurations(40, np.random.default_rng(seed))
@@ -162,11 +170,10 @@ def unseen_but_felt(robot: Robot, data: Dataset, free: FreeParameters, seed: int
         linear, angular = robot.derivatives(sweep, q, free.names)
         parts = (linear, angular) if target.quaternion is not None else (linear,)
         felt = np.concatenate([felt, *(part.reshape(len(free.names), -1).T * free.prior for part in parts)])
-    strength = np.linalg.norm(felt @ unseen.T, axis=0)
-    scale = np.linalg.norm(felt, axis=0).max()
-    lost = [direction for direction, size in zip(unseen, strength, strict=True) if size > 1e-6 * scale]
-    involved = np.any([abs(direction) > 0.1 for direction in lost], axis=0) if lost else np.zeros(0, bool)
-    return tuple(name for name, is_in in zip(free.names, involved, strict=False) if is_in)
+    _, strength, turned = np.linalg.svd(felt @ unseen.T)
+    lost = turned[: len(strength)][strength > _FELT * np.linalg.norm(felt, axis=0).max()] @ unseen
+    involved = np.linalg.norm(lost, axis=0) > _INVOLVED
+    return tuple(name for name, is_in in zip(free.names, involved.tolist(), strict=True) if is_in)
 
 
 def _unit_noise(data: Dataset) -> Dataset:

@@ -43,7 +43,8 @@ class Errors:
     position
         Predicted minus measured position of each reading [m], ``(readings, 3)``, NaN where nothing was read.
     orientation
-        Rotation vector from the measured to the predicted orientation [rad], likewise; None without any.
+        Rotation vector from the measured to the predicted orientation [rad], likewise; None without any. A target
+        that the robot knows only as a point has no orientation to be judged.
     """
 
     configurations: int
@@ -95,7 +96,10 @@ def errors_of(robot: Robot, data: Dataset) -> Errors:
         if not mine.any():
             continue
         sweep = robot.sweep(data.joints, name)
+        is_point = robot.target(name).quaternion is None
         for kind, errors in kinds:
+            if is_point and isinstance(kind, Orientation):
+                continue
             readings = np.flatnonzero(mine & kind.present(data))
             if errors is not None and len(readings):
                 errors[readings] = kind.residual(sweep, data, readings)

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from truearm.errors import InputError, nearest_names
+from truearm.files import exists
 from truearm.measurement.twin import Twin
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot, Tool
@@ -59,7 +60,7 @@ def truth_twin(robot: Robot, truth: str, rng: np.random.Generator) -> Twin:
             if p.group in ("geometry", "joint zero")
         }
         return Twin(_stationed(robot.with_values(drawn), tool))
-    if not Path(truth).suffix and not Path(truth).exists():
+    if not Path(truth).suffix and not exists(Path(truth)):
         known = truth_names(robot)
         near = nearest_names(truth, known)
         raise InputError(

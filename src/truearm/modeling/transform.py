@@ -56,14 +56,14 @@ def rotation_vector(R: Array) -> Array:
     return q[..., 1:] * np.where(s > 1e-12, angle / np.maximum(s, 1e-12), 2.0)
 
 
-def fixed_rotation(quaternion: Sequence[float], *, name: str | None = None) -> tuple[Element, ...]:
+def fixed_rotation(quaternion: Sequence[float]) -> tuple[Element, ...]:
     """Return the elements of a constant rotation, none for the identity."""
     w, *v = (float(x) for x in quaternion)
     s = float(np.linalg.norm(v))
     if s == 0.0:
         return ()
     axis = (v[0] / s, v[1] / s, v[2] / s)
-    return (Element("R", value=2 * float(np.arctan2(s, w)), parameter=name, axis=axis),)
+    return (Element("R", value=2 * float(np.arctan2(s, w)), axis=axis),)
 
 
 @dataclass(frozen=True)

@@ -7,12 +7,12 @@ import platform
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from importlib.metadata import version as installed_version
 from importlib.resources import files
 from pathlib import Path
 from typing import Final
 
 import numpy as np
-import scipy
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 from numpy.typing import NDArray
@@ -165,7 +165,7 @@ def report_html(report: Report) -> str:
             "truearm": __version__,
             "Python": platform.python_version(),
             "NumPy": np.__version__,
-            "SciPy": scipy.__version__,
+            "SciPy": installed_version("scipy"),
         },
         colours={"before": BEFORE, "after": AFTER},
     )

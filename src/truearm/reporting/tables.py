@@ -15,7 +15,7 @@ from truearm.units import SHOWN_AS, from_si
 
 #: Decimals of a parameter value: a micrometre, two micrometres at a metre, a millionth.
 _DECIMALS: Final = {"mm": 3, "deg": 4, "1": 6}
-#: Informed share below which an estimate is the prior's, not the data's.
+#: Correlated pairs that are listed.
 _PAIRS: Final = 10
 _SIGMA_SHOWN: Final = {"position": ("mm", 1e3), "orientation": ("mrad", 1e3)}
 
@@ -196,7 +196,4 @@ def parameter_sentence(rows: Sequence[ParameterRow]) -> str:
         found[row.status] = found.get(row.status, 0) + 1
     words = {"at bound": "stopped at a bound", "held: redundant": "held because they are redundant"}
     sentence = ", ".join(f"{count} {words.get(status, status)}" for status, count in found.items())
-    believed = sum(row.believed for row in rows)
-    if believed:
-        sentence += f"; of the identified, the readings say next to nothing about {believed}"
     return f"{sentence}."

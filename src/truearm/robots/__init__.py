@@ -2,17 +2,36 @@
 
 from __future__ import annotations
 
+import re
 from importlib.resources import files
 from pathlib import Path
+from typing import Final
 
 from truearm.errors import InputError, nearest_names
+from truearm.files import exists
 from truearm.modeling.formats.robot_file import read_robot
 from truearm.modeling.robot import Robot
+
+_URDF: Final = re.compile(r".*\.(?:urdf|xml|xacro)", re.I | re.S)
 
 
 def library() -> tuple[str, ...]:
     """Return the ids of the library's robots."""
     return tuple(sorted(p.name.removesuffix(".yaml") for p in files(__package__).iterdir() if p.name.endswith(".yaml")))
+
+
+def urdf_source(robot: str | Path) -> tuple[Path, str | None] | None:
+    """Return the URDF file that `robot` names and the link behind its ``#``, or None if it names no URDF.
+
+    A path that exists is taken whole, whatever ``#`` are in it; else the last ``#`` behind the ending of a URDF
+    parts file and link.
+    """
+    text = str(robot)
+    if not exists(Path(text)):
+        for place in reversed([m.start() for m in re.finditer("#", text)]):
+            if _URDF.fullmatch(text, 0, place):
+                return Path(text[:place]), text[place + 1 :] or None
+    return (Path(text), None) if _URDF.fullmatch(text) else None
 
 
 def load_robot(robot: str | Path) -> Robot:
@@ -30,21 +49,24 @@ def load_robot(robot: str | Path) -> Robot:
         If there is no such robot, or its file cannot be used.
     """
     text = str(robot)
+    choice = f"a library id ({', '.join(library())}), a robot file or a URDF"
+    if not text.strip():
+        raise InputError("no robot is given", where="ROBOT", came=text, allowed=choice)
     if text in library():
         return read_robot(Path(str(files(__package__) / f"{text}.yaml")))
-    name, _, tip = text.partition("#")
-    if name.lower().endswith((".urdf", ".xml", ".xacro")):
+    source = urdf_source(robot)
+    if source is not None:
         from truearm.modeling.formats.urdf import read_urdf
 
-        return read_urdf(Path(name), tip or None)
+        return read_urdf(*source)
     path = Path(text)
-    if path.exists() or path.suffix or len(path.parts) > 1:
+    if exists(path) or path.suffix or len(path.parts) > 1:
         return read_robot(path)
     near = nearest_names(text, library())
     raise InputError(
         "there is no such robot",
         where="ROBOT",
         came=text,
-        allowed=f"a library id ({', '.join(library())}), a robot file or a URDF",
+        allowed=choice,
         cure=f"Did you mean {' or '.join(near)}?" if near else "Run 'truearm robots' for the library.",
     )

@@ -66,10 +66,10 @@ def read_csv(path: Path) -> Dataset:
     labels = cells.texts(columns["configuration"].place)
     configurations = found_configurations(cells, labels, [j.place for j in joints], [j.unit for j in joints])
 
-    def numbers(*names: str, positive: bool = False) -> Array:
+    def numbers(*names: str, deviation: bool = False) -> Array:
         found = [columns[name] for name in names]
         return np.column_stack(
-            [cells.numbers(column.place, column.unit, missing=True, positive=positive) for column in found]
+            [cells.numbers(column.place, column.unit, missing=True, deviation=deviation) for column in found]
         )
 
     readings = Readings(
@@ -80,8 +80,8 @@ def read_csv(path: Path) -> Dataset:
         reference=np.array(_roles(cells, columns)) == "reference",
         position=numbers(*_POSITION),
         quaternion=numbers(*_QUATERNION) if "qw" in columns else None,
-        sigma=numbers("sigma", positive=True)[:, 0] if "sigma" in columns else None,
-        sigma_rot=numbers("sigma_rot", positive=True)[:, 0] if "sigma_rot" in columns else None,
+        sigma=numbers("sigma", deviation=True)[:, 0] if "sigma" in columns else None,
+        sigma_rot=numbers("sigma_rot", deviation=True)[:, 0] if "sigma_rot" in columns else None,
     )
     return dataset_of(readings, configurations)
 

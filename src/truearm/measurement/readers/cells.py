@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -16,10 +17,10 @@ from typing import Final
 import numpy as np
 
 from truearm.errors import InputError
+from truearm.files import is_one_line
 from truearm.modeling.chain import Array
-from truearm.units import to_si
+from truearm.units import as_number, sized_si
 
-_NUMBER: Final = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _WITH_COMMA: Final = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
 #: Makes a decimal comma a point, and a point what is no part of a number.
 _SWAPPED: Final = str.maketrans(".,", ",.")
@@ -93,9 +94,9 @@ class Cells:
                 cure="Only readings may be missing: fill the cell, or remove the row.",
             )
         for text in dict.fromkeys(cells):
-            if len(text.splitlines()) > 1:
+            if not is_one_line(text):
                 raise InputError(
-                    "the text has a line break",
+                    "the text has a line break or another control character",
                     where=self.place(cells.index(text), column),
                     came=text,
                     allowed="text on one line",
@@ -103,7 +104,7 @@ class Cells:
                 )
         return cells
 
-    def numbers(self, column: int, unit: str, *, missing: bool = False, positive: bool = False) -> Array:
+    def numbers(self, column: int, unit: str, *, missing: bool = False, deviation: bool = False) -> Array:
         """Return a column of numbers in SI units [m, rad or 1], ``(rows,)``.
 
         Parameters
@@ -114,37 +115,29 @@ class Cells:
             The unit of the column.
         missing
             Whether a cell may be empty; it is then NaN.
-        positive
-            Whether all numbers must be above zero.
+        deviation
+            Whether they are standard deviations, all of them above zero.
         """
         cells = self.columns[column]
         if self.decimal == ",":
             cells = tuple(cell.translate(_SWAPPED) for cell in cells)
-        parsed = {"": np.nan}
-        for cell in dict.fromkeys(cells):
-            if _NUMBER.fullmatch(cell):
-                parsed[cell] = to_si(float(cell), unit)
-            elif cell or not missing:
-                raise self._not_a_number(cells.index(cell), column, missing=missing)
-        values = np.array([parsed[cell] for cell in cells])
-        infinite = np.flatnonzero(np.isinf(values))
-        if len(infinite):
-            raise InputError(
-                "the number is too large",
-                where=self.place(int(infinite[0]), column),
-                came=self.columns[column][infinite[0]],
-                cure="Correct the cell.",
-            )
-        if positive and (values <= 0).any():
-            row = int(np.argmax(values <= 0))
-            raise InputError(
-                "a standard deviation must be above zero",
-                where=self.place(row, column),
-                came=self.columns[column][row],
-                allowed="a number above 0, or nothing",
-                cure="Write what the instrument is good for, or leave the whole column out.",
-            )
-        return values
+        parsed = {"": math.nan} if missing else {}
+        for row, cell in enumerate(cells):
+            if cell in parsed:
+                continue
+            value, where, came = as_number(cell), self.place(row, column), self.columns[column][row]
+            if value is None:
+                raise self._not_a_number(row, column, missing=missing)
+            if deviation and value <= 0:
+                raise InputError(
+                    "a standard deviation must be above zero",
+                    where=where,
+                    came=came,
+                    allowed="a number above 0, or nothing",
+                    cure="Write what the instrument is good for, or leave the whole column out.",
+                )
+            parsed[cell] = sized_si(value, unit, where, came=came, deviation=deviation)
+        return np.array([parsed[cell] for cell in cells])
 
     def _not_a_number(self, row: int, column: int, *, missing: bool) -> InputError:
         cell, where = self.columns[column][row], self.place(row, column)

@@ -6,9 +6,10 @@ import codecs
 import re
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints, model_validator
 from pydantic import field_validator as validator_of
 
+from truearm.files import is_one_line
 from truearm.measurement.readers.cells import Layout
 
 _DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "whitespace": None}
@@ -22,7 +23,14 @@ def _none_as_null(value: object) -> object:
     return None if value == "none" else value
 
 
+def _on_one_line(text: str) -> str:
+    if not is_one_line(text):
+        raise ValueError("text on one line belongs here, without control characters")
+    return text
+
+
 Text = Annotated[str, StringConstraints(min_length=1, strip_whitespace=True)]
+PointName = Annotated[Text, AfterValidator(_on_one_line)]
 #: A column by its name; by its number, counted from 1, where the file has no header.
 Column = Annotated[Text, BeforeValidator(_number_as_text)]
 Line = Annotated[int, Field(ge=1, strict=True)]
@@ -89,7 +97,7 @@ class NamesEntry(_Entry):
     def _compiles(cls, pattern: str) -> str:
         try:
             groups = set(re.compile(pattern).groupindex)
-        except re.error as error:
+        except (re.error, OverflowError, RecursionError) as error:
             raise ValueError(f"this is not a regular expression ({error})") from None
         if not groups or groups - {"configuration", "target"}:
             raise ValueError("the named groups must be (?P<configuration>..), (?P<target>..) or both")
@@ -104,7 +112,7 @@ class NamesEntry(_Entry):
 class ReadingEntry(_Entry):
     """The columns of one target; several of them make a wide table."""
 
-    target: Text | None = None
+    target: PointName | None = None
     target_column: Column | None = None
     x: Column
     y: Column
@@ -206,4 +214,20 @@ class MappingFile(_Entry):
             raise ValueError("several readings a row need target: with a different name in each of them")
         if self.sigma_rot is not None and not any(entry.quaternion for entry in self.readings):
             raise ValueError("sigma_rot is given, and no reading has an orientation (qw, qx, qy, qz)")
+        self._refuse_columns_used_twice()
         return self
+
+    def _refuse_columns_used_twice(self) -> None:
+        """Refuse numbers that are taken from one column for two things: a slip that would go unnoticed."""
+        used = [
+            (column, f"readings[{number}].{name}")
+            for number, entry in enumerate(self.readings, 1)
+            for name, column in (entry.position | entry.quaternion).items()
+        ]
+        joints = [(column, f"joints.columns[{number}]") for number, column in enumerate(self.joints.columns, 1)]
+        for group in [[*used, *joints]] if self.joints.file is None else [used, joints]:
+            first: dict[str, str] = {}
+            for column, entry in group:
+                if column in first:
+                    raise ValueError(f"the column {column!r} is used twice, for {first[column]} and for {entry}")
+                first[column] = entry

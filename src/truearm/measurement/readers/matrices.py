@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from truearm.errors import InputError
-from truearm.files import read_text
+from truearm.files import is_one_line, read_text
 from truearm.measurement.dataset import Dataset, IntArray
 from truearm.modeling.chain import Array
-from truearm.units import ANGLE_UNITS, LENGTH_UNITS, checked_unit, to_si
+from truearm.units import ANGLE_UNITS, LENGTH_UNITS, checked_unit, sized_si
 
 
 def read_matrices(
@@ -49,7 +49,7 @@ def read_matrices(
     if not targets:
         raise InputError("no target is given", where="--target", cure="Give at least one --target NAME=FILE.")
     for name in (*targets, *references):
-        if not name or len(name.splitlines()) > 1 or name != name.strip():
+        if not is_one_line(name) or name != name.strip():
             raise InputError(
                 "a point needs a name",
                 where="--target, --reference",
@@ -105,7 +105,7 @@ def _matrix(path: Path, width: int | None, unit: str, *, missing: bool) -> Array
         if not cells:
             continue
         where = f"{path}, line {line}"
-        row = [_number(cell, f"{where}, column {c}", missing=missing) for c, cell in enumerate(cells, 1)]
+        row = [_number(cell, unit, f"{where}, column {c}", missing=missing) for c, cell in enumerate(cells, 1)]
         first = first or line
         wanted = width or (len(rows[0]) if rows else len(row))
         if len(row) != wanted:
@@ -118,18 +118,20 @@ def _matrix(path: Path, width: int | None, unit: str, *, missing: bool) -> Array
             )
         if missing and (not any(row) or any(math.isnan(v) for v in row)):
             row = [math.nan] * wanted
-        rows.append([to_si(value, unit) for value in row])
+        rows.append(row)
     if not rows:
         raise InputError("the file holds no rows", where=str(path), cure="Check that it was exported whole.")
     return np.array(rows)
 
 
-def _number(cell: str, where: str, *, missing: bool) -> float:
+def _number(cell: str, unit: str, where: str, *, missing: bool) -> float:
     try:
         value = float(cell) if cell.isascii() and "_" not in cell else None
     except ValueError:
         value = None
-    if value is not None and (math.isfinite(value) or (missing and math.isnan(value))):
+    if value is not None and math.isfinite(value):
+        return sized_si(value, unit, where, came=cell)
+    if value is not None and missing and math.isnan(value):
         return value
     allowed = "a finite number, or NaN for a missing reading" if missing else "a finite number"
     if "," in cell or ";" in cell:

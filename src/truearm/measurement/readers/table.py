@@ -24,7 +24,7 @@ from truearm.measurement.readers.mapping import (
 )
 from truearm.measurement.readers.rows import Configurations, Readings, dataset_of, found_configurations
 from truearm.modeling.chain import Array
-from truearm.units import to_si
+from truearm.units import sized_si
 
 
 def read_table(path: Path, mapping: Path) -> Dataset:
@@ -73,17 +73,23 @@ def read_table(path: Path, mapping: Path) -> Dataset:
         reference=np.concatenate([reference, np.zeros(added, dtype=bool)]),
         position=padded(position),
         quaternion=None if quaternion is None else padded(quaternion),
-        sigma=_everywhere(content.sigma, count),
-        sigma_rot=_everywhere(content.sigma_rot, count),
+        sigma=_everywhere(content.sigma, count, f"{mapping}, sigma.value"),
+        sigma_rot=_everywhere(content.sigma_rot, count, f"{mapping}, sigma_rot.value"),
     )
     return dataset_of(readings, configurations)
+
+
+def files_read(path: Path, mapping: Path) -> tuple[Path, ...]:
+    """Return all files that :func:`read_table` reads."""
+    joints = read_yaml(mapping, MappingFile).joints.file
+    return (path, mapping) if joints is None else (path, mapping, mapping.parent / joints)
 
 
 def _read(path: Path, entry: LayoutEntry) -> Cells:
     encoding = "utf-8-sig" if entry.encoding == "utf-8" else entry.encoding
     try:
         text = read_bytes(path).decode(encoding)
-    except (UnicodeDecodeError, LookupError) as error:
+    except (UnicodeError, LookupError) as error:
         raise InputError(
             f"the file is not {entry.encoding} text",
             where=str(path),
@@ -208,8 +214,8 @@ def _quaternions(cells: Cells, content: MappingFile, mapping: Path) -> Array | N
     return np.stack(parts, axis=1).reshape(-1, 4)
 
 
-def _everywhere(sigma: SigmaEntry | SigmaRotEntry | None, count: int) -> Array | None:
-    return None if sigma is None else np.full(count, to_si(sigma.value, sigma.unit))
+def _everywhere(sigma: SigmaEntry | SigmaRotEntry | None, count: int, where: str) -> Array | None:
+    return None if sigma is None else np.full(count, sized_si(sigma.value, sigma.unit, where, deviation=True))
 
 
 def _is_reference(targets: list[str], references: list[str], where: str) -> NDArray[np.bool_]:

@@ -17,7 +17,6 @@ from __future__ import annotations
 import csv
 import io
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -32,7 +31,7 @@ from truearm.modeling.chain import Array, Chain
 from truearm.modeling.conventions import JOINT, JointKind, convention
 from truearm.modeling.robot import Joint, Robot
 from truearm.modeling.transform import Transform
-from truearm.units import ANGLE_UNITS, LENGTH_UNITS, SHOWN_AS, checked_unit, to_si, written
+from truearm.units import ANGLE_UNITS, LENGTH_UNITS, SHOWN_AS, as_number, checked_unit, sized_si, written
 
 DHConvention = Literal["standard-dh", "modified-dh"]
 
@@ -45,7 +44,6 @@ _ONE_LINE: Final = 1e-12
 #: Below this rest [m, rad] what lies behind the last axis is a DH link's own a and alpha.
 _REST: Final = 1e-12
 
-_NUMBER: Final = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _COLUMNS: Final = {"a": "m", "alpha": "rad", "d": "m", JOINT: "rad"}
 
 
@@ -331,7 +329,7 @@ def read_dh_csv(path: Path, convention_name: DHConvention) -> DHTable:
                 came=entry["type"],
                 allowed="revolute, prismatic",
             )
-        si = {name: to_si(_number(entry[name], f"{where}, {name}"), unit) for name, unit in columns if unit}
+        si = {name: _si(entry[name], unit, f"{where}, {name}") for name, unit in columns if unit}
         rows.append(DHRow(entry["joint"], kind, **si))
     return DHTable(convention_name, tuple(rows), Transform(), Transform())
 
@@ -358,8 +356,8 @@ def _header(cells: Sequence[str], where: str) -> list[tuple[str, str]]:
     return columns
 
 
-def _number(text: str, where: str) -> float:
-    value = float(text) if _NUMBER.fullmatch(text) else math.nan
-    if not math.isfinite(value):
+def _si(text: str, unit: str, where: str) -> float:
+    value = as_number(text)
+    if value is None:
         raise InputError("a number belongs here", where=where, came=text)
-    return value
+    return sized_si(value, unit, where, came=text)

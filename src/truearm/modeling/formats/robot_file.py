@@ -11,20 +11,22 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints, model_validator
 
 from truearm.errors import InputError, nearest_names
-from truearm.files import read_yaml
+from truearm.files import is_one_line, read_yaml
 from truearm.modeling.conventions import convention
 from truearm.modeling.effects import EFFECTS
 from truearm.modeling.parameters import Parameter
 from truearm.modeling.robot import Joint, LinkMass, Robot, Target, Tool, Truth
 from truearm.modeling.transform import Transform
-from truearm.units import SHOWN_AS, to_si, written
+from truearm.units import SHOWN_AS, sized_si, to_si, written
 
 SCHEMA = "truearm-robot/1"
+#: What a robot and a joint may be called.
+NAME: Final = r"[A-Za-z0-9][A-Za-z0-9_.-]*"
 
 Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=True)]
@@ -39,7 +41,17 @@ def _unit_length(q: tuple[float, float, float, float]) -> tuple[float, float, fl
 
 
 Quaternion = Annotated[tuple[Number, Number, Number, Number], AfterValidator(_unit_length)]
-Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", strict=True)]
+Name = Annotated[str, StringConstraints(pattern=f"^{NAME}$", strict=True)]
+
+
+def _one_line(name: str) -> str:
+    if not is_one_line(name):
+        raise ValueError("a name belongs here: one line of text, not empty, without control characters")
+    return name
+
+
+#: Targets are called what the data call them.
+TargetName = Annotated[str, StringConstraints(strict=True), AfterValidator(_one_line)]
 
 
 class _Entry(BaseModel):
@@ -72,7 +84,7 @@ class _Mass(_Entry):
 
 
 class _Tool(_Entry):
-    targets: dict[Name, Triple]
+    targets: dict[TargetName, Triple]
     mass: Mass = 0.0
     cog: Triple = (0.0, 0.0, 0.0)
 
@@ -84,7 +96,7 @@ class _Truth(_Entry):
 
 
 class _Target(_Entry):
-    name: Name
+    name: TargetName
     quaternion: Quaternion | None = None
 
 
@@ -141,13 +153,25 @@ def robot_from_file(content: RobotFile, where: str) -> Robot:
     """Build the robot that a checked file describes; `where` names the file in messages."""
     length, angle = content.units.length, content.units.angle
 
-    def metres(values: tuple[float, float, float]) -> tuple[float, float, float]:
-        x, y, z = (to_si(v, length) for v in values)
+    def si(value: float, unit: str, entry: str, *, deviation: bool = False) -> float:
+        return sized_si(value, unit, f"{where}, {entry}", deviation=deviation)
+
+    def metres(values: tuple[float, float, float], entry: str) -> tuple[float, float, float]:
+        x, y, z = (si(v, length, entry) for v in values)
         return x, y, z
 
     joints = tuple(
         _joint(content, number, entry, f"{where}, joints[{number}]") for number, entry in enumerate(content.joints, 1)
     )
+    names = [joint.name for joint in joints]
+    for number, name in enumerate(names, 1):
+        if name in names[: number - 1]:
+            raise InputError(
+                "two joints have the same name",
+                where=f"{where}, joints[{number}]",
+                came=name,
+                cure=f"joints[{names.index(name) + 1}] has it too: rename one of them.",
+            )
     numbered = [("link", "masses", mass.link) for mass in content.masses]
     for name, truth in content.truths.items():
         numbered += [("joint", f"truths.{name}.compliance", joint) for joint in truth.compliance]
@@ -162,18 +186,30 @@ def robot_from_file(content: RobotFile, where: str) -> Robot:
         source=content.source,
         convention_name=content.convention,
         joints=joints,
-        flange=Transform(metres(content.flange.translation), content.flange.quaternion or (1.0, 0.0, 0.0, 0.0)),
-        masses=tuple(LinkMass(m.link, m.mass, metres(m.cog)) for m in content.masses),
+        flange=Transform(
+            metres(content.flange.translation, "flange.translation"), content.flange.quaternion or (1.0, 0.0, 0.0, 0.0)
+        ),
+        masses=tuple(
+            LinkMass(m.link, si(m.mass, "1", f"masses[{i}].mass"), metres(m.cog, f"masses[{i}].cog"))
+            for i, m in enumerate(content.masses, 1)
+        ),
         base_quaternion=content.base_quaternion,
         targets=tuple(Target(t.name, t.quaternion) for t in content.targets),
         effect_names=tuple(content.effects),
         priors={
-            unit: to_si(value, file_unit)
-            for unit, value, file_unit in (("m", content.priors.length, length), ("rad", content.priors.angle, angle))
+            unit: si(value, file_unit, f"priors.{entry}", deviation=True)
+            for unit, entry, value, file_unit in (
+                ("m", "length", content.priors.length, length),
+                ("rad", "angle", content.priors.angle, angle),
+            )
             if value is not None
         },
         tools={
-            name: Tool({t: metres(p) for t, p in tool.targets.items()}, tool.mass, metres(tool.cog))
+            name: Tool(
+                {t: metres(p, f"tools.{name}.targets.{t}") for t, p in tool.targets.items()},
+                si(tool.mass, "1", f"tools.{name}.mass"),
+                metres(tool.cog, f"tools.{name}.cog"),
+            )
             for name, tool in content.tools.items()
         },
         history=tuple(content.history),
@@ -190,27 +226,31 @@ def robot_from_file(content: RobotFile, where: str) -> Robot:
     truths = {
         truth_name: Truth(
             truth.source,
-            {n: to_si(v, shown[known(n, f"truths.{truth_name}").unit]) for n, v in truth.values.items()},
-            truth.compliance,
+            {
+                n: si(v, shown[known(n, f"truths.{truth_name}").unit], f"truths.{truth_name}.values.{n}")
+                for n, v in truth.values.items()
+            },
+            {n: si(v, "1", f"truths.{truth_name}.compliance.{n}") for n, v in truth.compliance.items()},
         )
         for truth_name, truth in content.truths.items()
     }
     parameters = []
     for name, entry in content.parameters.items():
+        place = f"parameters.{name}"
         plain = known(name, "parameters")
         unit = shown[plain.unit]
         if entry.unit != unit:
             raise InputError(
-                "the unit differs from the file's", where=f"{where}, parameters.{name}", came=entry.unit, allowed=unit
+                "the unit differs from the file's", where=f"{where}, {place}", came=entry.unit, allowed=unit
             )
         parameters.append(
             Parameter(
                 name,
                 plain.unit,
                 plain.group,
-                nominal=to_si(entry.nominal, unit),
-                value=to_si(entry.value, unit),
-                prior=to_si(entry.prior, unit),
+                nominal=si(entry.nominal, unit, f"{place}.nominal"),
+                value=si(entry.value, unit, f"{place}.value"),
+                prior=si(entry.prior, unit, f"{place}.prior", deviation=True),
                 deviation=None if entry.deviation is None else to_si(entry.deviation, unit),
                 informed=entry.informed,
             )
@@ -219,14 +259,13 @@ def robot_from_file(content: RobotFile, where: str) -> Robot:
 
 
 def _joint(content: RobotFile, number: int, entry: _Joint, where: str) -> Joint:
-    table = convention(content.convention)
-    allowed = table.row_units(entry.type)
+    units = convention(content.convention).row_units(entry.type)
+    allowed = [column for column in units if not column.startswith("axis_")]
+    allowed += ["axis"] if len(allowed) < len(units) else []
     row: dict[str, float] = {}
     for column, value in (entry.model_extra or {}).items():
-        if column == "axis" and "axis_x" in allowed and isinstance(value, list) and len(value) == 3:
-            row |= {f"axis_{a}": _number(v, f"{where}.axis") for a, v in zip("xyz", value, strict=True)}
-            if abs(math.hypot(*value) - 1.0) > 1e-6:
-                raise InputError("an axis must have length 1", where=f"{where}.axis", came=value)
+        if column == "axis" and column in allowed:
+            row |= _axis(value, f"{where}.axis")
             continue
         if column not in allowed:
             near = nearest_names(column, allowed)
@@ -237,22 +276,46 @@ def _joint(content: RobotFile, number: int, entry: _Joint, where: str) -> Joint:
                 allowed=", ".join(["name", "type", "limits", *allowed]),
                 cure=f"Did you mean {' or '.join(near)}?" if near else None,
             )
-        unit = {"m": content.units.length, "rad": content.units.angle, "1": "1"}[allowed[column]]
-        row[column] = to_si(_number(value, f"{where}.{column}"), unit)
+        unit = content.units.length if units[column] == "m" else content.units.angle
+        row[column] = sized_si(_number(value, f"{where}.{column}"), unit, f"{where}.{column}")
     unit = content.units.angle if entry.type == "revolute" else content.units.length
     limits = None
     if entry.limits is not None:
         low, high = entry.limits
         if not low < high:
             raise InputError("the lower limit must be below the upper one", where=f"{where}.limits", came=[low, high])
-        limits = (to_si(low, unit), to_si(high, unit))
+        limits = (sized_si(low, unit, f"{where}.limits"), sized_si(high, unit, f"{where}.limits"))
+    elif entry.type == "prismatic":
+        raise InputError(
+            "a prismatic joint must have limits",
+            where=where,
+            allowed=f"limits: [LOWEST, HIGHEST] in {unit}",
+            cure="Give what the controller allows.",
+        )
     return Joint(entry.name or f"joint_{number}", entry.type, row, limits)
 
 
+def _axis(value: object, where: str) -> dict[str, float]:
+    if not isinstance(value, list) or len(value) != 3:
+        raise InputError("an axis is three numbers", where=where, came=_scalar(value), allowed="[x, y, z] of length 1")
+    row = {f"axis_{a}": _number(v, where) for a, v in zip("xyz", value, strict=True)}
+    if abs(math.hypot(*row.values()) - 1.0) > 1e-6:
+        raise InputError("an axis must have length 1", where=where, came=value)
+    return row
+
+
 def _number(value: object, where: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise InputError("a number belongs here", where=where, came=value)
-    return float(value)
+    try:
+        if not isinstance(value, bool) and isinstance(value, int | float) and math.isfinite(value):
+            return float(value)
+    except OverflowError:  # a whole number that no float can hold
+        pass
+    raise InputError("a number belongs here", where=where, came=_scalar(value))
+
+
+def _scalar(value: object) -> object:
+    """Return a value as a message shows it: of a list or a mapping only that it is one."""
+    return value if isinstance(value, str | int | float | None) else type(value).__name__
 
 
 # -- writing ---------------------------------------------------------------------------------------------------

@@ -26,6 +26,7 @@ from truearm.errors import InputError
 from truearm.files import read_bytes
 from truearm.modeling.chain import Array, Element
 from truearm.modeling.conventions import JointKind
+from truearm.modeling.formats.robot_file import NAME
 from truearm.modeling.formats.urdf_tree import (
     KIND,
     ZERO,
@@ -43,8 +44,6 @@ from truearm.modeling.formats.urdf_tree import (
 from truearm.modeling.robot import Joint, LinkMass, Robot
 from truearm.modeling.transform import Transform
 
-#: What robot files take as the name of a robot or a joint.
-_NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 #: How far the length of an axis may be from 1: files print five digits, but 0 0 2 means something else.
 _AXIS_TOLERANCE: Final = 1e-3
 #: How far the robot's nominal rows may be from the file's [m, rad]: more than digits, less than any change.
@@ -251,7 +250,7 @@ def _refuse_unfit(joint: UrdfJoint) -> None:
             where=joint.where,
             cure="End the chain before it, with #LINK behind the file name, or delete <mimic>.",
         )
-    if not _NAME.fullmatch(joint.name):
+    if not re.fullmatch(NAME, joint.name):
         raise InputError(
             "the joint's name cannot stand in a robot file",
             where=joint.where,
@@ -316,7 +315,7 @@ def _mass(tree: Tree, number: int, link: str) -> LinkMass | None:
 
 def _robot_name(name: str, path: Path) -> str:
     for candidate in (name, path.stem):
-        if _NAME.fullmatch(candidate):
+        if re.fullmatch(NAME, candidate):
             return candidate
     raise InputError(
         "neither the robot's name nor the file's can name a robot",

@@ -6,7 +6,6 @@ form one tree. What only matters on a chain, :mod:`truearm.modeling.formats.urdf
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -19,6 +18,7 @@ import numpy as np
 from truearm.errors import InputError, nearest_names
 from truearm.modeling.chain import Array, Chain, Element
 from truearm.modeling.conventions import JointKind, convention
+from truearm.units import as_number, sized_si
 
 Triple = tuple[float, float, float]
 
@@ -32,7 +32,6 @@ KIND: Final[Mapping[str, JointKind]] = {
 _TYPES: Final = (*KIND, "fixed", "floating", "planar")
 #: Links that name the end of a robot, best first (ROS-Industrial's convention).
 _ENDS: Final = ("tool0", "flange")
-_NUMBER: Final = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 
 
 @dataclass(frozen=True, slots=True)
@@ -248,15 +247,15 @@ def numbers(tag: Tag, attribute: str, count: int, where: str) -> tuple[float, ..
     if text is None:
         return None
     words = re.findall(r"[^ \t\r\n]+", text)
-    found = tuple(float(word) for word in words if _NUMBER.fullmatch(word))
-    if len(words) != count or len(found) != count or not all(map(math.isfinite, found)):
+    found = [value for value in map(as_number, words) if value is not None]
+    if len(words) != count or len(found) != count:
         raise InputError(
             f"bad numbers in <{tag.name} {attribute}>",
             where=where,
             came=text,
             allowed="one number" if count == 1 else f"{count} numbers with spaces between",
         )
-    return found
+    return tuple(sized_si(value, "1", f"{where}, <{tag.name} {attribute}>", came=text) for value in found)
 
 
 def triple(values: Iterable[float]) -> Triple:

@@ -1,0 +1,122 @@
+"""Reading and writing files: every failure is said in words."""
+
+from __future__ import annotations
+
+import os
+import socket
+from pathlib import Path
+
+import pytest
+from pydantic import BaseModel
+
+from truearm.errors import InputError
+from truearm.files import exists, is_one_line, read_bytes, read_yaml, write_files, write_text
+
+
+class Anything(BaseModel):
+    a: str = ""
+    n: float = 0
+    numbers: dict[int, float] = {}
+
+
+@pytest.mark.parametrize(
+    ("text", "part"),
+    [
+        ("a: 2023-02-30", "a value cannot be understood (day is out of range for month). Put text into quotes."),
+        ("a: 2023-02-03T25:00:00", "a value cannot be understood (hour must be in 0..23)"),
+        ("n: " + "9" * 5000, "a value cannot be understood (Exceeds the limit"),
+        ("a: " + "[" * 3000 + "]" * 3000, "nested too deep"),
+        ("a: !!bool x", "a value cannot be understood"),
+        ("a: !!int ''", "a value cannot be understood"),
+        ("%YAML 1.3\n---\na: 1", "a value cannot be understood (version"),
+        ("a: \x07", "this is not valid YAML"),
+        ("a: 0x" + "f" * 6000, "f.yaml, a: input should be a valid string; got a number of very many digits"),
+        ("numbers: {2: x}", "f.yaml, numbers.2: "),
+        ("1: 2\na: [1, 2]", "f.yaml, a: "),
+    ],
+)
+def test_yaml_that_cannot_be_used(tmp_path: Path, text: str, part: str) -> None:
+    (tmp_path / "f.yaml").write_text(text)
+    with pytest.raises(InputError) as caught:
+        read_yaml(tmp_path / "f.yaml", Anything)
+    assert part in str(caught.value)
+    assert "f.yaml" in str(caught.value)
+
+
+def test_only_near_names_are_offered(tmp_path: Path) -> None:
+    for name in ("data.csv", "data1.csv", "data2.csv", "robot.yaml"):
+        (tmp_path / name).touch()
+    with pytest.raises(InputError, match=r"no such file. Did you mean data\S*.csv or data\S*.csv\?$"):
+        read_bytes(tmp_path / "data3.csv")
+    with pytest.raises(InputError, match="Check the path"):
+        read_bytes(tmp_path / "notes.csv")
+
+
+@pytest.mark.parametrize(("name", "reason"), [("x" * 300, "File name too long"), ("a\0b", "null")])
+def test_paths_that_cannot_be(tmp_path: Path, name: str, reason: str) -> None:
+    with pytest.raises(InputError, match=f"the file cannot be read .*{reason}"):
+        read_bytes(tmp_path / name)
+    assert not exists(tmp_path / name)
+
+
+def test_a_file_is_no_folder(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(InputError, match="Not a directory"):
+        read_bytes(tmp_path / "file" / "data.csv")
+    with pytest.raises(InputError, match="this is a file, a folder is needed"):
+        write_text(tmp_path / "file" / "data.csv", "")
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may read everywhere")
+def test_folders_that_may_not_be_entered(tmp_path: Path) -> None:
+    shut = tmp_path / "shut"
+    shut.mkdir()
+    shut.chmod(0)
+    try:
+        with pytest.raises(InputError, match="Permission denied"):
+            read_bytes(shut / "data.csv")
+        with pytest.raises(InputError, match="Permission denied|cannot be written to"):
+            write_text(shut / "below" / "data.csv", "")
+    finally:
+        shut.chmod(0o700)
+
+
+@pytest.mark.parametrize("call", ["stat", "lstat"])
+def test_a_permission_that_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: str) -> None:
+    def denied(*_: object, **__: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, call, denied)
+    monkeypatch.setattr(Path, "read_bytes", denied)
+    with pytest.raises(InputError, match="Permission denied"):
+        read_bytes(tmp_path / "data.csv")
+    with pytest.raises(InputError, match="Permission denied"):
+        write_text(tmp_path / "data.csv", "")
+
+
+def test_what_is_no_plain_file_is_not_replaced(tmp_path: Path) -> None:
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(InputError, match="this is a folder, a file is to be written here"):
+        write_files(tmp_path, {"new": "", "folder": ""})
+    with socket.socket(socket.AF_UNIX) as pipe:
+        os.chdir(tmp_path)
+        pipe.bind("pipe")
+        with pytest.raises(InputError, match="this is a device or a pipe"):
+            write_text(tmp_path / "pipe", "")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["folder", "pipe"]
+
+
+def test_a_name_as_long_as_may_be_is_written(tmp_path: Path) -> None:
+    write_text(tmp_path / ("x" * 255), "text")
+    assert (tmp_path / ("x" * 255)).read_text() == "text"
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+@pytest.mark.parametrize("text", ["smr 1", "<b>", "Träger", "a: #{}", "日本", "\u00a0x"])
+def test_one_line(text: str) -> None:
+    assert is_one_line(text)
+
+
+@pytest.mark.parametrize("text", ["", "  ", "\u00a0", "a\nb", "a\tb", "a\0", "a\x7f", "a\u2028b", "a\x85b", "\ud800"])
+def test_not_one_line(text: str) -> None:
+    assert not is_one_line(text)

@@ -33,6 +33,9 @@ class Block:
         Name of the target.
     readings
         Indices into the dataset, ``(k,)``.
+    configurations
+        Index of the configuration of each reading; all of them at once, which costs no copy, where the target was
+        read at every one in order.
     sigma
         Standard deviation of each reading [m or rad], ``(k,)``.
     """
@@ -40,6 +43,7 @@ class Block:
     observation: Observation
     target: str
     readings: NDArray[np.intp]
+    configurations: NDArray[np.intp] | slice
     sigma: Array
 
 
@@ -79,7 +83,9 @@ class Problem:
                     sigma = (
                         np.full(len(readings), self.noise[observation.name]) if declared is None else declared[readings]
                     )
-                    made.append(Block(observation, name, readings, sigma))
+                    seen = self.data.configuration[readings]
+                    everywhere = np.array_equal(seen, np.arange(self.data.configurations))
+                    made.append(Block(observation, name, readings, slice(None) if everywhere else seen, sigma))
         return tuple(made)
 
     @property
@@ -153,8 +159,7 @@ class Evaluation:
             observation, sigma = block.observation, block.sigma[:, None]
             derivative = problem.robot.linear if observation.velocity == "linear" else problem.robot.angular
             velocity = derivative(self._sweeps[block.target], problem.data.joints, names, self._values)
-            velocity = velocity[..., problem.data.configuration[block.readings]]
-            moved = observation.jacobian(r[..., rows, :] * sigma, velocity)
+            moved = observation.jacobian(r[..., rows, :] * sigma, velocity[..., block.configurations])
             np.divide(moved, sigma, out=by_parameter[..., rows, :])
         return np.swapaxes(J.reshape(*J.shape[:-2], -1), -1, -2)
 

@@ -72,7 +72,7 @@ def solve(problem: Problem, loss: Loss = "linear", bounds: tuple[Array, Array] |
         cost = _cost(here, w)
         accepted = False
         for _ in range(25):
-            step = _step(R * prior, c, damping, _room(here.vector, bounds, prior)) * prior
+            step = _step(R * prior, c, damping, _room(here.vector, bounds, prior), full_rank=problem.priors) * prior
             trial = problem.at(here.vector + step)
             gain = cost - _cost(trial, w)
             predicted = float(c @ c) - float(np.sum((R @ step + c) ** 2))
@@ -134,7 +134,7 @@ def _room(x: Array, bounds: tuple[Array, Array] | None, prior: Array) -> tuple[A
     return (bounds[0] - x) / prior, (bounds[1] - x) / prior
 
 
-def _step(A: Array, c: Array, damping: float, room: tuple[Array, Array] | None) -> Array:
+def _step(A: Array, c: Array, damping: float, room: tuple[Array, Array] | None, *, full_rank: bool) -> Array:
     """Minimise |A s + c|^2 + damping |s|^2, within `room` if there are bounds."""
     if room is not None:
         from scipy.optimize import lsq_linear
@@ -146,6 +146,9 @@ def _step(A: Array, c: Array, damping: float, room: tuple[Array, Array] | None) 
         target = np.concatenate([-c, np.zeros(A.shape[1])])
         result = lsq_linear(damped, target, bounds=(low, high), method="bvls", tol=1e-14, max_iter=400)
         return np.asarray(np.clip(result.x, *room))
+    if full_rank and damping == 0.0:
+        size = A.shape[1]  # the row below is zero: what no step can change
+        return np.asarray(-np.linalg.solve(A[:size], c[:size]))
     U, s, Vt = np.linalg.svd(A, full_matrices=False)
     kept = s > 1e-14 * s[0]
     factor = np.where(kept, s / np.where(kept, s**2 + damping, 1.0), 0.0)

@@ -150,7 +150,7 @@ def unseen_but_felt(robot: Robot, data: Dataset, free: FreeParameters, seed: int
     noise = {"position": 1.0, "orientation": 1.0}
     plain = Problem(robot, _unit_noise(data), free, noise, priors=False)
     A = plain.linearised(free.start)[1] * free.prior
-    _, s, Vt = np.linalg.svd(A, full_matrices=True)
+    _, s, Vt = np.linalg.svd(np.linalg.qr(A, mode="r"), full_matrices=True)
     seen = int((s > 1e-8 * s[0]).sum()) if len(s) else 0
     unseen = Vt[seen:]
     if len(unseen) == 0:

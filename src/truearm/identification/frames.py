@@ -11,6 +11,8 @@ No start needs to be given by hand, and the number of joints does not matter.
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 from truearm.errors import InputError
@@ -118,7 +120,7 @@ def _turn_axes(R: Array) -> Array:
 
 def _nearest_rotation(G: Array, g: Array) -> Array:
     """Minimise r' G r - 2 g' r over the rotations, r = vec(R) row by row."""
-    candidates = rotation_from_quaternion(_even_quaternions(4000))
+    candidates = _even_rotations(4000)
     best = candidates[np.argsort(_cost(G, g, candidates))[:24]]
     for _ in range(50):
         # R exp(w): the columns of d vec(R) / dw are vec(R [e_k]x)
@@ -159,12 +161,14 @@ def _rotations(w: Array) -> Array:
     return rotation_from_quaternion(q)
 
 
-def _even_quaternions(count: int) -> Array:
-    """Spread unit quaternions evenly over all rotations (super-Fibonacci spiral, Alexa 2022)."""
+@cache
+def _even_rotations(count: int) -> Array:
+    """Spread rotations evenly over all of them (super-Fibonacci spiral, Alexa 2022), ``(count, 3, 3)``."""
     phi, psi = np.sqrt(2.0), 1.533751168755204288118041
     s = np.arange(count) + 0.5
     t = s / count
     d = 2 * np.pi * s
     alpha, beta = d / phi, d / psi
     inner, outer = np.sqrt(t), np.sqrt(1 - t)
-    return np.stack([inner * np.sin(alpha), inner * np.cos(alpha), outer * np.sin(beta), outer * np.cos(beta)], axis=1)
+    q = np.stack([inner * np.sin(alpha), inner * np.cos(alpha), outer * np.sin(beta), outer * np.cos(beta)], axis=1)
+    return rotation_from_quaternion(q)

@@ -6,6 +6,7 @@ one more row, (value - nominal) / deviation.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from truearm.errors import InputError
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.observations import OBSERVATIONS, Observation
-from truearm.modeling.chain import Array
+from truearm.modeling.chain import Array, Sweep
 from truearm.modeling.parameters import FreeParameters
 from truearm.modeling.robot import Robot
 
@@ -32,6 +33,9 @@ class Block:
         Name of the target.
     readings
         Indices into the dataset, ``(k,)``.
+    configurations
+        Index of the configuration of each reading; all of them at once, which costs no copy, where the target was
+        read at every one in order.
     sigma
         Standard deviation of each reading [m or rad], ``(k,)``.
     """
@@ -39,6 +43,7 @@ class Block:
     observation: Observation
     target: str
     readings: NDArray[np.intp]
+    configurations: NDArray[np.intp] | slice
     sigma: Array
 
 
@@ -78,7 +83,9 @@ class Problem:
                     sigma = (
                         np.full(len(readings), self.noise[observation.name]) if declared is None else declared[readings]
                     )
-                    made.append(Block(observation, name, readings, sigma))
+                    seen = self.data.configuration[readings]
+                    everywhere = np.array_equal(seen, np.arange(self.data.configurations))
+                    made.append(Block(observation, name, readings, slice(None) if everywhere else seen, sigma))
         return tuple(made)
 
     @property
@@ -91,13 +98,18 @@ class Problem:
         """Number of equations from readings."""
         return 3 * self.readings
 
+    def at(self, vector: Array) -> Evaluation:
+        """Compare the robot with the readings at a vector ``(parameters,)``, or at one for each of many trials."""
+        return Evaluation(self, vector)
+
     def residual(self, vector: Array) -> Array:
         """Return the whitened residual of the readings alone, ``(rows,)``."""
-        return self._evaluate(vector, jacobian=False)[0]
+        return self.at(vector).residual
 
     def linearised(self, vector: Array) -> tuple[Array, Array]:
         """Return the whitened residual ``(rows,)`` of the readings and its Jacobian ``(rows, parameters)``."""
-        return self._evaluate(vector, jacobian=True)
+        here = self.at(vector)
+        return here.residual, here.jacobian
 
     def prior_rows(self, vector: Array) -> tuple[Array, Array]:
         """Return the residual of the priors and the diagonal of its Jacobian, both ``(parameters,)``; zero without."""
@@ -110,31 +122,66 @@ class Problem:
         """Return the problem with other standard deviations for readings that declare none."""
         return replace(self, noise=noise)
 
-    def _evaluate(self, vector: Array, *, jacobian: bool) -> tuple[Array, Array]:
-        values = {**self.robot.values, **self.free.values(vector)}
-        names = self.free.names
-        q = self.data.joints
-        variables = self.robot.variables(q, values)
-        trunk = self.robot.trunk.sweep(variables, values)
-        r = np.empty((self.readings, 3))
-        J = np.empty((self.readings, 3, len(names))) if jacobian else np.empty((0, 3, len(names)))
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """A problem at one vector of its free parameters. The Jacobian goes on from the sweep of the residual.
+
+    Attributes
+    ----------
+    problem
+        What is evaluated.
+    vector
+        ``(parameters,)``, or ``(trials, parameters)``, and then all that follows has the trials in front.
+    """
+
+    problem: Problem
+    vector: Array
+
+    @cached_property
+    def residual(self) -> Array:
+        """Whitened residual of the readings, ``(rows,)``."""
+        r = np.empty((*self.vector.shape[:-1], self.problem.readings, 3))
+        for block, rows in self._rows():
+            raw = block.observation.residual(self._sweeps[block.target], self.problem.data, block.readings)
+            np.divide(raw, block.sigma[:, None], out=r[..., rows, :])
+        return r.reshape(*r.shape[:-2], -1)
+
+    @cached_property
+    def jacobian(self) -> Array:
+        """Derivative of the residual, ``(rows, parameters)``."""
+        problem, names = self.problem, self.problem.free.names
+        r = self.residual.reshape(*self.vector.shape[:-1], -1, 3)
+        # Parameter by parameter in memory: as sweeps give it, and as QR decompositions take it.
+        J = np.empty((*self.vector.shape[:-1], len(names), problem.readings, 3))
+        by_parameter = np.moveaxis(J, -3, 0)
+        for block, rows in self._rows():
+            observation, sigma = block.observation, block.sigma[:, None]
+            derivative = problem.robot.linear if observation.velocity == "linear" else problem.robot.angular
+            velocity = derivative(self._sweeps[block.target], problem.data.joints, names, self._values)
+            moved = observation.jacobian(r[..., rows, :] * sigma, velocity[..., block.configurations])
+            np.divide(moved, sigma, out=by_parameter[..., rows, :])
+        return np.swapaxes(J.reshape(*J.shape[:-2], -1), -1, -2)
+
+    def _rows(self) -> Iterator[tuple[Block, slice]]:
+        """Go through the blocks, with the readings of the problem that each of them is."""
         first = 0
-        for name in dict.fromkeys(block.target for block in self.blocks):
-            sweep = self.robot.target(name).chain.sweep(variables, values, trunk)
-            if jacobian:
-                linear, angular = self.robot.derivatives(sweep, q, names, values)
-            for block in self.blocks:
-                if block.target != name:
-                    continue
-                rows = slice(first, first + len(block.readings))
-                first = rows.stop
-                residual = block.observation.residual(sweep, self.data, block.readings)
-                r[rows] = residual / block.sigma[:, None]
-                if jacobian:
-                    where = self.data.configuration[block.readings]
-                    moved = block.observation.jacobian(residual, linear[:, :, where], angular[:, :, where])
-                    J[rows] = moved / block.sigma[:, None, None]
-        return r.reshape(-1), J.reshape(-1, len(names))
+        for block in self.problem.blocks:
+            yield block, slice(first, first + len(block.readings))
+            first += len(block.readings)
+
+    @cached_property
+    def _values(self) -> dict[str, float | Array]:
+        return {**self.problem.robot.values, **self.problem.free.values(self.vector)}
+
+    @cached_property
+    def _sweeps(self) -> dict[str, Sweep]:
+        """The sweep to each target; all go on from one to the flange."""
+        robot = self.problem.robot
+        variables = robot.variables(self.problem.data.joints, self._values)
+        trunk = robot.trunk.sweep(variables, self._values)
+        names = dict.fromkeys(block.target for block in self.problem.blocks)
+        return {name: robot.target(name).chain.sweep(variables, self._values, trunk) for name in names}
 
 
 def check_solvable(problem: Problem) -> None:

@@ -155,12 +155,8 @@ def unseen_but_felt(robot: Robot, data: Dataset, free: FreeParameters, seed: int
     noise = {"position": 1.0, "orientation": 1.0}
     plain = Problem(robot, _unit_noise(data), free, noise, priors=False)
     A = plain.linearised(free.start)[1] * free.prior
-    count = A.shape[1]
-    triangle = np.zeros((count, count))
-    reduced = np.asarray(np.linalg.qr(A, mode="r"), dtype=np.float64)
-    triangle[: len(reduced)] = reduced
-    _, s, Vt = np.linalg.svd(triangle)
-    unseen = Vt[s <= _UNSEEN * s[0]]
+    _, s, Vt = np.linalg.svd(np.linalg.qr(A, mode="r"), full_matrices=True)
+    unseen = Vt[int((s > _UNSEEN * s[0]).sum()) :]
     if len(unseen) == 0:
         return ()
     q = robot.random_configurations(40, np.random.default_rng(seed))

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from truearm.identification.fit import Fit
-from truearm.identification.problem import Problem
+from truearm.identification.problem import Block, Problem
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
 from truearm.notices import Notice
@@ -56,21 +56,9 @@ def settling(fit: Fit, data: Dataset) -> Settling | None:
     noise = {name: fit.sigma.get(name, 1.0) for name in ("position", "orientation")}
     problem = Problem(fit.robot, data, fit.free, noise)
     r, J = problem.linearised(np.array([fit.robot.values[name] for name in fit.free.names]))
-    arrived = np.sign(np.diff(data.joints, axis=0, prepend=data.joints[:1]))
-    H = np.concatenate(
-        [
-            block.observation.jacobian(
-                block.observation.residual(sweep, data, block.readings),
-                linear[:, :, where] * arrived[where].T[:, None, :],
-                angular[:, :, where] * arrived[where].T[:, None, :],
-            )
-            / block.sigma[:, None, None]
-            for block in problem.blocks
-            for where in [data.configuration[block.readings]]
-            for sweep in [fit.robot.sweep(data.joints, block.target)]
-            for linear, angular in [sweep.derivatives(fit.robot.moving)]
-        ]
-    ).reshape(len(r), -1)
+    arrived = np.sign(np.diff(data.joints, axis=0, prepend=data.joints[:1])).T[:, None, :]
+    H = np.concatenate([_by_arrival(fit, data, block, arrived) for block in problem.blocks], axis=1)
+    H = H.reshape(len(H), -1).T
     U, s, _ = np.linalg.svd(J * fit.free.prior, full_matrices=False)
     basis = U[:, s > 1e-8 * s[0]]
     free = len(r) - basis.shape[1]
@@ -81,6 +69,15 @@ def settling(fit: Fit, data: Dataset) -> Settling | None:
     before = float(left @ left) / free
     after = float(np.sum((left - moved @ angles) ** 2)) / (free - H.shape[1])
     return Settling(1.0 - float(np.sqrt(after / before)) if before > 0 else 0.0, -angles)
+
+
+def _by_arrival(fit: Fit, data: Dataset, block: Block, arrived: Array) -> Array:
+    """Return how the whitened readings of a block move with the lag of each joint, ``(joints, k, 3)``."""
+    sweep = fit.robot.sweep(data.joints, block.target)
+    by_joint = sweep.linear if block.observation.velocity == "linear" else sweep.angular
+    velocity = (by_joint(fit.robot.moving) * arrived)[..., block.configurations]
+    residual = block.observation.residual(sweep, data, block.readings)
+    return np.asarray(block.observation.jacobian(residual, velocity) / block.sigma[:, None])
 
 
 def check_settling(fit: Fit, data: Dataset) -> list[Notice]:

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from truearm.identification.losses import Loss, robust_scale, weights
-from truearm.identification.problem import Problem
+from truearm.identification.problem import Evaluation, Problem
 from truearm.modeling.chain import Array
 
 _STEPS: Final = {"linear": 60, "huber": 100, "cauchy": 100, "l1": 300}
@@ -58,26 +58,23 @@ def solve(problem: Problem, loss: Loss = "linear", bounds: tuple[Array, Array] |
     bounds
         Lowest and highest value of every parameter [SI], infinite where there is none.
     """
-    x = problem.free.start
-    if bounds is not None:
-        x = np.clip(x, *bounds)
+    start = problem.free.start
+    here = problem.at(start if bounds is None else np.clip(start, *bounds))
     prior = problem.free.prior
     damping = 0.0
     scale: float | None = None
-    r, J = problem.linearised(x)
     steps, converged = 0, False
     for steps in range(1, _STEPS[loss] + 1):
-        norms = _norms(r)
+        norms = _norms(here.residual)
         scale = _next_scale(loss, norms, scale, steps)
         w = weights(loss, norms, scale)
-        R, c = _triangle(problem, x, r, J, w)
-        cost = _cost(problem, x, r, w)
+        R, c = _triangle(here, w)
+        cost = _cost(here, w)
         accepted = False
         for _ in range(25):
-            step = _step(R * prior, c, damping, _room(x, bounds, prior)) * prior
-            trial = x + step
-            r_trial = problem.residual(trial)
-            gain = cost - _cost(problem, trial, r_trial, w)
+            step = _step(R * prior, c, damping, _room(here.vector, bounds, prior), full_rank=problem.priors) * prior
+            trial = problem.at(here.vector + step)
+            gain = cost - _cost(trial, w)
             predicted = float(c @ c) - float(np.sum((R @ step + c) ** 2))
             accepted = gain >= 0.0 or predicted <= 1e-13 * cost
             if accepted:
@@ -86,16 +83,15 @@ def solve(problem: Problem, loss: Loss = "linear", bounds: tuple[Array, Array] |
             damping = max(10 * damping, 1e-6 * float(np.sum((R * prior) ** 2)) / len(prior))
         if not accepted:
             break
-        x = trial
-        r, J = problem.linearised(x)
+        here = trial
         small = float(np.abs(step / prior).max()) < (1e-9 if loss == "linear" else 1e-6)
         if small or predicted <= 1e-24 * max(cost, 1.0):
-            converged = loss != "l1" or scale <= _FLOOR * float(np.median(_norms(r)) + 1e-300)
+            converged = loss != "l1" or scale <= _FLOOR * float(np.median(_norms(here.residual)) + 1e-300)
             if converged:
                 break
-    norms = _norms(r)
+    norms = _norms(here.residual)
     final = np.ones_like(norms) if loss == "linear" else weights(loss, norms, scale or 1.0)
-    return Solution(x, converged, steps, r, J, final)
+    return Solution(here.vector, converged, steps, here.residual, here.jacobian, final)
 
 
 _FLOOR: Final = 1e-4  # an l1 reading closer than this share of the median counts as met
@@ -116,17 +112,17 @@ def _norms(r: Array) -> Array:
     return np.asarray(np.linalg.norm(r.reshape(-1, 3), axis=1))
 
 
-def _cost(problem: Problem, x: Array, r: Array, w: Array) -> float:
-    prior, _ = problem.prior_rows(x)
-    return float(np.sum(w * np.sum(r.reshape(-1, 3) ** 2, axis=1))) + float(prior @ prior)
+def _cost(here: Evaluation, w: Array) -> float:
+    prior, _ = here.problem.prior_rows(here.vector)
+    return float(np.sum(w * np.sum(here.residual.reshape(-1, 3) ** 2, axis=1))) + float(prior @ prior)
 
 
-def _triangle(problem: Problem, x: Array, r: Array, J: Array, w: Array) -> tuple[Array, Array]:
+def _triangle(here: Evaluation, w: Array) -> tuple[Array, Array]:
     """Return R and c with |R s + c|^2 equal to the linearised cost of a step s, up to a constant."""
     root = np.repeat(np.sqrt(w), 3)
-    stacked = np.column_stack([J, r]) * root[:, None]
-    if problem.priors:
-        prior, weight = problem.prior_rows(x)
+    stacked = np.column_stack([here.jacobian, here.residual]) * root[:, None]
+    if here.problem.priors:
+        prior, weight = here.problem.prior_rows(here.vector)
         stacked = np.concatenate([stacked, np.column_stack([np.diag(weight), prior])])
     triangle = np.asarray(np.linalg.qr(stacked, mode="r"), dtype=np.float64)
     return triangle[:, :-1], triangle[:, -1]
@@ -138,7 +134,7 @@ def _room(x: Array, bounds: tuple[Array, Array] | None, prior: Array) -> tuple[A
     return (bounds[0] - x) / prior, (bounds[1] - x) / prior
 
 
-def _step(A: Array, c: Array, damping: float, room: tuple[Array, Array] | None) -> Array:
+def _step(A: Array, c: Array, damping: float, room: tuple[Array, Array] | None, *, full_rank: bool) -> Array:
     """Minimise |A s + c|^2 + damping |s|^2, within `room` if there are bounds."""
     if room is not None:
         from scipy.optimize import lsq_linear
@@ -150,6 +146,9 @@ def _step(A: Array, c: Array, damping: float, room: tuple[Array, Array] | None) 
         target = np.concatenate([-c, np.zeros(A.shape[1])])
         result = lsq_linear(damped, target, bounds=(low, high), method="bvls", tol=1e-14, max_iter=400)
         return np.asarray(np.clip(result.x, *room))
+    if full_rank and damping == 0.0:
+        size = A.shape[1]  # the row below is zero: what no step can change
+        return np.asarray(-np.linalg.solve(A[:size], c[:size]))
     U, s, Vt = np.linalg.svd(A, full_matrices=False)
     kept = s > 1e-14 * s[0]
     factor = np.where(kept, s / np.where(kept, s**2 + damping, 1.0), 0.0)

@@ -6,7 +6,7 @@ Residuals are prediction minus measurement, so adding a parameter step times the
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import ClassVar, Final
+from typing import ClassVar, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +17,19 @@ from truearm.modeling.transform import rotation_from_quaternion, rotation_vector
 
 
 class Observation(ABC):
-    """A kind of reading with three components."""
+    """A kind of reading with three components.
+
+    Attributes
+    ----------
+    name, unit
+        As reports spell them.
+    velocity
+        What moves it: the ``linear`` velocity of the target or its ``angular`` one.
+    """
 
     name: ClassVar[str]
     unit: ClassVar[str]
+    velocity: ClassVar[Literal["linear", "angular"]]
 
     @abstractmethod
     def present(self, data: Dataset) -> NDArray[np.bool_]:
@@ -32,7 +41,7 @@ class Observation(ABC):
 
     @abstractmethod
     def residual(self, sweep: Sweep, data: Dataset, readings: NDArray[np.intp]) -> Array:
-        """Return prediction minus measurement, ``(k, 3)``.
+        """Return prediction minus measurement, ``(..., k, 3)``.
 
         Parameters
         ----------
@@ -43,15 +52,15 @@ class Observation(ABC):
         """
 
     @abstractmethod
-    def jacobian(self, residual: Array, linear: Array, angular: Array) -> Array:
-        """Return the derivative of the residual, ``(k, 3, parameters)``.
+    def jacobian(self, residual: Array, velocity: Array) -> Array:
+        """Return the derivative of the residual, ``(parameters, ..., k, 3)``.
 
         Parameters
         ----------
         residual
-            From :meth:`residual`, ``(k, 3)``.
-        linear, angular
-            How the target moves with each parameter, ``(parameters, 3, k)``.
+            From :meth:`residual`, ``(..., k, 3)``.
+        velocity
+            How the target moves with each parameter, linear or angular, ``(parameters, 3, ..., k)``.
         """
 
 
@@ -60,6 +69,7 @@ class Position(Observation):
 
     name = "position"
     unit = "m"
+    velocity = "linear"
 
     def present(self, data: Dataset) -> NDArray[np.bool_]:
         """Return which readings hold a position."""
@@ -71,11 +81,12 @@ class Position(Observation):
 
     def residual(self, sweep: Sweep, data: Dataset, readings: NDArray[np.intp]) -> Array:
         """Return the difference of the positions [m]."""
-        return sweep.position[:, data.configuration[readings]].T - data.position[readings]
+        predicted = sweep.position[..., data.configuration[readings]]
+        return np.moveaxis(predicted, 0, -1) - data.position[readings]
 
-    def jacobian(self, residual: Array, linear: Array, angular: Array) -> Array:
+    def jacobian(self, residual: Array, velocity: Array) -> Array:
         """Return the linear velocities."""
-        return np.ascontiguousarray(np.moveaxis(linear, (0, 1, 2), (2, 1, 0)))
+        return np.moveaxis(velocity, 1, -1)
 
 
 class Orientation(Observation):
@@ -83,6 +94,7 @@ class Orientation(Observation):
 
     name = "orientation"
     unit = "rad"
+    velocity = "angular"
 
     def present(self, data: Dataset) -> NDArray[np.bool_]:
         """Return which readings hold an orientation."""
@@ -96,22 +108,22 @@ class Orientation(Observation):
         """Return log(R_predicted R_measured^T) [rad]."""
         if data.quaternion is None:
             raise ValueError("the data hold no orientations")
-        predicted = sweep.matrix()[data.configuration[readings]]
+        predicted = sweep.matrix()[..., data.configuration[readings], :, :]
         measured = rotation_from_quaternion(data.quaternion[readings])
         return rotation_vector(predicted @ np.swapaxes(measured, -1, -2))
 
-    def jacobian(self, residual: Array, linear: Array, angular: Array) -> Array:
+    def jacobian(self, residual: Array, velocity: Array) -> Array:
         """Return inv(left Jacobian of SO(3) at the residual) times the angular velocities (Barfoot 2017, eq. 7.85)."""
-        angle = np.linalg.norm(residual, axis=1)[:, None, None]
-        x, y, z = residual.T
+        angle = np.linalg.norm(residual, axis=-1)[..., None, None]
+        x, y, z = np.moveaxis(residual, -1, 0)
         zero = np.zeros_like(x)
-        cross = np.moveaxis(np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]), -1, 0)
+        cross = np.moveaxis(np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]), (0, 1), (-2, -1))
         small = angle < 1e-4
         safe = np.where(small, 1.0, angle)
         second = np.where(small, 1 / 12, 1 / safe**2 - (1 + np.cos(safe)) / (2 * safe * np.sin(safe)))
         inverse = np.eye(3) - 0.5 * cross + second * (cross @ cross)
-        moved: Array = inverse @ np.moveaxis(angular, (0, 1, 2), (2, 1, 0))
-        return moved
+        moved: Array = inverse @ np.moveaxis(velocity, 1, -1)[..., None]
+        return moved[..., 0]
 
 
 OBSERVATIONS: Final = (Position(), Orientation())

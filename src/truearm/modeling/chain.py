@@ -1,21 +1,29 @@
 """The chain of elementary transforms that every kinematic convention is a special case of.
 
 A chain is a product of rotations and translations along fixed axes. Every element has a value; some add a
-joint variable to it, and some values are named parameters that identification may change. Forward kinematics
-runs over the elements once, on all configurations together; the derivative with respect to a value falls out of
-the same sweep, because turning about an axis moves the tip by ``axis x (tip - origin)`` and sliding along it
-moves the tip by ``axis`` (Whitney 1972, "The mathematics of coordinated control of prosthetic arms").
+joint variable to it, and some values are named parameters that identification may change. A sweep goes over the
+elements twice, all configurations together. Backward, from the tip to the world, it carries one point: where the
+tip is, seen from each element. Forward, from the world to the tip, it carries the axes of each element's frame.
+That is also all a derivative needs, because turning about an axis moves the tip by ``axis x (tip - origin)`` and
+sliding along it moves the tip by ``axis`` (Whitney 1972, "The mathematics of coordinated control of prosthetic
+arms"): with the tip at (x, y, z) in the element's own frame, turning about its z moves it by ``x Y - y X``.
 
-Arrays are kept configuration-last: a column of the rotation matrix is ``(3, n)``, so that a rotation touches two
-columns with two multiply-adds and no matrix product. A leading trial axis of the values, ``(trials, 1)`` against
-``(n,)`` configurations, broadcasts through: columns are then ``(3, trials, n)``.
+Each pass runs when it is first asked for, so positions alone cost the backward pass, which touches numbers where
+the forward pass touches vectors. Chains that share a trunk share its forward pass.
+
+Arrays are kept configuration-last: an axis of a frame is ``(3, n)``, so that a rotation touches two axes with a
+few multiply-adds and no matrix product. What no joint has moved yet, from either end, stays a plain number or a
+``(3, 1)`` array. A leading trial axis of the values, ``(trials, 1)`` against ``(n,)`` configurations, broadcasts
+through: axes are then ``(3, trials, n)``.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Final, Literal
+from functools import cached_property
+from typing import Final, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +31,17 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Motion = Literal["Rx", "Ry", "Rz", "Tx", "Ty", "Tz", "R", "T"]
 
+#: The same at all configurations, or one each.
+Number = float | Array
+#: Of a point in a frame, or of the frame itself in the world.
+Coordinates = tuple[Number, Number, Number]
+Axes = tuple[Array, Array, Array]
+N = TypeVar("N", float, Array, Number)
+#: What an element does: () if nothing, a slide's distance [m], a turn's cosine and sine, or, about an axis of any
+#: direction, the nine entries of its rotation matrix row by row.
+Move = tuple[Number, ...]
+
 _AXIS: Final = {"x": 0, "y": 1, "z": 2}
-_IDENTITY: Final = tuple(np.eye(3)[:, [k]] for k in range(3))
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +61,13 @@ class Element:
         Index of the joint variable that is added to the value, if there is one.
     axis
         Unit vector in the moving frame, for ``R`` and ``T``.
+
+    Attributes
+    ----------
+    turns
+        Whether the element is a rotation.
+    along
+        Which axis of the moving frame it moves about or along, 0 to 2, unless it has an `axis` of its own.
     """
 
     motion: Motion
@@ -51,65 +75,139 @@ class Element:
     parameter: str | None = None
     variable: int | None = None
     axis: tuple[float, float, float] | None = None
+    turns: bool = field(init=False, repr=False, compare=False)
+    along: int = field(init=False, repr=False, compare=False)
 
-    @property
-    def turns(self) -> bool:
-        """Whether the element is a rotation."""
-        return self.motion[0] == "R"
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "turns", self.motion[0] == "R")
+        object.__setattr__(self, "along", _AXIS.get(self.motion[1:], -1))
 
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """A chain run through for all configurations, with what its derivatives need.
+    """A chain run through for all configurations.
 
     Attributes
     ----------
-    rotation
-        The three columns of the tip frame in the world, each ``(3, ..., n)``.
-    position
-        Origin of the tip frame [m], ``(3, ..., n)``.
     elements
         The elements passed, in order.
-    axes, origins
-        World axis and world origin of each element as the sweep passed it, each ``(3, ..., 1 or n)``.
+    moves
+        What each of them does.
+    shape
+        ``(n,)``, or ``(trials, n)`` with trial values.
+    start
+        The sweep that this one goes on from, whose elements are its first.
     """
 
-    rotation: tuple[Array, Array, Array]
-    position: Array
-    elements: tuple[Element, ...] = ()
-    axes: tuple[Array, ...] = ()
-    origins: tuple[Array, ...] = ()
+    elements: tuple[Element, ...]
+    moves: tuple[Move, ...]
+    shape: tuple[int, ...]
+    start: Sweep | None = None
+
+    @cached_property
+    def position(self) -> Array:
+        """Origin of the tip frame in the world [m], ``(3, ..., n)``."""
+        return self._filled(self._tips[0])
 
     def matrix(self) -> Array:
         """Return the rotation of the tip frame, ``(..., n, 3, 3)``."""
-        columns = np.stack(np.broadcast_arrays(*self.rotation))  # (column, row, ..., n)
-        return np.moveaxis(columns, (1, 0), (-2, -1))
+        axes = np.empty((3, 3, *self.shape))  # (axis, row, ..., n)
+        for k, axis in enumerate(self._frames[-1]):
+            axes[k] = axis
+        return np.moveaxis(axes, (1, 0), (-2, -1))
 
-    def derivatives(self, indices: Sequence[int]) -> tuple[Array, Array]:
-        """Return the derivative of the tip with respect to the values of the elements `indices`.
+    @cached_property
+    def places(self) -> Mapping[str, int]:
+        """Index of the element whose value is each parameter."""
+        return {e.parameter: i for i, e in enumerate(self.elements) if e.parameter is not None}
+
+    def axis(self, index: int) -> Array:
+        """Return the axis that element `index` moves about or along, in the world, ``(3, ..., n)``."""
+        return self._filled(_axis(self.elements[index], self._frames[index]))
+
+    def origin(self, index: int) -> Array:
+        """Return the origin of the frame that element `index` moves, in the world [m], ``(3, ..., n)``."""
+        arm = _combined(self._tips[index], self._frames[index])
+        return self.position - self._filled(arm)
+
+    def linear(self, indices: Sequence[int | None]) -> Array:
+        """Return the velocity of the tip's origin by the values of the elements `indices` [m per unit].
 
         Returns
         -------
-        linear, angular
-            Velocity of the tip's origin [m per unit] and angular velocity of the tip frame [rad per unit] in
-            the world, each ``(len(indices), 3, ..., n)``.
+        linear
+            In the world, ``(len(indices), 3, ..., n)``; zero where an index is None.
         """
-        shape = (len(indices), *self.position.shape)
-        linear, angular = np.zeros(shape), np.zeros(shape)
-        for row, index in enumerate(indices):
-            axis = self.axes[index]
-            if self.elements[index].turns:
-                arm = self.position - self.origins[index]
-                linear[row, 0] = axis[1] * arm[2] - axis[2] * arm[1]
-                linear[row, 1] = axis[2] * arm[0] - axis[0] * arm[2]
-                linear[row, 2] = axis[0] * arm[1] - axis[1] * arm[0]
-                angular[row] = axis
+        linear = np.empty((len(indices), 3, *self.shape))
+        other = np.empty((3, *self.shape))
+        for row, index in zip(linear, indices, strict=True):
+            if index is None:
+                row[...] = 0.0
+                continue
+            element, axes = self.elements[index], self._frames[index]
+            if not element.turns:
+                row[...] = _axis(element, axes)
+            elif element.axis is not None:
+                row[...] = _combined(_cross(element.axis, self._tips[index]), axes)
             else:
-                linear[row] = axis
-        return linear, angular
+                i, j = _TURNED[element.along]
+                tip = self._tips[index]
+                np.multiply(axes[j], tip[i], out=row)
+                np.multiply(axes[i], tip[j], out=other)
+                np.subtract(row, other, out=row)
+        return linear
 
+    def angular(self, indices: Sequence[int | None]) -> Array:
+        """Return the angular velocity of the tip frame by the values of the elements `indices` [rad per unit].
 
-_START: Final = Sweep(_IDENTITY, np.zeros((3, 1)))  # type: ignore[arg-type]
+        Returns
+        -------
+        angular
+            In the world, ``(len(indices), 3, ..., n)``; zero where an index is None.
+        """
+        angular = np.zeros((len(indices), 3, *self.shape))
+        for row, index in zip(angular, indices, strict=True):
+            if index is not None and self.elements[index].turns:
+                row[...] = _axis(self.elements[index], self._frames[index])
+        return angular
+
+    def derivatives(self, indices: Sequence[int | None]) -> tuple[Array, Array]:
+        """Return :meth:`linear` and :meth:`angular`."""
+        return self.linear(indices), self.angular(indices)
+
+    @cached_property
+    def _frames(self) -> list[Axes]:
+        """Axes, in the world, of the frame before each element and of the tip frame, each ``(3, ..., 1 or n)``."""
+        if self.start is None:
+            x, y, z = np.eye(3).reshape(3, 3, *(1 for _ in self.shape))
+            frames: list[Axes] = [(x, y, z)]
+        else:
+            frames = self.start._frames.copy()
+        passed = len(frames) - 1
+        axes = frames[-1]
+        for element, move in zip(self.elements[passed:], self.moves[passed:], strict=True):
+            if element.turns and move:
+                axes = _turned(axes, element, move)
+            frames.append(axes)
+        return frames
+
+    @cached_property
+    def _tips(self) -> list[Coordinates]:
+        """The tip's origin seen from the frame before each element, and from itself."""
+        tip: Coordinates = (0.0, 0.0, 0.0)
+        tips = [tip]
+        for element, move in zip(reversed(self.elements), reversed(self.moves), strict=True):
+            if move:
+                tip = _seen_before(tip, element, move)
+            tips.append(tip)
+        tips.reverse()
+        return tips
+
+    def _filled(self, vector: Coordinates | Array) -> Array:
+        full = np.empty((3, *self.shape))
+        for row, part in zip(full, vector, strict=True):
+            row[...] = part
+        return full
 
 
 @dataclass(frozen=True)
@@ -147,7 +245,7 @@ class Chain:
         self,
         variables: Array,
         values: Mapping[str, float | Array] | None = None,
-        start: Sweep = _START,
+        start: Sweep | None = None,
     ) -> Sweep:
         """Run through the chain for all configurations.
 
@@ -158,50 +256,96 @@ class Chain:
         values
             Parameter values that replace nominal ones, each a number or ``(trials, 1)`` [rad or m].
         start
-            A sweep to go on from, with the same `variables`.
+            A sweep to go on from, with the same `variables` and `values`.
         """
         given = values or {}
-        columns, position = list(start.rotation), start.position
-        if position.ndim == 2 and any(isinstance(value, np.ndarray) for value in given.values()):
-            columns, position = [column[:, None, :] for column in columns], position[:, None, :]
-        axes, origins = list(start.axes), list(start.origins)
+        moves: list[Move] = []
         for element in self.elements:
-            amount: float | Array = element.value
+            amount: Number = element.value
             if element.parameter is not None:
                 amount = given.get(element.parameter, amount)
             if element.variable is not None:
                 amount = amount + variables[element.variable]
-            if element.axis is None:
-                k = _AXIS[element.motion[1]]
-                axis = columns[k]
-            else:
-                k = -1
-                x, y, z = element.axis
-                axis = x * columns[0] + y * columns[1] + z * columns[2]
-            axes.append(axis)
-            origins.append(position)
-            if not element.turns:
-                position = position + amount * axis
-                continue
-            c, s = np.cos(amount), np.sin(amount)
-            if k >= 0:
-                i, j = (k + 1) % 3, (k + 2) % 3
-                columns[i], columns[j] = c * columns[i] + s * columns[j], c * columns[j] - s * columns[i]
-            else:
-                columns = [
-                    c * column + s * _cross(axis, column) + ((1 - c) * a) * axis
-                    for a, column in zip(element.axis, columns, strict=True)  # type: ignore[arg-type]
-                ]
-        shape = np.broadcast_shapes(position.shape, variables.shape[1:], *(c.shape for c in columns))
-        return Sweep(
-            rotation=tuple(np.broadcast_to(column, shape) for column in columns),  # type: ignore[arg-type]
-            position=np.broadcast_to(position, shape),
-            elements=(*start.elements, *self.elements),
-            axes=tuple(axes),
-            origins=tuple(origins),
-        )
+            moves.append(_move(element, amount))
+        if start is not None:
+            return Sweep((*start.elements, *self.elements), (*start.moves, *moves), start.shape, start)
+        shape = variables.shape[1:]
+        trials = next((value.shape for value in given.values() if isinstance(value, np.ndarray)), ())
+        return Sweep(self.elements, tuple(moves), np.broadcast_shapes(shape, trials) if trials else shape)
 
 
-def _cross(a: Array, b: Array) -> Array:
-    """Cross product along the first axis."""
-    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+# -- one element -----------------------------------------------------------------------------------------
+
+#: The two axes that a turn about axis k turns, the first towards the second.
+_TURNED: Final = ((1, 2), (2, 0), (0, 1))
+
+
+def _move(element: Element, amount: Number) -> Move:
+    """Prepare what both passes need of an element whose value, with its variable, is `amount` [rad or m]."""
+    c: Number
+    s: Number
+    if isinstance(amount, np.ndarray):
+        if not element.turns:
+            return (amount,)
+        half = np.tan(0.5 * amount)  # one function instead of two, and NumPy's tan is vectorised where its sin is not
+        share = 2.0 / (1.0 + half * half)
+        c, s = share - 1.0, half * share
+    elif amount == 0.0:
+        return ()
+    elif not element.turns:
+        return (amount,)
+    else:
+        c, s = math.cos(amount), math.sin(amount)
+    if element.axis is None:
+        return c, s
+    x, y, z = element.axis  # Rodrigues: c I + s [axis]x + (1 - c) axis axis^T
+    v = 1.0 - c
+    return (
+        *(c + v * (x * x), v * (x * y) - s * z, v * (x * z) + s * y),
+        *(v * (y * x) + s * z, c + v * (y * y), v * (y * z) - s * x),
+        *(v * (z * x) - s * y, v * (z * y) + s * x, c + v * (z * z)),
+    )
+
+
+def _turned(axes: Axes, element: Element, move: Move) -> Axes:
+    """Return the axes of the frame behind a turn, from those before it."""
+    if element.axis is not None:
+        x, y, z = (_combined(move[k::3], axes) for k in range(3))
+        return x, y, z
+    i, j = _TURNED[element.along]
+    c, s = move
+    turned = list(axes)
+    turned[i] = c * axes[i] + s * axes[j]
+    turned[j] = c * axes[j] - s * axes[i]
+    return turned[0], turned[1], turned[2]
+
+
+def _seen_before(point: Coordinates, element: Element, move: Move) -> Coordinates:
+    """Return a point seen from the frame before an element, from how it is seen from the frame behind."""
+    if element.axis is not None:
+        if element.turns:
+            return _combined(move[:3], point), _combined(move[3:6], point), _combined(move[6:], point)
+        x, y, z = (p + move[0] * a for p, a in zip(point, element.axis, strict=True))
+        return x, y, z
+    seen = list(point)
+    if element.turns:
+        i, j = _TURNED[element.along]
+        c, s = move
+        seen[i] = c * point[i] - s * point[j]
+        seen[j] = s * point[i] + c * point[j]
+    else:
+        seen[element.along] = point[element.along] + move[0]
+    return seen[0], seen[1], seen[2]
+
+
+def _axis(element: Element, axes: Axes) -> Array:
+    """Return the axis of an element in the world, from the axes of the frame before it."""
+    return axes[element.along] if element.axis is None else _combined(element.axis, axes)
+
+
+def _combined(weights: Sequence[Number], parts: Sequence[N]) -> N:
+    return weights[0] * parts[0] + weights[1] * parts[1] + weights[2] * parts[2]  # type: ignore[return-value]
+
+
+def _cross(a: tuple[float, float, float], b: Coordinates) -> Coordinates:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

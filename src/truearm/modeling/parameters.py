@@ -111,9 +111,11 @@ class FreeParameters:
         """Standard deviations of the priors."""
         return np.array([p.prior for p in self.parameters])
 
-    def values(self, vector: Array) -> dict[str, float]:
-        """Name the entries of a vector."""
-        return dict(zip(self.names, map(float, vector), strict=True))
+    def values(self, vector: Array) -> dict[str, float | Array]:
+        """Name the entries of a vector ``(parameters,)``, or, each as ``(trials, 1)``, of many vectors."""
+        if vector.ndim == 1:
+            return dict(zip(self.names, map(float, vector), strict=True))
+        return dict(zip(self.names, vector.T[:, :, None], strict=True))
 
     def without(self, names: Iterable[str]) -> FreeParameters:
         """Return the others."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Final
@@ -375,10 +375,8 @@ class Robot:
         sweep = self.sweep(q, target)
         return np.moveaxis(np.concatenate(sweep.derivatives(self.moving), axis=1), (0, 1), (2, 1))
 
-    def derivatives(
-        self, sweep: Sweep, q: Array, names: Sequence[str], values: Values | None = None
-    ) -> tuple[Array, Array]:
-        """Return how the tip of a sweep moves with the parameters `names`.
+    def linear(self, sweep: Sweep, q: Array, names: Sequence[str], values: Values | None = None) -> Array:
+        """Return the velocity of the tip of a sweep by the parameters `names` [m per unit of the parameter].
 
         Parameters
         ----------
@@ -387,25 +385,43 @@ class Robot:
 
         Returns
         -------
-        linear, angular
-            ``(len(names), 3, ..., n)`` in the world [m and rad per unit of the parameter]; zero for parameters of
-            other targets.
+        linear
+            ``(len(names), 3, ..., n)`` in the world; zero for parameters of other targets.
         """
-        values = self.values if values is None else values
-        places = {e.parameter: i for i, e in enumerate(sweep.elements) if e.parameter is not None}
-        shape = (len(names), *sweep.position.shape)
-        linear, angular = np.zeros(shape), np.zeros(shape)
-        rows = [i for i, name in enumerate(names) if name in places]
-        linear[rows], angular[rows] = sweep.derivatives([places[names[i]] for i in rows])
-        if self.effects and len(rows) < len(names):
-            by_joint = sweep.derivatives(self.moving)
+        return self._by_parameters(sweep, sweep.linear, q, names, values)
+
+    def angular(self, sweep: Sweep, q: Array, names: Sequence[str], values: Values | None = None) -> Array:
+        """Return the angular velocity of the tip of a sweep by the parameters `names` [rad per unit of the parameter].
+
+        Parameters and the shape of what is returned are as for :meth:`linear`.
+        """
+        return self._by_parameters(sweep, sweep.angular, q, names, values)
+
+    def derivatives(
+        self, sweep: Sweep, q: Array, names: Sequence[str], values: Values | None = None
+    ) -> tuple[Array, Array]:
+        """Return :meth:`linear` and :meth:`angular`."""
+        return self.linear(sweep, q, names, values), self.angular(sweep, q, names, values)
+
+    def _by_parameters(
+        self,
+        sweep: Sweep,
+        by_elements: Callable[[Sequence[int | None]], Array],
+        q: Array,
+        names: Sequence[str],
+        values: Values | None,
+    ) -> Array:
+        places = [sweep.places.get(name) for name in names]
+        derivative = by_elements(places)
+        if self.effects and None in places:
+            by_joint = by_elements(self.moving)
             readings = np.asarray(q, float).T
+            values = self.values if values is None else values
             rates = {n: r for effect in self.effects for n, r in effect.derivative(readings, values).items()}
             for i, name in enumerate(names):
                 for joint, rate in rates.get(name, {}).items():
-                    linear[i] += rate * by_joint[0][joint]
-                    angular[i] += rate * by_joint[1][joint]
-        return linear, angular
+                    derivative[i] += rate * by_joint[joint]
+        return derivative
 
     @cached_property
     def moving(self) -> list[int]:

@@ -163,8 +163,7 @@ def _axes(robot: Robot) -> list[_Axis]:
     sweep = robot.trunk.sweep(np.zeros((len(robot.joints), 1)), robot.values)
     places = {e.variable: i for i, e in enumerate(sweep.elements) if e.variable is not None}
     axes = [
-        _Axis(joint, sweep.axes[places[i]][:, 0], sweep.origins[places[i]][:, 0])
-        for i, joint in enumerate(robot.joints)
+        _Axis(joint, sweep.axis(places[i])[:, 0], sweep.origin(places[i])[:, 0]) for i, joint in enumerate(robot.joints)
     ]
     for i in reversed(range(len(axes))):
         if axes[i].joint.kind == "prismatic":

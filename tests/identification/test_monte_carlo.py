@@ -1,0 +1,117 @@
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from truearm.identification.fit import identify
+from truearm.identification.models import MODELS
+from truearm.identification.monte_carlo import MonteCarlo, monte_carlo
+from truearm.identification.problem import Problem
+from truearm.identification.solver import solve
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.statistics import errors_of
+from truearm.measurement.truths import truth_twin
+from truearm.measurement.twin import Twin, measure
+from truearm.modeling.robot import Robot
+from truearm.modeling.transform import Transform
+from truearm.robots import load_robot
+
+BY_NAME = {m.name: m for m in MODELS}
+SIGMA = 0.05e-3
+
+
+def stationed() -> Robot:
+    return truth_twin(load_robot("irb120"), "nominal", np.random.default_rng(0)).robot
+
+
+@cache
+def simulated(model: str, trials: int) -> MonteCarlo:
+    robot = stationed()
+    rng = np.random.default_rng(2024)
+    q, held_out = robot.random_configurations(50, rng), robot.random_configurations(20, rng)
+    return monte_carlo(robot, q, BY_NAME[model], SIGMA, trials, rng, held_out)
+
+
+@pytest.mark.parametrize("model", ["offsets", "geometric"])
+def test_intervals_contain_the_truth_as_often_as_they_say(model: str) -> None:
+    trials = simulated(model, 1000)
+    assert trials.converged.all()
+    joints = [p.group not in ("base", "target") for p in trials.problem.free.parameters]
+    informed = (trials.informed > 0.5)[:, joints]
+    inside = np.abs(trials.estimate - trials.truth) < 1.959964 * trials.deviation
+    assert informed.sum() >= 4000
+    assert 0.93 <= inside[:, joints][informed].mean() <= 0.97
+
+
+@pytest.mark.parametrize("model", ["offsets", "joints", "geometric"])
+def test_trials_together_are_what_the_solver_finds_alone(model: str) -> None:
+    together = simulated(model, 5)
+    for trial in range(5):
+        alone = solve(replace(together.problem, data=together.dataset(trial)))
+        assert alone.converged
+        np.testing.assert_allclose(together.estimate[trial], alone.vector, rtol=0, atol=1e-9)
+
+
+def test_trials_together_are_calibrations_of_their_datasets() -> None:
+    """The base and the targets have another nominal place there, so predictions are compared, not what is shared."""
+    together = simulated("geometric", 5)
+    robot, names = stationed(), together.problem.free.names
+    q = robot.random_configurations(20, np.random.default_rng(1))
+    for trial in range(5):
+        fit = identify(load_robot("irb120"), together.dataset(trial), BY_NAME["geometric"])
+        found = robot.with_values(dict(zip(names, together.estimate[trial], strict=True)))
+        for target in robot.targets:
+            np.testing.assert_allclose(
+                found.poses(q, target.name)[0], fit.robot.poses(q, target.name)[0], rtol=0, atol=1e-9
+            )
+        for i, name in enumerate(names):
+            alone = fit.robot.parameters[name]
+            if alone.group in ("joint zero", "geometry"):
+                assert together.estimate[trial, i] == pytest.approx(alone.value, abs=1e-7), name
+                assert together.deviation[trial, i] * fit.excess == pytest.approx(alone.deviation, rel=1e-4), name
+
+
+def test_readings_and_position_errors_are_those_of_the_twin() -> None:
+    trials = simulated("geometric", 3)
+    names = trials.problem.free.names
+    robot = stationed()
+    rng = np.random.default_rng(2024)
+    q, held_out = robot.random_configurations(50, rng), robot.random_configurations(20, rng)
+    for trial in range(3):
+        twin = Twin(robot.with_values(dict(zip(names, trials.truth[trial], strict=True))))
+        seen = trials.dataset(trial).position.reshape(3, 50, 3)
+        noise = seen - np.moveaxis(measure(twin, q, 0.0, rng).position.reshape(50, 3, 3), 1, 0)
+        assert np.sqrt(np.mean(noise**2)) == pytest.approx(SIGMA, rel=0.1)
+        found = robot.with_values(dict(zip(names, trials.estimate[trial], strict=True)))
+        norms = errors_of(found, measure(twin, held_out, 0.0, rng)).position_norms
+        np.testing.assert_allclose(trials.position_error[trial], norms.reshape(20, 3).T, rtol=0, atol=1e-12)
+
+
+def test_a_problem_at_many_vectors_is_the_problem_at_each() -> None:
+    rng = np.random.default_rng(5)
+    frame = Transform((0.1, 0.02, 0.15), (0.6, 0.0, 0.8, 0.0))
+    robot = (
+        BY_NAME["joints"].prepared(load_robot("irb120")).with_frames(Transform(), {"1": frame, "2": (0.1, 0.1, 0.1)})
+    )
+    quaternion = np.concatenate([rng.normal(size=(7, 4)), np.full((7, 4), np.nan)])
+    data = Dataset(
+        source="made",
+        labels=tuple("abcdefg"),
+        joints=robot.random_configurations(7, rng),
+        joint_kinds=("revolute",) * 6,
+        targets=("1", "2"),
+        configuration=np.concatenate([np.arange(7), rng.permutation(7)]),
+        target=np.repeat([0, 1], 7),
+        position=rng.normal(size=(14, 3)),
+        quaternion=quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True),
+    )
+    problem = Problem(robot, data, BY_NAME["joints"].free(robot), {"position": 1e-4, "orientation": 1e-4})
+    vectors = problem.free.start + 1e-2 * rng.normal(size=(4, len(problem.free.names)))
+    together = problem.at(vectors)
+    for trial, vector in enumerate(vectors):
+        r, J = problem.linearised(vector)
+        np.testing.assert_allclose(together.residual[trial], r, rtol=1e-12, atol=1e-9)
+        np.testing.assert_allclose(together.jacobian[trial], J, rtol=1e-12, atol=1e-9)

@@ -189,7 +189,7 @@ class Chain:
                 columns[i], columns[j] = c * columns[i] + s * columns[j], c * columns[j] - s * columns[i]
             else:
                 columns = [
-                    c * column + s * _cross(axis, column) + ((1 - c) * a) * axis
+                    c * column + s * cross(axis, column) + ((1 - c) * a) * axis
                     for a, column in zip(element.axis, columns, strict=True)  # type: ignore[arg-type]
                 ]
         shape = np.broadcast_shapes(position.shape, variables.shape[1:], *(c.shape for c in columns))
@@ -202,6 +202,11 @@ class Chain:
         )
 
 
-def _cross(a: Array, b: Array) -> Array:
-    """Cross product along the first axis."""
+def dot(a: Array, b: Array) -> Array:
+    """Return the dot product of vectors ``(3, ...)`` along the first axis."""
+    return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+
+
+def cross(a: Array, b: Array) -> Array:
+    """Return the cross product of vectors ``(3, ...)`` along the first axis."""
     return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])

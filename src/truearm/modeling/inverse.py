@@ -1,0 +1,347 @@
+"""Inverse kinematics of the robot as it is: joint readings for poses, with every joint effect of the model.
+
+An arm of six joints whose nominal axes allow it is solved in closed form first, on all branches; from there damped
+Newton steps go to the calibrated model. Any other arm, and any task that leaves part of the orientation free, is solved
+by the same steps from several starts, the seed first.
+
+Poses are matrices of the tip, in the robot's base frame unless the world is asked for. The base frame is where
+calibration left it: base and first joint can share an offset in many ways, and both must be of the same robot file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from truearm.errors import InputError
+from truearm.modeling.branches import BRANCHES, BranchRule, branch_number, branch_rule
+from truearm.modeling.candidates import Candidates
+from truearm.modeling.chain import Array, cross
+from truearm.modeling.closed_form import SLOTS, ClosedForm
+from truearm.modeling.pose_solver import Orientation, PoseTask, weakest_motion
+from truearm.modeling.robot import Robot
+from truearm.modeling.solutions import JointSolutions, PoseStatus
+from truearm.modeling.transform import quaternion_from_rotation, rotation_from_quaternion
+from truearm.modeling.turns import beyond_limits, nearest_turns
+
+PoseFrame = Literal["base", "world"]
+
+#: A rotation matrix may be off by this much, as by rounding; it is then made exact.
+ROTATION_TOLERANCE: Final = 1e-6
+#: Below this singular value [reach lengths, rad] a posture is called near-singular: there 0.1 mm may take 2 deg.
+NEAR_SINGULAR: Final = 5e-3
+#: A nominal start that misses by more [reach lengths, rad] is no start but for the nearest pose.
+_NEAR: Final = 0.05
+#: Where a branch was lost, the way to it leads from a posture with a singular value below this ..
+_WEAK: Final = 0.1
+#: .. along the joint motion that moves the pose least, by one of these amounts [rad]; the last one turns a wrist over.
+_ACROSS: Final = ((0.02, 0.1, 0.4), (0.05, 0.2, 0.9, 1.8, np.sqrt(2) * np.pi))
+#: Most steps there: the way may be a bent valley.
+_PATIENCE: Final = 250
+#: Fake targets tried one after the other.
+_FAKE_TARGETS: Final = 6
+#: Starts of an arm without closed form: around the seed [rad], then anywhere within the limits.
+_AROUND: Final = 0.3
+_ROUNDS: Final = 4
+_STARTS_A_ROUND: Final = 4
+
+
+def inverse(
+    robot: Robot,
+    position: ArrayLike,
+    rotation: ArrayLike | None = None,
+    *,
+    target: str | None = None,
+    frame: PoseFrame = "base",
+    branch: str | None = None,
+    seed: ArrayLike | None = None,
+    orientation: Orientation = "full",
+) -> JointSolutions:
+    """Return joint readings that bring the flange, or a target, to poses.
+
+    Parameters
+    ----------
+    robot
+        With the parameter values and joint effects that shall hold.
+    position
+        [m], ``(n, 3)``.
+    rotation
+        Rotation matrices, ``(n, 3, 3)``; None with ``orientation="free"``.
+    target
+        Name of the target that shall be there; the flange if None. A target without orientation has the flange's.
+    frame
+        What the poses are given in: ``base``, the robot's base, or ``world``, the instrument's frame.
+    branch
+        A branch by name, ``all``, or None for the one nearest to the seed that lies within the limits.
+    seed
+        Joint readings ``(joints,)`` or ``(n, joints)`` [rad or m] near which the answer shall lie; zero if None.
+    orientation
+        ``full``; ``axis`` if only the direction of the z axis counts, as for an arm of five joints; ``free`` if only
+        the position does.
+
+    Raises
+    ------
+    InputError
+        If an array has the wrong shape or a NaN, a matrix is no rotation, the arm has fewer than three joints, or the
+        branch has no such name or the arm no named branches.
+    """
+    if len(robot.joints) < 3:
+        raise InputError(
+            "inverse kinematics needs an arm of three joints or more", where=robot.name, came=len(robot.joints)
+        )
+    task = _task(robot, position, rotation, target, frame, orientation)
+    near = _seed(robot, seed, task.position.shape[1])
+    rule = branch_rule(robot) if orientation == "full" else None
+    form = ClosedForm(robot, target) if rule is not None else None
+    if rule is not None and form is not None and form.known:
+        return _by_branches(task, form, rule, branch, near)
+    if branch is not None:
+        raise InputError(
+            "the branches have no names here",
+            where=robot.name,
+            came=branch,
+            allowed="no branch: the answer nearest to the seed is taken",
+            cure="Named branches need six turning joints with a closed form, and the whole orientation.",
+        )
+    return _by_starts(task, near)
+
+
+# -- with a closed form -----------------------------------------------------------------------------------
+
+
+def _by_branches(task: PoseTask, form: ClosedForm, rule: BranchRule, branch: str | None, seed: Array) -> JointSolutions:
+    robot, count = task.robot, task.position.shape[1]
+    wanted = branch_number(branch) if branch not in (None, "all") else None
+    starts = form.starts(task.position.T, np.stack(task.rotation).transpose(2, 1, 0))
+    empty = np.isnan(starts.joints[:, :, 0])
+    lone = empty.all(axis=1)
+    joints = np.where(lone[:, None, None], seed[:, None, :], starts.joints)
+    joints = nearest_turns(robot, joints, seed[:, None, :])
+    numbers = np.full((count, SLOTS), -1)
+    numbers[~empty] = rule.numbers(robot.trunk.sweep(joints[~empty].T))
+    cost = 1e4 * starts.nearest + np.where(empty & ~lone[:, None], np.inf, 0.0)
+    if wanted is not None:
+        cost += 1e6 * (numbers != wanted)
+    else:
+        far = np.abs(np.where(empty[:, :, None], 0.0, joints - seed[:, None, :])).max(axis=2)
+        cost += 1e2 * beyond_limits(robot, joints).any(axis=2) + far
+
+    pool = Candidates(task, seed, rule)
+    everyone = np.arange(count)
+    if branch != "all":
+        slot = np.argmin(cost, axis=1)
+        pool.add(everyone, joints[everyone, slot])
+        missing = everyone[~pool.satisfied(wanted)]
+    else:
+        missing = everyone
+    if len(missing):
+        # Every nominal branch there is; and for poses out of reach the way that comes nearest.
+        pose, slot = np.nonzero(np.isfinite(cost[missing]))
+        pose = missing[pose]
+        part = task.of(pose)
+        size = np.full((count, SLOTS), np.inf)
+        size[pose, slot] = np.linalg.norm(part.error(robot.sweep(joints[pose, slot], task.target)), axis=1)
+        hopeful = size < _NEAR
+        try_ = np.isfinite(size) & (hopeful | (size <= size.min(axis=1, keepdims=True)))
+        pose, slot = np.nonzero(try_)
+        pool.add(pose, joints[pose, slot])
+
+        # Newton may cross to the other side of a singular posture that is near.
+        def lost() -> NDArray[np.bool_]:
+            exact = hopeful & ~starts.nearest
+            return pool.lost(numbers, exact, hopeful & starts.nearest, wanted, branch == "all")
+
+        pose, number = np.nonzero(lost())
+        pool.add(pose, _by_fake_targets(task.of(pose), form, rule, number, seed[pose]), _PATIENCE)
+        tried = np.flatnonzero(lost().any(axis=1)[pool.pose])
+        value, motion = weakest_motion(task.of(pool.pose[tried]), pool.joints[tried])
+        weak = value < _WEAK
+        pose, origin, motion = pool.pose[tried][weak], pool.joints[tried][weak], motion[weak]
+        for amounts in _ACROSS:
+            left = np.flatnonzero(lost().any(axis=1)[pose])
+            way = np.tile([*amounts, *(-a for a in amounts)], len(left))[:, None]
+            again = np.repeat(left, 2 * len(amounts))
+            pool.add(pose[again], origin[again] + way * motion[again], _PATIENCE)
+    rows = pool.best(wanted) if branch != "all" else pool.every_branch()
+    return _answer(task, pool, rows, wanted)
+
+
+def _by_fake_targets(
+    task: PoseTask, form: ClosedForm, rule: BranchRule, number: NDArray[np.intp], start: Array
+) -> Array:
+    """Return joints ``(n, 6)`` on the branches asked for, by closed forms of shifted poses alone.
+
+    The pose is shifted by what the calibrated arm missed it by, and the nominal arm solved again (the fake targets of
+    Nubiola, section 1.5). The closed form knows a branch up to its very end, where Newton's steps may leave it.
+    """
+    robot = task.robot
+    wanted = _matrices(np.stack(task.rotation).transpose(2, 1, 0), task.position.T)
+    shifted, joints = wanted, start
+    for _ in range(_FAKE_TARGETS):
+        found = form.starts(shifted[:, :3, 3], shifted[:, :3, :3])
+        empty = np.isnan(found.joints[:, :, 0])
+        there = np.full(empty.shape, -1)
+        there[~empty] = rule.numbers(robot.trunk.sweep(found.joints[~empty].T))
+        cost = np.where(empty, 1e6, 1e2 * (there != number[:, None]) + 1e1 * found.nearest)
+        slot = np.argmin(cost, axis=1)
+        every = np.arange(len(slot))
+        joints = np.where(empty[every, slot][:, None], joints, found.joints[every, slot])
+        sweep = robot.sweep(joints, task.target)
+        shifted = wanted @ np.linalg.inv(_matrices(sweep.matrix(), sweep.position.T)) @ shifted
+    return nearest_turns(robot, joints, start)
+
+
+def _matrices(rotation: Array, position: Array) -> Array:
+    """Return homogeneous matrices, ``(n, 4, 4)``."""
+    made = np.zeros((len(position), 4, 4))
+    made[:, :3, :3], made[:, :3, 3], made[:, 3, 3] = rotation, position, 1.0
+    return made
+
+
+# -- without ----------------------------------------------------------------------------------------------
+
+
+def _by_starts(task: PoseTask, seed: Array) -> JointSolutions:
+    robot, rng = task.robot, np.random.default_rng(0)
+    pool = Candidates(task, seed, None)
+    everyone = np.arange(len(seed))
+    pool.add(everyone, seed)
+    for number in range(_ROUNDS):
+        missing = np.repeat(everyone[~pool.satisfied(None)], _STARTS_A_ROUND)
+        if not len(missing):
+            break
+        if number:
+            starts = robot.random_configurations(len(missing), rng)
+        else:
+            starts = seed[missing] + _AROUND * rng.standard_normal((len(missing), len(robot.joints)))
+        pool.add(missing, starts)
+    return _answer(task, pool, pool.best(None), None)
+
+
+# -- the answer -------------------------------------------------------------------------------------------
+
+
+def _answer(task: PoseTask, pool: Candidates, rows: NDArray[np.intp], wanted: int | None) -> JointSolutions:
+    pose, joints = pool.pose[rows], pool.joints[rows]
+    numbers, reached, beyond = pool.number[rows], pool.reached[rows], pool.beyond[rows]
+    singular_value, _ = weakest_motion(task.of(pose), joints)
+    status = np.full(len(rows), PoseStatus.REACHED, dtype=object)
+    status[singular_value < NEAR_SINGULAR] = PoseStatus.NEAR_SINGULAR
+    status[beyond.any(axis=1)] = PoseStatus.BEYOND_LIMIT
+    if wanted is not None:
+        status[numbers != wanted] = PoseStatus.BRANCH_LOST
+    status[~reached] = PoseStatus.UNREACHABLE
+    return JointSolutions(
+        poses=task.position.shape[1],
+        pose=pose,
+        joints=joints,
+        status=tuple(status.tolist()),
+        branch=tuple(BRANCHES[number] if number >= 0 else "" for number in numbers.tolist()),
+        position_error=pool.position_error[rows],
+        orientation_error=pool.orientation_error[rows],
+        beyond=beyond,
+        singular_value=singular_value,
+        joint_names=tuple(joint.name for joint in task.robot.joints),
+    )
+
+
+# -- the question -----------------------------------------------------------------------------------------
+
+
+def _task(
+    robot: Robot,
+    position: ArrayLike,
+    rotation: ArrayLike | None,
+    target: str | None,
+    frame: PoseFrame,
+    orientation: Orientation,
+) -> PoseTask:
+    p = _array("position", position, 3)
+    if target is not None:
+        robot.target(target)  # refuses an unknown one
+    for name, came, allowed in (
+        ("frame", frame, ("base", "world")),
+        ("orientation", orientation, ("full", "axis", "free")),
+    ):
+        if came not in allowed:
+            raise InputError("there is no such choice", where=name, came=came, allowed=", ".join(allowed))
+    if rotation is None:
+        if orientation != "free":
+            raise InputError(
+                "the poses have no orientation",
+                where="rotation",
+                allowed="rotation matrices, (n, 3, 3)",
+                cure="Give them, or ask for the position alone.",
+            )
+        R = np.broadcast_to(np.eye(3), (len(p), 3, 3))
+    else:
+        R = _rotations(rotation, len(p))
+    if frame == "base":
+        base = robot.base
+        p, R = p @ base.rotation.T + np.array(base.translation), base.rotation @ R
+    x, y, z = np.ascontiguousarray(R.transpose(2, 1, 0))
+    return PoseTask(robot, target, orientation, np.ascontiguousarray(p.T), (x, y, z), _reach(robot, target))
+
+
+def _array(name: str, given: ArrayLike, *shape: int) -> Array:
+    values = np.asarray(given, float)
+    if values.shape[1:] != shape:
+        raise InputError(
+            "the array has the wrong shape",
+            where=name,
+            came=str(values.shape),
+            allowed=f"(n, {', '.join(map(str, shape))})",
+        )
+    if not np.isfinite(values).all():
+        row = int(np.argwhere(~np.isfinite(values))[0][0])
+        raise InputError("NaN and infinity are no pose", where=f"{name}, row {row}", cure="Remove the row.")
+    return values
+
+
+def _rotations(given: ArrayLike, count: int) -> Array:
+    R = _array("rotation", given, 3, 3)
+    if len(R) != count:
+        raise InputError(
+            "there are not as many rotations as positions", where="rotation", came=len(R), allowed=f"{count}"
+        )
+    off = np.abs(R.swapaxes(1, 2) @ R - np.eye(3)).max(axis=(1, 2), initial=0.0)
+    wrong = np.flatnonzero((off > ROTATION_TOLERANCE) | (np.linalg.det(R) < 0))
+    if len(wrong):
+        row = int(wrong[0])
+        left = off[row] <= ROTATION_TOLERANCE
+        raise InputError(
+            "the matrix mirrors, it does not turn"
+            if left
+            else "the matrix is no rotation: its columns are not orthonormal",
+            where=f"rotation, row {row}",
+            came=f"determinant {np.linalg.det(R[row]):.6g}" if left else f"R'R off from 1 by {off[row]:.3g}",
+            allowed="determinant 1" if left else f"within {ROTATION_TOLERANCE:g}",
+            cure="Check rows against columns, and that all digits were passed on.",
+        )
+    return rotation_from_quaternion(quaternion_from_rotation(R))
+
+
+def _seed(robot: Robot, seed: ArrayLike | None, count: int) -> Array:
+    joints = len(robot.joints)
+    values = np.zeros(joints) if seed is None else np.asarray(seed, float)
+    if values.shape not in ((joints,), (count, joints)):
+        raise InputError(
+            "the seed has the wrong length",
+            where="seed",
+            came=str(values.shape),
+            allowed=f"({joints},), one reading for each joint of {robot.name}, or ({count}, {joints})",
+        )
+    if not np.isfinite(values).all():
+        raise InputError("NaN and infinity are no joint readings", where="seed")
+    return np.broadcast_to(values, (count, joints))
+
+
+def _reach(robot: Robot, target: str | None) -> float:
+    """Return the length of the stretched arm from its first joint [m]."""
+    sweep = robot.sweep(np.zeros((1, len(robot.joints))), target)
+    places = [i for i, element in enumerate(sweep.elements) if element.variable is not None]
+    points = [*(sweep.origins[i][:, 0] for i in places), sweep.position[:, 0]]
+    return float(sum(np.linalg.norm(b - a) for a, b in zip(points, points[1:], strict=False)))

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from truearm.cli.calibrate import calibrate
+from truearm.cli.ik import ik
 from truearm.cli.importing import app as importing
 from truearm.cli.library import robots, show
 from truearm.cli.simulate import simulate
@@ -48,6 +49,7 @@ def _root(
 
 app.command()(calibrate)
 app.command()(validate)
+app.command()(ik)
 app.command()(simulate)
 app.add_typer(importing, name="import")
 app.command()(robots)

@@ -58,7 +58,8 @@ class Candidates:
     def add(self, pose: NDArray[np.intp], starts: Array, iterations: int = 60) -> None:
         """Solve the poses with these indices from starts ``(candidates, joints)`` and keep what comes out.
 
-        `iterations` is the most steps of each."""
+        `iterations` is the most steps of each.
+        """
         if not len(pose):
             return
         robot, part = self._task.robot, self._task.of(pose)
@@ -89,40 +90,11 @@ class Candidates:
         good = self.reached & (~self.beyond.any(axis=1) if wanted is None else self.number == wanted)
         return self._any(good)
 
-    def lost(
-        self,
-        numbers: NDArray[np.intp],
-        exact: NDArray[np.bool_],
-        nearest: NDArray[np.bool_],
-        wanted: int | None,
-        every: bool,
-    ) -> NDArray[np.bool_]:
-        """Return which branches of a pose the nominal arm lets expect and none has been found of, ``(n, 8)``.
-
-        Parameters
-        ----------
-        numbers
-            Branch of each nominal start, ``(n, starts)``.
-        exact, nearest
-            Which starts reach the pose, and which only come near to it, ``(n, starts)``.
-        wanted
-            The branch that is looked for.
-        every
-            Whether all are; if neither, a pose that is reached lacks none.
-        """
-        expected, found = np.zeros((2, len(numbers), len(BRANCHES)), dtype=bool)
-        pose, slot = np.nonzero(exact)
-        expected[pose, numbers[pose, slot]] = True
+    def found(self) -> NDArray[np.bool_]:
+        """Return which branches reach which poses, ``(n, 8)``."""
+        found = np.zeros((len(self._seed), len(BRANCHES)), dtype=bool)
         found[self.pose[self.reached], self.number[self.reached]] = True
-        if wanted is not None:
-            # At its end a branch has no side, and its name is by chance.
-            there = expected[:, wanted] | nearest.any(axis=1)
-            expected[:] = False
-            expected[:, wanted] = there
-        elif not every:
-            expected[nearest.any(axis=1)] = True
-            expected[self._any(self.reached)] = False
-        return expected & ~found
+        return found
 
     def best(self, wanted: int | None) -> NDArray[np.intp]:
         """Return the one candidate of each pose to answer with, in the order of the poses."""

@@ -10,22 +10,22 @@ calibration left it: base and first joint can share an offset in many ways, and 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from itertools import pairwise
 from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truearm.errors import InputError
-from truearm.modeling.branches import BRANCHES, BranchRule, branch_number, branch_rule
+from truearm.modeling.branch_search import BranchSearch
+from truearm.modeling.branches import BRANCHES, branch_number, branch_rule
 from truearm.modeling.candidates import Candidates
-from truearm.modeling.chain import Array, cross
-from truearm.modeling.closed_form import SLOTS, ClosedForm
+from truearm.modeling.chain import Array
+from truearm.modeling.closed_form import ClosedForm
 from truearm.modeling.pose_solver import Orientation, PoseTask, weakest_motion
 from truearm.modeling.robot import Robot
 from truearm.modeling.solutions import JointSolutions, PoseStatus
 from truearm.modeling.transform import quaternion_from_rotation, rotation_from_quaternion
-from truearm.modeling.turns import beyond_limits, nearest_turns
 
 PoseFrame = Literal["base", "world"]
 
@@ -33,16 +33,6 @@ PoseFrame = Literal["base", "world"]
 ROTATION_TOLERANCE: Final = 1e-6
 #: Below this singular value [reach lengths, rad] a posture is called near-singular: there 0.1 mm may take 2 deg.
 NEAR_SINGULAR: Final = 5e-3
-#: A nominal start that misses by more [reach lengths, rad] is no start but for the nearest pose.
-_NEAR: Final = 0.05
-#: Where a branch was lost, the way to it leads from a posture with a singular value below this ..
-_WEAK: Final = 0.1
-#: .. along the joint motion that moves the pose least, by one of these amounts [rad]; the last one turns a wrist over.
-_ACROSS: Final = ((0.02, 0.1, 0.4), (0.05, 0.2, 0.9, 1.8, np.sqrt(2) * np.pi))
-#: Most steps there: the way may be a bent valley.
-_PATIENCE: Final = 250
-#: Fake targets tried one after the other.
-_FAKE_TARGETS: Final = 6
 #: Starts of an arm without closed form: around the seed [rad], then anywhere within the limits.
 _AROUND: Final = 0.3
 _ROUNDS: Final = 4
@@ -97,7 +87,10 @@ def inverse(
     rule = branch_rule(robot) if orientation == "full" else None
     form = ClosedForm(robot, target) if rule is not None else None
     if rule is not None and form is not None and form.known:
-        return _by_branches(task, form, rule, branch, near)
+        number = branch_number(branch) if branch not in (None, "all") else None
+        search = BranchSearch(task, near, rule, form)
+        pool = search.every_branch() if branch == "all" else search.one_branch(number)
+        return _answer(task, pool, pool.every_branch() if branch == "all" else pool.best(number), number)
     if branch is not None:
         raise InputError(
             "the branches have no names here",
@@ -109,99 +102,7 @@ def inverse(
     return _by_starts(task, near)
 
 
-# -- with a closed form -----------------------------------------------------------------------------------
-
-
-def _by_branches(task: PoseTask, form: ClosedForm, rule: BranchRule, branch: str | None, seed: Array) -> JointSolutions:
-    robot, count = task.robot, task.position.shape[1]
-    wanted = branch_number(branch) if branch not in (None, "all") else None
-    starts = form.starts(task.position.T, np.stack(task.rotation).transpose(2, 1, 0))
-    empty = np.isnan(starts.joints[:, :, 0])
-    lone = empty.all(axis=1)
-    joints = np.where(lone[:, None, None], seed[:, None, :], starts.joints)
-    joints = nearest_turns(robot, joints, seed[:, None, :])
-    numbers = np.full((count, SLOTS), -1)
-    numbers[~empty] = rule.numbers(robot.trunk.sweep(joints[~empty].T))
-    cost = 1e4 * starts.nearest + np.where(empty & ~lone[:, None], np.inf, 0.0)
-    if wanted is not None:
-        cost += 1e6 * (numbers != wanted)
-    else:
-        far = np.abs(np.where(empty[:, :, None], 0.0, joints - seed[:, None, :])).max(axis=2)
-        cost += 1e2 * beyond_limits(robot, joints).any(axis=2) + far
-
-    pool = Candidates(task, seed, rule)
-    everyone = np.arange(count)
-    if branch != "all":
-        slot = np.argmin(cost, axis=1)
-        pool.add(everyone, joints[everyone, slot])
-        missing = everyone[~pool.satisfied(wanted)]
-    else:
-        missing = everyone
-    if len(missing):
-        # Every nominal branch there is; and for poses out of reach the way that comes nearest.
-        pose, slot = np.nonzero(np.isfinite(cost[missing]))
-        pose = missing[pose]
-        part = task.of(pose)
-        size = np.full((count, SLOTS), np.inf)
-        size[pose, slot] = np.linalg.norm(part.error(robot.sweep(joints[pose, slot], task.target)), axis=1)
-        hopeful = size < _NEAR
-        try_ = np.isfinite(size) & (hopeful | (size <= size.min(axis=1, keepdims=True)))
-        pose, slot = np.nonzero(try_)
-        pool.add(pose, joints[pose, slot])
-
-        # Newton may cross to the other side of a singular posture that is near.
-        def lost() -> NDArray[np.bool_]:
-            exact = hopeful & ~starts.nearest
-            return pool.lost(numbers, exact, hopeful & starts.nearest, wanted, branch == "all")
-
-        pose, number = np.nonzero(lost())
-        pool.add(pose, _by_fake_targets(task.of(pose), form, rule, number, seed[pose]), _PATIENCE)
-        tried = np.flatnonzero(lost().any(axis=1)[pool.pose])
-        value, motion = weakest_motion(task.of(pool.pose[tried]), pool.joints[tried])
-        weak = value < _WEAK
-        pose, origin, motion = pool.pose[tried][weak], pool.joints[tried][weak], motion[weak]
-        for amounts in _ACROSS:
-            left = np.flatnonzero(lost().any(axis=1)[pose])
-            way = np.tile([*amounts, *(-a for a in amounts)], len(left))[:, None]
-            again = np.repeat(left, 2 * len(amounts))
-            pool.add(pose[again], origin[again] + way * motion[again], _PATIENCE)
-    rows = pool.best(wanted) if branch != "all" else pool.every_branch()
-    return _answer(task, pool, rows, wanted)
-
-
-def _by_fake_targets(
-    task: PoseTask, form: ClosedForm, rule: BranchRule, number: NDArray[np.intp], start: Array
-) -> Array:
-    """Return joints ``(n, 6)`` on the branches asked for, by closed forms of shifted poses alone.
-
-    The pose is shifted by what the calibrated arm missed it by, and the nominal arm solved again (the fake targets of
-    Nubiola, section 1.5). The closed form knows a branch up to its very end, where Newton's steps may leave it.
-    """
-    robot = task.robot
-    wanted = _matrices(np.stack(task.rotation).transpose(2, 1, 0), task.position.T)
-    shifted, joints = wanted, start
-    for _ in range(_FAKE_TARGETS):
-        found = form.starts(shifted[:, :3, 3], shifted[:, :3, :3])
-        empty = np.isnan(found.joints[:, :, 0])
-        there = np.full(empty.shape, -1)
-        there[~empty] = rule.numbers(robot.trunk.sweep(found.joints[~empty].T))
-        cost = np.where(empty, 1e6, 1e2 * (there != number[:, None]) + 1e1 * found.nearest)
-        slot = np.argmin(cost, axis=1)
-        every = np.arange(len(slot))
-        joints = np.where(empty[every, slot][:, None], joints, found.joints[every, slot])
-        sweep = robot.sweep(joints, task.target)
-        shifted = wanted @ np.linalg.inv(_matrices(sweep.matrix(), sweep.position.T)) @ shifted
-    return nearest_turns(robot, joints, start)
-
-
-def _matrices(rotation: Array, position: Array) -> Array:
-    """Return homogeneous matrices, ``(n, 4, 4)``."""
-    made = np.zeros((len(position), 4, 4))
-    made[:, :3, :3], made[:, :3, 3], made[:, 3, 3] = rotation, position, 1.0
-    return made
-
-
-# -- without ----------------------------------------------------------------------------------------------
+# -- by starts --------------------------------------------------------------------------------------------
 
 
 def _by_starts(task: PoseTask, seed: Array) -> JointSolutions:
@@ -344,4 +245,4 @@ def _reach(robot: Robot, target: str | None) -> float:
     sweep = robot.sweep(np.zeros((1, len(robot.joints))), target)
     places = [i for i, element in enumerate(sweep.elements) if element.variable is not None]
     points = [*(sweep.origins[i][:, 0] for i in places), sweep.position[:, 0]]
-    return float(sum(np.linalg.norm(b - a) for a, b in zip(points, points[1:], strict=False)))
+    return float(sum(np.linalg.norm(b - a) for a, b in pairwise(points)))

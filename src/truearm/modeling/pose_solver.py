@@ -129,7 +129,7 @@ class Solved:
     @property
     def size(self) -> Array:
         """Norm of the error, ``(n,)``."""
-        return np.linalg.norm(self.error, axis=1)
+        return np.asarray(np.linalg.norm(self.error, axis=1))
 
 
 def solve(task: PoseTask, starts: Array, iterations: int = 60) -> Solved:

@@ -28,7 +28,7 @@ _WEAK: Final = 0.1
 #: .. along the joint motion that moves the pose least, by one of these amounts [rad]; the last one turns a wrist over.
 _ACROSS: Final = ((0.02, 0.1, 0.4), (0.05, 0.2, 0.9, 1.8, float(np.sqrt(2) * np.pi)))
 #: Most steps there: the way may be a bent valley.
-_PATIENCE: Final = 250
+_PATIENCE: Final = 120
 
 
 class BranchSearch:
@@ -46,7 +46,7 @@ class BranchSearch:
 
     def __init__(self, task: PoseTask, seed: Array, rule: BranchRule, form: ClosedForm) -> None:
         self._task, self._seed, self._rule, self._form = task, seed, rule, form
-        self._joints, self._number, self._exact = self._nominal(task, seed)
+        self._joints, self._number, self._exact = self._nominal(task)
         # A pose without any solution starts at the seed.
         lone = (self._number < 0).all(axis=1)
         self._joints[lone, 0], self._number[lone, 0] = seed[lone], 0
@@ -59,6 +59,7 @@ class BranchSearch:
         if wanted is not None:
             cost += 1e6 * (self._number != wanted)
         else:
+            self._joints = nearest_turns(self._task.robot, self._joints, self._seed[:, None, :])
             away = np.abs(self._joints - self._seed[:, None, :]).max(axis=2)
             cost += 1e2 * beyond_limits(self._task.robot, self._joints).any(axis=2)
             cost += np.where(filled, away, 0.0)
@@ -85,10 +86,10 @@ class BranchSearch:
         self._look_again(self._expected(near))
         return self._pool
 
-    def _nominal(self, task: PoseTask, seed: Array) -> tuple[Array, NDArray[np.intp], NDArray[np.bool_]]:
+    def _nominal(self, task: PoseTask) -> tuple[Array, NDArray[np.intp], NDArray[np.bool_]]:
         """Return the nominal solutions, their branches (-1 for none), and which reach the pose."""
         starts = self._form.starts(task.position.T, np.stack(task.rotation).transpose(2, 1, 0))
-        joints = nearest_turns(task.robot, starts.joints, seed[:, None, :])
+        joints = starts.joints
         filled = ~np.isnan(joints[:, :, 0])
         number = np.full(filled.shape, -1)
         number[filled] = self._rule.numbers(task.robot.trunk.sweep(joints[filled].T))
@@ -109,8 +110,13 @@ class BranchSearch:
     def _expected(self, near: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Return the branches ``(n, 8)`` that near nominal solutions are on; all where nothing reaches the pose yet."""
         expected = np.zeros((len(near), len(BRANCHES)), dtype=bool)
-        pose, slot = np.nonzero(near & self._exact)
-        expected[pose, self._number[pose, slot]] = True
+        pose, slot = np.nonzero(near)
+        number = self._number[pose, slot]
+        expected[pose, number] = True
+        # Where the nominal arm just does not reach, the calibrated one may, on both sides of what was the end.
+        edge = ~self._exact[pose, slot]
+        for side in (2, 4):
+            expected[pose[edge], number[edge] ^ side] = True
         expected[near.any(axis=1) & ~self._pool.found().any(axis=1)] = True
         return expected
 
@@ -145,7 +151,7 @@ class BranchSearch:
         for _ in range(_FAKE_TARGETS):
             x, y, z, position = np.moveaxis(shifted[:, :3, :], 0, -1).transpose(1, 0, 2)
             found, there, exact = self._nominal(
-                PoseTask(part.robot, part.target, "full", position, (x, y, z), part.length), joints
+                PoseTask(part.robot, part.target, "full", position, (x, y, z), part.length)
             )
             slot = np.argmin(np.where(there < 0, 1e6, 1e2 * (there != number[:, None]) + 1e1 * ~exact), axis=1)
             none = there[every, slot] < 0

@@ -63,7 +63,7 @@ class Candidates:
         if not len(pose):
             return
         robot, part = self._task.robot, self._task.of(pose)
-        solved = solve(part, starts, iterations)
+        solved = solve(part, nearest_turns(robot, starts, self._seed[pose]), iterations)
         joints, error = solved.joints, solved.error
         turned = nearest_turns(robot, joints, self._seed[pose])
         changed = np.flatnonzero((np.abs(turned - joints) > 1.0).any(axis=1))

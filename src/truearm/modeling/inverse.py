@@ -22,7 +22,7 @@ from truearm.modeling.branches import BRANCHES, branch_number, branch_rule
 from truearm.modeling.candidates import Candidates
 from truearm.modeling.chain import Array
 from truearm.modeling.closed_form import ClosedForm
-from truearm.modeling.pose_solver import Orientation, PoseTask, weakest_motion
+from truearm.modeling.pose_solver import Orientation, PoseTask, smallest_singular_value
 from truearm.modeling.robot import Robot
 from truearm.modeling.solutions import JointSolutions, PoseStatus
 from truearm.modeling.transform import quaternion_from_rotation, rotation_from_quaternion
@@ -128,7 +128,7 @@ def _by_starts(task: PoseTask, seed: Array) -> JointSolutions:
 def _answer(task: PoseTask, pool: Candidates, rows: NDArray[np.intp], wanted: int | None) -> JointSolutions:
     pose, joints = pool.pose[rows], pool.joints[rows]
     numbers, reached, beyond = pool.number[rows], pool.reached[rows], pool.beyond[rows]
-    singular_value, _ = weakest_motion(task.of(pose), joints)
+    singular_value = smallest_singular_value(task.of(pose), joints)
     status = np.full(len(rows), PoseStatus.REACHED, dtype=object)
     status[singular_value < NEAR_SINGULAR] = PoseStatus.NEAR_SINGULAR
     status[beyond.any(axis=1)] = PoseStatus.BEYOND_LIMIT

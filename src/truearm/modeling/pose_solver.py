@@ -171,17 +171,19 @@ def solve(task: PoseTask, starts: Array, iterations: int = 60) -> Solved:
     return Solved(joints, error)
 
 
-def weakest_motion(task: PoseTask, joints: Array) -> tuple[Array, Array]:
-    """Return, for each pose, the joint motion of norm 1 that moves it least, and how much that is.
+def smallest_singular_value(task: PoseTask, joints: Array) -> Array:
+    """Return, for each pose, how little it moves with a joint motion of norm 1 [reach lengths or rad], ``(n,)``.
 
     The motion of a redundant arm that leaves the pose as it is does not count.
-
-    Returns
-    -------
-    value, motion
-        Smallest singular value of the Jacobian [reach lengths or rad], ``(n,)``, and its right singular vector,
-        ``(n, joints)``.
     """
+    if not len(joints):
+        return np.zeros(0)
+    jacobian = task.jacobian(task.robot.sweep(joints, task.target))
+    return np.asarray(np.linalg.svd(jacobian, compute_uv=False)[:, -1])
+
+
+def weakest_motion(task: PoseTask, joints: Array) -> tuple[Array, Array]:
+    """Return the :func:`smallest_singular_value` of each pose, and the joint motion ``(n, joints)`` that belongs to it."""
     if not len(joints):
         return np.zeros(0), np.zeros(joints.shape)
     jacobian = task.jacobian(task.robot.sweep(joints, task.target))

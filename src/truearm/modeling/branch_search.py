@@ -21,14 +21,18 @@ from truearm.modeling.turns import beyond_limits, nearest_turns
 
 #: A nominal start that misses by more [reach lengths, rad] is no start but for the nearest pose.
 _NEAR: Final = 0.05
+#: A nominal start may be this far beyond a limit [rad]: the calibrated arm may reach the pose within it.
+_SLACK: Final = 0.02
 #: Fake targets tried one after the other.
 _FAKE_TARGETS: Final = 6
 #: The way to a lost branch leads from a posture with a singular value below this ..
 _WEAK: Final = 0.1
 #: .. along the joint motion that moves the pose least, by one of these amounts [rad]; the last one turns a wrist over.
-_ACROSS: Final = ((0.02, 0.1, 0.4), (0.05, 0.2, 0.9, 1.8, float(np.sqrt(2) * np.pi)))
-#: Most steps there: the way may be a bent valley.
-_PATIENCE: Final = 120
+_ACROSS: Final = (
+    (True, (0.02, 0.1, 0.4)),
+    (False, (0.05, 0.2, 0.9, 1.8, float(np.sqrt(2) * np.pi))),
+    (True, (0.05, 0.2, 0.9, 1.8, float(np.sqrt(2) * np.pi))),
+)
 
 
 class BranchSearch:
@@ -61,20 +65,24 @@ class BranchSearch:
         else:
             self._joints = nearest_turns(self._task.robot, self._joints, self._seed[:, None, :])
             away = np.abs(self._joints - self._seed[:, None, :]).max(axis=2)
-            cost += 1e2 * beyond_limits(self._task.robot, self._joints).any(axis=2)
+            cost += 1e2 * beyond_limits(self._task.robot, self._joints, _SLACK).any(axis=2)
             cost += np.where(filled, away, 0.0)
         every = np.arange(len(cost))
         slot = np.argmin(cost, axis=1)
         self._pool.add(every, self._joints[every, slot])
+        # A seed that is nearly there is a start of its own: at its end a branch of the nominal arm may be missing.
+        size = np.linalg.norm(self._task.error(self._task.robot.sweep(self._seed, self._task.target)), axis=1)
+        there = np.flatnonzero(size < _NEAR)
+        self._pool.add(there, self._seed[there])
         missing = ~self._pool.satisfied(wanted)
         if missing.any():
             near = self._add_all(missing)
             expected = self._expected(near)
             if wanted is not None:
                 # At its end a branch has no side, and the name of a nominal solution is by chance.
-                there = expected[:, wanted] | (near & ~self._exact).any(axis=1)
+                possible = expected[:, wanted] | (near & ~self._exact).any(axis=1)
                 expected[:] = False
-                expected[:, wanted] = there
+                expected[:, wanted] = possible
             else:
                 expected[~missing | self._pool.found().any(axis=1)] = False
             self._look_again(expected)
@@ -128,16 +136,16 @@ class BranchSearch:
         """Look for branches ``(n, 8)`` that were expected and not found."""
         pool = self._pool
         pose, number = np.nonzero(expected & ~pool.found())
-        pool.add(pose, self._by_fake_targets(pose, number), _PATIENCE)
+        pool.add(pose, self._by_fake_targets(pose, number), bold=True)
         tried = np.flatnonzero(self._lost(expected)[pool.pose])
         value, motion = weakest_motion(self._task.of(pool.pose[tried]), pool.joints[tried])
         weak = value < _WEAK
         pose, origin, motion = pool.pose[tried][weak], pool.joints[tried][weak], motion[weak]
-        for amounts in _ACROSS:
+        for bold, amounts in _ACROSS:
             left = np.flatnonzero(self._lost(expected)[pose])
             way = np.tile([*amounts, *(-amount for amount in amounts)], len(left))[:, None]
             again = np.repeat(left, 2 * len(amounts))
-            pool.add(pose[again], origin[again] + way * motion[again], _PATIENCE)
+            pool.add(pose[again], origin[again] + way * motion[again], bold=bold)
 
     def _by_fake_targets(self, pose: NDArray[np.intp], number: NDArray[np.intp]) -> Array:
         """Return joints ``(m, 6)`` for poses on branches, by closed forms of shifted poses alone.

@@ -55,21 +55,21 @@ class Candidates:
         self.beyond: NDArray[np.bool_] = np.zeros((0, joints), dtype=bool)
         self.number: NDArray[np.intp] = np.zeros(0, dtype=np.intp)
 
-    def add(self, pose: NDArray[np.intp], starts: Array, iterations: int = 60) -> None:
+    def add(self, pose: NDArray[np.intp], starts: Array, *, bold: bool = False) -> None:
         """Solve the poses with these indices from starts ``(candidates, joints)`` and keep what comes out.
 
-        `iterations` is the most steps of each.
+        `bold` steps need not come nearer.
         """
         if not len(pose):
             return
         robot, part = self._task.robot, self._task.of(pose)
-        solved = solve(part, nearest_turns(robot, starts, self._seed[pose]), iterations)
+        solved = solve(part, nearest_turns(robot, starts, self._seed[pose]), bold=bold)
         joints, error = solved.joints, solved.error
         turned = nearest_turns(robot, joints, self._seed[pose])
         changed = np.flatnonzero((np.abs(turned - joints) > 1.0).any(axis=1))
         if len(changed):
             # A joint effect (a gain) need not be the same a turn further on.
-            again = solve(part.of(changed), turned[changed], iterations)
+            again = solve(part.of(changed), turned[changed], bold=bold)
             joints[changed], error[changed] = again.joints, again.error
         position = np.linalg.norm(error[:, :3], axis=1) * part.length
         angle = np.linalg.norm(error[:, 3:], axis=1)

@@ -31,6 +31,7 @@ _LEVEL: Final = 1e-6
 _LONGEST_STEP: Final = 0.5
 #: Keeps the normal matrix of a singular arm invertible; what it takes from a step is far below a tenth.
 _FLOOR: Final = 1e-15
+_MOST_STEPS: Final = 60
 _DAMPING: Final = (1e-6, 1e12)
 
 
@@ -132,15 +133,16 @@ class Solved:
         return np.asarray(np.linalg.norm(self.error, axis=1))
 
 
-def solve(task: PoseTask, starts: Array, iterations: int = 60) -> Solved:
+def solve(task: PoseTask, starts: Array, *, bold: bool = False) -> Solved:
     """Go from starting readings to the poses of a task, or as near to them as can be.
 
     Parameters
     ----------
     starts
         One for each pose [rad or m], ``(n, joints)``.
-    iterations
-        Most steps of one pose.
+    bold
+        Whether a step is taken even if the error grows, undamped. Along a bent valley near a singular posture that is
+        faster by far, and it ends anywhere if there is no solution.
     """
     joints = np.array(starts, float)
     error = np.empty((len(joints), 0))
@@ -151,7 +153,7 @@ def solve(task: PoseTask, starts: Array, iterations: int = 60) -> Solved:
     sweep = part.robot.sweep(q, part.target)
     e, jacobian = part.error(sweep), part.jacobian(sweep)
     error = e.copy()
-    for _ in range(iterations):
+    for _ in range(_MOST_STEPS):
         size = np.linalg.norm(e, axis=1)
         gradient = np.linalg.norm((jacobian * e[:, :, None]).sum(1), axis=1)
         going = (size > CONVERGED) & (gradient > _LEVEL * size * np.minimum(size, 1.0)) & (damping < _DAMPING[1])
@@ -160,10 +162,10 @@ def solve(task: PoseTask, starts: Array, iterations: int = 60) -> Solved:
             damping, size, part = damping[going], size[going], part.of(np.flatnonzero(going))
         if not len(active):
             break
-        tried = part.advanced(q, _step(jacobian, e, damping * size**2 + _FLOOR))
+        tried = part.advanced(q, _step(jacobian, e, _FLOOR + (0.0 if bold else damping) * size**2))
         sweep = part.robot.sweep(tried, part.target)
         tried_error = part.error(sweep)
-        better = np.linalg.norm(tried_error, axis=1) < size
+        better = (np.linalg.norm(tried_error, axis=1) < size) | bold
         damping = np.where(better, np.maximum(damping / 5, _DAMPING[0]), damping * 10)
         q, e = np.where(better[:, None], tried, q), np.where(better[:, None], tried_error, e)
         jacobian = np.where(better[:, None, None], part.jacobian(sweep), jacobian)
@@ -183,7 +185,7 @@ def smallest_singular_value(task: PoseTask, joints: Array) -> Array:
 
 
 def weakest_motion(task: PoseTask, joints: Array) -> tuple[Array, Array]:
-    """Return the :func:`smallest_singular_value` of each pose, and the joint motion ``(n, joints)`` that belongs to it."""
+    """Return the :func:`smallest_singular_value` of each pose and its joint motion ``(n, joints)``."""
     if not len(joints):
         return np.zeros(0), np.zeros(joints.shape)
     jacobian = task.jacobian(task.robot.sweep(joints, task.target))

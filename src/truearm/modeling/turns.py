@@ -22,10 +22,10 @@ def limits(robot: Robot) -> tuple[Array, Array]:
     return low, high
 
 
-def beyond_limits(robot: Robot, joints: Array) -> NDArray[np.bool_]:
-    """Return which readings lie beyond the limits, ``(n, joints)``."""
+def beyond_limits(robot: Robot, joints: Array, slack: float = _ON_LIMIT) -> NDArray[np.bool_]:
+    """Return which readings ``(..., joints)`` lie beyond the limits by more than `slack` [rad or m]."""
     low, high = limits(robot)
-    beyond: NDArray[np.bool_] = (joints < low - _ON_LIMIT) | (joints > high + _ON_LIMIT)
+    beyond: NDArray[np.bool_] = (joints < low - slack) | (joints > high + slack)
     return beyond
 
 

@@ -85,13 +85,13 @@ class BranchSearch:
                 expected[:, wanted] = possible
             else:
                 expected[~missing | self._pool.found().any(axis=1)] = False
-            self._look_again(expected)
+            self._look_again(expected, thorough=True)
         return self._pool
 
     def every_branch(self) -> Candidates:
         """Return candidates on every branch there is."""
         near = self._add_all(np.ones(len(self._seed), dtype=bool))
-        self._look_again(self._expected(near))
+        self._look_again(self._expected(near), thorough=False)
         return self._pool
 
     def _nominal(self, task: PoseTask) -> tuple[Array, NDArray[np.intp], NDArray[np.bool_]]:
@@ -132,12 +132,16 @@ class BranchSearch:
         """Return the poses that lack a branch they are expected to have, ``(n,)``."""
         return np.asarray((expected & ~self._pool.found()).any(axis=1))
 
-    def _look_again(self, expected: NDArray[np.bool_]) -> None:
+    def _look_again(self, expected: NDArray[np.bool_], thorough: bool) -> None:
         """Look for branches ``(n, 8)`` that were expected and not found."""
         pool = self._pool
         pose, number = np.nonzero(expected & ~pool.found())
         pool.add(pose, self._by_fake_targets(pose, number), bold=True)
-        tried = np.flatnonzero(self._lost(expected)[pool.pose])
+        # From candidates that only came near too, where one branch matters: it finds the last few in ten thousand.
+        origins = np.ones(len(pool.pose), dtype=bool)
+        if not thorough:
+            origins = pool.reached | ~pool.found().any(axis=1)[pool.pose]
+        tried = np.flatnonzero(self._lost(expected)[pool.pose] & origins)
         value, motion = weakest_motion(self._task.of(pool.pose[tried]), pool.joints[tried])
         weak = value < _WEAK
         pose, origin, motion = pool.pose[tried][weak], pool.joints[tried][weak], motion[weak]

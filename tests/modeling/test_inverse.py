@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -173,6 +174,16 @@ def test_joints_keep_their_branch_when_the_arm_is_calibrated_or_moved(name: str)
     assert clear.sum() > 1000
     agree = rule.numbers(nominal.sweep(q)) == rule.numbers(robot.sweep(q))
     assert agree[clear].all()
+
+
+def test_angles_rounded_to_four_digits_as_in_urdf_files_still_have_named_branches() -> None:
+    robot = load_robot("ur5")
+    joints = tuple(replace(j, row={c: round(v, 4) for c, v in j.row.items()}) for j in robot.joints)
+    robot = replace(robot, joints=joints)
+    p, R = robot.poses(robot.random_configurations(50, np.random.default_rng(0)))
+    found = inverse(robot, p, R, frame="world", branch="all")
+    assert found.complete
+    assert len(found.pose) > 300
 
 
 def test_branches_that_have_no_names() -> None:

@@ -138,9 +138,8 @@ class BranchSearch:
         pose, number = np.nonzero(expected & ~pool.found())
         pool.add(pose, self._by_fake_targets(pose, number), bold=True)
         # From candidates that only came near too, where one branch matters: it finds the last few in ten thousand.
-        origins = np.ones(len(pool.pose), dtype=bool)
-        if not thorough:
-            origins = pool.reached | ~pool.found().any(axis=1)[pool.pose]
+        unreached = ~np.asarray(pool.found().any(axis=1))
+        origins = pool.reached | unreached[pool.pose] | thorough
         tried = np.flatnonzero(self._lost(expected)[pool.pose] & origins)
         value, motion = weakest_motion(self._task.of(pool.pose[tried]), pool.joints[tried])
         weak = value < _WEAK

@@ -75,7 +75,7 @@ def test_folders_that_may_not_be_entered(tmp_path: Path) -> None:
     try:
         with pytest.raises(InputError, match="Permission denied"):
             read_bytes(shut / "data.csv")
-        with pytest.raises(InputError, match="Permission denied|cannot be written to"):
+        with pytest.raises(InputError, match=r"Permission denied|cannot be written to"):
             write_text(shut / "below" / "data.csv", "")
     finally:
         shut.chmod(0o700)

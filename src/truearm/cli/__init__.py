@@ -11,6 +11,7 @@ import typer
 
 from truearm.cli.calibrate import calibrate
 from truearm.cli.check import check
+from truearm.cli.ik import ik
 from truearm.cli.importing import app as importing
 from truearm.cli.library import robots, show
 from truearm.cli.simulate import simulate
@@ -51,6 +52,7 @@ def _root(
 app.command()(check)
 app.command()(calibrate)
 app.command()(validate)
+app.command()(ik)
 app.command()(simulate)
 app.add_typer(importing, name="import")
 app.command()(robots)

@@ -109,6 +109,12 @@ class Sweep:
         """Origin of the tip frame in the world [m], ``(3, ..., n)``."""
         return self._filled(self._tips[0])
 
+    @cached_property
+    def rotation(self) -> Axes:
+        """Axes of the tip frame in the world, each ``(3, ..., n)``."""
+        x, y, z = (self._filled(axis) for axis in self._frames[-1])
+        return x, y, z
+
     def matrix(self) -> Array:
         """Return the rotation of the tip frame, ``(..., n, 3, 3)``."""
         axes = np.empty((3, 3, *self.shape))  # (axis, row, ..., n)

@@ -11,6 +11,16 @@ import numpy as np
 from truearm.modeling.chain import Array, Element
 
 
+def dot(a: Array, b: Array) -> Array:
+    """Return the dot product of vectors ``(3, ...)`` along the first axis."""
+    return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+
+
+def cross(a: Array, b: Array) -> Array:
+    """Return the cross product of vectors ``(3, ...)`` along the first axis."""
+    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
 def rotation_from_quaternion(q: Array) -> Array:
     """Return rotation matrices ``(..., 3, 3)`` of unit quaternions ``(..., 4)``, scalar first."""
     w, x, y, z = np.moveaxis(np.asarray(q, float), -1, 0)

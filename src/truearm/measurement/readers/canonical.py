@@ -59,7 +59,7 @@ def read_csv(path: Path) -> Dataset:
     """
     text = read_text(path)
     header = 1 + next(number for number, line in enumerate(io.StringIO(text, newline="")) if line.strip())
-    _refuse_other_separators(text, f"{path}, line {header}")
+    refuse_other_separators(text, f"{path}, line {header}")
     cells = read_cells(text, str(path), Layout(header=header))
     columns = _columns(cells)
     joints = [columns[f"joint_{number}"] for number in _joint_numbers(columns)]
@@ -86,7 +86,8 @@ def read_csv(path: Path) -> Dataset:
     return dataset_of(readings, configurations)
 
 
-def _refuse_other_separators(text: str, where: str) -> None:
+def refuse_other_separators(text: str, where: str) -> None:
+    """Refuse a text whose header is not separated by commas; `where` names the header."""
     heading = text.lstrip().splitlines()[0]
     seen = next((name for sign, name in _SEPARATORS.items() if sign in heading), None)
     if seen is None and "," not in heading and len(heading.split()) > 3:

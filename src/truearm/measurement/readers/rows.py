@@ -113,7 +113,9 @@ def dataset_of(readings: Readings, configurations: Configurations) -> Dataset:
             cure="Give the points on the robot the role `target`.",
         )
     position = np.where(np.isnan(readings.position).any(axis=1, keepdims=True), np.nan, readings.position)
-    quaternion = _unit_quaternions(readings)
+    quaternion = None
+    if readings.quaternion is not None:
+        quaternion = unit_quaternions(readings.quaternion, readings.source, readings.lines)
     references = None
     if readings.reference.any():
         references = _part(readings, configurations, readings.reference, position, quaternion)
@@ -186,20 +188,17 @@ def _refuse_both_roles(readings: Readings) -> None:
             )
 
 
-def _unit_quaternions(readings: Readings) -> Array | None:
-    """Return quaternions of length 1.
+def unit_quaternions(q: Array, source: str, lines: Sequence[int]) -> Array:
+    """Return quaternions ``(rows, 4)`` of length 1, or refuse one that is further from it than rounding.
 
     One that is already there to rounding stays as it is, so that reading what was written changes nothing.
     """
-    q = readings.quaternion
-    if q is None:
-        return None
     norm = np.sqrt((q * q).sum(axis=1))
     bad = np.flatnonzero(np.abs(norm - 1.0) > QUATERNION_TOLERANCE)
     if len(bad):
         raise InputError(
             "the quaternion (qw, qx, qy, qz) has not length 1",
-            where=f"{readings.source}, line {readings.lines[bad[0]]}, columns qw qx qy qz",
+            where=f"{source}, line {lines[bad[0]]}, columns qw qx qy qz",
             came=f"length {norm[bad[0]]:.6g}",
             allowed=f"1 within {QUATERNION_TOLERANCE:g}",
             cure="Check the order of the columns, and that all digits were exported.",

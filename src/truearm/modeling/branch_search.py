@@ -1,0 +1,179 @@
+"""From the branches of the nominal arm to those of the calibrated one.
+
+Newton's steps from a nominal solution keep to its branch, unless a singular posture is as near as the calibration
+errors move the arm; for random joints that is one pose in a hundred. A branch that the nominal arm lets expect and that
+was not found is looked for again, first by fake targets, then across the singular posture.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.modeling.branches import BRANCHES, BranchRule
+from truearm.modeling.candidates import Candidates
+from truearm.modeling.chain import Array
+from truearm.modeling.closed_form import ClosedForm
+from truearm.modeling.pose_solver import PoseTask, weakest_motion
+from truearm.modeling.turns import beyond_limits, nearest_turns
+
+#: A nominal start that misses by more [reach lengths, rad] is no start but for the nearest pose.
+_NEAR: Final = 0.05
+#: A nominal start may be this far beyond a limit [rad]: the calibrated arm may reach the pose within it.
+_SLACK: Final = 0.02
+#: Fake targets tried one after the other.
+_FAKE_TARGETS: Final = 6
+#: The way to a lost branch leads from a posture with a singular value below this ..
+_WEAK: Final = 0.1
+#: .. along the joint motion that moves the pose least, by one of these amounts [rad]; the last one turns a wrist over.
+_ACROSS: Final = (
+    (True, (0.02, 0.1, 0.4)),
+    (False, (0.05, 0.2, 0.9, 1.8, float(np.sqrt(2) * np.pi))),
+    (True, (0.05, 0.2, 0.9, 1.8, float(np.sqrt(2) * np.pi))),
+)
+
+
+class BranchSearch:
+    """The search for the branches of poses on the calibrated arm.
+
+    Parameters
+    ----------
+    task
+        The poses, with their whole orientation.
+    seed
+        Readings to stay near to [rad], ``(n, 6)``.
+    rule, form
+        Names and closed form of the robot's branches.
+    """
+
+    def __init__(self, task: PoseTask, seed: Array, rule: BranchRule, form: ClosedForm) -> None:
+        self._task, self._seed, self._rule, self._form = task, seed, rule, form
+        self._joints, self._number, self._exact = self._nominal(task)
+        # A pose without any solution starts at the seed.
+        lone = (self._number < 0).all(axis=1)
+        self._joints[lone, 0], self._number[lone, 0] = seed[lone], 0
+        self._pool = Candidates(task, seed, rule)
+
+    def one_branch(self, wanted: int | None) -> Candidates:
+        """Return candidates on one branch, or on the one nearest to the seed within the limits if None."""
+        filled = self._number >= 0
+        cost = np.where(filled, 1e4 * ~self._exact, np.inf)
+        if wanted is not None:
+            cost += 1e6 * (self._number != wanted)
+        else:
+            self._joints = nearest_turns(self._task.robot, self._joints, self._seed[:, None, :])
+            away = np.abs(self._joints - self._seed[:, None, :]).max(axis=2)
+            cost += 1e2 * beyond_limits(self._task.robot, self._joints, _SLACK).any(axis=2)
+            cost += np.where(filled, away, 0.0)
+        every = np.arange(len(cost))
+        slot = np.argmin(cost, axis=1)
+        self._pool.add(every, self._joints[every, slot])
+        # A seed that is nearly there is a start of its own: at its end a branch of the nominal arm may be missing.
+        size = np.linalg.norm(self._task.error(self._task.robot.sweep(self._seed, self._task.target)), axis=1)
+        there = np.flatnonzero(size < _NEAR)
+        self._pool.add(there, self._seed[there])
+        missing = ~self._pool.satisfied(wanted)
+        if missing.any():
+            near = self._add_all(missing)
+            expected = self._expected(near)
+            if wanted is not None:
+                # At its end a branch has no side, and the name of a nominal solution is by chance.
+                possible = expected[:, wanted] | (near & ~self._exact).any(axis=1)
+                expected[:] = False
+                expected[:, wanted] = possible
+            else:
+                expected[~missing | self._pool.found().any(axis=1)] = False
+            self._look_again(expected, thorough=True)
+        return self._pool
+
+    def every_branch(self) -> Candidates:
+        """Return candidates on every branch there is."""
+        near = self._add_all(np.ones(len(self._seed), dtype=bool))
+        self._look_again(self._expected(near), thorough=False)
+        return self._pool
+
+    def _nominal(self, task: PoseTask) -> tuple[Array, NDArray[np.intp], NDArray[np.bool_]]:
+        """Return the nominal solutions, their branches (-1 for none), and which reach the pose."""
+        starts = self._form.starts(task.position.T, np.stack(task.rotation).transpose(2, 1, 0))
+        joints = starts.joints
+        filled = ~np.isnan(joints[:, :, 0])
+        number = np.full(filled.shape, -1)
+        number[filled] = self._rule.numbers(task.robot.trunk.sweep(joints[filled].T))
+        return joints, number, filled & ~starts.nearest
+
+    def _add_all(self, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Start from every near nominal solution of some poses, or from the nearest one; return which are near."""
+        pose, slot = np.nonzero((self._number >= 0) & chosen[:, None])
+        part, joints = self._task.of(pose), self._joints[pose, slot]
+        size = np.full(self._number.shape, np.inf)
+        size[pose, slot] = np.linalg.norm(part.error(part.robot.sweep(joints, part.target)), axis=1)
+        near = np.asarray(size < _NEAR)
+        nearest = np.isfinite(size) & (size <= size.min(axis=1, keepdims=True))
+        pose, slot = np.nonzero(near | nearest)
+        self._pool.add(pose, self._joints[pose, slot])
+        return near
+
+    def _expected(self, near: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Return the branches ``(n, 8)`` that near nominal solutions are on; all where nothing reaches the pose yet."""
+        expected = np.zeros((len(near), len(BRANCHES)), dtype=bool)
+        pose, slot = np.nonzero(near)
+        number = self._number[pose, slot]
+        expected[pose, number] = True
+        # Where the nominal arm just does not reach, the calibrated one may, on both sides of what was the end.
+        edge = ~self._exact[pose, slot]
+        for side in (2, 4):
+            expected[pose[edge], number[edge] ^ side] = True
+        expected[near.any(axis=1) & ~self._pool.found().any(axis=1)] = True
+        return expected
+
+    def _lost(self, expected: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Return the poses that lack a branch they are expected to have, ``(n,)``."""
+        return np.asarray((expected & ~self._pool.found()).any(axis=1))
+
+    def _look_again(self, expected: NDArray[np.bool_], thorough: bool) -> None:
+        """Look for branches ``(n, 8)`` that were expected and not found."""
+        pool = self._pool
+        pose, number = np.nonzero(expected & ~pool.found())
+        pool.add(pose, self._by_fake_targets(pose, number), bold=True)
+        # From candidates that only came near too, where one branch matters: it finds the last few in ten thousand.
+        unreached = ~np.asarray(pool.found().any(axis=1))
+        origins = pool.reached | unreached[pool.pose] | thorough
+        tried = np.flatnonzero(self._lost(expected)[pool.pose] & origins)
+        value, motion = weakest_motion(self._task.of(pool.pose[tried]), pool.joints[tried])
+        weak = value < _WEAK
+        pose, origin, motion = pool.pose[tried][weak], pool.joints[tried][weak], motion[weak]
+        for bold, amounts in _ACROSS:
+            left = np.flatnonzero(self._lost(expected)[pose])
+            way = np.tile([*amounts, *(-amount for amount in amounts)], len(left))[:, None]
+            again = np.repeat(left, 2 * len(amounts))
+            pool.add(pose[again], origin[again] + way * motion[again], bold=bold)
+
+    def _by_fake_targets(self, pose: NDArray[np.intp], number: NDArray[np.intp]) -> Array:
+        """Return joints ``(m, 6)`` for poses on branches, by closed forms of shifted poses alone.
+
+        The pose is shifted by what the calibrated arm misses it by, and the nominal arm solved again (the fake targets
+        of Nubiola, section 1.5). The closed form knows a branch up to its very end, where Newton's steps leave it.
+        """
+        part, joints = self._task.of(pose), self._seed[pose]
+        wanted = _matrices(np.stack(part.rotation).transpose(2, 1, 0), part.position.T)
+        shifted, every = wanted, np.arange(len(pose))
+        for _ in range(_FAKE_TARGETS):
+            x, y, z, position = np.moveaxis(shifted[:, :3, :], 0, -1).transpose(1, 0, 2)
+            found, there, exact = self._nominal(
+                PoseTask(part.robot, part.target, "full", position, (x, y, z), part.length)
+            )
+            slot = np.argmin(np.where(there < 0, 1e6, 1e2 * (there != number[:, None]) + 1e1 * ~exact), axis=1)
+            none = there[every, slot] < 0
+            joints = np.where(none[:, None], joints, found[every, slot])
+            sweep = part.robot.sweep(joints, part.target)
+            shifted = wanted @ np.linalg.inv(_matrices(sweep.matrix(), sweep.position.T)) @ shifted
+        return joints
+
+
+def _matrices(rotation: Array, position: Array) -> Array:
+    """Return homogeneous matrices, ``(n, 4, 4)``."""
+    made = np.zeros((len(position), 4, 4))
+    made[:, :3, :3], made[:, :3, 3], made[:, 3, 3] = rotation, position, 1.0
+    return made

@@ -1,0 +1,248 @@
+"""Inverse kinematics of the robot as it is: joint readings for poses, with every joint effect of the model.
+
+An arm of six joints whose nominal axes allow it is solved in closed form first, on all branches; from there damped
+Newton steps go to the calibrated model. Any other arm, and any task that leaves part of the orientation free, is solved
+by the same steps from several starts, the seed first.
+
+Poses are matrices of the tip, in the robot's base frame unless the world is asked for. The base frame is where
+calibration left it: base and first joint can share an offset in many ways, and both must be of the same robot file.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from truearm.errors import InputError
+from truearm.modeling.branch_search import BranchSearch
+from truearm.modeling.branches import BRANCHES, branch_number, branch_rule
+from truearm.modeling.candidates import Candidates
+from truearm.modeling.chain import Array
+from truearm.modeling.closed_form import ClosedForm
+from truearm.modeling.pose_solver import Orientation, PoseTask, smallest_singular_value
+from truearm.modeling.robot import Robot
+from truearm.modeling.solutions import JointSolutions, PoseStatus
+from truearm.modeling.transform import quaternion_from_rotation, rotation_from_quaternion
+
+PoseFrame = Literal["base", "world"]
+
+#: A rotation matrix may be off by this much, as by rounding; it is then made exact.
+ROTATION_TOLERANCE: Final = 1e-6
+#: Below this singular value [reach lengths, rad] a posture is called near-singular: there 0.1 mm may take 2 deg.
+NEAR_SINGULAR: Final = 5e-3
+#: Starts of an arm without closed form: around the seed [rad], then anywhere within the limits.
+_AROUND: Final = 0.3
+_ROUNDS: Final = 4
+_STARTS_A_ROUND: Final = 4
+
+
+def inverse(
+    robot: Robot,
+    position: ArrayLike,
+    rotation: ArrayLike | None = None,
+    *,
+    target: str | None = None,
+    frame: PoseFrame = "base",
+    branch: str | None = None,
+    seed: ArrayLike | None = None,
+    orientation: Orientation = "full",
+) -> JointSolutions:
+    """Return joint readings that bring the flange, or a target, to poses.
+
+    Parameters
+    ----------
+    robot
+        With the parameter values and joint effects that shall hold.
+    position
+        [m], ``(n, 3)``.
+    rotation
+        Rotation matrices, ``(n, 3, 3)``; None with ``orientation="free"``.
+    target
+        Name of the target that shall be there; the flange if None. A target without orientation has the flange's.
+    frame
+        What the poses are given in: ``base``, the robot's base, or ``world``, the instrument's frame.
+    branch
+        A branch by name, ``all``, or None for the one nearest to the seed that lies within the limits.
+    seed
+        Joint readings ``(joints,)`` or ``(n, joints)`` [rad or m] near which the answer shall lie; zero if None.
+    orientation
+        ``full``; ``axis`` if only the direction of the z axis counts, as for an arm of five joints; ``free`` if only
+        the position does.
+
+    Raises
+    ------
+    InputError
+        If an array has the wrong shape or a NaN, a matrix is no rotation, the arm has fewer than three joints, or the
+        branch has no such name or the arm no named branches.
+    """
+    if len(robot.joints) < 3:
+        raise InputError(
+            "inverse kinematics needs an arm of three joints or more", where=robot.name, came=len(robot.joints)
+        )
+    task = _task(robot, position, rotation, target, frame, orientation)
+    near = _seed(robot, seed, task.position.shape[1])
+    rule = branch_rule(robot) if orientation == "full" else None
+    form = ClosedForm(robot, target) if rule is not None else None
+    if rule is not None and form is not None and form.known:
+        number = branch_number(branch) if branch not in (None, "all") else None
+        search = BranchSearch(task, near, rule, form)
+        pool = search.every_branch() if branch == "all" else search.one_branch(number)
+        return _answer(task, pool, pool.every_branch() if branch == "all" else pool.best(number), number)
+    if branch is not None:
+        raise InputError(
+            "the branches have no names here",
+            where=robot.name,
+            came=branch,
+            allowed="no branch: the answer nearest to the seed is taken",
+            cure="Named branches need six turning joints with a closed form, and the whole orientation.",
+        )
+    return _by_starts(task, near)
+
+
+# -- by starts --------------------------------------------------------------------------------------------
+
+
+def _by_starts(task: PoseTask, seed: Array) -> JointSolutions:
+    robot, rng = task.robot, np.random.default_rng(0)
+    pool = Candidates(task, seed, None)
+    everyone = np.arange(len(seed))
+    pool.add(everyone, seed)
+    for number in range(_ROUNDS):
+        missing = np.repeat(everyone[~pool.satisfied(None)], _STARTS_A_ROUND)
+        if not len(missing):
+            break
+        if number:
+            starts = robot.random_configurations(len(missing), rng)
+        else:
+            starts = seed[missing] + _AROUND * rng.standard_normal((len(missing), len(robot.joints)))
+        pool.add(missing, starts)
+    return _answer(task, pool, pool.best(None), None)
+
+
+# -- the answer -------------------------------------------------------------------------------------------
+
+
+def _answer(task: PoseTask, pool: Candidates, rows: NDArray[np.intp], wanted: int | None) -> JointSolutions:
+    pose, joints = pool.pose[rows], pool.joints[rows]
+    numbers, reached, beyond = pool.number[rows], pool.reached[rows], pool.beyond[rows]
+    singular_value = smallest_singular_value(task.of(pose), joints)
+    status = np.full(len(rows), PoseStatus.REACHED, dtype=object)
+    status[singular_value < NEAR_SINGULAR] = PoseStatus.NEAR_SINGULAR
+    status[beyond.any(axis=1)] = PoseStatus.BEYOND_LIMIT
+    if wanted is not None:
+        status[numbers != wanted] = PoseStatus.BRANCH_LOST
+    status[~reached] = PoseStatus.UNREACHABLE
+    return JointSolutions(
+        poses=task.position.shape[1],
+        pose=pose,
+        joints=joints,
+        status=tuple(status.tolist()),
+        branch=tuple(BRANCHES[number] if number >= 0 else "" for number in numbers.tolist()),
+        position_error=pool.position_error[rows],
+        orientation_error=pool.orientation_error[rows],
+        beyond=beyond,
+        singular_value=singular_value,
+        joint_names=tuple(joint.name for joint in task.robot.joints),
+    )
+
+
+# -- the question -----------------------------------------------------------------------------------------
+
+
+def _task(
+    robot: Robot,
+    position: ArrayLike,
+    rotation: ArrayLike | None,
+    target: str | None,
+    frame: PoseFrame,
+    orientation: Orientation,
+) -> PoseTask:
+    p = _array("position", position, 3)
+    if target is not None:
+        robot.target(target)  # refuses an unknown one
+    for name, came, allowed in (
+        ("frame", frame, ("base", "world")),
+        ("orientation", orientation, ("full", "axis", "free")),
+    ):
+        if came not in allowed:
+            raise InputError("there is no such choice", where=name, came=came, allowed=", ".join(allowed))
+    if rotation is None:
+        if orientation != "free":
+            raise InputError(
+                "the poses have no orientation",
+                where="rotation",
+                allowed="rotation matrices, (n, 3, 3)",
+                cure="Give them, or ask for the position alone.",
+            )
+        R = np.broadcast_to(np.eye(3), (len(p), 3, 3))
+    else:
+        R = _rotations(rotation, len(p))
+    if frame == "base":
+        base = robot.base
+        p, R = p @ base.rotation.T + np.array(base.translation), base.rotation @ R
+    x, y, z = np.ascontiguousarray(R.transpose(2, 1, 0))
+    return PoseTask(robot, target, orientation, np.ascontiguousarray(p.T), (x, y, z), _reach(robot, target))
+
+
+def _array(name: str, given: ArrayLike, *shape: int) -> Array:
+    values = np.asarray(given, float)
+    if values.shape[1:] != shape:
+        raise InputError(
+            "the array has the wrong shape",
+            where=name,
+            came=str(values.shape),
+            allowed=f"(n, {', '.join(map(str, shape))})",
+        )
+    if not np.isfinite(values).all():
+        row = int(np.argwhere(~np.isfinite(values))[0][0])
+        raise InputError("NaN and infinity are no pose", where=f"{name}, row {row}", cure="Remove the row.")
+    return values
+
+
+def _rotations(given: ArrayLike, count: int) -> Array:
+    R = _array("rotation", given, 3, 3)
+    if len(R) != count:
+        raise InputError(
+            "there are not as many rotations as positions", where="rotation", came=len(R), allowed=f"{count}"
+        )
+    off = np.abs(R.swapaxes(1, 2) @ R - np.eye(3)).max(axis=(1, 2), initial=0.0)
+    wrong = np.flatnonzero((off > ROTATION_TOLERANCE) | (np.linalg.det(R) < 0))
+    if len(wrong):
+        row = int(wrong[0])
+        left = off[row] <= ROTATION_TOLERANCE
+        raise InputError(
+            "the matrix mirrors, it does not turn"
+            if left
+            else "the matrix is no rotation: its columns are not orthonormal",
+            where=f"rotation, row {row}",
+            came=f"determinant {np.linalg.det(R[row]):.6g}" if left else f"R'R off from 1 by {off[row]:.3g}",
+            allowed="determinant 1" if left else f"within {ROTATION_TOLERANCE:g}",
+            cure="Check rows against columns, and that all digits were passed on.",
+        )
+    return rotation_from_quaternion(quaternion_from_rotation(R))
+
+
+def _seed(robot: Robot, seed: ArrayLike | None, count: int) -> Array:
+    joints = len(robot.joints)
+    values = np.zeros(joints) if seed is None else np.asarray(seed, float)
+    if values.shape not in ((joints,), (count, joints)):
+        raise InputError(
+            "the seed has the wrong length",
+            where="seed",
+            came=str(values.shape),
+            allowed=f"({joints},), one reading for each joint of {robot.name}, or ({count}, {joints})",
+        )
+    if not np.isfinite(values).all():
+        raise InputError("NaN and infinity are no joint readings", where="seed")
+    return np.broadcast_to(values, (count, joints))
+
+
+def _reach(robot: Robot, target: str | None) -> float:
+    """Return the length of the stretched arm from its first joint [m]."""
+    sweep = robot.sweep(np.zeros((1, len(robot.joints))), target)
+    places = [i for i, element in enumerate(sweep.elements) if element.variable is not None]
+    points = [*(sweep.origin(i)[:, 0] for i in places), sweep.position[:, 0]]
+    return float(sum(np.linalg.norm(b - a) for a, b in pairwise(points)))

@@ -1,0 +1,221 @@
+"""Damped Newton for many poses at once: joint readings that bring the tip of a robot to given poses.
+
+The step is Levenberg's, with a damping that follows the squared error (Sugihara, "Solvability-unconcerned inverse
+kinematics by the Levenberg-Marquardt method", IEEE Trans. Robotics 27, 2011): far away or beyond the reach it is a
+careful descent that ends at the nearest pose, and near a solution it is Newton's own step. Every pose has a damping of
+its own, and those that are done leave the computation.
+
+A step is a change of the true joint variables. Joint effects are evaluated anew for every reading that is tried:
+the reading is what turns the joint to where the step wants it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.modeling.chain import Array, Sweep
+from truearm.modeling.robot import Robot
+from truearm.modeling.transform import cross, dot
+
+#: ``full``; ``axis``, the direction of the tip's z axis alone; ``free``, the position alone.
+Orientation = Literal["full", "axis", "free"]
+
+#: Where a pose counts as met and the steps end [reach lengths, rad].
+CONVERGED: Final = 1e-12
+#: A gradient this small beside the error is that of a nearest pose.
+_LEVEL: Final = 1e-6
+#: Largest change of a joint in one step [rad, reach lengths].
+_LONGEST_STEP: Final = 0.5
+#: Keeps the normal matrix of a singular arm invertible; what it takes from a step is far below a tenth.
+_FLOOR: Final = 1e-15
+_MOST_STEPS: Final = 60
+_DAMPING: Final = (1e-6, 1e12)
+
+
+@dataclass(frozen=True, eq=False)
+class PoseTask:
+    """Poses the tip of a robot shall have, in the world.
+
+    Attributes
+    ----------
+    robot
+        With its parameter values and joint effects.
+    target
+        Name of the target that is the tip; the flange if None.
+    orientation
+        How much of the orientation counts.
+    position
+        [m], ``(3, n)``.
+    rotation
+        Columns of the rotation matrix, each ``(3, n)``.
+    length
+        Reach of the arm [m]: an error as long as this weighs as much as one of 1 rad.
+    """
+
+    robot: Robot
+    target: str | None
+    orientation: Orientation
+    position: Array
+    rotation: tuple[Array, Array, Array]
+    length: float
+
+    def of(self, rows: NDArray[np.intp]) -> PoseTask:
+        """Return the task of some poses, which may be repeated."""
+        x, y, z = (column[:, rows] for column in self.rotation)
+        return replace(self, position=self.position[:, rows], rotation=(x, y, z))
+
+    def error(self, sweep: Sweep) -> Array:
+        """Return what is missing in position [reach lengths] and orientation [rad], ``(n, 3, 5 or 6)``."""
+        away = (self.position - sweep.position) / self.length
+        if self.orientation == "free":
+            return away.T
+        x, y, z = sweep.rotation
+        if self.orientation == "axis":
+            turn = _turned(cross(z, self.rotation[2]), dot(z, self.rotation[2]), x)
+            return np.concatenate([away, dot(turn, x)[None], dot(turn, y)[None]]).T
+        pairs = list(zip(sweep.rotation, self.rotation, strict=True))
+        sine = 0.5 * sum((cross(now, wanted) for now, wanted in pairs), np.zeros(()))
+        cosine = 0.5 * (sum((dot(now, wanted) for now, wanted in pairs), np.zeros(())) - 1.0)
+        return np.concatenate([away, _turned(sine, cosine, x)]).T
+
+    def jacobian(self, sweep: Sweep) -> Array:
+        """Return how position and orientation follow the true joint variables, ``(n, 3, 5 or 6, joints)``.
+
+        A sliding joint is counted in reach lengths, a turning one in rad.
+        """
+        places = {e.variable: i for i, e in enumerate(sweep.elements) if e.variable is not None}
+        joints = self.robot.joints
+        linear, angular = sweep.derivatives([places[i] for i in range(len(joints))])  # (joints, 3, n)
+        rows = [linear / self.length]
+        if self.orientation == "full":
+            rows.append(angular)
+        elif self.orientation == "axis":
+            x, y, _ = sweep.rotation
+            rows.append(np.stack([(angular * x).sum(1), (angular * y).sum(1)], axis=1))
+        whole = np.concatenate(rows, axis=1)
+        sliding = [i for i, joint in enumerate(joints) if joint.kind == "prismatic"]
+        whole[sliding] *= self.length
+        return np.ascontiguousarray(whole.transpose(2, 1, 0))
+
+    def advanced(self, q: Array, step: Array) -> Array:
+        """Return the readings ``(n, joints)`` whose true variables are those of `q` plus a step in them."""
+        scale = [self.length if joint.kind == "prismatic" else 1.0 for joint in self.robot.joints]
+        step = step * scale
+        moved: Array = q + step
+        if self.robot.effects:
+            wanted = self.robot.variables(q, self.robot.values) + step.T
+            for _ in range(2):  # an effect changes by a thousandth of the step: two rounds leave nothing
+                moved = moved + (wanted - self.robot.variables(moved, self.robot.values)).T
+        return moved
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """Where the steps of many poses ended.
+
+    Attributes
+    ----------
+    joints
+        Readings [rad or m], ``(n, joints)``.
+    error
+        As :meth:`PoseTask.error` gives it.
+    """
+
+    joints: Array
+    error: Array
+
+    @property
+    def size(self) -> Array:
+        """Norm of the error, ``(n,)``."""
+        return np.asarray(np.linalg.norm(self.error, axis=1))
+
+
+def solve(task: PoseTask, starts: Array, *, bold: bool = False) -> Solved:
+    """Go from starting readings to the poses of a task, or as near to them as can be.
+
+    Parameters
+    ----------
+    starts
+        One for each pose [rad or m], ``(n, joints)``.
+    bold
+        Whether a step is taken even if the error grows, undamped. Along a bent valley near a singular posture that is
+        faster by far, and it ends anywhere if there is no solution.
+    """
+    joints = np.array(starts, float)
+    error = np.empty((len(joints), 0))
+    if not len(joints):
+        return Solved(joints, error)
+    active = np.arange(len(joints))
+    part, q, damping = task, joints, np.ones(len(joints))
+    sweep = part.robot.sweep(q, part.target)
+    e, jacobian = part.error(sweep), part.jacobian(sweep)
+    error = e.copy()
+    for _ in range(_MOST_STEPS):
+        size = np.linalg.norm(e, axis=1)
+        gradient = np.linalg.norm((jacobian * e[:, :, None]).sum(1), axis=1)
+        going = (size > CONVERGED) & (gradient > _LEVEL * size * np.minimum(size, 1.0)) & (damping < _DAMPING[1])
+        if not going.all():
+            active, q, e, jacobian = active[going], q[going], e[going], jacobian[going]
+            damping, size, part = damping[going], size[going], part.of(np.flatnonzero(going))
+        if not len(active):
+            break
+        tried = part.advanced(q, _step(jacobian, e, _FLOOR + (0.0 if bold else damping) * size**2))
+        sweep = part.robot.sweep(tried, part.target)
+        tried_error = part.error(sweep)
+        better = (np.linalg.norm(tried_error, axis=1) < size) | bold
+        damping = np.where(better, np.maximum(damping / 5, _DAMPING[0]), damping * 10)
+        q, e = np.where(better[:, None], tried, q), np.where(better[:, None], tried_error, e)
+        jacobian = np.where(better[:, None, None], part.jacobian(sweep), jacobian)
+        joints[active], error[active] = q, e
+    return Solved(joints, error)
+
+
+def smallest_singular_value(task: PoseTask, joints: Array) -> Array:
+    """Return, for each pose, how little it moves with a joint motion of norm 1 [reach lengths or rad], ``(n,)``.
+
+    The motion of a redundant arm that leaves the pose as it is does not count.
+    """
+    if not len(joints):
+        return np.zeros(0)
+    jacobian = task.jacobian(task.robot.sweep(joints, task.target))
+    return np.asarray(np.linalg.svd(jacobian, compute_uv=False)[:, -1])
+
+
+def weakest_motion(task: PoseTask, joints: Array) -> tuple[Array, Array]:
+    """Return the :func:`smallest_singular_value` of each pose and its joint motion ``(n, joints)``."""
+    if not len(joints):
+        return np.zeros(0), np.zeros(joints.shape)
+    jacobian = task.jacobian(task.robot.sweep(joints, task.target))
+    _, values, motions = np.linalg.svd(jacobian, full_matrices=False)
+    return values[:, -1], motions[:, -1]
+
+
+def _step(jacobian: Array, error: Array, damping: Array) -> Array:
+    """Return the damped least-squares step, by the smaller of the two normal matrices, and not too long."""
+    transposed = jacobian.swapaxes(1, 2)
+    rows, columns = jacobian.shape[1:]
+    if rows <= columns:
+        normal = jacobian @ transposed + damping[:, None, None] * np.eye(rows)
+        step = (transposed @ np.linalg.solve(normal, error[:, :, None]))[:, :, 0]
+    else:
+        normal = transposed @ jacobian + damping[:, None, None] * np.eye(columns)
+        step = np.linalg.solve(normal, transposed @ error[:, :, None])[:, :, 0]
+    longest = np.abs(step).max(axis=1, keepdims=True)
+    shortened: Array = step * np.minimum(1.0, _LONGEST_STEP / np.maximum(longest, _LONGEST_STEP))
+    return shortened
+
+
+def _turned(sine: Array, cosine: Array, across: Array) -> Array:
+    """Return the rotation vector [rad] ``(3, n)`` from its axis times the sine and the cosine of its angle.
+
+    Half a turn away the axis is lost, and `across` serves: any way will do from there.
+    """
+    size = np.sqrt(dot(sine, sine))
+    angle = np.arctan2(size, cosine)
+    lost = (size < 1e-9) & (cosine < 0)
+    vector = sine * np.where(size > 1e-9, angle / np.maximum(size, 1e-9), 1.0)
+    return np.where(lost, np.pi * across, vector)

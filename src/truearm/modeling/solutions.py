@@ -1,0 +1,107 @@
+"""What inverse kinematics answers: joint readings for poses, and how far each answer can be trusted."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.modeling.chain import Array
+
+
+class PoseStatus(Enum):
+    """How the search for a pose ended; the value is the word in files, `advice` what to do."""
+
+    REACHED = "reached"
+    NEAR_SINGULAR = "near-singular"
+    BEYOND_LIMIT = "beyond-limit"
+    BRANCH_LOST = "branch-lost"
+    UNREACHABLE = "unreachable"
+
+    @property
+    def usable(self) -> bool:
+        """Whether the robot can go there with these joints."""
+        return self in (PoseStatus.REACHED, PoseStatus.NEAR_SINGULAR)
+
+    @property
+    def advice(self) -> str:
+        """What it means and what to do about it."""
+        return {
+            PoseStatus.REACHED: "The joints give the pose.",
+            PoseStatus.NEAR_SINGULAR: "The joints give the pose, but near a singular posture, where a small change "
+            "of the pose takes a large motion of the joints: go there by joint motion, or move the pose.",
+            PoseStatus.BEYOND_LIMIT: "The joints give the pose, but the robot cannot turn so far: take another branch, "
+            "or move the pose.",
+            PoseStatus.BRANCH_LOST: "The pose is reached on another branch, whose joints are given, and not on the one "
+            "asked for: take that one, or move the pose.",
+            PoseStatus.UNREACHABLE: "No joints give the pose; those given come as near as was found: move the pose, "
+            "and check its frame, its units and the target.",
+        }[self]
+
+
+@dataclass(frozen=True, eq=False)
+class JointSolutions:
+    """Joint readings for poses, one row a pose, or one a pose and branch where all branches were asked for.
+
+    Attributes
+    ----------
+    poses
+        How many poses were asked for.
+    pose
+        Index of each row's pose, ascending, ``(rows,)``. Every pose has at least one row.
+    joints
+        Joint readings [rad or m], ``(rows, joints)``.
+    status
+        How each search ended.
+    branch
+        Name of the branch of each row; empty where the robot's branches have no names.
+    position_error
+        Distance from the pose asked for [m], ``(rows,)``.
+    orientation_error
+        Angle from it [rad], ``(rows,)``; between the z axes where only those count, NaN where no orientation does.
+    beyond
+        Which readings are beyond their limits, ``(rows, joints)``.
+    singular_value
+        How little the pose moves with a joint motion of norm 1, positions in reach lengths, ``(rows,)``. It is 0 in a
+        singular posture.
+    joint_names
+        As the robot has them.
+    """
+
+    poses: int
+    pose: NDArray[np.intp]
+    joints: Array
+    status: tuple[PoseStatus, ...]
+    branch: tuple[str, ...]
+    position_error: Array
+    orientation_error: Array
+    beyond: NDArray[np.bool_]
+    singular_value: Array
+    joint_names: tuple[str, ...]
+
+    @property
+    def complete(self) -> bool:
+        """Whether every pose has a row the robot can go to."""
+        usable = [status.usable for status in self.status]
+        return len(set(self.pose[usable].tolist())) == self.poses
+
+    def rows(self, *wanted: PoseStatus) -> NDArray[np.intp]:
+        """Return the rows that have one of these statuses."""
+        return np.flatnonzero([status in wanted for status in self.status])
+
+    def advice(self, row: int) -> str:
+        """Say of one row what it means and what to do about it, with its figures."""
+        status = self.status[row]
+        if status is PoseStatus.UNREACHABLE:
+            angle = self.orientation_error[row]
+            turn = "" if math.isnan(angle) else f" and {math.degrees(angle):.4g} deg"
+            return f"{self.position_error[row] * 1e3:.4g} mm{turn} are missing. {status.advice}"
+        if status is PoseStatus.BEYOND_LIMIT:
+            names = [name for name, beyond in zip(self.joint_names, self.beyond[row], strict=True) if beyond]
+            return f"Beyond its limits: {', '.join(names)}. {status.advice}"
+        if status is PoseStatus.BRANCH_LOST:
+            return f"Reached on {self.branch[row]}. {status.advice}"
+        return status.advice

@@ -233,6 +233,22 @@ Q = ",qw,qx,qy,qz"
         (PLAIN.replace("1001", "-inf"), ["NaN and infinity", "'-inf'"]),
         (PLAIN.replace("1001", "1e999"), ["line 3, column x [mm]", "too large", "'1e999'"]),
         (
+            PLAIN.replace("1001", "-1.001e9"),
+            ["line 3, column x [mm]", "too large to be meant", "'-1.001e9'", "-1e+09 to 1e+09 mm", "or its unit"],
+        ),
+        (PLAIN.replace("10.0", "1e8"), ["line 3, column joint_1 [deg]", "too large", "5.72958e+07 deg"]),
+        (PLAIN.replace("side", "si\tde"), ["line 3, column target", "control character", r"'si\tde'"]),
+        (PLAIN.replace("side", "si\0de"), ["line 3, column target", "control character"]),
+        (
+            f"{HEADER},sigma [mm]\na,1,2,t,1,2,3,1e-7\n",
+            ["line 2, column sigma [mm]", "too small to be meant", "'1e-7'", "1e-06 to 1e+06 mm"],
+        ),
+        (f"{HEADER},sigma [m]\na,1,2,t,1,2,3,1001\n", ["column sigma [m]", "too large", "1e-09 to 1000 m"]),
+        (
+            f"{HEADER}{Q},sigma_rot [rad]\na,1,2,t,1,2,3,1,0,0,0,11\n",
+            ["column sigma_rot [rad]", "too large", "1e-09 to 10 rad"],
+        ),
+        (
             PLAIN.replace("10.0", "nan"),
             ["line 3, column joint_1 [deg]", "NaN and infinity", "Fill in the number"],
         ),

@@ -79,6 +79,8 @@ def test_units_are_taken_as_given(tmp_path: Path) -> None:
         ),
         (JOINTS, "1;2;3\n", ["'1;2;3'", "import table"]),
         (JOINTS, "1_0 2 3\n", ["'1_0'"]),
+        (JOINTS, "1 2e9 3\n", ["a.txt, line 1, column 2", "too large to be meant", "'2e9'", "1e+09 mm"]),
+        ("1 2\n1 1e8\n1 2", GOOD, ["q.txt, line 2, column 2", "too large", "5.72958e+07 deg"]),
         (JOINTS, "", ["a.txt: the file is empty"]),
         (JOINTS, "# nothing\n", ["a.txt: the file holds no rows", "exported whole"]),
         (
@@ -111,7 +113,7 @@ def test_names_and_units_are_checked(tmp_path: Path) -> None:
         read_matrices(joints, {}, {"a": target}, "deg", "mm")
     with pytest.raises(InputError, match=r"'a' is given as a target and as a reference.*different names"):
         read_matrices(joints, {"a": target}, {"a": target}, "deg", "mm")
-    for name in ("", " a", "a\nb"):
+    for name in ("", " a", "a\nb", "a\tb"):
         with pytest.raises(InputError, match=r"a point needs a name.*NAME=FILE"):
             read_matrices(joints, {name: target}, {}, "deg", "mm")
 

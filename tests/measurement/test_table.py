@@ -266,6 +266,23 @@ def test_the_guides_examples_all_say_the_same(guide: Path) -> None:
         (POINTS.replace("::b::", "::d::"), SPATIAL, ["table.txt, line 2", "no joints in", "'d'", "joints.key"]),
         (POINTS, SPATIAL.replace("key: label", "key: lable"), ["map.yaml, joints.key", "Did you mean label?"]),
         (POINTS, SPATIAL.replace("  key: label\n", ""), ["joints.csv", "3 rows", "allowed: 2 rows", "a key"]),
+        (LONG, MAP + "layout: {encoding: undefined}", ["not undefined text", "layout.encoding"]),
+        (LONG, MAP + "names: {column: ball, pattern: 'x{99999999999}'}", ["names.pattern", "not a regular"]),
+        (LONG, MAP.replace("y: Y", "y: X"), ["'X' is used twice, for readings[1].x and for readings[1].y"]),
+        (LONG, MAP.replace("q2]", "q1]"), ["'q1' is used twice, for joints.columns[1] and for joints.columns[2]"]),
+        (LONG, MAP.replace("q2]", "Z]"), ["'Z' is used twice, for readings[1].z and for joints.columns[2]"]),
+        (LONG, MAP.replace("z: Z", "z: Z, qw: w, qx: a, qy: a, qz: c"), ["'a' is used twice", "readings[1].qy"]),
+        (
+            LONG,
+            MAP.replace("target_column: ball", "target: a").replace(
+                "joints:", "  - {target: b, x: Z, y: V, z: W}\njoints:"
+            ),
+            ["'Z' is used twice, for readings[1].z and for readings[2].x"],
+        ),
+        (POINTS, SPATIAL.replace("[q1]", "[q1, q1]"), ["'q1' is used twice"]),
+        (LONG, MAP.replace("target_column: ball", 'target: "a\\nb"'), ["readings[1].target", "on one line"]),
+        (LONG, MAP + "sigma: {value: 1e-7, unit: mm}", ["map.yaml, sigma.value", "too small", "1e-06 to 1e+06 mm"]),
+        (LONG.replace("4,5,6", "4,5,6e9"), MAP, ["table.txt, line 3, column Z", "too large", "'6e9'", "1e+09 mm"]),
         (POINTS, SPATIAL.replace("joints.csv", "joint.csv"), ["no such file", "Did you mean joints.csv"]),
     ],
 )
@@ -274,6 +291,11 @@ def test_refusals(tmp_path: Path, table: str, mapping: str, parts: list[str]) ->
         read(tmp_path, table, mapping, JOINTS)
     for part in parts:
         assert part in str(caught.value)
+
+
+def test_one_name_may_stand_in_two_files(tmp_path: Path) -> None:
+    data = read(tmp_path, POINTS, SPATIAL.replace("[q1]", "[2]").replace("q1", "2"), JOINTS.replace("q1", "2"))
+    assert data.joints[0].tolist() == [math.radians(10)]
 
 
 # -- round trip ------------------------------------------------------------------------------------------

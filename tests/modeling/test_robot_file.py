@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 
 from truearm.errors import InputError
 from truearm.modeling.formats.robot_file import RobotFile, read_robot, robot_from_file, robot_text
-from truearm.modeling.robot import Robot
+from truearm.modeling.robot import Robot, Tool
 from truearm.modeling.transform import Transform
 from truearm.robots import load_robot
 from truearm.units import to_si, written
@@ -205,6 +205,69 @@ def changed(old: str, new: str) -> str:
             ["joints[1].axis", "length 1", "got [0, 0, 2]"],
             id="axis not of length 1",
         ),
+        pytest.param(
+            URDF_LIKE.replace("axis: [0, 0, 1]", "axis_x: 1"),
+            ["joints[1]", "no such entry", "got 'axis_x'", "Did you mean axis?"],
+            id="axis in columns",
+        ),
+        pytest.param(
+            URDF_LIKE.replace("[0, 0, 1]", "[0, 1]"),
+            ["joints[1].axis", "three numbers", "allowed: [x, y, z]"],
+            id="axis of two",
+        ),
+        pytest.param(
+            URDF_LIKE.replace("[0, 0, 1]", "[0, 0, up]"), ["joints[1].axis", "a number", "got 'up'"], id="axis of words"
+        ),
+        pytest.param(
+            URDF_LIKE.replace(", limits: [-0.1, 0.1]", ""),
+            ["joints[2]", "a prismatic joint must have limits", "[LOWEST, HIGHEST] in m"],
+            id="slide without limits",
+        ),
+        pytest.param(
+            changed("axis_2", "axis_1"),
+            ["joints[2]", "two joints have the same name", "got 'axis_1'", "joints[1]", "rename"],
+            id="two joints of one name",
+        ),
+        pytest.param(
+            changed("name: axis_1", "name: joint_2").replace("name: axis_2, ", ""),
+            ["joints[2]", "two joints have the same name", "got 'joint_2'"],
+            id="a joint named like one without a name",
+        ),
+        pytest.param(
+            changed("a: 270", f"a: 1{'0' * 400}"),
+            ["joints[3].a", "a number belongs here", "very many digits"],
+            id="400 digits",
+        ),
+        pytest.param(
+            changed("a: 270", "a: 1.1e9"),
+            ["joints[3].a", "too large to be meant", "got 1100000000.0", "allowed: -1e+09 to 1e+09 mm", "its unit"],
+            id="length of the earth",
+        ),
+        pytest.param(
+            changed("alpha: -90", "alpha: -1e9"), ["joints[2].alpha", "too large", "5.72958e+07 deg"], id="wound up"
+        ),
+        pytest.param(changed("-165, 165", "-165, 1e300"), ["joints[1].limits", "too large"], id="wide limits"),
+        pytest.param(changed("[0, 0, 5]", "[0, 0, 5e9]"), ["flange.translation", "too large"], id="far flange"),
+        pytest.param(changed("mass: 4.2", "mass: 1e300"), ["masses[1].mass", "too large"], id="mass of a star"),
+        pytest.param(changed("[140, 0, 0]", "[1e99, 0, 0]"), ["masses[1].cog", "too large"], id="far centre"),
+        pytest.param(changed("[0, 0, 125]", "[0, 0, 1e99]"), ["tools.ball.targets.1", "too large"], id="far target"),
+        pytest.param(changed("270.2", "-2e9"), ["truths.printed.values.a_3", "too large"], id="far truth"),
+        pytest.param(changed("0.03e-3", "1e99"), ["truths.printed.compliance.2", "too large"], id="soft joint"),
+        pytest.param(
+            PLAIN + "priors: {length: 1e-7}\n", ["priors.length", "too small", "1e-06 to 1e+06 mm"], id="small prior"
+        ),
+        pytest.param(PLAIN + "priors: {angle: 600}\n", ["priors.angle", "too large", "572.958 deg"], id="large prior"),
+        pytest.param(
+            PLAIN + "parameters: {a_3: {nominal: 270, value: 1e10, prior: 1, unit: mm}}\n",
+            ["parameters.a_3.value", "too large"],
+            id="absurd value",
+        ),
+        pytest.param(PLAIN + "targets: [{name: ''}]\n", ["targets[1].name", "a name belongs here"], id="no name"),
+        pytest.param(PLAIN + "targets: [{name: '  '}]\n", ["targets[1].name", "not empty"], id="blank name"),
+        pytest.param(
+            PLAIN + 'targets: [{name: "a\\nb"}]\n', ["targets[1].name", "one line", r"got 'a\nb'"], id="two lines"
+        ),
+        pytest.param(PLAIN + "targets: [{name: 5}]\n", ["targets[1].name", "valid string", "got 5"], id="number"),
     ],
 )
 def test_refused(tmp_path: Path, text: str, parts: list[str]) -> None:
@@ -385,3 +448,17 @@ def test_two_targets_of_one_name_are_refused(tmp_path: Path) -> None:
         _ = robot.parameters
     assert "target_1_x" in str(caught.value)
     assert "Rename the target" in str(caught.value)
+
+
+ONE_LINE = st.text(st.characters(exclude_categories=["Cc", "Cs", "Zl", "Zp"]), min_size=1).filter(str.strip)
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.sampled_from(["smr 1", "<b>", "Träger", "# 1", "a: b", "- x", "'", '"', "null", "1e3", "~"]) | ONE_LINE)
+def test_targets_are_called_what_the_data_call_them(name: str) -> None:
+    robot = load_robot("li3").with_frames(Transform(), {name: (0.0, 0.0, 0.1)})
+    robot = replace(robot, tools={"ball": Tool({name: (0.0, 0.0, 0.1)})})
+    again = parsed(robot_text(robot))
+    assert [target.name for target in again.targets] == [name]
+    assert list(again.tools["ball"].targets) == [name]
+    assert dict(again.values) == dict(robot.values)

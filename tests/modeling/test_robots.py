@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from truearm.errors import InputError
 from truearm.modeling.chain import Array
 from truearm.modeling.conventions import parallel_joints_without_beta
 from truearm.modeling.formats.robot_file import read_robot, robot_text
+from truearm.modeling.formats.urdf import urdf_text
 from truearm.modeling.robot import Robot
-from truearm.robots import library, load_robot
+from truearm.robots import library, load_robot, urdf_source
 
 IDS = ("irb120", "irb1600", "katana450", "kr5", "li3", "lrmate200ic", "puma560", "ur10", "ur5")
 
@@ -19,6 +21,52 @@ def position(robot: Robot, degrees: list[float]) -> Array:
     """Flange position [mm]."""
     positions, _ = robot.poses(np.radians([degrees]))
     return np.array(positions[0] * 1e3)
+
+
+@pytest.mark.parametrize(
+    ("text", "source"),
+    [
+        ("irb120", None),
+        ("my.yaml", None),
+        ("my#1.yaml", None),
+        ("arm.urdf", (Path("arm.urdf"), None)),
+        ("arm.URDF", (Path("arm.URDF"), None)),
+        ("arm.xml", (Path("arm.xml"), None)),
+        ("arm.urdf.xacro#tip", (Path("arm.urdf.xacro"), "tip")),
+        ("arm.urdf#", (Path("arm.urdf"), None)),
+        ("cell#3/arm#2.urdf", (Path("cell#3/arm#2.urdf"), None)),
+        ("cell#3/arm#2.urdf#tip", (Path("cell#3/arm#2.urdf"), "tip")),
+        ("arm.urdf#tip#2", (Path("arm.urdf"), "tip#2")),
+        ("arm.urdf#old.urdf#tip", (Path("arm.urdf#old.urdf"), "tip")),
+        ("there.urdf#old.urdf", (Path("there.urdf#old.urdf"), None)),
+        ("there.urdf#note.yaml", None),
+    ],
+)
+def test_what_is_a_urdf(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str, source: tuple[Path, str | None] | None
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("there.urdf#old.urdf").touch()
+    Path("there.urdf#note.yaml").touch()
+    assert urdf_source(text) == source
+    assert urdf_source(Path(text)) == source
+
+
+def test_a_path_with_a_hash_is_a_path(tmp_path: Path) -> None:
+    folder = tmp_path / "cell #3"
+    folder.mkdir()
+    path = folder / "arm #2.urdf"
+    path.write_text(urdf_text(load_robot("li3"))[0])
+    for text in (path, f"{path}#tool0"):
+        assert len(load_robot(text).joints) == 3
+    with pytest.raises(InputError, match=r"there is no link of this name; got 'tool'"):
+        load_robot(f"{path}#tool")
+
+
+@pytest.mark.parametrize("text", ["", " "])
+def test_no_robot_is_refused(text: str) -> None:
+    with pytest.raises(InputError, match=r"ROBOT: no robot is given; .* a robot file or a URDF"):
+        load_robot(text)
 
 
 def test_library_holds_these_robots() -> None:

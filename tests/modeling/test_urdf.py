@@ -349,6 +349,11 @@ REFUSED: dict[str, tuple[bytes, tuple[str, ...]]] = {
     "rpy of words": (only('<origin rpy="0 pi 0"/>'), ("joint j", "<origin rpy>", "'0 pi 0'")),
     "rpy of no numbers": (only('<origin rpy="0 nan 1_0"/>'), ("<origin rpy>", "nan")),
     "xyz without end": (only('<origin xyz="0 0 1e999"/>'), ("<origin xyz>", "1e999")),
+    "xyz beyond the moon": (only('<origin xyz="0 0 1e9"/>'), ("joint j", "<origin xyz>", "too large", "'0 0 1e9'")),
+    "limit without end": (
+        simple(TURN.replace('"-1"', '"-1e16"'), links=AB),
+        ("joint turn", "<limit lower>", "too large", "'-1e16'"),
+    ),
     "xyz with commas": (only('<origin xyz="0,0,1"/>'), ("<origin xyz>", "spaces between")),
     "fixed xyz": (
         simple(ARM, joint("f", "b", "tool0", "fixed", '<origin xyz=""/>'), links=("a", "b", "tool0")),

@@ -110,7 +110,19 @@ class RobotFile(_Entry):
     title: str = ""
     source: str = ""
     units: _Units
-    convention: Literal["standard-dh", "modified-dh", "hayati", "modified-hayati", "translations", "urdf"]
+    convention: Literal[
+        "standard-dh",
+        "modified-dh",
+        "hayati",
+        "modified-hayati",
+        "s-model",
+        "cpc",
+        "mcpc",
+        "zero-reference",
+        "product-of-exponentials",
+        "translations",
+        "urdf",
+    ]
     joints: list[_Joint] = Field(min_length=1)
     flange: _Place = _Place()
     masses: list[_Mass] = []
@@ -220,13 +232,15 @@ def robot_from_file(content: RobotFile, where: str) -> Robot:
 
 def _joint(content: RobotFile, number: int, entry: _Joint, where: str) -> Joint:
     table = convention(content.convention)
-    allowed = table.row_units(entry.type)
+    units = table.row_units(entry.type)
+    shown = {"m": content.units.length, "rad": content.units.angle, "1": "1"}
+    vectors = [name for name in table.vectors if f"{name}_x" in units]
+    allowed = [*(c for c in units if c.rpartition("_")[0] not in vectors), *vectors]
     row: dict[str, float] = {}
     for column, value in (entry.model_extra or {}).items():
-        if column == "axis" and "axis_x" in allowed and isinstance(value, list) and len(value) == 3:
-            row |= {f"axis_{a}": _number(v, f"{where}.axis") for a, v in zip("xyz", value, strict=True)}
-            if abs(math.hypot(*value) - 1.0) > 1e-6:
-                raise InputError("an axis must have length 1", where=f"{where}.axis", came=value)
+        if column in vectors:
+            unit = units[f"{column}_x"]
+            row |= _vector(column, value, shown[unit], f"{where}.{column}", direction=unit == "1")
             continue
         if column not in allowed:
             near = nearest_names(column, allowed)
@@ -237,8 +251,10 @@ def _joint(content: RobotFile, number: int, entry: _Joint, where: str) -> Joint:
                 allowed=", ".join(["name", "type", "limits", *allowed]),
                 cure=f"Did you mean {' or '.join(near)}?" if near else None,
             )
-        unit = {"m": content.units.length, "rad": content.units.angle, "1": "1"}[allowed[column]]
-        row[column] = to_si(_number(value, f"{where}.{column}"), unit)
+        row[column] = to_si(_number(value, f"{where}.{column}"), shown[units[column]])
+    fault = table.fault(row, entry.type)
+    if fault:
+        raise InputError(fault, where=where)
     unit = content.units.angle if entry.type == "revolute" else content.units.length
     limits = None
     if entry.limits is not None:
@@ -247,6 +263,15 @@ def _joint(content: RobotFile, number: int, entry: _Joint, where: str) -> Joint:
             raise InputError("the lower limit must be below the upper one", where=f"{where}.limits", came=[low, high])
         limits = (to_si(low, unit), to_si(high, unit))
     return Joint(entry.name or f"joint_{number}", entry.type, row, limits)
+
+
+def _vector(name: str, value: object, unit: str, where: str, *, direction: bool) -> dict[str, float]:
+    if not isinstance(value, list) or len(value) != 3:
+        raise InputError("three numbers belong here", where=where, came=value, allowed="[x, y, z]")
+    numbers = [_number(v, where) for v in value]
+    if direction and abs(math.hypot(*numbers) - 1.0) > 1e-6:
+        raise InputError("a direction must have length 1", where=where, came=value)
+    return {f"{name}_{a}": to_si(v, unit) for a, v in zip("xyz", numbers, strict=True)}
 
 
 def _number(value: object, where: str) -> float:
@@ -277,13 +302,13 @@ def robot_text(robot: Robot) -> str:
         return listed([written(v, "mm") for v in values])
 
     shown = SHOWN_AS
-    units = robot.convention.row_units("revolute") | robot.convention.row_units("prismatic")
 
     def joint(j: Joint) -> CommentedMap:
         row: dict[str, Any] = {"name": j.name, "type": j.kind}
-        if "axis_x" in j.row:
-            row["axis"] = listed([j.row[f"axis_{a}"] for a in "xyz"])
-        row |= {c: written(v, shown[units[c]]) for c, v in j.row.items() if not c.startswith("axis_")}
+        units = robot.convention.row_units(j.kind)
+        vectors = [name for name in robot.convention.vectors if f"{name}_x" in j.row]
+        entries = {c: written(v, shown[units[c]]) for c, v in j.row.items()}
+        row |= {name: listed([entries.pop(f"{name}_{a}") for a in "xyz"]) for name in vectors} | entries
         if j.limits:
             row["limits"] = listed([written(v, "deg" if j.kind == "revolute" else "mm") for v in j.limits])
         return flow(row)

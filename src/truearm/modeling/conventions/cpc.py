@@ -76,7 +76,7 @@ def published_direction(b: Direction, rx: float, ry: float) -> Direction:
 def small_rotations(b: Direction, published: Direction) -> tuple[float, float]:
     """Return the small rotations rx, ry [rad] that tilt a link of nominal `b` into a published vector."""
     x, y, z = (float(v) for v in rotation_to(b).T @ published)
-    return math.atan2(-y, z), math.asin(max(-1.0, min(1.0, x)))
+    return math.atan2(-y, z), math.atan2(x, math.hypot(y, z))
 
 
 def _rotation(b: Direction) -> tuple[Element, ...]:

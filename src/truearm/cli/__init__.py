@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from truearm.cli.calibrate import calibrate
+from truearm.cli.convert import convert
 from truearm.cli.importing import app as importing
 from truearm.cli.library import robots, show
 from truearm.cli.simulate import simulate
@@ -52,6 +53,7 @@ app.command()(simulate)
 app.add_typer(importing, name="import")
 app.command()(robots)
 app.command()(show)
+app.command()(convert)
 app.command("new-robot")(new_robot)
 app.command()(example)
 app.command()(demo)

@@ -16,6 +16,7 @@ import numpy as np
 
 from truearm.errors import InputError, nearest_names
 from truearm.modeling.chain import Array
+from truearm.modeling.conventions import convention
 from truearm.modeling.conversion.base_frame import exponentials, zero_reference
 from truearm.modeling.conversion.common_normals import dh, hayati, s_model
 from truearm.modeling.conversion.directions import cpc, mcpc, translations
@@ -41,8 +42,8 @@ CONVERSIONS: Final[Mapping[str, Callable[[Robot], Links]]] = {
 
 #: A frame that moves by less [m, rad] has not moved, and a flange behind it that is as small is none.
 _SAME: Final = 1e-12
-#: How small a number [m, rad] is the rounding of a right angle.
-_ROUNDING: Final = 1e-15
+#: Decimals [m, rad] behind which there is only the rounding of right angles.
+_DECIMALS: Final = 15
 #: How far [cosine] the base's z may turn and still point where weights have been taken to hang from: 1 deg.
 _UPRIGHT: Final = float(np.cos(np.radians(1.0)))
 
@@ -54,7 +55,7 @@ def converted(robot: Robot, convention_name: str) -> Robot:
     where the convention can start from it; one that starts on the first axis (DH, Hayati, S-model, CPC, MCPC) gets
     the frame on that axis which is nearest to the base. If that turns the base's z, against which weights hang, by
     more than 1 deg, the masses are left out. Truths are left out too, because they are values of parameters that are
-    no more. The robot's history says what was left out.
+    no more. The robot's history says whether the base moved and what was left out.
 
     Raises
     ------
@@ -79,11 +80,13 @@ def converted(robot: Robot, convention_name: str) -> Robot:
         for name, p in robot.known.items()
         if p.group not in ("geometry", "joint zero") and not (moved and p.group == "base")
     }
-    rows = [{c: 0.0 if abs(v) < _ROUNDING else v for c, v in row.items()} for row in links.rows]
     made = replace(
         robot,
         convention_name=convention_name,
-        joints=tuple(replace(joint, row=row) for joint, row in zip(robot.joints, rows, strict=True)),
+        joints=tuple(
+            replace(joint, row=_tidy(row, convention(convention_name).row_units(joint.kind)))
+            for joint, row in zip(robot.joints, links.rows, strict=True)
+        ),
         flange=Transform(),
         masses=(),
         truths={},
@@ -93,26 +96,43 @@ def converted(robot: Robot, convention_name: str) -> Robot:
         made = _based(made, links.base)
     behind = np.linalg.inv(at_zero(made, made.trunk.elements)) @ flange
     if np.abs(behind - np.eye(4)).max() > _SAME:
-        made = replace(made, flange=Transform.from_matrix(behind[:3, :3], behind[:3, 3]))
+        made = replace(made, flange=_transform(behind))
     upright = float(made.base.rotation[:, 2] @ base[:3, 2]) > _UPRIGHT
     lost = [
         *([f"truths {', '.join(robot.truths)}"] if robot.truths else []),
         *(["link masses, because the base's z has turned"] if robot.masses and not upright else []),
     ]
-    said = f"converted from {robot.convention_name} to {convention_name}"
+    said = [
+        f"converted from {robot.convention_name} to {convention_name}",
+        *(["the base frame now lies on the first axis"] if moved else []),
+        *([f"left out: {' and '.join(lost)}"] if lost else []),
+    ]
     return replace(
-        made,
-        masses=_moved_masses(robot, made) if upright else (),
-        history=(*robot.history, f"{said}; left out: {'; '.join(lost)}" if lost else said),
+        made, masses=_moved_masses(robot, made) if upright else (), history=(*robot.history, "; ".join(said))
     )
 
 
 def _based(robot: Robot, base: Array) -> Robot:
     """Return the robot at another place ``T_world_base`` ``(4, 4)``."""
-    place = Transform.from_matrix(base[:3, :3], base[:3, 3])
+    place = _transform(base)
     turned = replace(robot, base_quaternion=place.quaternion)
     slides = zip(("base_x", "base_y", "base_z"), place.translation, strict=True)
-    return turned.with_parameters(turned.parameters[name].restarted(value) for name, value in slides)
+    return turned.with_parameters(turned.parameters[name].restarted(value) for name, value in slides if value != 0.0)
+
+
+def _transform(frame: Array) -> Transform:
+    tidy = np.round(frame, _DECIMALS) + 0.0
+    return Transform.from_matrix(tidy[:3, :3], tidy[:3, 3])
+
+
+def _tidy(row: Mapping[str, float], units: Mapping[str, str]) -> dict[str, float]:
+    """Return a row in the order of its columns, without the roundings of right angles."""
+
+    def tidy(value: float, unit: str) -> float:
+        rounded = round(value, _DECIMALS) + 0.0
+        return rounded if unit == "m" or rounded == 0.0 else value
+
+    return {column: tidy(row[column], unit) for column, unit in units.items() if column in row}
 
 
 def _moved_masses(before: Robot, after: Robot) -> tuple[LinkMass, ...]:
@@ -122,6 +142,6 @@ def _moved_masses(before: Robot, after: Robot) -> tuple[LinkMass, ...]:
             at_zero(r, [*r.base_elements, *(e for link in r.link_elements[: mass.joint] for e in link)])
             for r in (before, after)
         )
-        x, y, z, _ = (float(v) for v in np.linalg.inv(new) @ old @ [*mass.cog, 1.0])
+        x, y, z, _ = (round(float(v), _DECIMALS) + 0.0 for v in np.linalg.inv(new) @ old @ [*mass.cog, 1.0])
         masses.append(replace(mass, cog=(x, y, z)))
     return tuple(masses)

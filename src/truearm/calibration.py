@@ -461,12 +461,16 @@ def _warnings(fit: Fit, nothing_held_out: bool, not_better: bool) -> list[Notice
             better = {"standard-dh": "hayati", "modified-dh": "modified-hayati"}.get(
                 robot.convention_name, robot.convention_name
             )
+            cure = (
+                "Convert the robot: truearm convert, --convention hayati."
+                if robot.convention_name == "s-model"
+                else f"Write 'convention: {better}' in the robot file and 'beta: 0' at the link between them."
+            )
             found.append(
                 Notice(
                     "parallel-axes",
                     f"Joints {names} are parallel and no beta lets them tilt against each other, so the model "
-                    f"cannot follow the real robot. Write 'convention: {better}' in the robot file and "
-                    f"'beta: 0' at the link between them.",
+                    f"cannot follow the real robot. {cure}",
                 )
             )
     if fit.status is Status.NOT_CONVERGED:

@@ -13,7 +13,7 @@ import numpy as np
 
 from truearm.calibration import Calibration, calibrate
 from truearm.errors import InputError
-from truearm.files import exists, read_bytes, read_yaml, write_files
+from truearm.files import exists, read_bytes, read_yaml, write_files, write_new_text
 from truearm.measurement.readers.canonical import csv_text
 from truearm.measurement.truths import truth_twin
 from truearm.measurement.twin import measure
@@ -67,9 +67,7 @@ def new_robot(path: Path) -> None:
     InputError
         If the file exists: nothing is overwritten.
     """
-    if exists(path):
-        raise InputError("this exists already and is not overwritten", where=str(path), cure="Choose another name.")
-    write_files(path.parent, {path.name: template()})
+    write_new_text(path, template())
 
 
 def example(folder: Path) -> tuple[Path, ...]:

@@ -151,6 +151,13 @@ def write_text(path: Path, text: str) -> None:
     write_files(path.parent, {path.name: text})
 
 
+def write_new_text(path: Path, text: str) -> None:
+    """Write a file that does not exist yet; nothing is overwritten."""
+    if path.exists():
+        raise InputError("this exists already and is not overwritten", where=str(path), cure="Choose another name.")
+    write_text(path, text)
+
+
 def writable_folder(folder: Path) -> Path:
     """Make sure that files can be written in `folder`, before any long work, and return it."""
     try:

@@ -111,12 +111,17 @@ def random_robot(convention: Convention, effects: tuple[str, ...], rng: np.rando
     kinds: tuple[JointKind, ...] = ("revolute", "prismatic", "revolute", "revolute")
     joints = []
     for number, kind in enumerate(kinds, 1):
+        units = convention.row_units(kind)
         row = {
             column: float(rng.uniform(-1, 1) if unit == "rad" else rng.uniform(-0.3, 0.3))
-            for column, unit in convention.row_units(kind).items()
+            for column, unit in units.items()
         }
-        if "axis_x" in row:
-            row |= dict(zip(("axis_x", "axis_y", "axis_z"), random_unit(rng, 3), strict=True))
+        for name in convention.vectors:
+            if units.get(f"{name}_x") == "1":
+                row |= dict(zip((f"{name}_x", f"{name}_y", f"{name}_z"), random_unit(rng, 3), strict=True))
+        if "w_x" in row:  # a turning twist does not slide
+            moment = np.cross([row[f"w_{a}"] for a in "xyz"], rng.uniform(-0.3, 0.3, 3))
+            row |= dict(zip(("v_x", "v_y", "v_z"), map(float, moment), strict=True))
         joints.append(Joint(f"joint_{number}", kind, row))
     robot = Robot(
         name="random",

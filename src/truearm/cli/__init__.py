@@ -11,6 +11,7 @@ import typer
 
 from truearm.cli.calibrate import calibrate
 from truearm.cli.check import check
+from truearm.cli.convert import convert
 from truearm.cli.ik import ik
 from truearm.cli.importing import app as importing
 from truearm.cli.library import robots, show
@@ -57,6 +58,7 @@ app.command()(simulate)
 app.add_typer(importing, name="import")
 app.command()(robots)
 app.command()(show)
+app.command()(convert)
 app.command("new-robot")(new_robot)
 app.command()(example)
 app.command()(demo)

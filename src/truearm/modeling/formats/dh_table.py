@@ -27,20 +27,28 @@ import numpy as np
 
 from truearm.errors import InputError
 from truearm.files import read_text
-from truearm.modeling.chain import Array, Chain
-from truearm.modeling.conventions import JOINT, JointKind, convention
+from truearm.modeling.chain import Array
+from truearm.modeling.conventions import JOINT, JointKind
+from truearm.modeling.lines import (
+    PARALLEL,
+    JointAxis,
+    across,
+    at_zero,
+    base_and_flange,
+    common_normal,
+    first_frame,
+    frame,
+    joint_axes,
+    turn,
+)
 from truearm.modeling.robot import Joint, Robot
 from truearm.modeling.transform import Transform
 from truearm.units import ANGLE_UNITS, LENGTH_UNITS, SHOWN_AS, as_number, checked_unit, sized_si, written
 
 DHConvention = Literal["standard-dh", "modified-dh"]
 
-#: Below this angle [rad] two axes are parallel: they part by less than 1 nm over the reach of a robot.
-_PARALLEL: Final = 1e-9
 #: Below this angle [rad] the common normal of two axes that are not parallel runs away.
 _NEARLY_PARALLEL: Final = math.radians(0.5)
-#: Below this distance [m] two parallel axes are one line.
-_ONE_LINE: Final = 1e-12
 #: Below this rest [m, rad] what lies behind the last axis is a DH link's own a and alpha.
 _REST: Final = 1e-12
 
@@ -97,25 +105,6 @@ class DHTable:
         return tuple(Joint(r.joint, r.kind, {c: getattr(r, c) for c in _COLUMNS}) for r in self.rows)
 
 
-@dataclass(frozen=True)
-class _Axis:
-    """A joint's axis in the world: unit direction ``(3,)`` and a point on it [m] ``(3,)``."""
-
-    joint: Joint
-    along: Array
-    point: Array
-
-    def nearest(self, point: Array) -> Array:
-        """Return the point of the line that is nearest to `point`."""
-        return self.point + ((point - self.point) @ self.along) * self.along
-
-    def angle(self, other: _Axis) -> float:
-        """Return the angle between two lines [rad], 0 to 90 deg."""
-        return math.atan2(
-            float(np.linalg.norm(np.cross(self.along, other.along))), abs(float(self.along @ other.along))
-        )
-
-
 def dh_table(robot: Robot, convention_name: DHConvention) -> DHTable:
     """Return the DH table of a robot with its current parameter values.
 
@@ -128,43 +117,38 @@ def dh_table(robot: Robot, convention_name: DHConvention) -> DHTable:
         ``standard-dh`` or ``modified-dh``.
     """
     axes = _axes(robot)
-    base, flange = _world(robot)
-    across = _across(base[:3, :3], axes[0].along)
-    start = _frame(across, axes[0].along, axes[0].nearest(base[:3, 3]))
+    base, flange = base_and_flange(robot)
+    start = first_frame(base, axes[0])
     # theta, d, a, alpha in the order of the chain: the first two to the common normal, the others along it.
     # The standard form cuts the chain behind them into links, the modified form before a and alpha.
     numbers: list[tuple[float, float, float, float]] = []
-    here = start[:3, 3]
+    x, here = start[:3, 0], start[:3, 3]
     for axis, following in pairwise(axes):
-        normal, foot, landing = _common_normal(axis, following, across, here)
+        normal, foot, landing = common_normal(axis, following, x, here)
         numbers.append(
             (
-                _turn(across, normal, axis.along),
+                turn(x, normal, axis.along),
                 float((foot - here) @ axis.along),
                 float((landing - foot) @ normal),
-                _turn(axis.along, following.along, normal),
+                turn(axis.along, following.along, normal),
             )
         )
-        across, here = normal, landing
+        x, here = normal, landing
     last = axes[-1]
-    normal, foot = _across(flange[:3, :3], last.along), last.nearest(flange[:3, 3])
-    behind = np.linalg.inv(_frame(normal, last.along, foot)) @ flange
+    normal, foot = across(flange[:3, :3], last.along), last.nearest(flange[:3, 3])
+    behind = np.linalg.inv(frame(normal, last.along, foot)) @ flange
     own = convention_name == "standard-dh" and np.abs(behind[[1, 1, 2], [3, 0, 0]]).max() < _REST < behind[0, 0]
     a, alpha = (float(behind[0, 3]), math.atan2(behind[2, 1], behind[1, 1])) if own else (0.0, 0.0)
-    theta, d = _turn(across, normal, last.along), float((foot - here) @ last.along)
+    theta, d = turn(x, normal, last.along), float((foot - here) @ last.along)
     numbers.append((theta, d, a, alpha))
     rows = _rows(robot.joints, numbers, convention_name)
     table = DHTable(convention_name, rows, _transform(start), Transform())
     return replace(table, flange=_transform(np.linalg.inv(start @ _links_at_zero(table)) @ flange))
 
 
-def _axes(robot: Robot) -> list[_Axis]:
+def _axes(robot: Robot) -> list[JointAxis]:
     """Return the joint axes of a robot, joint variables at zero, or refuse those that are nearly parallel."""
-    sweep = robot.trunk.sweep(np.zeros((len(robot.joints), 1)), robot.values)
-    places = {e.variable: i for i, e in enumerate(sweep.elements) if e.variable is not None}
-    axes = [
-        _Axis(joint, sweep.axis(places[i])[:, 0], sweep.origin(places[i])[:, 0]) for i, joint in enumerate(robot.joints)
-    ]
+    axes = joint_axes(robot)
     for i in reversed(range(len(axes))):
         if axes[i].joint.kind == "prismatic":
             near = [j for j in (i + 1, i - 1) if 0 <= j < len(axes) and _nearly_parallel(axes[i], axes[j])]
@@ -183,71 +167,8 @@ def _axes(robot: Robot) -> list[_Axis]:
     return axes
 
 
-def _nearly_parallel(one: _Axis, other: _Axis) -> bool:
-    return _PARALLEL < one.angle(other) < _NEARLY_PARALLEL
-
-
-def _world(robot: Robot) -> tuple[Array, Array]:
-    """Return the base and the flange frame in the world, joint variables at zero, each ``(4, 4)``."""
-    found = []
-    for elements in (robot.base_elements, robot.trunk.elements):
-        sweep = Chain(elements).sweep(np.zeros((len(robot.joints), 1)), robot.values)
-        rotation = sweep.matrix()[0]
-        found.append(_frame(rotation[:, 0], rotation[:, 2], sweep.position[:, 0]))
-    return found[0], found[1]
-
-
-def _common_normal(axis: _Axis, following: _Axis, across: Array, here: Array) -> tuple[Array, Array, Array]:
-    """Return direction, start and end of a common normal of two axes.
-
-    Parameters
-    ----------
-    across
-        The x direction of the frame on `axis`: of two opposite normals the one nearer to it is taken, so that
-        joint zeros stay what they were; where both are as near, the one that points to `following`.
-    here
-        Origin of that frame, on `axis`.
-    """
-    normal = np.cross(axis.along, following.along)
-    sine = float(np.linalg.norm(normal))
-    if sine < _PARALLEL:
-        foot, landing = here, following.nearest(here)
-        distance = float(np.linalg.norm(landing - foot))
-        if distance < _ONE_LINE:
-            return across, foot, landing
-        normal = (landing - foot) / distance
-    else:
-        normal = normal / sine
-        apart = following.point - axis.point
-        foot = axis.point + float(np.cross(apart, following.along) @ normal) / sine * axis.along
-        landing = following.point + float(np.cross(apart, axis.along) @ normal) / sine * following.along
-    leaning = float(normal @ across)
-    if abs(leaning) < 1e-9:
-        distance = float((landing - foot) @ normal)
-        leaning = distance if abs(distance) > _ONE_LINE else 1.0
-    return (normal if leaning > 0 else -normal), foot, landing
-
-
-def _across(rotation: Array, along: Array) -> Array:
-    """Return the direction across `along` nearest to a frame's x axis, or its y axis if x lies along it."""
-    for column in (0, 1):
-        side = rotation[:, column] - (rotation[:, column] @ along) * along
-        length = float(np.linalg.norm(side))
-        if length > 0.5:
-            break
-    return np.asarray(side / length)
-
-
-def _turn(start: Array, end: Array, axis: Array) -> float:
-    """Return the angle [rad] from one direction to another about an axis across both."""
-    return math.atan2(float(np.cross(start, end) @ axis), float(start @ end))
-
-
-def _frame(x: Array, z: Array, origin: Array) -> Array:
-    """Return the frame of these axes, ``(4, 4)``."""
-    frame = np.eye(4)
-    frame[:3, 0], frame[:3, 1], frame[:3, 2], frame[:3, 3] = x, np.cross(z, x), z, origin
-    return frame
+def _nearly_parallel(one: JointAxis, other: JointAxis) -> bool:
+    return PARALLEL < one.angle(other) < _NEARLY_PARALLEL
 
 
 def _transform(frame: Array) -> Transform:
@@ -270,11 +191,8 @@ def _rows(
 
 def _links_at_zero(table: DHTable) -> Array:
     """Return the product of a table's rows with the joint variables at zero, ``(4, 4)``."""
-    form = convention(table.convention_name)
-    elements = [e for n, j in enumerate(table.joints(), 1) for e in form.elements(n, j.row, j.kind)]
-    sweep = Chain(tuple(elements)).sweep(np.zeros((len(table.rows), 1)))
-    rotation = sweep.matrix()[0]
-    return _frame(rotation[:, 0], rotation[:, 2], sweep.position[:, 0])
+    robot = Robot("table", "", "", table.convention_name, table.joints())
+    return at_zero(robot, (element for link in robot.link_elements for element in link))
 
 
 # -- as CSV -------------------------------------------------------------------------------------------------

@@ -122,7 +122,19 @@ class RobotFile(_Entry):
     title: str = ""
     source: str = ""
     units: _Units
-    convention: Literal["standard-dh", "modified-dh", "hayati", "modified-hayati", "translations", "urdf"]
+    convention: Literal[
+        "standard-dh",
+        "modified-dh",
+        "hayati",
+        "modified-hayati",
+        "s-model",
+        "cpc",
+        "mcpc",
+        "zero-reference",
+        "product-of-exponentials",
+        "translations",
+        "urdf",
+    ]
     joints: list[_Joint] = Field(min_length=1)
     flange: _Place = _Place()
     masses: list[_Mass] = []
@@ -259,13 +271,16 @@ def robot_from_file(content: RobotFile, where: str) -> Robot:
 
 
 def _joint(content: RobotFile, number: int, entry: _Joint, where: str) -> Joint:
-    units = convention(content.convention).row_units(entry.type)
-    allowed = [column for column in units if not column.startswith("axis_")]
-    allowed += ["axis"] if len(allowed) < len(units) else []
+    table = convention(content.convention)
+    units = table.row_units(entry.type)
+    shown = {"m": content.units.length, "rad": content.units.angle, "1": "1"}
+    vectors = [name for name in table.vectors if f"{name}_x" in units]
+    allowed = [*(c for c in units if c.rpartition("_")[0] not in vectors), *vectors]
     row: dict[str, float] = {}
     for column, value in (entry.model_extra or {}).items():
-        if column == "axis" and column in allowed:
-            row |= _axis(value, f"{where}.axis")
+        if column in vectors:
+            unit = units[f"{column}_x"]
+            row |= _vector(column, value, shown[unit], f"{where}.{column}", direction=unit == "1")
             continue
         if column not in allowed:
             near = nearest_names(column, allowed)
@@ -276,8 +291,10 @@ def _joint(content: RobotFile, number: int, entry: _Joint, where: str) -> Joint:
                 allowed=", ".join(["name", "type", "limits", *allowed]),
                 cure=f"Did you mean {' or '.join(near)}?" if near else None,
             )
-        unit = content.units.length if units[column] == "m" else content.units.angle
-        row[column] = sized_si(_number(value, f"{where}.{column}"), unit, f"{where}.{column}")
+        row[column] = sized_si(_number(value, f"{where}.{column}"), shown[units[column]], f"{where}.{column}")
+    fault = table.fault(row, entry.type)
+    if fault:
+        raise InputError(fault, where=where)
     unit = content.units.angle if entry.type == "revolute" else content.units.length
     limits = None
     if entry.limits is not None:
@@ -295,13 +312,13 @@ def _joint(content: RobotFile, number: int, entry: _Joint, where: str) -> Joint:
     return Joint(entry.name or f"joint_{number}", entry.type, row, limits)
 
 
-def _axis(value: object, where: str) -> dict[str, float]:
+def _vector(name: str, value: object, unit: str, where: str, *, direction: bool) -> dict[str, float]:
     if not isinstance(value, list) or len(value) != 3:
-        raise InputError("an axis is three numbers", where=where, came=_scalar(value), allowed="[x, y, z] of length 1")
-    row = {f"axis_{a}": _number(v, where) for a, v in zip("xyz", value, strict=True)}
-    if abs(math.hypot(*row.values()) - 1.0) > 1e-6:
-        raise InputError("an axis must have length 1", where=where, came=value)
-    return row
+        raise InputError("three numbers belong here", where=where, came=_scalar(value), allowed="[x, y, z]")
+    numbers = [_number(v, where) for v in value]
+    if direction and abs(math.hypot(*numbers) - 1.0) > 1e-6:
+        raise InputError("a direction must have length 1", where=where, came=value)
+    return {f"{name}_{a}": sized_si(v, unit, where) for a, v in zip("xyz", numbers, strict=True)}
 
 
 def _number(value: object, where: str) -> float:
@@ -340,13 +357,13 @@ def robot_text(robot: Robot) -> str:
         return listed([written(v, "mm") for v in values])
 
     shown = SHOWN_AS
-    units = robot.convention.row_units("revolute") | robot.convention.row_units("prismatic")
 
     def joint(j: Joint) -> CommentedMap:
         row: dict[str, Any] = {"name": j.name, "type": j.kind}
-        if "axis_x" in j.row:
-            row["axis"] = listed([j.row[f"axis_{a}"] for a in "xyz"])
-        row |= {c: written(v, shown[units[c]]) for c, v in j.row.items() if not c.startswith("axis_")}
+        units = robot.convention.row_units(j.kind)
+        vectors = [name for name in robot.convention.vectors if f"{name}_x" in j.row]
+        entries = {c: written(v, shown[units[c]]) for c, v in j.row.items()}
+        row |= {name: listed([entries.pop(f"{name}_{a}") for a in "xyz"]) for name in vectors} | entries
         if j.limits:
             row["limits"] = listed([written(v, "deg" if j.kind == "revolute" else "mm") for v in j.limits])
         return flow(row)

@@ -137,7 +137,8 @@ def urdf_text(robot: Robot) -> tuple[str, list[str]]:
     for number, (joint, place) in enumerate(zip(robot.joints, origins[:-1], strict=True), 1):
         parent = f"link_{number - 1}" if number > 1 else "base_link"
         lines += _link_lines(robot, number, behind[number - 1])
-        lines += _joint_lines(joint, parent, f"link_{number}", place, _limit(robot.name, joint))
+        moving = next(e for e in robot.link_elements[number - 1] if e.variable is not None)
+        lines += _joint_lines(joint, parent, f"link_{number}", place, _limit(robot.name, joint), moving.axis)
     lines += ['  <link name="tool0"/>']
     lines += _joint_lines(None, f"link_{len(robot.joints)}", "tool0", origins[-1], [])
     if any(joint.limits for joint in robot.joints):
@@ -448,14 +449,15 @@ def _collapsed(robot: Robot) -> tuple[list[Array], list[Array]]:
     return [*origins, product([*pending, *robot.flange_elements], robot.values)], behind
 
 
-def _joint_lines(joint: Joint | None, parent: str, child: str, origin: Array, limit: list[str]) -> list[str]:
-    """Return the lines of one joint; None is the fixed one at the end."""
+def _joint_lines(
+    joint: Joint | None, parent: str, child: str, origin: Array, limit: list[str], axis: Triple | None = None
+) -> list[str]:
+    """Return the lines of one joint, its axis z if None; None is the fixed one at the end."""
     if joint is None:
         head = '  <joint name="tool0_joint" type="fixed">'
     else:
         type_ = joint.kind if limit else "continuous"
-        axis = (joint.row.get(f"axis_{a}", default) for a, default in zip("xyz", (0.0, 0.0, 1.0), strict=True))
-        limit = [f'    <axis xyz="{_written(axis)}"/>', *limit]
+        limit = [f'    <axis xyz="{_written(axis or (0.0, 0.0, 1.0))}"/>', *limit]
         head = f'  <joint name={quoteattr(joint.name)} type="{type_}">'
     place = f'xyz="{_written(origin[:3, 3])}" rpy="{_written(roll_pitch_yaw(origin[:3, :3]))}"'
     ends = [f'    <parent link="{parent}"/>', f'    <child link="{child}"/>']

@@ -1,0 +1,147 @@
+"""Robots from one convention into another, with the same kinematics.
+
+The joint axes of a robot are lines in space; every convention is a way to write such lines down. A conversion looks at
+them at zero readings, with the current values, and writes them anew. Sense and zero of every joint stay, so readings,
+limits and joint effects mean what they meant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import partial
+from typing import Final
+
+import numpy as np
+
+from truearm.errors import InputError, nearest_names
+from truearm.modeling.chain import Array
+from truearm.modeling.conventions import convention
+from truearm.modeling.conversion.base_frame import exponentials, zero_reference
+from truearm.modeling.conversion.common_normals import dh, hayati, s_model
+from truearm.modeling.conversion.directions import cpc, mcpc, translations
+from truearm.modeling.conversion.links import Links
+from truearm.modeling.conversion.origins import origins
+from truearm.modeling.lines import at_zero, base_and_flange
+from truearm.modeling.robot import LinkMass, Robot
+from truearm.modeling.transform import Transform
+
+CONVERSIONS: Final[Mapping[str, Callable[[Robot], Links]]] = {
+    "standard-dh": partial(dh, convention_name="standard-dh"),
+    "modified-dh": partial(dh, convention_name="modified-dh"),
+    "hayati": partial(hayati, modified=False),
+    "modified-hayati": partial(hayati, modified=True),
+    "s-model": s_model,
+    "cpc": cpc,
+    "mcpc": mcpc,
+    "zero-reference": zero_reference,
+    "product-of-exponentials": exponentials,
+    "translations": translations,
+    "urdf": origins,
+}
+
+#: A frame that moves by less [m, rad] has not moved, and a flange behind it that is as small is none.
+_SAME: Final = 1e-12
+#: Decimals [m, rad] behind which there is only the rounding of right angles.
+_DECIMALS: Final = 15
+#: How far [cosine] the base's z may turn and still point where weights have been taken to hang from: 1 deg.
+_UPRIGHT: Final = float(np.cos(np.radians(1.0)))
+
+
+def converted(robot: Robot, convention_name: str) -> Robot:
+    """Return a robot in another convention, every pose the same; its current values become the nominal ones.
+
+    Targets, limits, joint effects and tools stay. Link masses move with their links' frames. The base frame stays
+    where the convention can start from it; one that starts on the first axis (DH, Hayati, S-model, CPC, MCPC) gets
+    the frame on that axis which is nearest to the base. If that turns the base's z, against which weights hang, by
+    more than 1 deg, the masses are left out. Truths are left out too, because they are values of parameters that are
+    no more. The robot's history says whether the base moved and what was left out.
+
+    Raises
+    ------
+    InputError
+        If there is no such convention, or the convention cannot describe the robot: axes that are nearly parallel
+        in a DH table or the S-model.
+    """
+    if convention_name not in CONVERSIONS:
+        near = nearest_names(convention_name, CONVERSIONS)
+        raise InputError(
+            "there is no such convention",
+            where=robot.name,
+            came=convention_name,
+            allowed=", ".join(CONVERSIONS),
+            cure=f"Did you mean {' or '.join(near)}?" if near else None,
+        )
+    base, flange = base_and_flange(robot)
+    links = CONVERSIONS[convention_name](robot)
+    moved = links.base is not None and bool(np.abs(links.base - base).max() > _SAME)
+    stay = {
+        name: p.restarted(p.value)
+        for name, p in robot.known.items()
+        if p.group not in ("geometry", "joint zero") and not (moved and p.group == "base")
+    }
+    made = replace(
+        robot,
+        convention_name=convention_name,
+        joints=tuple(
+            replace(joint, row=_tidy(row, convention(convention_name).row_units(joint.kind)))
+            for joint, row in zip(robot.joints, links.rows, strict=True)
+        ),
+        flange=Transform(),
+        masses=(),
+        truths={},
+        known=stay,
+    )
+    if moved and links.base is not None:
+        made = _based(made, links.base)
+    behind = np.linalg.inv(at_zero(made, made.trunk.elements)) @ flange
+    if np.abs(behind - np.eye(4)).max() > _SAME:
+        made = replace(made, flange=_transform(behind))
+    upright = float(made.base.rotation[:, 2] @ base[:3, 2]) > _UPRIGHT
+    lost = [
+        *([f"truths {', '.join(robot.truths)}"] if robot.truths else []),
+        *(["link masses, because the base's z has turned"] if robot.masses and not upright else []),
+    ]
+    said = [
+        f"converted from {robot.convention_name} to {convention_name}",
+        *(["the base frame now lies on the first axis"] if moved else []),
+        *([f"left out: {' and '.join(lost)}"] if lost else []),
+    ]
+    return replace(
+        made, masses=_moved_masses(robot, made) if upright else (), history=(*robot.history, "; ".join(said))
+    )
+
+
+def _based(robot: Robot, base: Array) -> Robot:
+    """Return the robot at another place ``T_world_base`` ``(4, 4)``."""
+    place = _transform(base)
+    turned = replace(robot, base_quaternion=place.quaternion)
+    slides = zip(("base_x", "base_y", "base_z"), place.translation, strict=True)
+    return turned.with_parameters(turned.parameters[name].restarted(value) for name, value in slides if value != 0.0)
+
+
+def _transform(frame: Array) -> Transform:
+    tidy = np.round(frame, _DECIMALS) + 0.0
+    return Transform.from_matrix(tidy[:3, :3], tidy[:3, 3])
+
+
+def _tidy(row: Mapping[str, float], units: Mapping[str, str]) -> dict[str, float]:
+    """Return a row in the order of its columns, without the roundings of right angles."""
+
+    def tidy(value: float, unit: str) -> float:
+        rounded = round(value, _DECIMALS) + 0.0
+        return rounded if unit == "m" or rounded == 0.0 else value
+
+    return {column: tidy(row[column], unit) for column, unit in units.items() if column in row}
+
+
+def _moved_masses(before: Robot, after: Robot) -> tuple[LinkMass, ...]:
+    masses = []
+    for mass in before.masses:
+        old, new = (
+            at_zero(r, [*r.base_elements, *(e for link in r.link_elements[: mass.joint] for e in link)])
+            for r in (before, after)
+        )
+        x, y, z, _ = (round(float(v), _DECIMALS) + 0.0 for v in np.linalg.inv(new) @ old @ [*mass.cog, 1.0])
+        masses.append(replace(mass, cog=(x, y, z)))
+    return tuple(masses)

@@ -1,0 +1,123 @@
+"""Joint axes as lines in space, and the frames that are laid on them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from truearm.modeling.chain import Array, Chain, Element
+from truearm.modeling.robot import Joint, Robot
+
+#: Below this angle [rad] two axes are parallel: they part by less than 1 nm over the reach of a robot.
+PARALLEL: Final = 1e-9
+#: Below this distance [m] two parallel axes are one line.
+ONE_LINE: Final = 1e-12
+
+
+@dataclass(frozen=True)
+class JointAxis:
+    """A joint's axis in the world: unit direction ``(3,)`` and a point on it [m] ``(3,)``."""
+
+    joint: Joint
+    along: Array
+    point: Array
+
+    def nearest(self, point: Array) -> Array:
+        """Return the point of the line that is nearest to `point`."""
+        return self.point + ((point - self.point) @ self.along) * self.along
+
+    def angle(self, other: JointAxis) -> float:
+        """Return the angle between two lines [rad], 0 to 90 deg."""
+        return math.atan2(
+            float(np.linalg.norm(np.cross(self.along, other.along))), abs(float(self.along @ other.along))
+        )
+
+
+def joint_axes(robot: Robot) -> list[JointAxis]:
+    """Return the joint axes of a robot as it is now, readings at zero."""
+    sweep = robot.trunk.sweep(np.zeros((len(robot.joints), 1)), robot.values)
+    places = {e.variable: i for i, e in enumerate(sweep.elements) if e.variable is not None}
+    return [
+        JointAxis(joint, sweep.axis(places[i])[:, 0], sweep.origin(places[i])[:, 0])
+        for i, joint in enumerate(robot.joints)
+    ]
+
+
+def at_zero(robot: Robot, elements: Iterable[Element]) -> Array:
+    """Return the product of some of a robot's elements, joint variables at zero, ``(4, 4)``."""
+    sweep = Chain(tuple(elements)).sweep(np.zeros((len(robot.joints), 1)), robot.values)
+    made = np.eye(4)
+    made[:3, :3], made[:3, 3] = sweep.matrix()[0], sweep.position[:, 0]
+    return made
+
+
+def base_and_flange(robot: Robot) -> tuple[Array, Array]:
+    """Return the base and the flange frame in the world, joint variables at zero, each ``(4, 4)``."""
+    return at_zero(robot, robot.base_elements), at_zero(robot, robot.trunk.elements)
+
+
+def first_frame(base: Array, axis: JointAxis) -> Array:
+    """Return the frame on an axis, z along it, that is nearest to the base frame, ``(4, 4)``."""
+    return frame(across(base[:3, :3], axis.along), axis.along, axis.nearest(base[:3, 3]))
+
+
+def common_normal(axis: JointAxis, following: JointAxis, before: Array, here: Array) -> tuple[Array, Array, Array]:
+    """Return direction, start and end of a common normal of two axes.
+
+    Parameters
+    ----------
+    before
+        The x direction of the frame on `axis`: of two opposite normals the one nearer to it is taken, so that
+        joint zeros stay what they were; where both are as near, the one that points to `following`.
+    here
+        Origin of that frame, on `axis`.
+    """
+    normal = np.cross(axis.along, following.along)
+    sine = float(np.linalg.norm(normal))
+    if sine < PARALLEL:
+        foot, landing = here, following.nearest(here)
+        distance = float(np.linalg.norm(landing - foot))
+        if distance < ONE_LINE:
+            return before, foot, landing
+        normal = (landing - foot) / distance
+    else:
+        normal = normal / sine
+        apart = following.point - axis.point
+        foot = axis.point + float(np.cross(apart, following.along) @ normal) / sine * axis.along
+        landing = following.point + float(np.cross(apart, axis.along) @ normal) / sine * following.along
+    return nearer_way(normal, before, landing - foot), foot, landing
+
+
+def nearer_way(normal: Array, before: Array, gap: Array) -> Array:
+    """Return `normal` or its opposite: the one nearer to `before`, where both are as near the one along `gap`."""
+    leaning = float(normal @ before)
+    if abs(leaning) < 1e-9:
+        distance = float(gap @ normal)
+        leaning = distance if abs(distance) > ONE_LINE else 1.0
+    return normal if leaning > 0 else -normal
+
+
+def across(rotation: Array, along: Array) -> Array:
+    """Return the direction across `along` nearest to a frame's x axis, or its y axis if x lies along it."""
+    for column in (0, 1):
+        side = rotation[:, column] - (rotation[:, column] @ along) * along
+        length = float(np.linalg.norm(side))
+        if length > 0.5:
+            break
+    return np.asarray(side / length)
+
+
+def turn(start: Array, end: Array, axis: Array) -> float:
+    """Return the angle [rad] from one direction to another about an axis across both."""
+    return math.atan2(float(np.cross(start, end) @ axis), float(start @ end))
+
+
+def frame(x: Array, z: Array, origin: Array) -> Array:
+    """Return the frame of these axes, ``(4, 4)``."""
+    made = np.eye(4)
+    made[:3, 0], made[:3, 1], made[:3, 2], made[:3, 3] = x, np.cross(z, x), z, origin
+    return made

@@ -277,3 +277,25 @@ def test_too_few_readings_for_a_model_are_said(truearm: Truearm, small: Path, tm
     words = ["calibrate", "irb120", tmp_path / "data.csv", "--redundancy", "drop", "--out", tmp_path / "out", "--json"]
     found = {w["code"] for seed in range(5) for w in json.loads(truearm(*words, "--seed", seed).out)["warnings"]}
     assert "not-better" in found
+
+
+def test_convert_writes_the_same_robot_in_another_convention(truearm: Truearm, tmp_path: Path) -> None:
+    out = tmp_path / "kr5.yaml"
+    said = truearm("convert", "kr5", "--convention", "mcpc", "--out", out).out
+    base = "the base frame now lies on the first axis"
+    assert said == f"{out}: kr5, converted from translations to mcpc; {base}; left out: truths axis-tests.\n"
+    zero = [json.loads(truearm("show", robot, "--json").out) for robot in ("kr5", out)]
+    assert [z["convention"] for z in zero] == ["translations", "mcpc"]
+    assert zero[1]["history"] == [said.partition("kr5, ")[2].rstrip(".\n")]
+
+
+def test_a_model_that_cannot_tilt_parallel_axes_says_what_would(truearm: Truearm, small: Path, tmp_path: Path) -> None:
+    for name, cure in (
+        ("s-model", "Convert the robot: truearm convert, --convention hayati."),
+        ("standard-dh", "Write 'convention: hayati' in the robot file and 'beta: 0' at the link between them."),
+    ):
+        truearm("convert", "irb120", "--convention", name, "--out", tmp_path / f"{name}.yaml")
+        run = truearm("calibrate", tmp_path / f"{name}.yaml", small / "data.csv", "--out", tmp_path / "out", "--json")
+        warnings = {w["code"]: w["message"] for w in json.loads(run.out)["warnings"]}
+        assert "Joints 2 and 3 are parallel" in warnings["parallel-axes"]
+        assert cure in warnings["parallel-axes"]

@@ -387,3 +387,12 @@ def test_a_number_written_with_an_exponent_is_a_number(truearm: Truearm, tmp_pat
     shown = json.loads(truearm("show", tmp_path / "e.yaml", "--json").out)
     assert shown["joints"][1]["values"]["a_2"] == 25
     assert shown["joints"][5]["values"]["d_6"] == 80
+
+
+def test_convert_overwrites_nothing_and_knows_its_conventions(truearm: Truearm, tmp_path: Path) -> None:
+    out = tmp_path / "mine.yaml"
+    out.write_text("mine")
+    assert "exists already" in refused(truearm, "convert", "ur5", "--convention", "cpc", "--out", out)
+    assert out.read_text() == "mine"
+    message = refused(truearm, "convert", "ur5", "--convention", "dh", "--out", tmp_path / "dh.yaml")
+    assert "there is no such convention; got 'dh'; allowed: standard-dh, modified-dh" in message

@@ -52,12 +52,18 @@ def test_every_convention_can_be_converted_to() -> None:
 
 
 @pytest.mark.parametrize("robot_id", library())
+def test_library_robot_goes_into_any_convention(robot_id: str) -> None:
+    robot = load_robot(robot_id)
+    for name in CONVERSIONS:
+        check_same(converted(robot, name), robot, np.random.default_rng(0))
+
+
+@pytest.mark.parametrize("robot_id", ["irb120", "katana450", "kr5", "ur5"])  # one of each build
 def test_library_robot_goes_from_any_convention_to_any(robot_id: str) -> None:
     rng = np.random.default_rng(0)
     robot = load_robot(robot_id)
     for first in CONVERSIONS:
         made = converted(robot, first)
-        check_same(made, robot, rng)
         for second in CONVERSIONS:
             check_same(converted(made, second), robot, rng)
 
@@ -74,9 +80,8 @@ def test_calibrated_robot_goes_where_tilts_have_a_place(robot_id: str) -> None:
 
 
 @pytest.mark.parametrize("convention", CONVENTIONS, ids=lambda c: c.name)
-@pytest.mark.parametrize("seed", range(2))
-def test_random_robot_goes_from_its_convention_to_any(convention: Convention, seed: int) -> None:
-    rng = np.random.default_rng(seed)
+def test_random_robot_goes_from_its_convention_to_any(convention: Convention) -> None:
+    rng = np.random.default_rng(0)
     masses = (LinkMass(2, 1.0, (0.1, 0.2, 0.3)), LinkMass(4, 2.0, (0.0, 0.0, 1.0)))
     robot = replace(random_robot(convention, ("gain",), rng), masses=masses)
     q = robot.random_configurations(3, rng)

@@ -108,6 +108,15 @@ def test_validate_works_on_new_data_in_the_same_frames(truearm: Truearm, small: 
     assert "mean 0." in truearm("validate", tmp_path / "out" / "calibrated.yaml", second).out
 
 
+def test_targets_may_have_any_name(truearm: Truearm, small: Path, tmp_path: Path) -> None:
+    data = replace(read_csv(small / "data.csv"), targets=("smr 1", "<b>", "Träger, #3: ?"))
+    (tmp_path / "data.csv").write_text(csv_text(data), encoding="utf-8")
+    assert truearm("calibrate", "irb120", tmp_path / "data.csv", "--out", tmp_path / "out").code == 0
+    calibrated = tmp_path / "out" / "calibrated.yaml"
+    assert json.loads(truearm("show", calibrated, "--json").out)["targets"] == list(data.targets)
+    assert truearm("validate", calibrated, tmp_path / "data.csv").code == 0
+
+
 def test_a_calibrated_robot_is_a_robot_like_any_other(truearm: Truearm, small: Path, tmp_path: Path) -> None:
     truearm("calibrate", "irb120", small / "data.csv", "--out", tmp_path)
     again = json.loads(

@@ -454,11 +454,12 @@ ONE_LINE = st.text(st.characters(exclude_categories=["Cc", "Cs", "Zl", "Zp"]), m
 
 
 @settings(deadline=None, max_examples=60)
-@given(st.sampled_from(["smr 1", "<b>", "Träger", "# 1", "a: b", "- x", "'", '"', "null", "1e3", "~"]) | ONE_LINE)
+@given(st.sampled_from(["smr 1", "?0", "<b>", "Träger", "# 1", "a: b", "- x", "'", '"', "null", "1e3", "~"]) | ONE_LINE)
 def test_targets_are_called_what_the_data_call_them(name: str) -> None:
     robot = load_robot("li3").with_frames(Transform(), {name: (0.0, 0.0, 0.1)})
-    robot = replace(robot, tools={"ball": Tool({name: (0.0, 0.0, 0.1)})})
+    robot = replace(robot, tools={"ball": Tool({name: (0.0, 0.0, 0.1)})}, title=name, source=name, history=(name,))
     again = parsed(robot_text(robot))
     assert [target.name for target in again.targets] == [name]
     assert list(again.tools["ball"].targets) == [name]
+    assert (again.title, again.source, again.history) == (name, name, (name,))
     assert dict(again.values) == dict(robot.values)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -342,6 +343,7 @@ def robot_text(robot: Robot) -> str:
     """Return the robot as the text of a robot file, in mm and degrees."""
     from ruamel.yaml import YAML
     from ruamel.yaml.comments import CommentedMap, CommentedSeq
+    from ruamel.yaml.scalarstring import DoubleQuotedScalarString
 
     def flow(content: Mapping[str, Any]) -> CommentedMap:
         made = CommentedMap(content)
@@ -355,6 +357,9 @@ def robot_text(robot: Robot) -> str:
 
     def mm(values: tuple[float, float, float]) -> CommentedSeq:
         return listed([written(v, "mm") for v in values])
+
+    def text(words: str) -> str:  # the writer leaves some texts without the quotes that its reader needs
+        return words if re.fullmatch(NAME, words) else DoubleQuotedScalarString(words)
 
     shown = SHOWN_AS
 
@@ -386,7 +391,7 @@ def robot_text(robot: Robot) -> str:
         content["masses"] = [flow({"link": m.joint, "mass": m.mass, "cog": mm(m.cog)}) for m in robot.masses]
     if robot.tools:
         content["tools"] = {
-            name: {"targets": {t: mm(p) for t, p in tool.targets.items()}, "mass": tool.mass, "cog": mm(tool.cog)}
+            name: {"targets": {text(t): mm(p) for t, p in tool.targets.items()}, "mass": tool.mass, "cog": mm(tool.cog)}
             for name, tool in robot.tools.items()
         }
     if robot.truths:
@@ -407,12 +412,12 @@ def robot_text(robot: Robot) -> str:
         content["base_quaternion"] = listed(list(robot.base_quaternion))
     if robot.targets:
         content["targets"] = [
-            flow({"name": t.name} | ({"quaternion": listed(list(t.quaternion))} if t.quaternion else {}))
+            flow({"name": text(t.name)} | ({"quaternion": listed(list(t.quaternion))} if t.quaternion else {}))
             for t in robot.targets
         ]
     if robot.known:
         content["parameters"] = {
-            name: flow(_parameter(robot.known[name], shown)) for name in robot.parameters if name in robot.known
+            text(name): flow(_parameter(robot.known[name], shown)) for name in robot.parameters if name in robot.known
         }
     if robot.history:
         content["history"] = list(robot.history)

@@ -153,7 +153,7 @@ def write_text(path: Path, text: str) -> None:
 
 def write_new_text(path: Path, text: str) -> None:
     """Write a file that does not exist yet; nothing is overwritten."""
-    if path.exists():
+    if exists(path):
         raise InputError("this exists already and is not overwritten", where=str(path), cure="Choose another name.")
     write_text(path, text)
 

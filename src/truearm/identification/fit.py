@@ -184,7 +184,7 @@ def identify(
         # What is redundant at the nominal robot need not be at the real one: look again there.
         found = dict(zip(kept.names, solution.vector, strict=True))
         there = FreeParameters(tuple(replace(p, value=float(found.get(p.name, p.nominal))) for p in free.parameters))
-        problem = replace(problem, free=there)
+        problem = replace(problem, free=there, noise=reduced.noise)
         dropped = find_redundancies(problem, there.start, held)
         if [r.dropped for r in dropped] == held:
             break

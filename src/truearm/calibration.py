@@ -31,11 +31,14 @@ from truearm.modeling.conventions import parallel_joints_without_beta
 from truearm.modeling.formats.robot_file import robot_text
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
-from truearm.robots import load_robot
+from truearm.robots import load_robot, urdf_source
 from truearm.units import SHOWN_AS, from_si
 from truearm.version import __version__
 
 Train = int | Literal["all"] | None
+
+#: What a calibration writes into its folder.
+RESULT_FILES: Final = ("calibrated.yaml", "result.json", "report.html", "calibrated.urdf")
 
 #: Priors that a parameter may move before the robot, its units or its joint order are doubted.
 _FAR: Final = 6.0
@@ -225,9 +228,8 @@ def calibrate(
     words = ["truearm", "calibrate", str(robot) if isinstance(robot, str | Path) else "ROBOT"]
     if isinstance(robot, str | Path):
         progress("reading the robot")
-        name = str(robot).partition("#")[0]
-        if name.lower().endswith((".urdf", ".xml")):
-            urdf = read_bytes(Path(name))
+        source = urdf_source(robot)
+        urdf = None if source is None else read_bytes(source[0])
         robot = load_robot(robot)
     digest = ""
     if isinstance(data, str | Path):

@@ -396,3 +396,11 @@ def test_convert_overwrites_nothing_and_knows_its_conventions(truearm: Truearm, 
     assert out.read_text() == "mine"
     message = refused(truearm, "convert", "ur5", "--convention", "dh", "--out", tmp_path / "dh.yaml")
     assert "there is no such convention; got 'dh'; allowed: standard-dh, modified-dh" in message
+
+
+def test_a_calibration_does_not_overwrite_what_it_reads(truearm: Truearm, small: Path, tmp_path: Path) -> None:
+    truearm("calibrate", "irb120", small / "data.csv", "--out", tmp_path)
+    before = (tmp_path / "calibrated.yaml").read_bytes()
+    message = refused(truearm, "calibrate", tmp_path / "calibrated.yaml", small / "data.csv", "--out", tmp_path)
+    assert "this file is read, and would be overwritten" in message
+    assert (tmp_path / "calibrated.yaml").read_bytes() == before

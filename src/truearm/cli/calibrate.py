@@ -39,10 +39,16 @@ def calibrate(
 
     Writes calibrated.yaml, result.json, report.html and calibrated.urdf into DIR.
     """
+    from truearm.calibration import RESULT_FILES
     from truearm.calibration import calibrate as run
-    from truearm.files import writable_folder
+    from truearm.files import refuse_overwriting, writable_folder
+    from truearm.robots import urdf_source
 
     writable_folder(out)
+    source = urdf_source(robot)
+    inputs = [Path(robot) if source is None else source[0], Path(data), *([bounds] if bounds else [])]
+    for name in RESULT_FILES:
+        refuse_overwriting(out / name, inputs)
     with progress() as say:
         calibration = run(
             robot,

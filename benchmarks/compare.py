@@ -25,6 +25,7 @@ CONTENDERS = {
     "truearm_fit": None,
     "figaroh_fit": "figaroh",
     "pinocchio_inverse": "pinocchio",
+    "truearm_inverse": None,
 }
 Figures = dict[str, Any]
 
@@ -182,13 +183,36 @@ def page(record: dict[str, Any]) -> str:
             over(("figaroh_fit", fit), lambda a, b: 10 * median(a["simulated"]["fit"]) / b["monte_carlo_1000"]),
         ),
     ]
+    goals.append(
+        goal(
+            "inverse of 10 000 poses: times faster than Pinocchio's documented damped Newton",
+            20.0,
+            over(("pinocchio_inverse", "truearm_inverse"), lambda a, b: a["documented_seconds"] / b["seconds"]),
+        )
+    )
     kilobytes, speed = f"{size / 1e3:.0f} kB", f"{bandwidth / 1e9:.0f} GB/s"
     fastest, fill = shown(size / bandwidth), shown(filled)
-    inverse = "pinocchio_inverse"
-    solved = over((inverse,), lambda a: a["solved"])
-    newton = absent.get(inverse) or (
-        f"{shown(over((inverse,), lambda a: a['seconds']))}, {100 * (solved or 0):.2f} % solved"
-    )
+    own, other = "truearm_inverse", "pinocchio_inverse"
+    inverses = [
+        row("truearm, one branch, no seed, to 1e-9", own, lambda a: a["seconds"], lambda a, b: 1, own),
+        row("truearm, nearest to a seed up to 0.1 rad away", own, lambda a: a["near_seconds"], lambda a, b: 1, own),
+        row(
+            "Pinocchio from Python, as documented: from neutral, to 1e-4",
+            other,
+            lambda a: a["documented_seconds"],
+            lambda a, b: a["documented_seconds"] / b["seconds"],
+            own,
+        ),
+        row(
+            "Pinocchio from Python, whole steps from a seed up to 0.1 rad away, to 1e-9",
+            other,
+            lambda a: a["seconds"],
+            lambda a, b: a["seconds"] / b["seconds"],
+            own,
+        ),
+    ]
+    solved = over((other,), lambda a: a["solved"])
+    documented = over((other,), lambda a: a["documented_solved"])
     versions = sorted({f"{k} {v}" for r in rounds for c in r.values() for k, v in c["versions"].items()})
     here = record["machine"]
     python = rounds[0][kin]["python"]
@@ -247,10 +271,13 @@ configurations.
 
 ## Inverse kinematics of 10 000 poses of the IRB 120
 
-| what | time |
-|---|---|
-| Pinocchio from Python, damped Newton from seeds up to 0.1 rad away | {newton} |
-| truearm | pending |
+| what | time | times truearm's on one branch |
+|---|---|---|
+{nl.join(inverses)}
+
+Solved: Pinocchio as documented {100 * (documented or 0):.1f} % (measured on the first 1000 poses), from near seeds
+{100 * (solved or 0):.2f} %; truearm solves them on the branch that is asked for, or says why not.
+Which ratio counts depends on what one has: without a seed near the answer the documented loop is what there is.
 """
 
 

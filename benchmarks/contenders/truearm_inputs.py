@@ -9,6 +9,7 @@ import numpy as np
 
 from truearm.measurement.readers.matrices import read_matrices
 from truearm.measurement.truths import truth_twin
+from truearm.modeling.branches import BRANCHES, branch_rule
 from truearm.modeling.formats.urdf import urdf_text
 from truearm.robots import load_robot
 
@@ -40,8 +41,12 @@ np.savez(
     jacobian=real.joint_jacobian(q),
     nominal_position=nominal.poses(q)[0],
 )
-# Inverse kinematics: poses that the robot reaches, from seeds up to 0.1 rad away.
-q = nominal.random_configurations(POSES, rng)
+# Inverse kinematics: poses that the robot reaches on one branch, and seeds up to 0.1 rad away.
+rule = branch_rule(nominal)
+assert rule is not None
+q = nominal.random_configurations(16 * POSES, rng)
+q = q[rule.numbers(real.sweep(q)) == BRANCHES.index("front-up-noflip")][:POSES]
+assert len(q) == POSES
 position, rotation = real.poses(q)
 np.savez(folder / "inverse.npz", position=position, rotation=rotation, seed=q + rng.uniform(-0.1, 0.1, q.shape))
 # Fits: what a tracker reads of three targets, and where the targets truly are at configurations held out.

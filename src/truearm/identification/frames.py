@@ -120,14 +120,15 @@ def _turn_axes(R: Array) -> Array:
 
 def _nearest_rotation(G: Array, g: Array) -> Array:
     """Minimise r' G r - 2 g' r over the rotations, r = vec(R) row by row."""
-    candidates = _even_rotations(4000)
+    candidates = _even_rotations(1500)
     best = candidates[np.argsort(_cost(G, g, candidates))[:24]]
     for _ in range(50):
         # R exp(w): the columns of d vec(R) / dw are vec(R [e_k]x)
         D = np.stack([(best @ generator).reshape(-1, 9) for generator in _GENERATORS], axis=2)
         r = best.reshape(-1, 9)
-        gradient = np.einsum("nij,ni->nj", D, r @ G - g)
-        hessian = np.einsum("nij,ik,nkl->njl", D, G, D)
+        Dt = D.swapaxes(1, 2)
+        gradient = (Dt @ (r @ G - g)[:, :, None])[:, :, 0]
+        hessian = Dt @ (G @ D)
         damping = 1e-9 * np.trace(hessian, axis1=1, axis2=2)[:, None, None] * np.eye(3) + 1e-300 * np.eye(3)
         step = -np.linalg.solve(hessian + damping, gradient[:, :, None])[:, :, 0]
         size = np.linalg.norm(step, axis=1, keepdims=True)
@@ -151,7 +152,7 @@ _GENERATORS = np.array(
 
 def _cost(G: Array, g: Array, R: Array) -> Array:
     r = R.reshape(-1, 9)
-    return np.asarray(np.einsum("ni,ij,nj->n", r, G, r) - 2 * r @ g)
+    return np.asarray(((r @ G - 2 * g) * r).sum(axis=1))
 
 
 def _rotations(w: Array) -> Array:

@@ -163,10 +163,11 @@ def unseen_but_felt(robot: Robot, data: Dataset, free: FreeParameters, seed: int
     felt = np.zeros((0, len(free.names)))
     for target in robot.targets:
         sweep = robot.sweep(q, target.name)
-        linear, angular = robot.derivatives(sweep, q, free.names)
-        parts = (linear, angular) if target.quaternion is not None else (linear,)
+        parts = [robot.linear(sweep, q, free.names)]
+        if target.quaternion is not None:
+            parts.append(robot.angular(sweep, q, free.names))
         felt = np.concatenate([felt, *(part.reshape(len(free.names), -1).T * free.prior for part in parts)])
-    _, strength, turned = np.linalg.svd(felt @ unseen.T)
+    _, strength, turned = np.linalg.svd(felt @ unseen.T, full_matrices=False)
     lost = turned[: len(strength)][strength > _FELT * np.linalg.norm(felt, axis=0).max()] @ unseen
     involved = np.linalg.norm(lost, axis=0) > _INVOLVED
     return tuple(name for name, is_in in zip(free.names, involved.tolist(), strict=True) if is_in)

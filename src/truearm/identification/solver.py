@@ -16,6 +16,10 @@ from truearm.identification.losses import Loss, robust_scale, weights
 from truearm.identification.problem import Evaluation, Problem
 from truearm.modeling.chain import Array
 
+#: A step this small is the last: the next one would be smaller by the share of the residual that bends, 1e-3 or less.
+_SMALL: Final = 1e-6
+#: Size of a step that counts as one, where the prior is no scale (base and targets) [m or rad].
+_GEOMETRIC: Final = 1e-3
 _STEPS: Final = {"linear": 60, "huber": 100, "cauchy": 100, "l1": 300}
 
 
@@ -84,7 +88,7 @@ def solve(problem: Problem, loss: Loss = "linear", bounds: tuple[Array, Array] |
         if not accepted:
             break
         here = trial
-        small = float(np.abs(step / prior).max()) < (1e-9 if loss == "linear" else 1e-6)
+        small = float(np.abs(step / np.minimum(prior, _GEOMETRIC)).max()) < _SMALL
         if small or predicted <= 1e-24 * max(cost, 1.0):
             converged = loss != "l1" or scale <= _FLOOR * float(np.median(_norms(here.residual)) + 1e-300)
             if converged:

@@ -9,8 +9,8 @@ import numpy as np
 
 from truearm.measurement.readers.matrices import read_matrices
 from truearm.measurement.truths import truth_twin
-from truearm.modeling.branches import BRANCHES, branch_rule
 from truearm.modeling.formats.urdf import urdf_text
+from truearm.modeling.inverse.branches import BRANCHES, branch_rule
 from truearm.robots import load_robot
 
 CONFIGURATIONS, POSES = 1000, 10_000

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from tests.cli.conftest import Truearm
 
-from truearm.modeling.branches import BRANCHES
+from truearm.modeling.inverse.branches import BRANCHES
 from truearm.modeling.transform import quaternion_from_rotation
 from truearm.robots import load_robot
 

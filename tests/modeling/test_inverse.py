@@ -12,11 +12,11 @@ from scipy.optimize import least_squares
 from tests.modeling.pinocchio_oracle import PinocchioChain
 
 from truearm.errors import InputError
-from truearm.modeling.branches import BRANCHES, branch_rule
 from truearm.modeling.chain import Array
 from truearm.modeling.inverse import inverse
+from truearm.modeling.inverse.branches import BRANCHES, branch_rule
+from truearm.modeling.inverse.solutions import PoseStatus
 from truearm.modeling.robot import Joint, Robot
-from truearm.modeling.solutions import PoseStatus
 from truearm.modeling.transform import Transform, rotation_vector
 from truearm.robots import load_robot
 

@@ -12,8 +12,8 @@ from truearm.cli.output import Json, print_json
 from truearm.errors import InputError
 
 if TYPE_CHECKING:
+    from truearm.modeling.inverse.solutions import JointSolutions
     from truearm.modeling.robot import Robot
-    from truearm.modeling.solutions import JointSolutions
 
 #: Poses explained one by one where a person reads.
 _EXPLAINED = 10

@@ -18,8 +18,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.modeling.branches import Line, joint_axes
 from truearm.modeling.chain import Array, Sweep
+from truearm.modeling.inverse.branches import Line, joint_axes
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import cross
 
@@ -51,7 +51,7 @@ class ClosedForm:
     Parameters
     ----------
     robot
-        One that has a :func:`~truearm.modeling.branches.branch_rule`.
+        One that has a :func:`~truearm.modeling.inverse.branches.branch_rule`.
     target
         The tip of the poses that will be asked for; the flange if None.
     """

@@ -17,14 +17,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truearm.errors import InputError
-from truearm.modeling.branch_search import BranchSearch
-from truearm.modeling.branches import BRANCHES, branch_number, branch_rule
-from truearm.modeling.candidates import Candidates
 from truearm.modeling.chain import Array
-from truearm.modeling.closed_form import ClosedForm
-from truearm.modeling.pose_solver import Orientation, PoseTask, smallest_singular_value
+from truearm.modeling.inverse.branch_search import BranchSearch
+from truearm.modeling.inverse.branches import BRANCHES, branch_number, branch_rule
+from truearm.modeling.inverse.candidates import Candidates
+from truearm.modeling.inverse.closed_form import ClosedForm
+from truearm.modeling.inverse.pose_solver import Orientation, PoseTask, smallest_singular_value
+from truearm.modeling.inverse.solutions import JointSolutions, PoseStatus
 from truearm.modeling.robot import Robot
-from truearm.modeling.solutions import JointSolutions, PoseStatus
 from truearm.modeling.transform import quaternion_from_rotation, rotation_from_quaternion
 
 PoseFrame = Literal["base", "world"]

@@ -7,10 +7,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.modeling.branches import BRANCHES, BranchRule
 from truearm.modeling.chain import Array
-from truearm.modeling.pose_solver import PoseTask, solve
-from truearm.modeling.turns import beyond_limits, nearest_turns
+from truearm.modeling.inverse.branches import BRANCHES, BranchRule
+from truearm.modeling.inverse.pose_solver import PoseTask, solve
+from truearm.modeling.inverse.turns import beyond_limits, nearest_turns
 
 #: A pose is reached within this [m, rad].
 REACHED: Final = 1e-9

@@ -12,12 +12,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.modeling.branches import BRANCHES, BranchRule
-from truearm.modeling.candidates import Candidates
 from truearm.modeling.chain import Array
-from truearm.modeling.closed_form import ClosedForm
-from truearm.modeling.pose_solver import PoseTask, weakest_motion
-from truearm.modeling.turns import beyond_limits, nearest_turns
+from truearm.modeling.inverse.branches import BRANCHES, BranchRule
+from truearm.modeling.inverse.candidates import Candidates
+from truearm.modeling.inverse.closed_form import ClosedForm
+from truearm.modeling.inverse.pose_solver import PoseTask, weakest_motion
+from truearm.modeling.inverse.turns import beyond_limits, nearest_turns
 
 #: A nominal start that misses by more [reach lengths, rad] is no start but for the nearest pose.
 _NEAR: Final = 0.05

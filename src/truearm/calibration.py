@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from truearm.errors import InputError, nearest_names
 from truearm.files import read_bytes, writable_folder, write_files
+from truearm.identification.advice import check_fit
 from truearm.identification.bounds import Bounds, read_bounds
 from truearm.identification.fit import Fit, Redundant, Status, identify, place
 from truearm.identification.losses import LOSSES, Loss
@@ -27,7 +28,6 @@ from truearm.measurement.dataset import Dataset
 from truearm.measurement.readers.canonical import read_csv
 from truearm.measurement.statistics import Errors, Spread, errors_of
 from truearm.measurement.table_motion import without_table_motion
-from truearm.modeling.conventions import parallel_joints_without_beta
 from truearm.modeling.formats.robot_file import robot_text
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
@@ -39,9 +39,6 @@ Train = int | Literal["all"] | None
 
 #: What a calibration writes into its folder.
 RESULT_FILES: Final = ("calibrated.yaml", "result.json", "report.html", "calibrated.urdf")
-
-#: Priors that a parameter may move before the robot, its units or its joint order are doubted.
-_FAR: Final = 6.0
 
 
 def load_data(path: str | Path) -> Dataset:
@@ -278,7 +275,8 @@ def calibrate(
         train=errors_of(fit.robot, first),
         validation=validation,
         warnings=(
-            *_warnings(fit, second is None, _not_better(before, validation)),
+            *_check_proof(before, validation),
+            *check_fit(fit),
             *noticed,
             *check_settling(fit, data),
         ),
@@ -439,102 +437,23 @@ def _chosen(name: str, known: Mapping[str, Any], option: str) -> Any:
     )
 
 
-def _not_better(before: Errors, after: Errors | None) -> bool:
-    if after is None or before.position_spread is None or after.position_spread is None:
-        return False
-    return after.position_spread.mean > before.position_spread.mean
-
-
-def _warnings(fit: Fit, nothing_held_out: bool, not_better: bool) -> list[Notice]:
-    found = []
-    robot = fit.robot
-    if nothing_held_out:
-        found.append(
+def _check_proof(before: Errors, after: Errors | None) -> list[Notice]:
+    """Say if there is no proof, or if it speaks against the calibration."""
+    if after is None:
+        return [
             Notice(
                 "nothing-held-out",
                 "Nothing was held out: the errors are those of the training readings and flatter the model. "
                 "Leave --train out to see the error on configurations the fit has not seen.",
             )
+        ]
+    old, new = before.position_spread, after.position_spread
+    if old is None or new is None or new.mean <= old.mean:
+        return []
+    return [
+        Notice(
+            "not-better",
+            "On configurations the fit has not seen, the calibrated robot is no better than the nominal one: "
+            "there are too few readings for this model, or something is wrong with them.",
         )
-    if "joint zero" in fit.model.groups and "geometry" in fit.model.groups:
-        pairs = parallel_joints_without_beta(robot.convention, [dict(j.row) for j in robot.joints])
-        if pairs:
-            names = ", ".join(f"{a} and {b}" for a, b in pairs)
-            better = {"standard-dh": "hayati", "modified-dh": "modified-hayati"}.get(
-                robot.convention_name, robot.convention_name
-            )
-            cure = (
-                "Convert the robot: truearm convert, --convention hayati."
-                if robot.convention_name == "s-model"
-                else f"Write 'convention: {better}' in the robot file and 'beta: 0' at the link between them."
-            )
-            found.append(
-                Notice(
-                    "parallel-axes",
-                    f"Joints {names} are parallel and no beta lets them tilt against each other, so the model "
-                    f"cannot follow the real robot. {cure}",
-                )
-            )
-    if fit.status is Status.NOT_CONVERGED:
-        found.append(Notice("not-converged", f"The fit did not converge. {Status.NOT_CONVERGED.advice}"))
-    if fit.unseen:
-        found.append(
-            Notice(
-                "rank-loss",
-                f"The training data do not determine {', '.join(fit.unseen)}, on which predictions elsewhere "
-                f"depend. {Status.RANK_LOSS.advice}",
-            )
-        )
-    if fit.at_bound:
-        found.append(Notice("at-bound", f"At a bound: {', '.join(fit.at_bound)}. {Status.AT_BOUND.advice}"))
-    if fit.redundancies:
-        combinations = "; ".join(f"{r.dropped} ({r.combination})" for r in fit.redundancies)
-        found.append(
-            Notice(
-                "redundant",
-                "Held at their nominal values, because the readings cannot tell the combination in brackets "
-                f"apart: {combinations}." + ("" if fit.unseen else " Predictions are not affected."),
-            )
-        )
-    far = [
-        p.name
-        for p in robot.parameters.values()
-        if p.group not in ("base", "target") and abs(p.value - p.nominal) > _FAR * p.prior
     ]
-    if far:
-        found.append(
-            Notice(
-                "far-from-nominal",
-                f"{', '.join(far[:8])}{' and others' if len(far) > 8 else ''} moved by more than {_FAR:g} times what "
-                "the nominal values are believed to be good for. Is it this robot, in these units, with its joints in "
-                "this order? If so, say in the robot file what its numbers are good for (priors).",
-            )
-        )
-    if not_better:
-        found.append(
-            Notice(
-                "not-better",
-                "On configurations the fit has not seen, the calibrated robot is no better than the nominal one: "
-                "there are too few readings for this model, or something is wrong with them.",
-            )
-        )
-    if fit.excess > 1.0:
-        found.append(
-            Notice(
-                "residuals-exceed-sigma",
-                f"The residuals are {fit.excess:.1f} times what the declared deviations allow: the robot does "
-                f"something that the {fit.model.name} model cannot express, or sigma is too small. The "
-                "deviations of the parameters are widened by that factor.",
-            )
-        )
-    if fit.robot.effect_names:
-        gains = ", ".join(fit.robot.effect_names)
-        found.append(
-            Notice(
-                "urdf-partial",
-                f"calibrated.urdf holds the geometry and the joint zeros; a URDF cannot hold: {gains} "
-                f"({', '.join(p.name for p in robot.parameters.values() if p.group == 'gain')}), nor the base "
-                "and the targets in the instrument's frame. calibrated.yaml holds everything.",
-            )
-        )
-    return found

@@ -408,3 +408,23 @@ def _branch(robot: Robot, q: Array) -> str:
     rule = branch_rule(robot)
     assert rule is not None
     return BRANCHES[int(rule.numbers(robot.sweep(q))[0])]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_next_to_a_singular_wrist_branches_are_found_that_the_nominal_arm_has_not(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    nominal = load_robot("ur5")
+    robot = calibrated(nominal, seed)
+    q = nominal.random_configurations(10_000, rng)
+    q = q[abs(np.sin(q[:, 4])) < 0.02]
+    assert len(q) > 50
+    position, rotation = robot.poses(q)
+    rule = branch_rule(robot)
+    assert rule is not None
+    number = rule.numbers(robot.sweep(q))
+    lost = 0
+    for k in sorted(set(number.tolist())):
+        mine = number == k
+        found = inverse(robot, position[mine], rotation[mine], branch=BRANCHES[k])
+        lost += sum(status is PoseStatus.BRANCH_LOST for status in found.status)
+    assert lost <= 1

@@ -33,6 +33,8 @@ _ACROSS: Final = (
     (False, (0.05, 0.2, 0.9, 1.8, float(np.sqrt(2) * np.pi))),
     (True, (0.05, 0.2, 0.9, 1.8, float(np.sqrt(2) * np.pi))),
 )
+#: Singular value below which calibration errors decide which branches there are.
+_SINGULAR: Final = 0.01
 
 
 class BranchSearch:
@@ -79,8 +81,9 @@ class BranchSearch:
             near = self._add_all(missing)
             expected = self._expected(near)
             if wanted is not None:
-                # At its end a branch has no side, and the name of a nominal solution is by chance.
-                possible = expected[:, wanted] | (near & ~self._exact).any(axis=1)
+                # At its end a branch has no side, and the name of a nominal solution is by chance. Next to a singular
+                # posture the calibrated arm can have a branch that the nominal one has not.
+                possible = expected[:, wanted] | (near & ~self._exact).any(axis=1) | self._singular(missing)
                 expected[:] = False
                 expected[:, wanted] = possible
             else:
@@ -127,6 +130,14 @@ class BranchSearch:
             expected[pose[edge], number[edge] ^ side] = True
         expected[near.any(axis=1) & ~self._pool.found().any(axis=1)] = True
         return expected
+
+    def _singular(self, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Return the chosen poses ``(n,)`` of which a nominal solution is all but singular."""
+        pose, slot = np.nonzero((self._number >= 0) & chosen[:, None])
+        value, _ = weakest_motion(self._task.of(pose), self._joints[pose, slot])
+        singular = np.zeros(len(chosen), dtype=bool)
+        singular[pose[value < _SINGULAR]] = True
+        return singular
 
     def _lost(self, expected: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Return the poses that lack a branch they are expected to have, ``(n,)``."""

@@ -230,7 +230,7 @@ def _solve_with_noise(problem: Problem, loss: Loss, limits: tuple[Array, Array] 
         started = FreeParameters(
             tuple(replace(p, value=float(v)) for p, v in zip(problem.free.parameters, solution.vector, strict=True))
         )
-        problem = replace(problem.with_noise(noise), free=started)
+        problem = replace(problem, noise=noise, free=started)
         solution = solve(problem, loss, limits)
         steps += solution.steps
         if change < 0.02:

@@ -7,7 +7,7 @@ one more row, (value - nominal) / deviation.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -117,10 +117,6 @@ class Problem:
             return np.zeros(len(vector)), np.zeros(len(vector))
         weight = 1.0 / self.free.prior
         return (vector - self.free.nominal) * weight, weight
-
-    def with_noise(self, noise: dict[str, float]) -> Problem:
-        """Return the problem with other standard deviations for readings that declare none."""
-        return replace(self, noise=noise)
 
 
 @dataclass(frozen=True, eq=False)

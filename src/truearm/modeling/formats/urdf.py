@@ -372,7 +372,8 @@ def _origin_edits(
     new = {name: value for name, value in ((b"xyz", xyz), (b"rpy", rpy)) if value is not None}
     tag = child_tag(joint.tag, "origin", joint.where)
     found = _START_TAG.match(source, (tag or joint.tag).start)
-    assert found is not None  # the parser found a start tag here
+    if found is None:
+        raise ValueError("the parser found a start tag where there is none")
     if tag is None:
         return [(found.end(), found.end(), b"<origin" + _attributes(new) + b"/>")]
     edits = []

@@ -11,7 +11,8 @@ from tests.modeling.pinocchio_oracle import PinocchioChain
 from truearm.modeling.chain import Array, Chain, Element, Motion
 from truearm.modeling.conventions import CONVENTIONS, Convention, JointKind
 from truearm.modeling.effects import EFFECTS, Effect
-from truearm.modeling.robot import Joint, Robot
+from truearm.modeling.parts import Joint
+from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 from truearm.robots import library, load_robot
 

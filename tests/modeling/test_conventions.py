@@ -15,7 +15,8 @@ from truearm.modeling.chain import Array
 from truearm.modeling.conventions import CONVENTIONS, Convention, JointKind, convention, parallel_joints_without_beta
 from truearm.modeling.conventions.cpc import Direction, published_direction, rotation_to, small_rotations
 from truearm.modeling.formats.robot_file import read_robot, robot_text
-from truearm.modeling.robot import Joint, Robot
+from truearm.modeling.parts import Joint
+from truearm.modeling.robot import Robot
 
 BOTH: tuple[JointKind, ...] = ("revolute", "prismatic")
 

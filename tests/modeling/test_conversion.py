@@ -14,7 +14,8 @@ from truearm.modeling.conventions import CONVENTIONS, Convention, JointKind
 from truearm.modeling.conventions.cpc import published_direction
 from truearm.modeling.conversion import CONVERSIONS, converted
 from truearm.modeling.formats.robot_file import robot_text
-from truearm.modeling.robot import Joint, LinkMass, Robot
+from truearm.modeling.parts import Joint, LinkMass
+from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 from truearm.robots import library, load_robot
 

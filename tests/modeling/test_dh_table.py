@@ -14,7 +14,8 @@ from truearm.errors import InputError
 from truearm.modeling.chain import Array
 from truearm.modeling.conventions import JointKind
 from truearm.modeling.formats.dh_table import DHConvention, DHTable, dh_csv, dh_table, read_dh_csv
-from truearm.modeling.robot import Joint, Robot
+from truearm.modeling.parts import Joint
+from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 from truearm.robots import library, load_robot
 

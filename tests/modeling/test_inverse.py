@@ -16,7 +16,8 @@ from truearm.modeling.chain import Array
 from truearm.modeling.inverse import inverse
 from truearm.modeling.inverse.branches import BRANCHES, branch_rule
 from truearm.modeling.inverse.solutions import PoseStatus
-from truearm.modeling.robot import Joint, Robot
+from truearm.modeling.parts import Joint
+from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform, rotation_vector
 from truearm.robots import load_robot
 

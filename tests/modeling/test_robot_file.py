@@ -12,7 +12,8 @@ from numpy.testing import assert_allclose
 
 from truearm.errors import InputError
 from truearm.modeling.formats.robot_file import RobotFile, read_robot, robot_from_file, robot_text
-from truearm.modeling.robot import Robot, Tool
+from truearm.modeling.parts import Tool
+from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 from truearm.robots import load_robot
 from truearm.units import to_si, written

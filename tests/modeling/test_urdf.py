@@ -16,7 +16,8 @@ from truearm.modeling.chain import Array, Chain
 from truearm.modeling.conventions import CONVENTIONS, Convention, JointKind
 from truearm.modeling.formats.robot_file import read_robot, robot_text
 from truearm.modeling.formats.urdf import calibrated_urdf, read_urdf, roll_pitch_yaw, urdf_text
-from truearm.modeling.robot import Joint, LinkMass, Robot
+from truearm.modeling.parts import Joint, LinkMass
+from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 from truearm.robots import library, load_robot
 

@@ -12,7 +12,8 @@ from truearm.errors import InputError, nearest_names
 from truearm.files import exists
 from truearm.measurement.twin import Twin
 from truearm.modeling.chain import Array
-from truearm.modeling.robot import Robot, Tool
+from truearm.modeling.parts import Tool
+from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform, rotation_from_quaternion
 from truearm.robots import load_robot
 

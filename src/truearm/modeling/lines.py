@@ -10,7 +10,8 @@ from typing import Final
 import numpy as np
 
 from truearm.modeling.chain import Array, Chain, Element
-from truearm.modeling.robot import Joint, Robot
+from truearm.modeling.parts import Joint
+from truearm.modeling.robot import Robot
 
 #: Below this angle [rad] two axes are parallel: they part by less than 1 nm over the reach of a robot.
 PARALLEL: Final = 1e-9

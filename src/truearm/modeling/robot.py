@@ -5,132 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Final
 
 import numpy as np
 
 from truearm.errors import InputError, nearest_names
-from truearm.modeling.chain import Array, Chain, Element, Motion, Sweep
-from truearm.modeling.conventions import Convention, JointKind, convention
+from truearm.modeling.chain import Array, Chain, Element, Sweep
+from truearm.modeling.conventions import Convention, convention
 from truearm.modeling.effects import EFFECTS, Effect
 from truearm.modeling.parameters import Group, Parameter, Unit, parameter
+from truearm.modeling.parts import GRAVITY, NO_PAYLOAD, SLIDES, TURNS, Joint, LinkMass, Payload, Target, Tool, Truth
 from truearm.modeling.transform import IDENTITY, Transform, fixed_rotation
 
 Values = Mapping[str, float | Array]
-
-
-@dataclass(frozen=True)
-class Joint:
-    """One joint as the robot file describes it.
-
-    Attributes
-    ----------
-    name
-        The maker's name.
-    kind
-        ``revolute`` or ``prismatic``.
-    row
-        Nominal value of each column of the convention [m and rad].
-    limits
-        Lowest and highest reading [rad or m], where known.
-    """
-
-    name: str
-    kind: JointKind
-    row: Mapping[str, float]
-    limits: tuple[float, float] | None = None
-
-
-@dataclass(frozen=True)
-class LinkMass:
-    """Mass of the link behind a joint.
-
-    Attributes
-    ----------
-    joint
-        Number of the joint, from 1.
-    mass
-        [kg].
-    cog
-        Centre of gravity in the link's frame [m].
-    """
-
-    joint: int
-    mass: float
-    cog: tuple[float, float, float]
-
-
-@dataclass(frozen=True)
-class Target:
-    """A point, or a frame, fixed to the flange, that an instrument sees.
-
-    Its position is three parameters; its orientation is `quaternion` followed by three small rotations that are
-    parameters too.
-
-    Attributes
-    ----------
-    name
-        As the data call it.
-    quaternion
-        Reference orientation in the flange frame, None for a point.
-    """
-
-    name: str
-    quaternion: tuple[float, float, float, float] | None = None
-
-    def parameter(self, axis: str) -> str:
-        """Return the name of the parameter for ``x``, ``y``, ``z``, ``rx``, ``ry`` or ``rz``."""
-        prefix = self.name if self.name.startswith("target") else f"target_{self.name}"
-        return f"{prefix}_{axis}"
-
-    @cached_property
-    def chain(self) -> Chain:
-        """The way from the flange to the target."""
-        elements = tuple(Element(motion, parameter=self.parameter(axis)) for axis, motion in _SLIDES)
-        if self.quaternion is not None:
-            elements += fixed_rotation(self.quaternion)
-            elements += tuple(Element(motion, parameter=self.parameter(axis)) for axis, motion in _TURNS)
-        return Chain(elements)
-
-
-@dataclass(frozen=True)
-class Truth:
-    """Published or chosen parameter values, for simulation.
-
-    Attributes
-    ----------
-    source
-        Where they come from.
-    values
-        Parameter values [m, rad]; what is not named is nominal.
-    compliance
-        Deflection of a joint per moment about its axis [rad/(N m)], by joint number; only the twin knows it.
-    """
-
-    source: str
-    values: Mapping[str, float]
-    compliance: Mapping[int, float] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Tool:
-    """An end-effector with targets, for simulation.
-
-    Attributes
-    ----------
-    targets
-        Position of each target in the flange frame [m].
-    mass, cog
-        [kg] and [m] in the flange frame, where known.
-    """
-
-    targets: Mapping[str, tuple[float, float, float]]
-    mass: float = 0.0
-    cog: tuple[float, float, float] = (0.0, 0.0, 0.0)
-
-
-_SLIDES: Final[tuple[tuple[str, Motion], ...]] = (("x", "Tx"), ("y", "Ty"), ("z", "Tz"))
-_TURNS: Final[tuple[tuple[str, Motion], ...]] = (("rx", "Rx"), ("ry", "Ry"), ("rz", "Rz"))
 
 
 @dataclass(frozen=True)
@@ -154,6 +40,10 @@ class Robot:
         From the last link's frame to the flange.
     masses
         Link masses, where published.
+    payload
+        What hangs on the flange.
+    gravity
+        Acceleration of free fall in the base frame [m/s^2].
     base_quaternion
         Reference orientation of the base in the world.
     targets
@@ -177,6 +67,8 @@ class Robot:
     joints: tuple[Joint, ...]
     flange: Transform = IDENTITY
     masses: tuple[LinkMass, ...] = ()
+    payload: Payload = NO_PAYLOAD
+    gravity: tuple[float, float, float] = GRAVITY
     base_quaternion: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
     targets: tuple[Target, ...] = ()
     effect_names: tuple[str, ...] = ()
@@ -195,9 +87,9 @@ class Robot:
     def base_elements(self) -> tuple[Element, ...]:
         """The way from the world to the base frame."""
         return (
-            *(Element(motion, parameter=f"base_{axis}") for axis, motion in _SLIDES),
+            *(Element(motion, parameter=f"base_{axis}") for axis, motion in SLIDES),
             *fixed_rotation(self.base_quaternion),
-            *(Element(motion, parameter=f"base_{axis}") for axis, motion in _TURNS),
+            *(Element(motion, parameter=f"base_{axis}") for axis, motion in TURNS),
         )
 
     @cached_property
@@ -210,7 +102,7 @@ class Robot:
     @cached_property
     def flange_elements(self) -> tuple[Element, ...]:
         """The way from the last link's frame to the flange."""
-        slides = zip(_SLIDES, self.flange.translation, strict=True)
+        slides = zip(SLIDES, self.flange.translation, strict=True)
         return (
             *(Element(motion, value=value) for (_, motion), value in slides if value),
             *fixed_rotation(self.flange.quaternion),

@@ -23,7 +23,8 @@ from truearm.modeling.conversion.directions import cpc, mcpc, translations
 from truearm.modeling.conversion.links import Links
 from truearm.modeling.conversion.origins import origins
 from truearm.modeling.lines import at_zero, base_and_flange
-from truearm.modeling.robot import LinkMass, Robot
+from truearm.modeling.parts import LinkMass
+from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 
 CONVERSIONS: Final[Mapping[str, Callable[[Robot], Links]]] = {

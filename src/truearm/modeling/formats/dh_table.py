@@ -41,7 +41,8 @@ from truearm.modeling.lines import (
     joint_axes,
     turn,
 )
-from truearm.modeling.robot import Joint, Robot
+from truearm.modeling.parts import Joint
+from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 from truearm.units import ANGLE_UNITS, LENGTH_UNITS, SHOWN_AS, as_number, checked_unit, sized_si, written
 

@@ -8,7 +8,7 @@ import math
 from collections.abc import Sequence
 
 from truearm.modeling.inverse.solutions import JointSolutions
-from truearm.modeling.robot import Joint
+from truearm.modeling.parts import Joint
 from truearm.units import written
 
 

@@ -21,7 +21,8 @@ from truearm.files import is_one_line, read_yaml
 from truearm.modeling.conventions import convention
 from truearm.modeling.effects import EFFECTS
 from truearm.modeling.parameters import Parameter
-from truearm.modeling.robot import Joint, LinkMass, Robot, Target, Tool, Truth
+from truearm.modeling.parts import Joint, LinkMass, Target, Tool, Truth
+from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 from truearm.units import SHOWN_AS, sized_si, to_si, written
 

@@ -41,7 +41,8 @@ from truearm.modeling.formats.urdf_tree import (
     read_tree,
     triple,
 )
-from truearm.modeling.robot import Joint, LinkMass, Robot
+from truearm.modeling.parts import Joint, LinkMass
+from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 
 #: How far the length of an axis may be from 1: files print five digits, but 0 0 2 means something else.

@@ -1,0 +1,150 @@
+"""What a robot is made of: joints, masses, what it carries and what an instrument sees of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Final
+
+from truearm.modeling.chain import Chain, Element, Motion
+from truearm.modeling.conventions import JointKind
+from truearm.modeling.transform import fixed_rotation
+
+#: Standard gravity, with the base's z upwards [m/s^2].
+GRAVITY: Final = (0.0, 0.0, -9.80665)
+SLIDES: Final[tuple[tuple[str, Motion], ...]] = (("x", "Tx"), ("y", "Ty"), ("z", "Tz"))
+TURNS: Final[tuple[tuple[str, Motion], ...]] = (("rx", "Rx"), ("ry", "Ry"), ("rz", "Rz"))
+
+
+@dataclass(frozen=True)
+class Joint:
+    """One joint as the robot file describes it.
+
+    Attributes
+    ----------
+    name
+        The maker's name.
+    kind
+        ``revolute`` or ``prismatic``.
+    row
+        Nominal value of each column of the convention [m and rad].
+    limits
+        Lowest and highest reading [rad or m], where known.
+    """
+
+    name: str
+    kind: JointKind
+    row: Mapping[str, float]
+    limits: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class LinkMass:
+    """Mass of the link behind a joint.
+
+    Attributes
+    ----------
+    joint
+        Number of the joint, from 1.
+    mass
+        [kg].
+    cog
+        Centre of gravity in the link's frame [m].
+    inertia
+        Moments of inertia xx, yy, zz, xy, xz, yz about the centre of gravity, in the axes of the link's frame
+        [kg m^2]; zero is a point mass.
+    """
+
+    joint: int
+    mass: float
+    cog: tuple[float, float, float]
+    inertia: tuple[float, float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Payload:
+    """What hangs on the flange.
+
+    Attributes
+    ----------
+    mass
+        [kg].
+    cog
+        Centre of gravity in the flange frame [m].
+    """
+
+    mass: float = 0.0
+    cog: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+NO_PAYLOAD: Final = Payload()
+
+
+@dataclass(frozen=True)
+class Target:
+    """A point, or a frame, fixed to the flange, that an instrument sees.
+
+    Its position is three parameters; its orientation is `quaternion` followed by three small rotations that are
+    parameters too.
+
+    Attributes
+    ----------
+    name
+        As the data call it.
+    quaternion
+        Reference orientation in the flange frame, None for a point.
+    """
+
+    name: str
+    quaternion: tuple[float, float, float, float] | None = None
+
+    def parameter(self, axis: str) -> str:
+        """Return the name of the parameter for ``x``, ``y``, ``z``, ``rx``, ``ry`` or ``rz``."""
+        prefix = self.name if self.name.startswith("target") else f"target_{self.name}"
+        return f"{prefix}_{axis}"
+
+    @cached_property
+    def chain(self) -> Chain:
+        """The way from the flange to the target."""
+        elements = tuple(Element(motion, parameter=self.parameter(axis)) for axis, motion in SLIDES)
+        if self.quaternion is not None:
+            elements += fixed_rotation(self.quaternion)
+            elements += tuple(Element(motion, parameter=self.parameter(axis)) for axis, motion in TURNS)
+        return Chain(elements)
+
+
+@dataclass(frozen=True)
+class Truth:
+    """Published or chosen parameter values, for simulation.
+
+    Attributes
+    ----------
+    source
+        Where they come from.
+    values
+        Parameter values [m, rad]; what is not named is nominal.
+    compliance
+        Deflection of a joint per moment about its axis [rad/(N m)], by joint number; only the twin knows it.
+    """
+
+    source: str
+    values: Mapping[str, float]
+    compliance: Mapping[int, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Tool:
+    """An end-effector with targets, for simulation.
+
+    Attributes
+    ----------
+    targets
+        Position of each target in the flange frame [m].
+    mass, cog
+        [kg] and [m] in the flange frame, where known.
+    """
+
+    targets: Mapping[str, tuple[float, float, float]]
+    mass: float = 0.0
+    cog: tuple[float, float, float] = (0.0, 0.0, 0.0)

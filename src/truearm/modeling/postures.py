@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,7 +80,7 @@ def approach_of(joints: Array, order: NDArray[np.int64]) -> Array:
     """
     signs = np.zeros_like(joints)
     rows = np.argsort(order, kind="stable")
-    for before, row in zip(rows[:-1], rows[1:], strict=True):
+    for before, row in pairwise(rows):
         if order[row] == order[before] + 1:
             moved = np.sign(joints[row] - joints[before])
             signs[row] = np.where(moved == 0.0, signs[before], moved)

@@ -13,8 +13,8 @@ from truearm.errors import InputError, nearest_names
 from truearm.modeling.chain import Array, Chain, Element, Sweep, across
 from truearm.modeling.conventions import Convention, convention
 from truearm.modeling.effects import EFFECTS, Effect, Layout
-from truearm.modeling.parameters import Group, Parameter, Unit, parameter
 from truearm.modeling.loads import joint_loads
+from truearm.modeling.parameters import Group, Parameter, Unit, parameter
 from truearm.modeling.parts import GRAVITY, NO_PAYLOAD, SLIDES, TURNS, Joint, LinkMass, Payload, Target, Tool, Truth
 from truearm.modeling.postures import Postures
 from truearm.modeling.transform import IDENTITY, Transform, fixed_rotation
@@ -328,9 +328,7 @@ class Robot:
         sweep = self.sweep(q, target)
         return np.moveaxis(np.concatenate(sweep.derivatives(self.moving[: len(self.joints)]), axis=1), (0, 1), (2, 1))
 
-    def linear(
-        self, sweep: Sweep, q: Array | Postures, names: Sequence[str], values: Values | None = None
-    ) -> Array:
+    def linear(self, sweep: Sweep, q: Array | Postures, names: Sequence[str], values: Values | None = None) -> Array:
         """Return the velocity of the tip of a sweep by the parameters `names` [m per unit of the parameter].
 
         Parameters
@@ -345,9 +343,7 @@ class Robot:
         """
         return self._by_parameters(sweep, sweep.linear, q, names, values)
 
-    def angular(
-        self, sweep: Sweep, q: Array | Postures, names: Sequence[str], values: Values | None = None
-    ) -> Array:
+    def angular(self, sweep: Sweep, q: Array | Postures, names: Sequence[str], values: Values | None = None) -> Array:
         """Return the angular velocity of the tip of a sweep by the parameters `names` [rad per unit of the parameter].
 
         Parameters and the shape of what is returned are as for :meth:`linear`.

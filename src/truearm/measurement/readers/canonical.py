@@ -23,12 +23,14 @@ from truearm.units import ANGLE_UNITS, LENGTH_UNITS, SMALL_ANGLE_UNITS, checked_
 _POSITION: Final = ("x", "y", "z")
 _QUATERNION: Final = ("qw", "qx", "qy", "qz")
 _ROLES: Final = ("target", "reference")
-_UNITS: Final[dict[str, tuple[str, ...]]] = dict.fromkeys((*_POSITION, "sigma"), LENGTH_UNITS) | {
-    "sigma_rot": SMALL_ANGLE_UNITS
-}
 _FORCE: Final = ("force_x", "force_y", "force_z")
 _MOMENT: Final = ("moment_x", "moment_y", "moment_z")
-_UNITS |= {"temperature": ("degC",)} | dict.fromkeys(_FORCE, ("N",)) | dict.fromkeys(_MOMENT, ("N m",))
+_UNITS: Final[dict[str, tuple[str, ...]]] = (
+    dict.fromkeys((*_POSITION, "sigma"), LENGTH_UNITS)
+    | {"sigma_rot": SMALL_ANGLE_UNITS, "temperature": ("degC",)}
+    | dict.fromkeys(_FORCE, ("N",))
+    | dict.fromkeys(_MOMENT, ("N m",))
+)
 _PLAIN: Final = ("configuration", "target", "role", *_QUATERNION)
 #: Every column as one writes it, for messages.
 _SHOWN: Final = (
@@ -89,7 +91,6 @@ def read_csv(path: Path) -> Dataset:
         sigma_rot=numbers("sigma_rot", deviation=True)[:, 0] if "sigma_rot" in columns else None,
     )
 
-
     def circumstance(name: str) -> Array:
         column = columns[name]
         return same_everywhere(cells, configurations, column.place, column.unit)
@@ -97,9 +98,7 @@ def read_csv(path: Path) -> Dataset:
     wrench = None
     if "force_x" in columns:
         still = np.zeros(len(configurations.labels))
-        wrench = np.column_stack(
-            [circumstance(n) if n in columns else still for n in (*_FORCE, *_MOMENT)]
-        )
+        wrench = np.column_stack([circumstance(n) if n in columns else still for n in (*_FORCE, *_MOMENT)])
     return replace(
         dataset_of(readings, configurations),
         temperature=circumstance("temperature") if "temperature" in columns else None,

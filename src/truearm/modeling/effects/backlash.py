@@ -31,9 +31,7 @@ class Backlash(LinearEffect):
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """One play a turning joint."""
-        return tuple(
-            Parameter.plain(f"backlash_{i + 1}", "rad", "backlash", 0.0, _PRIOR) for i in self.layout.turning
-        )
+        return tuple(Parameter.plain(f"backlash_{i + 1}", "rad", "backlash", 0.0, _PRIOR) for i in self.layout.turning)
 
     def shapes(self, at: Postures) -> Rates:
         """Return half the sign of the moments, smooth where they change sign."""

@@ -186,6 +186,30 @@ class Evaluation:
         return {name: robot.target(name).chain.sweep(variables, self._values, trunk) for name in names}
 
 
+def check_circumstances(robot: Robot, data: Dataset) -> None:
+    """Refuse joint effects that need to know what the data do not tell.
+
+    Raises
+    ------
+    InputError
+        Naming the effect and what is missing.
+    """
+    for effect in robot.effects:
+        if effect.ordered and data.approach is None:
+            raise InputError(
+                f"the effect {effect.name} needs the order in which the configurations were measured",
+                where=data.source,
+                came="configurations that are not numbered",
+                cure="Number the configurations 1, 2, 3 .. in the order of measurement, or choose another model.",
+            )
+        if effect.warmed and data.temperature is None:
+            raise InputError(
+                f"the effect {effect.name} needs the temperature of the arm",
+                where=data.source,
+                cure="Add the column temperature [degC], or choose another model.",
+            )
+
+
 def check_solvable(problem: Problem) -> None:
     """Refuse fewer equations than unknowns where no prior helps.
 

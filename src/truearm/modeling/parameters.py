@@ -25,6 +25,7 @@ Group = Literal[
     "compliance",
     "hardening",
     "backlash",
+    "bearing-compliance",
     "clearance",
     "clearance-linear-contact",
     "approach",

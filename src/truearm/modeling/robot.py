@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -217,6 +218,30 @@ class Robot:
                 cure = f"Did you mean {' or '.join(near)}?" if near else None
                 raise InputError("the robot has no such parameter", where=self.name, came=name, cure=cure)
         return self.with_parameters(replace(self.parameters[n], value=float(v)) for n, v in values.items())
+
+    def carrying(self, payload: Payload | None = None, gravity: tuple[float, float, float] | None = None) -> Robot:
+        """Return the robot with another payload, or mounted another way; None leaves what it has.
+
+        Raises
+        ------
+        InputError
+            If the mass is negative, or the gravity is none.
+        """
+        if payload is not None and payload.mass < 0.0:
+            raise InputError("a mass cannot be negative", where="payload", came=f"{payload.mass:g} kg")
+        if gravity is not None and not 0.1 <= math.hypot(*gravity) <= 100.0:
+            raise InputError(
+                "this is no acceleration of free fall",
+                where="gravity",
+                came=f"{math.hypot(*gravity):g} m/s^2",
+                allowed="about 9.81 m/s^2 on Earth, 0.1 to 100",
+                cure="Give x, y and z in the robot's base frame: 0,0,-9.81 stands, 0,0,9.81 hangs.",
+            )
+        return replace(
+            self,
+            payload=self.payload if payload is None else payload,
+            gravity=self.gravity if gravity is None else gravity,
+        )
 
     def with_effects(self, names: Sequence[str]) -> Robot:
         """Return the robot with these joint effects added."""

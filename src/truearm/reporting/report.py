@@ -18,6 +18,7 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from truearm.identification.fit import Fit
+from truearm.identification.selection import Selection
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import Errors
 from truearm.modeling.chain import Array
@@ -73,6 +74,8 @@ class Report:
         How to run it again.
     history
         What was done, in one line with the hash of the data.
+    selection
+        How the model was chosen, if it was not named.
     """
 
     fit: Fit
@@ -85,6 +88,7 @@ class Report:
     warnings: Sequence[Notice]
     command: str
     history: str
+    selection: Selection | None = None
 
     @property
     def judged(self) -> Errors:

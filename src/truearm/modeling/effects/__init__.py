@@ -6,6 +6,7 @@ from typing import Final
 
 from truearm.modeling.effects.approach import Approach
 from truearm.modeling.effects.backlash import Backlash
+from truearm.modeling.effects.bearing import BearingCompliance
 from truearm.modeling.effects.clearance import Clearance, LinearContactClearance
 from truearm.modeling.effects.compliance import Compliance
 from truearm.modeling.effects.effect import Effect, Layout
@@ -20,6 +21,7 @@ EFFECTS: Final[tuple[type[Effect], ...]] = (
     Compliance,
     Hardening,
     Backlash,
+    BearingCompliance,
     Clearance,
     LinearContactClearance,
     Approach,

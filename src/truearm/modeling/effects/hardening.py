@@ -30,8 +30,8 @@ class Hardening(LinearEffect):
             plain
             for i in self.layout.turning
             for plain in (
-                Parameter.plain(f"compliance_quadratic_{i + 1}", "rad/(N m)^2", "hardening", 0.0, 1e-4),
-                Parameter.plain(f"compliance_cubic_{i + 1}", "rad/(N m)^3", "hardening", 0.0, 1e-5),
+                Parameter.plain(f"compliance_quadratic_{i + 1}", "rad/(N m)^2", "hardening", 0.0, 3e-5),
+                Parameter.plain(f"compliance_cubic_{i + 1}", "rad/(N m)^3", "hardening", 0.0, 3e-7),
             )
         )
 

@@ -21,7 +21,7 @@ from truearm.files import is_one_line, read_yaml
 from truearm.modeling.conventions import convention
 from truearm.modeling.effects import EFFECTS
 from truearm.modeling.parameters import Parameter
-from truearm.modeling.parts import Joint, LinkMass, Target, Tool, Truth
+from truearm.modeling.parts import GRAVITY, NO_PAYLOAD, Joint, LinkMass, Payload, Target, Tool, Truth
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 from truearm.units import SHOWN_AS, sized_si, to_si, written
@@ -91,6 +91,17 @@ class _Tool(_Entry):
     cog: Triple = (0.0, 0.0, 0.0)
 
 
+class _Payload(_Entry):
+    mass: Mass
+    cog: Triple = (0.0, 0.0, 0.0)
+
+
+def _falls(gravity: tuple[float, float, float]) -> tuple[float, float, float]:
+    if not 0.1 <= math.hypot(*gravity) <= 100.0:
+        raise ValueError(f"free fall of 0.1 to 100 m/s^2 belongs here, this one has {math.hypot(*gravity):.6g}")
+    return gravity
+
+
 class _Truth(_Entry):
     source: str
     values: dict[str, Number]
@@ -140,6 +151,8 @@ class RobotFile(_Entry):
     joints: list[_Joint] = Field(min_length=1)
     flange: _Place = _Place()
     masses: list[_Mass] = []
+    payload: _Payload | None = None
+    gravity: Annotated[Triple, AfterValidator(_falls)] = GRAVITY
     tools: dict[Name, _Tool] = {}
     truths: dict[Name, _Truth] = {}
     priors: _Priors = _Priors()
@@ -207,6 +220,10 @@ def robot_from_file(content: RobotFile, where: str) -> Robot:
             LinkMass(m.link, si(m.mass, "1", f"masses[{i}].mass"), metres(m.cog, f"masses[{i}].cog"))
             for i, m in enumerate(content.masses, 1)
         ),
+        payload=NO_PAYLOAD
+        if content.payload is None
+        else Payload(si(content.payload.mass, "1", "payload.mass"), metres(content.payload.cog, "payload.cog")),
+        gravity=content.gravity,
         base_quaternion=content.base_quaternion,
         targets=tuple(Target(t.name, t.quaternion) for t in content.targets),
         effect_names=tuple(content.effects),
@@ -228,7 +245,7 @@ def robot_from_file(content: RobotFile, where: str) -> Robot:
         },
         history=tuple(content.history),
     )
-    shown = {"m": length, "rad": angle, "1": "1"}
+    shown = {**SHOWN_AS, "m": length, "rad": angle}
 
     def known(name: str, entry: str) -> Parameter:
         if name in robot.parameters:
@@ -390,6 +407,10 @@ def robot_text(robot: Robot) -> str:
         }
     if robot.masses:
         content["masses"] = [flow({"link": m.joint, "mass": m.mass, "cog": mm(m.cog)}) for m in robot.masses]
+    if robot.payload != NO_PAYLOAD:
+        content["payload"] = flow({"mass": robot.payload.mass, "cog": mm(robot.payload.cog)})
+    if robot.gravity != GRAVITY:
+        content["gravity"] = listed(list(robot.gravity))
     if robot.tools:
         content["tools"] = {
             name: {"targets": {text(t): mm(p) for t, p in tool.targets.items()}, "mass": tool.mass, "cog": mm(tool.cog)}

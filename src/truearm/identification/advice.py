@@ -84,12 +84,12 @@ def check_fit(fit: Fit) -> list[Notice]:
     found += _check_effects(fit)
     if fit.robot.effect_names:
         effects = ", ".join(fit.robot.effect_names)
-        names = [p.name for effect in robot.effects for p in effect.parameters]
+        own = [p.name for effect in robot.effects for p in effect.parameters]
         found.append(
             Notice(
                 "urdf-partial",
                 f"calibrated.urdf holds the geometry and the joint zeros; a URDF cannot hold: {effects} "
-                f"({', '.join(names[:6])}{', ..' if len(names) > 6 else ''}), nor the base "
+                f"({", ".join(own[:6])}{", .." if len(own) > 6 else ""}), nor the base "
                 "and the targets in the instrument's frame. calibrated.yaml holds everything.",
             )
         )

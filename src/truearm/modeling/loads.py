@@ -32,11 +32,10 @@ from truearm.modeling.chain import (
     seen_before,
     seen_behind,
 )
+from truearm.modeling.parts import POINT_MASS, Inertia
 from truearm.modeling.robot import Robot
 
-Inertia = tuple[float, float, float, float, float, float]
 _NOTHING: Final[Coordinates] = (0.0, 0.0, 0.0)
-_POINT: Final[Inertia] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def joint_loads(
@@ -89,7 +88,7 @@ def joint_loads(
     moves = Chain(elements).sweep(variables, robot.values).moves
     ends = [0, *accumulate(len(link) for link in robot.link_elements)]
     bodies = [(ends[link.joint], link.mass, link.cog, link.inertia) for link in robot.masses]
-    bodies.append((len(elements), robot.payload.mass, robot.payload.cog, _POINT))
+    bodies.append((len(elements), robot.payload.mass, robot.payload.cog, POINT_MASS))
     bodies = [(end, mass, cog, inertia) for end, mass, cog, inertia in bodies if mass or any(inertia)]
     moving = velocity is not None or acceleration is not None
     rest = np.zeros((count, 1))

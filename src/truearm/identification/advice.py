@@ -89,7 +89,7 @@ def check_fit(fit: Fit) -> list[Notice]:
             Notice(
                 "urdf-partial",
                 f"calibrated.urdf holds the geometry and the joint zeros; a URDF cannot hold: {effects} "
-                f"({", ".join(own[:6])}{", .." if len(own) > 6 else ""}), nor the base "
+                f"({', '.join(own[:6])}{', ..' if len(own) > 6 else ''}), nor the base "
                 "and the targets in the instrument's frame. calibrated.yaml holds everything.",
             )
         )

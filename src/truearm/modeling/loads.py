@@ -7,9 +7,9 @@ Robotics", equations 6.51 and 6.52), is its opposite.
 
 It is the recursive Newton-Euler method (Luh, Walker and Paul 1980, "On-line computational scheme for mechanical
 manipulators"), element by element of the chain and for all configurations together. Forward goes what each frame
-feels: free fall, which is gravity less the acceleration of the frame's origin, and in motion how it spins; with it each
-body's wrench. Backward go force and moment, summed, about the origin and in the axes of the frame at hand. At rest
-three vectors are carried and no frame of the base.
+feels: free fall, which is gravity less the acceleration of the frame's origin, and in motion its angular velocity and
+acceleration; they give each body's wrench. Backward go force and moment, summed, about the origin and in the axes of
+the frame at hand. At rest that is one vector forward and two backward.
 """
 
 from __future__ import annotations
@@ -32,13 +32,12 @@ from truearm.modeling.chain import (
     seen_before,
     seen_behind,
 )
+from truearm.modeling.parts import POINT_MASS, Inertia
 
 if TYPE_CHECKING:
     from truearm.modeling.robot import Robot
 
-Inertia = tuple[float, float, float, float, float, float]
 _NOTHING: Final[Coordinates] = (0.0, 0.0, 0.0)
-_POINT: Final[Inertia] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def joint_loads(
@@ -91,15 +90,15 @@ def joint_loads(
     moves = Chain(elements).sweep(variables, robot.values).moves
     ends = [0, *accumulate(len(link) for link in robot.link_elements)]
     bodies = [(ends[link.joint], link.mass, link.cog, link.inertia) for link in robot.masses]
-    bodies.append((len(elements), robot.payload.mass, robot.payload.cog, _POINT))
+    bodies.append((len(elements), robot.payload.mass, robot.payload.cog, POINT_MASS))
     bodies = [(end, mass, cog, inertia) for end, mass, cog, inertia in bodies if mass or any(inertia)]
     moving = velocity is not None or acceleration is not None
     rest = np.zeros((count, 1))
-    rates = rest if velocity is None else velocity
-    gains = rest if acceleration is None else acceleration
+    qd = rest if velocity is None else velocity
+    qdd = rest if acceleration is None else acceleration
 
     fall: Coordinates = robot.gravity
-    spin = gain = force = moment = _NOTHING
+    omega = alpha = force = moment = _NOTHING
     if wrench is not None:
         force, moment = (wrench[0], wrench[1], wrench[2]), (wrench[3], wrench[4], wrench[5])
     applied: dict[int, list[tuple[Coordinates, Coordinates]]] = {}
@@ -107,26 +106,26 @@ def joint_loads(
         if move and element.turns:
             fall = seen_behind(fall, element, move)
             if moving:
-                spin, gain = seen_behind(spin, element, move), seen_behind(gain, element, move)
+                omega, alpha = seen_behind(omega, element, move), seen_behind(alpha, element, move)
             if wrench is not None:
                 force, moment = seen_behind(force, element, move), seen_behind(moment, element, move)
         elif move and moving:
-            fall = _less(fall, _swing(spin, gain, _scaled(axis_of(element), move[0])))
+            fall = _less(fall, _swing(omega, alpha, _scaled(axis_of(element), move[0])))
         if moving and element.variable is not None and element.variable < count:
-            rate = _scaled(axis_of(element), rates[element.variable])
-            own = _scaled(axis_of(element), gains[element.variable])
-            turned = cross(spin, rate)  # by Coriolis once for a turn, twice for a slide
+            rate = _scaled(axis_of(element), qd[element.variable])
+            surge = _scaled(axis_of(element), qdd[element.variable])
+            turned = cross(omega, rate)  # by Coriolis once for a turn, twice for a slide
             if element.turns:
-                gain, spin = _plus(_plus(gain, turned), own), _plus(spin, rate)
+                alpha, omega = _plus(_plus(alpha, turned), surge), _plus(omega, rate)
             else:
-                fall = _less(fall, _plus(_plus(turned, turned), own))
+                fall = _less(fall, _plus(_plus(turned, turned), surge))
         for end, mass, cog, inertia in bodies:
             if end == place:
-                felt = _less(fall, _swing(spin, gain, cog)) if moving else fall
+                felt = _less(fall, _swing(omega, alpha, cog)) if moving else fall
                 pull = _scaled(felt, mass)
                 turn = cross(cog, pull)
                 if moving and any(inertia):
-                    turn = _less(turn, _plus(_times(inertia, gain), cross(spin, _times(inertia, spin))))
+                    turn = _less(turn, _plus(_times(inertia, alpha), cross(omega, _times(inertia, omega))))
                 applied.setdefault(place, []).append((pull, turn))
 
     loads = np.empty((count, 6, size))
@@ -148,9 +147,9 @@ def joint_loads(
 # -- vectors whose entries are numbers or arrays -----------------------------------------------------------
 
 
-def _swing(spin: Coordinates, gain: Coordinates, arm: Coordinates) -> Coordinates:
+def _swing(omega: Coordinates, alpha: Coordinates, arm: Coordinates) -> Coordinates:
     """Return the acceleration of the end of an arm that turns about its other end [m/s^2]."""
-    return _plus(cross(gain, arm), cross(spin, cross(spin, arm)))
+    return _plus(cross(alpha, arm), cross(omega, cross(omega, arm)))
 
 
 def _times(inertia: Inertia, vector: Coordinates) -> Coordinates:

@@ -14,6 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
+import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints, model_validator
 
 from truearm.errors import InputError, nearest_names
@@ -21,7 +22,18 @@ from truearm.files import is_one_line, read_yaml
 from truearm.modeling.conventions import convention
 from truearm.modeling.effects import EFFECTS
 from truearm.modeling.parameters import Parameter
-from truearm.modeling.parts import GRAVITY, NO_PAYLOAD, Joint, LinkMass, Payload, Target, Tool, Truth
+from truearm.modeling.parts import (
+    GRAVITY,
+    NO_PAYLOAD,
+    POINT_MASS,
+    Inertia,
+    Joint,
+    LinkMass,
+    Payload,
+    Target,
+    Tool,
+    Truth,
+)
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 from truearm.units import SHOWN_AS, sized_si, to_si, written
@@ -42,7 +54,20 @@ def _unit_length(q: tuple[float, float, float, float]) -> tuple[float, float, fl
     return q
 
 
+def _of_a_body(inertia: Inertia) -> Inertia:
+    """Refuse moments that no mass distribution has: the largest principal one exceeds the sum of the others."""
+    xx, yy, zz, xy, xz, yz = inertia
+    small, middle, large = (float(v) for v in np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+    if small + middle < large * (1.0 - 1e-6):  # small < 0 included; files round a flat or thin body
+        raise ValueError(
+            f"no body has these moments of inertia (xx, yy, zz, xy, xz, yz): the principal ones are {small:.6g}, "
+            f"{middle:.6g} and {large:.6g} kg m^2, but none can be negative or exceed the sum of the two others"
+        )
+    return inertia
+
+
 Quaternion = Annotated[tuple[Number, Number, Number, Number], AfterValidator(_unit_length)]
+Moments = Annotated[tuple[Number, Number, Number, Number, Number, Number], AfterValidator(_of_a_body)]
 Name = Annotated[str, StringConstraints(pattern=f"^{NAME}$", strict=True)]
 
 
@@ -83,6 +108,7 @@ class _Mass(_Entry):
     link: Annotated[int, Field(strict=True)]
     mass: Mass
     cog: Triple
+    inertia: Moments = POINT_MASS
 
 
 class _Tool(_Entry):
@@ -217,7 +243,12 @@ def robot_from_file(content: RobotFile, where: str) -> Robot:
             metres(content.flange.translation, "flange.translation"), content.flange.quaternion or (1.0, 0.0, 0.0, 0.0)
         ),
         masses=tuple(
-            LinkMass(m.link, si(m.mass, "1", f"masses[{i}].mass"), metres(m.cog, f"masses[{i}].cog"))
+            LinkMass(
+                m.link,
+                si(m.mass, "1", f"masses[{i}].mass"),
+                metres(m.cog, f"masses[{i}].cog"),
+                _inertia(m.inertia, f"{where}, masses[{i}].inertia"),
+            )
             for i, m in enumerate(content.masses, 1)
         ),
         payload=NO_PAYLOAD
@@ -340,6 +371,11 @@ def _vector(name: str, value: object, unit: str, where: str, *, direction: bool)
     return {f"{name}_{a}": sized_si(v, unit, where) for a, v in zip("xyz", numbers, strict=True)}
 
 
+def _inertia(moments: Inertia, where: str) -> Inertia:
+    xx, yy, zz, xy, xz, yz = (sized_si(v, "1", where) for v in moments)
+    return xx, yy, zz, xy, xz, yz
+
+
 def _number(value: object, where: str) -> float:
     try:
         if not isinstance(value, bool) and isinstance(value, int | float) and math.isfinite(value):
@@ -406,7 +442,13 @@ def robot_text(robot: Robot) -> str:
             "quaternion": listed(list(robot.flange.quaternion)),
         }
     if robot.masses:
-        content["masses"] = [flow({"link": m.joint, "mass": m.mass, "cog": mm(m.cog)}) for m in robot.masses]
+        content["masses"] = [
+            flow(
+                {"link": m.joint, "mass": m.mass, "cog": mm(m.cog)}
+                | ({"inertia": listed(list(m.inertia))} if any(m.inertia) else {})
+            )
+            for m in robot.masses
+        ]
     if robot.payload != NO_PAYLOAD:
         content["payload"] = flow({"mass": robot.payload.mass, "cog": mm(robot.payload.cog)})
     if robot.gravity != GRAVITY:

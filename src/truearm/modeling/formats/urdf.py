@@ -145,7 +145,7 @@ def urdf_text(robot: Robot) -> tuple[str, list[str]]:
     if any(joint.limits for joint in robot.joints):
         left_out.append("Effort and velocity limits are not known and stand as 0.")
     if robot.masses:
-        left_out.append("Inertia tensors are not known and stand as 0.")
+        left_out.append("Inertia tensors are not written and stand as 0.")
     return "\n".join([*lines, "</robot>", ""]), left_out
 
 

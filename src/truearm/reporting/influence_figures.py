@@ -23,8 +23,8 @@ def influence_figure(influence: Influence) -> Figure:
         "error_y": {
             "type": "data",
             "symmetric": False,
-            "array": rounded(greatest - mean, 4),
-            "arrayminus": rounded(mean - least, 4),
+            "array": rounded(np.maximum(greatest - mean, 0.0), 4),
+            "arrayminus": rounded(np.maximum(mean - least, 0.0), 4),
             "thickness": 1.2,
             "width": 4,
         },

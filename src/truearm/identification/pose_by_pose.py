@@ -7,14 +7,15 @@ was measured:
 - minimum norm (equation 3.6): the smallest step that does it, ``J^T (J J^T)^-1 dP``. "Smallest" depends on the units
   in which parameters are counted; they are rad and mm, as in the document, so lengths hardly move.
 - influence-based (equations 3.7 and 3.8): that step times C < 1, each parameter then times its share in the influence
-  vector k, and again from where that leads. What is left of dP shrinks each time by a factor of at most 1 - C min(k).
-  All steps lie in the span of ``diag(k) J^T``, so for small errors the set ends where ``dE^T diag(k)^-1 dE`` is
-  smallest, whatever C is.
+  vector k, and again from where that leads. It converges, because ``J diag(k) J^T (J J^T)^-1`` has eigenvalues between
+  min(k) and 1. All steps lie in the span of ``diag(k) J^T``, so for small errors the set ends where
+  ``dE^T diag(k)^-1 dE`` is smallest, whatever C is.
 
 Each set explains its own pose only: of what is wrong with the robot it holds the three combinations that this pose
 sees. The document does not say how "a set of kinematics parameters is calculated that best fit the accuracy to all
-measured poses" from them; see :data:`Combination`. The linear combination of the sets that fits best is least squares
-over all poses itself, and going through the poses again from their mean, again and again, comes closer to it.
+measured poses" from them; see :data:`Combination`. With more poses than parameters the linear combination of the sets
+that fits best is least squares over all poses itself, and going through the poses again from their mean, again and
+again, comes closer to it.
 
 Base and targets are held where the robot has them, unless their parameters are named: this is for readings taken in
 a known frame.
@@ -31,7 +32,7 @@ from numpy.typing import NDArray
 
 from truearm.errors import InputError
 from truearm.identification.influence import influence, sizes_of
-from truearm.identification.problem import Problem, check_solvable
+from truearm.identification.problem import Problem
 from truearm.identification.solver import solve
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
@@ -162,7 +163,6 @@ def least_squares(robot: Robot, data: Dataset, names: Sequence[str], target: str
     parameters = (robot.parameters[name] for name in names)
     free = FreeParameters(tuple(p.restarted(p.value) for p in parameters))
     problem = Problem(robot, poses.data, free, {"position": TOLERANCE})
-    check_solvable(problem)
     return _with_set(robot, names, solve(problem).vector, "least squares over all poses")
 
 
@@ -259,16 +259,12 @@ def _result(
 def _combined(poses: _Poses, start: Array, sets: Array, combination: Combination) -> Array:
     if combination == "best-pose":
         return np.asarray(sets[np.argmin(poses.mean_errors(sets))])
-    mean = sets.mean(axis=0)
-    if combination == "mean":
-        return np.asarray(mean)
-    along, scale = mean - start, 1.0
-    for _ in range(5):  # nearly linear in the scale
-        error, J = poses.at(np.tile(start + scale * along, (len(sets), 1)))
-        moved = J @ along
-        if not moved.any():
-            break
-        scale += float(np.sum(moved * error) / np.sum(moved**2))
+    along, scale = (sets - start).mean(axis=0), 1.0
+    if combination == "scaled-mean" and along.any():
+        for _ in range(5):  # nearly linear in the scale
+            error, J = poses.at(np.tile(start + scale * along, (len(sets), 1)))
+            moved = J @ along
+            scale += float(np.sum(moved * error) / np.sum(moved**2))
     return np.asarray(start + scale * along)
 
 

@@ -39,6 +39,16 @@ def by_influence(robot: Robot, data: Dataset, **options: Any) -> PoseByPose:
 BOTH = pytest.mark.parametrize("method", [standard, by_influence])
 
 
+def tilting(robot: Robot) -> Robot:
+    """Return the robot with tables 4.3 and 4.4 and a softness of 1e-4 rad/(N m)."""
+    tilt, gap = (0.022, 0.024, 0.017, 0.015, 0.018), (0.063, 0.061, 0.057, 0.046, 0.051)
+    effects = robot.with_effects(["compliance", "clearance", "backlash"])
+    known = {f"compliance_{i}": 1e-4 for i in range(1, 6)}
+    known |= {f"clearance_{i}": math.radians(a) for i, a in enumerate(tilt, 1)}
+    known |= {f"backlash_{i}": math.radians(a) / 2 for i, a in enumerate(gap, 1)}
+    return effects.with_values(known)
+
+
 def with_set(robot: Robot, vector: Array) -> Robot:
     return robot.with_values(dict(zip(NAMES, vector, strict=True)))
 
@@ -66,7 +76,7 @@ def test_each_set_explains_its_own_pose(method: Method) -> None:
 @BOTH
 def test_poses_together_are_what_each_pose_gives_alone(method: Method) -> None:
     """The poses are one trial with other values at each configuration, through joint effects too."""
-    robot = katana().with_effects(["gain"]).with_values({"gain_2": 1.001, "gain_4": 0.999})
+    robot = tilting(katana())
     data = readings(drawn(1.0, 2), 8, NOISE, 2)
     together = method(robot, data)
     for pose in range(8):
@@ -195,14 +205,30 @@ def test_again_from_the_mean_comes_closer(method: Method) -> None:
 
 @BOTH
 def test_what_is_not_named_is_held_at_what_is_known(method: Method) -> None:
-    """Known joint effects are compensated by starting from a robot that has them."""
-    gains = {"gain_2": 1.002, "gain_3": 0.999}
-    data = readings(katana().with_effects(["gain"]).with_values(gains), 10, 0.0, 1)
-    compensated = method(katana().with_effects(["gain"]).with_values(gains), data, combination="scaled-mean")
+    """Tilting is compensated by starting from a robot that has it."""
+    known = tilting(katana())
+    q = known.random_configurations(10, np.random.default_rng(1))
+    data = replace(readings(katana(), 10, 0.0, 1), joints=q, position=known.poses(q, "tip")[0])
+    compensated = method(known, data, combination="scaled-mean")
     assert (compensated.iterations == 0).all()
     np.testing.assert_array_equal(values(compensated.robot), values(katana()))
-    assert compensated.robot.values["gain_2"] == 1.002
+    assert compensated.robot.values["clearance_2"] == known.values["clearance_2"] != 0.0
     assert (method(katana(), data).iterations > 0).all()
+
+
+@BOTH
+def test_geometry_is_found_beneath_known_tilting(method: Method) -> None:
+    true = tilting(drawn(1.0, 3))
+    rng = np.random.default_rng(3)
+    q, unseen = true.random_configurations(60, rng), true.random_configurations(60, rng)
+    data = replace(readings(katana(), 60, 0.0, 1), joints=q, position=true.poses(q, "tip")[0])
+    judged = replace(data, joints=unseen, position=true.poses(unseen, "tip")[0])
+    starts = katana(), tilting(katana())
+    without, compensated = (mean_error(method(r, data, combination="scaled-mean").robot, judged) for r in starts)
+    assert compensated < without
+    without, compensated = (mean_error(least_squares(r, data, NAMES, "tip"), judged) for r in starts)
+    assert compensated < 1e-6
+    assert without > 3e-4
 
 
 def test_only_positions_of_the_target_count() -> None:

@@ -16,6 +16,7 @@ import numpy as np
 
 from truearm.errors import InputError, nearest_names
 from truearm.modeling.chain import Array
+from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
 
 #: +0.05 deg and +0.1 mm, by SI unit (Patel, section 3.5).
@@ -78,7 +79,7 @@ class Influence:
 
 def influence(
     robot: Robot,
-    q: Array,
+    q: Array | Postures,
     names: Sequence[str],
     target: str | None,
     perturbations: Mapping[str, float] | None = None,
@@ -88,9 +89,9 @@ def influence(
     Parameters
     ----------
     robot
-        Perturbed about its current parameter values, with its joint effects.
+        Perturbed about its current parameter values, with its joint effects; the loads are held.
     q
-        Joint readings, ``(n, joints)``, n at least 1.
+        Joint readings ``(n, joints)``, or postures, n at least 1.
     names
         Parameters of the robot.
     target
@@ -104,12 +105,12 @@ def influence(
         For parameters that the robot does not have, no configuration, or a perturbation that is no size.
     """
     perturbation = sizes_of(robot, names, PERTURBATION, perturbations or {}, "perturbation")
-    q = np.asarray(q, float)
-    if len(q) == 0:
+    at = robot.loaded(q)
+    if len(at) == 0:
         raise InputError("there is no configuration", where=robot.name, cure="Give at least one.")
     moved = np.diag(perturbation)[:, :, None]
     values = {**robot.values, **{n: robot.values[n] + steps for n, steps in zip(names, moved, strict=True)}}
-    apart = robot.sweep(q, target, values).position - robot.sweep(q, target).position[:, None, :]
+    apart = robot.sweep(at, target, values).position - robot.sweep(at, target).position[:, None, :]
     return Influence(tuple(names), perturbation, np.asarray(np.linalg.norm(apart, axis=0)))
 
 

@@ -25,6 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Final, Literal
 
 import numpy as np
@@ -37,6 +38,7 @@ from truearm.identification.solver import solve
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
 from truearm.modeling.parameters import FreeParameters
+from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
 
 #: ``mean`` of the sets; ``scaled-mean``: the mean step times the one number that fits all readings best, because
@@ -51,6 +53,7 @@ TOLERANCE: Final = 1e-5
 DAMPING: Final = 0.5
 
 _ITERATIONS: Final = 1000
+_LOADINGS: Final = 3  # a problem holds the loads of the robot that it starts from
 _RANK: Final = 1e-9  # of the largest singular value
 _BLOCK: Final = 9_000  # positions swept together
 
@@ -120,7 +123,7 @@ def minimum_norm(
         unit that is not above zero.
     """
     poses = _poses(robot, data, names, target, tolerance, units)
-    return _result(robot, poses, np.ones((len(poses.q), len(names))), tolerance, combination, "minimum norm")
+    return _result(robot, poses, np.ones((len(poses.postures), len(names))), tolerance, combination, "minimum norm")
 
 
 def influence_based(
@@ -149,7 +152,7 @@ def influence_based(
     if not 0.0 < damping <= 1.0:
         raise InputError("the damping coefficient C is out of range", came=damping, allowed="above 0, at most 1")
     poses = _poses(robot, data, names, target, tolerance, units)
-    k = influence(robot, poses.q, names, target, perturbations).vector
+    k = influence(robot, poses.postures, names, target, perturbations).vector
     return _result(robot, poses, damping * k.T, tolerance, combination, f"influence-based, C = {damping:g}")
 
 
@@ -160,10 +163,13 @@ def least_squares(robot: Robot, data: Dataset, names: Sequence[str], target: str
     :func:`minimum_norm`.
     """
     poses = _poses(robot, data, names, target, TOLERANCE, dict.fromkeys(names, 1.0))
-    parameters = (robot.parameters[name] for name in names)
-    free = FreeParameters(tuple(p.restarted(p.value) for p in parameters))
-    problem = Problem(robot, poses.data, free, {"position": TOLERANCE})
-    return _with_set(robot, names, solve(problem).vector, "least squares over all poses")
+    centres = [p.restarted(p.value) for p in (robot.parameters[name] for name in names)]
+    found = robot
+    for _ in range(_LOADINGS if any(effect.loaded for effect in robot.effects) else 1):
+        free = FreeParameters(tuple(replace(p, value=found.values[p.name]) for p in centres))
+        vector = solve(Problem(found, poses.data, free, {"position": TOLERANCE})).vector
+        found = robot.with_values(dict(zip(names, vector, strict=True)))
+    return _with_set(robot, names, vector, "least squares over all poses")
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,26 +182,26 @@ class _Poses:
     target: str
     unit: Array
 
-    @property
-    def q(self) -> Array:
-        """Joint readings, ``(n, joints)``."""
-        return self.data.joints[self.data.configuration]
+    @cached_property
+    def postures(self) -> Postures:
+        """How the arm stood at each reading, with the loads of `robot` at its own parameter values."""
+        return self.robot.loaded(self.data.postures.at(self.data.configuration))
 
-    def at(self, sets: Array) -> tuple[Array, Array]:
+    def compared(self, sets: Array) -> tuple[Array, Array]:
         """Return measured minus predicted positions ``(n, 3)`` [m] and Jacobians, each pose with its own of `sets`."""
         # One trial that has other values at every configuration: the chain broadcasts (1, n) as it does (trials, 1).
         values = {**self.robot.values, **dict(zip(self.names, sets.T[:, None, :], strict=True))}
-        sweep = self.robot.sweep(self.q, self.target, values)
-        J = self.robot.linear(sweep, self.q, self.names, values)[:, :, 0, :]
+        sweep = self.robot.sweep(self.postures, self.target, values)
+        J = self.robot.linear(sweep, self.postures, self.names, values)[:, :, 0, :]
         return self.data.position - sweep.position[:, 0, :].T, np.moveaxis(J, -1, 0).swapaxes(1, 2)
 
     def mean_errors(self, sets: Array) -> Array:
         """Return the mean position error over all poses with each of `sets` [m], ``(sets,)``."""
         means = np.empty(len(sets))
-        size = max(1, _BLOCK // len(self.q))
+        size = max(1, _BLOCK // len(self.postures))
         for block in (slice(first, first + size) for first in range(0, len(sets), size)):
             values = {**self.robot.values, **dict(zip(self.names, sets[block].T[:, :, None], strict=True))}
-            apart = self.robot.sweep(self.q, self.target, values).position - self.data.position.T[:, None, :]
+            apart = self.robot.sweep(self.postures, self.target, values).position - self.data.position.T[:, None, :]
             means[block] = np.linalg.norm(apart, axis=0).mean(axis=1)
         return means
 
@@ -240,17 +246,17 @@ def _result(
 ) -> PoseByPose:
     """Step at every pose, each parameter's step times its `factor`, ``(n, parameters)``, and combine."""
     start = np.array([robot.values[name] for name in poses.names])
-    sets = np.tile(start, (len(poses.q), 1))
+    sets = np.tile(start, (len(poses.postures), 1))
     iterations = np.zeros(len(sets), dtype=np.intp)
     for _ in range(_ITERATIONS):
-        error, J = poses.at(sets)
+        error, J = poses.compared(sets)
         unmet = np.linalg.norm(error, axis=1) >= tolerance
         if not unmet.any():
             break
         iterations += unmet
         smallest = poses.unit * (np.linalg.pinv(J * poses.unit, rcond=_RANK) @ error[:, :, None])[:, :, 0]
         sets = sets + np.where(unmet[:, None], factor * smallest, 0.0)
-    left = np.asarray(np.linalg.norm(poses.at(sets)[0], axis=1))
+    left = np.asarray(np.linalg.norm(poses.compared(sets)[0], axis=1))
     combined = _combined(poses, start, sets, combination)
     made = _with_set(robot, poses.names, combined, f"{len(sets)} poses one at a time, {method}, {combination}")
     return PoseByPose(made, poses.names, sets, iterations, left, left < tolerance)
@@ -262,7 +268,7 @@ def _combined(poses: _Poses, start: Array, sets: Array, combination: Combination
     along, scale = (sets - start).mean(axis=0), 1.0
     if combination == "scaled-mean" and along.any():
         for _ in range(5):  # nearly linear in the scale
-            error, J = poses.at(np.tile(start + scale * along, (len(sets), 1)))
+            error, J = poses.compared(np.tile(start + scale * along, (len(sets), 1)))
             moved = J @ along
             scale += float(np.sum(moved * error) / np.sum(moved**2))
     return np.asarray(start + scale * along)

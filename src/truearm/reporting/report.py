@@ -23,15 +23,8 @@ from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import Errors
 from truearm.modeling.chain import Array
 from truearm.notices import Notice
-from truearm.reporting.figures import (
-    AFTER,
-    BEFORE,
-    Figure,
-    correlation_map,
-    histogram,
-    residuals,
-    workspace,
-)
+from truearm.reporting.drawing import AFTER, BEFORE, Figure
+from truearm.reporting.figures import correlation_map, histogram, residuals, workspace
 from truearm.reporting.tables import (
     SpreadRow,
     noise_rows,

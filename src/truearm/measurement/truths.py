@@ -11,8 +11,9 @@ import numpy as np
 from truearm.errors import InputError, nearest_names
 from truearm.files import exists
 from truearm.measurement.twin import Twin
+from truearm.measurement.twin_joint import JointTruth
 from truearm.modeling.chain import Array
-from truearm.modeling.parts import Tool
+from truearm.modeling.parts import NO_PAYLOAD, Payload, Tool
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform, rotation_from_quaternion
 from truearm.robots import load_robot
@@ -51,7 +52,8 @@ def truth_twin(robot: Robot, truth: str, rng: np.random.Generator) -> Twin:
     if truth in robot.truths:
         published = robot.truths[truth]
         true = robot.with_values(published.values)
-        return Twin(_stationed(true, tool), published.compliance, payload=(tool.mass, tool.cog))
+        sprung = {number: JointTruth(compliance) for number, compliance in published.compliance.items()}
+        return Twin(_stationed(true, tool), sprung)
     if truth == "nominal":
         return Twin(_stationed(robot, tool))
     if truth == "random":
@@ -83,8 +85,12 @@ def truth_twin(robot: Robot, truth: str, rng: np.random.Generator) -> Twin:
 
 
 def _stationed(robot: Robot, tool: Tool) -> Robot:
-    """Return the robot with its base as it is, seen from the station, carrying the tool."""
+    """Return the robot with its base as it is, seen from the station, carrying the tool.
+
+    A payload that the robot has already includes the tool's mass.
+    """
     base, R = robot.base, rotation_from_quaternion(np.array(STATION.quaternion))
     moved: Array = R @ np.array(base.translation) + np.array(STATION.translation)
     placed = robot.with_frames(Transform.from_matrix(R @ base.rotation, moved), tool.targets)
-    return replace(placed, history=(*robot.history, "simulated truth"))
+    payload = Payload(tool.mass, tool.cog) if robot.payload == NO_PAYLOAD else robot.payload
+    return replace(placed, payload=payload, history=(*robot.history, "simulated truth"))

@@ -110,7 +110,6 @@ class Calibration:
         """Return the figures as ``--json`` prints them: errors in mm and mrad."""
         return {
             "status": self.status.value,
-            "model": {"name": self.fit.model.name, "effects": list(self.fit.model.effects)},
             "warnings": [{"code": n.code, "message": n.message} for n in self.warnings],
             "nominal": errors_summary(self.nominal),
             "train": errors_summary(self.train),
@@ -124,6 +123,7 @@ class Calibration:
             **self.summary(),
             "command": self.command,
             "history": self.history,
+            "model": {"name": self.fit.model.name, "effects": list(self.fit.model.effects)},
             "parameters": list(self._parameters()),
             **({} if self.selection is None else {"selection": selection_summary(self.selection)}),
         }

@@ -276,6 +276,9 @@ def measure(
         target=np.tile(np.arange(len(names)), n),
         position=position,
         sigma=np.full(n * len(names), noise) if noise > 0 else None,
+        approach=conditions.get("approach", directions(joints)),
+        temperature=conditions.get("temperature"),
+        wrench=conditions.get("wrench"),
     )
 
 

@@ -372,13 +372,6 @@ def test_noise_and_sigma() -> None:
 # -- refusals ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["compliance", "backlash", "clearance"])
-@pytest.mark.parametrize("value", [-1e-9, math.nan])
-def test_negative_amounts_are_refused(name: str, value: float) -> None:
-    with pytest.raises(InputError, match=f"no negative {name}.*0 or more"):
-        replace(JointTruth(), **{name: value})  # type: ignore[arg-type]
-
-
 def test_joints_that_are_not_there_are_refused() -> None:
     for number in (0, 3):
         with pytest.raises(InputError, match=rf"joint {number} of the twin of planar: the robot has no such.*1 to 2"):

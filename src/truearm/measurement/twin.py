@@ -107,7 +107,7 @@ class Twin:
             if not 1 <= number <= count:
                 raise InputError("the robot has no such joint", where=where, allowed=f"1 to {count}")
             link = self._cold[number - 1]
-            if truth.clearance and not (link.turns and link.generator[1, 0] == 1.0):
+            if (truth.clearance or truth.bearing) and not (link.turns and link.generator[1, 0] == 1.0):
                 raise InputError("only a joint that turns about its frame's z can tilt", where=where)
 
     def target_frames(self, reading: Array) -> Mapping[str, Array]:

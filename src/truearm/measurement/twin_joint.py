@@ -6,8 +6,6 @@ import math
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from truearm.errors import InputError
-
 #: Loads below this [N or N m] are rounding: no shaft leans on its housing for them.
 _NO_LOAD: Final = 1e-9
 
@@ -34,6 +32,8 @@ class JointTruth:
         How far the shaft can tilt in its housing from the middle [rad] (Patel, equation 4.11).
     gear
         Run-out of the gear: harmonic (1 for one sine a turn), amplitude [rad] and phase [rad] of each sine.
+    bearing
+        Tilt of the shaft per moment across the axis [rad/(N m)]: bearings that give way.
     hysteresis
         What the joint turns too far [rad] when its last move was forward, and too little when it was backward.
     growth
@@ -45,14 +45,10 @@ class JointTruth:
     cubic: float = 0.0
     backlash: float = 0.0
     clearance: float = 0.0
+    bearing: float = 0.0
     gear: tuple[tuple[int, float, float], ...] = ()
     hysteresis: float = 0.0
     growth: float = 0.0
-
-    def __post_init__(self) -> None:
-        for name in ("compliance", "backlash", "clearance"):
-            if not getattr(self, name) >= 0.0:
-                raise InputError(f"a joint has no negative {name}", came=getattr(self, name), allowed="0 or more")
 
     def turn(self, reading: float, approach: float, load: float) -> float:
         """Return what the joint turns, or slides, beyond its reading [rad or m].
@@ -78,13 +74,14 @@ class JointTruth:
         """
         sign_x, sign_y = _sign(x), _sign(y)
         if not (self.clearance and (sign_x or sign_y)):
-            return 0.0, 0.0
+            return self.bearing * x, self.bearing * y
         if contact == "exact":
             gamma = math.atan2(abs(x), abs(y))
         else:
             gamma = math.pi / 2 * abs(x) / (abs(x) + abs(y))
         across, along = math.tan(self.clearance) * math.sin(gamma), math.tan(self.clearance) * math.cos(gamma)
-        return sign_x * across / math.hypot(1.0, across), sign_y * along / math.hypot(1.0, along)
+        laid_x, laid_y = sign_x * across / math.hypot(1.0, across), sign_y * along / math.hypot(1.0, along)
+        return laid_x + self.bearing * x, laid_y + self.bearing * y
 
 
 #: Follows its reading and nothing else.

@@ -57,7 +57,7 @@ def joint_loads(
     Parameters
     ----------
     variables
-        True joint variables [rad or m], ``(joints, n)``; rows beyond the joints are at rest.
+        Variables of the trunk [rad or m], ``(joints or more, n)``; those beyond the joints are at rest.
     velocity, acceleration
         Of the joints, ``(joints, n)`` [rad/s and rad/s^2, or m/s and m/s^2]; zero if None.
     wrench
@@ -86,9 +86,9 @@ def joint_loads(
                 came=f"an array of shape {np.shape(given)}",
                 allowed=f"({rows}, {size}): one column for each configuration",
             )
-    elements = (*chain.from_iterable(robot.link_elements), *robot.flange_elements)
+    elements = (*chain.from_iterable(robot.moved_links), *robot.flange_elements)
     moves = Chain(elements).sweep(variables, robot.values).moves
-    ends = [0, *accumulate(len(link) for link in robot.link_elements)]
+    ends = [0, *accumulate(len(link) for link in robot.moved_links)]
     bodies = [(ends[link.joint], link.mass, link.cog, link.inertia) for link in robot.masses]
     bodies.append((len(elements), robot.payload.mass, robot.payload.cog, POINT_MASS))
     bodies = [(end, mass, cog, inertia) for end, mass, cog, inertia in bodies if mass or any(inertia)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Final
@@ -119,22 +119,28 @@ class Robot:
     @cached_property
     def trunk(self) -> Chain:
         """The chain from the world to the flange, with what joint effects tilt and stretch."""
-        return Chain((*self.base_elements, *self._moved_links(), *self.flange_elements))
+        links = (element for link in self.moved_links for element in link)
+        return Chain((*self.base_elements, *links, *self.flange_elements))
 
-    def _moved_links(self) -> Iterator[Element]:
+    @cached_property
+    def moved_links(self) -> tuple[tuple[Element, ...], ...]:
+        """The way along each link, as :attr:`link_elements`, with what joint effects tilt and stretch."""
         tilts = any(effect.tilts for effect in self.effects)
         stretches = any(effect.stretches for effect in self.effects)
-        slide = 0
-        for joint, elements in enumerate(self.link_elements):
-            for element in elements:
-                if _has_length(element):
-                    yield replace(element, variable=self.layout.length(slide)) if stretches else element
-                    slide += 1
-                    continue
-                yield element
-                if element.variable is not None and tilts:
-                    for axis, variable in zip(across(element), self.layout.tilt(joint), strict=True):
-                        yield Element("R", axis=axis, variable=variable)
+        slides = iter(range(len(self.layout.lengths)))
+
+        def moved(joint: int, element: Element) -> tuple[Element, ...]:
+            if stretches and _has_length(element):
+                return (replace(element, variable=self.layout.length(next(slides))),)
+            if tilts and element.variable is not None:
+                across_it = zip(across(element), self.layout.tilt(joint), strict=True)
+                return (element, *(Element("R", axis=axis, variable=variable) for axis, variable in across_it))
+            return (element,)
+
+        return tuple(
+            tuple(part for element in link for part in moved(joint, element))
+            for joint, link in enumerate(self.link_elements)
+        )
 
     @cached_property
     def layout(self) -> Layout:
@@ -291,12 +297,12 @@ class Robot:
             "acceleration": None if at.acceleration is None else at.acceleration.T,
             "wrench": None if at.wrench is None else at.wrench.T,
         }
-        variables = np.ascontiguousarray(at.joints.T)
+        variables = self._rows({}, np.ascontiguousarray(at.joints.T))
         for _ in range(_ROUNDS):
             loads = joint_loads(self, variables, **rates)
             at = replace(at, loads=loads)
-            before, variables = variables, self.variables(at, self.values)[: len(self.joints)]
-            if variables.size == 0 or float(np.abs(variables - before).max()) < _SETTLED:
+            before, variables = variables, self.variables(at, self.values)
+            if np.abs(variables - before).max(initial=0.0) < _SETTLED:
                 break
         return at
 

@@ -39,12 +39,14 @@ from truearm.modeling.transform import Transform
 from truearm.units import SHOWN_AS, sized_si, to_si, written
 
 SCHEMA = "truearm-robot/1"
+#: Groups of parameters that cannot be negative. An identified value may come out so; what somebody states may not.
+_POSITIVE: Final = ("compliance", "bearing-compliance", "backlash", "clearance", "clearance-linear-contact")
 #: What a robot and a joint may be called.
 NAME: Final = r"[A-Za-z0-9][A-Za-z0-9_.-]*"
 
 Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=True)]
-Mass = Annotated[float, Field(ge=0, allow_inf_nan=False, strict=True)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False, strict=True)]
 Triple = tuple[Number, Number, Number]
 
 
@@ -106,19 +108,19 @@ class _Place(_Entry):
 
 class _Mass(_Entry):
     link: Annotated[int, Field(strict=True)]
-    mass: Mass
+    mass: NotNegative
     cog: Triple
     inertia: Moments = POINT_MASS
 
 
 class _Tool(_Entry):
     targets: dict[TargetName, Triple]
-    mass: Mass = 0.0
+    mass: NotNegative = 0.0
     cog: Triple = (0.0, 0.0, 0.0)
 
 
 class _Payload(_Entry):
-    mass: Mass
+    mass: NotNegative
     cog: Triple = (0.0, 0.0, 0.0)
 
 
@@ -131,7 +133,7 @@ def _falls(gravity: tuple[float, float, float]) -> tuple[float, float, float]:
 class _Truth(_Entry):
     source: str
     values: dict[str, Number]
-    compliance: dict[Annotated[int, Field(strict=True)], Number] = {}
+    compliance: dict[Annotated[int, Field(strict=True)], NotNegative] = {}
 
 
 class _Target(_Entry):
@@ -301,6 +303,13 @@ def robot_from_file(content: RobotFile, where: str) -> Robot:
         place = f"parameters.{name}"
         plain = known(name, "parameters")
         unit = shown[plain.unit]
+        if plain.group in _POSITIVE and entry.nominal < 0.0:
+            raise InputError(
+                "no joint has a negative one",
+                where=f"{where}, {place}.nominal",
+                came=f"{entry.nominal:g} {unit}",
+                allowed="0 or more",
+            )
         if entry.unit != unit:
             raise InputError(
                 "the unit differs from the file's", where=f"{where}, {place}", came=entry.unit, allowed=unit

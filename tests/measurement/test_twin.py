@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import ast
 import math
 from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 from truearm.errors import InputError
+from truearm.measurement import inclinometer, twin_body, twin_joint
+from truearm.measurement import twin as twin_module
 from truearm.measurement.truths import truth_twin
 from truearm.measurement.twin import Posture, Twin, directions, measure
 from truearm.measurement.twin_joint import Contact, JointTruth
@@ -150,6 +155,14 @@ def test_axes_of_a_joint_in_any_direction() -> None:
         assert load[[2, 5]] == pytest.approx([force @ axis, moment @ axis], abs=1e-13)
         assert np.linalg.norm(load[:3]) == pytest.approx(np.linalg.norm(force))
         assert load[:3] @ load[3:] == pytest.approx(force @ moment)  # neither mirrored nor mixed
+
+
+@pytest.mark.parametrize("module", [twin_module, twin_body, twin_joint, inclinometer])
+def test_the_twin_goes_a_way_of_its_own(module: ModuleType) -> None:
+    assert module.__file__ is not None
+    imports = [n for n in ast.walk(ast.parse(Path(module.__file__).read_text())) if isinstance(n, ast.ImportFrom)]
+    names = {alias.name for n in imports if n.module and n.module.startswith("truearm.modeling") for alias in n.names}
+    assert names <= {"Array", "Element", "LinkMass", "Robot"}
 
 
 # -- deflection about the axis --------------------------------------------------------------------------------

@@ -285,6 +285,7 @@ class Chain:
 
 #: The two axes that a turn about axis k turns, the first towards the second.
 _TURNED: Final = ((1, 2), (2, 0), (0, 1))
+_TURNS: Final[tuple[Motion, Motion, Motion]] = ("Rx", "Ry", "Rz")
 _UNITS: Final[tuple[Direction, Direction, Direction]] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
@@ -377,6 +378,13 @@ def across(element: Element) -> tuple[Direction, Direction]:
     s = 1.0 if z > -0.9 else -1.0
     a = -1.0 / (s + z)
     return (1.0 + s * a * x * x, s * a * x * y, -s * x), (a * x * y, s + a * y * y, -y)
+
+
+def turn_about(axis: Direction, variable: int) -> Element:
+    """Return the element that turns by a variable alone about a unit vector in the moving frame."""
+    if axis in _UNITS:
+        return Element(_TURNS[_UNITS.index(axis)], variable=variable)
+    return Element("R", axis=axis, variable=variable)
 
 
 def _axis(element: Element, axes: Axes) -> Array:

@@ -35,6 +35,7 @@ _CANDIDATES: Final = (
     "clearance",
     "fourier",
     "approach",
+    "warm-up",
     "thermal-growth",
 )
 
@@ -164,7 +165,7 @@ def _open(effects: tuple[str, ...], data: Dataset) -> list[str]:
         name
         for name in _CANDIDATES
         if name not in effects
-        and not (kinds[name].ordered and data.approach is None)
+        and not (kinds[name].ordered and (data.approach is None or data.number is None))
         and not (kinds[name].warmed and data.temperature is None)
     ]
 

@@ -14,6 +14,7 @@ from truearm.modeling.effects.fourier import Fourier
 from truearm.modeling.effects.gain import Gain
 from truearm.modeling.effects.hardening import Hardening
 from truearm.modeling.effects.thermal import ThermalGrowth
+from truearm.modeling.effects.warm_up import WarmUp
 
 EFFECTS: Final[tuple[type[Effect], ...]] = (
     Gain,
@@ -26,6 +27,7 @@ EFFECTS: Final[tuple[type[Effect], ...]] = (
     LinearContactClearance,
     Approach,
     ThermalGrowth,
+    WarmUp,
 )
 
 __all__ = ["EFFECTS", "Effect", "Gain", "Layout"]

@@ -22,6 +22,7 @@ Group = Literal[
     # of joint effects, by their names
     "gain",
     "fourier",
+    "transmission-error",
     "compliance",
     "hardening",
     "backlash",

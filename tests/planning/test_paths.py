@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -71,7 +72,7 @@ def test_length_of_hermite_sections_against_quadrature() -> None:
     path = Hermite(WAYPOINTS, VELOCITIES, knots)
     whole = sum(
         quad(lambda u: float(np.linalg.norm(path.by_parameter(np.array([u]))[1])), a, b, epsabs=1e-13)[0]
-        for a, b in zip(knots, knots[1:], strict=False)
+        for a, b in pairwise(knots)
     )
     assert path.length == pytest.approx(whole, rel=1e-11)
 

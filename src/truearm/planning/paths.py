@@ -6,7 +6,6 @@ It knows nothing of time: :func:`truearm.planning.time_law.timed` adds that.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Final, Protocol
 
@@ -120,8 +119,8 @@ class Hermite:
     With ``h`` the length of a section in the parameter and ``x`` from 0 to 1 along it, the section from waypoint 0 to 1
     is ``(2x^3-3x^2+1) p0 + (x^3-2x^2+x) h v0 + (3x^2-2x^3) p1 + (x^3-x^2) h v1``.
 
-    Direction is continuous everywhere. Curvature is so within a section; at a waypoint only with the velocities that are
-    taken if none are given, those of the natural cubic spline.
+    Direction is continuous everywhere, curvature within a section. At a waypoint curvature jumps, unless no velocities
+    are given and those of the natural cubic spline are taken.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """When a point is where on its path: from rest to rest, at a stated speed, with continuous acceleration.
 
 The speed rises over a ramp of duration ``T`` as ``V (3x^2 - 2x^3)``, ``x = t / T``, is constant, and falls in the same
-way. The acceleration along the path is then ``6 V/T x (1 - x)``: continuous, zero at rest and at full speed, and at most
-``1.5 V / T``, which is the acceleration that the caller states. The documents state no law; this one is ours.
+way. The acceleration along the path is then ``6 V/T x (1 - x)``: continuous, zero at rest and at full speed, and at
+most ``1.5 V / T``, which is the acceleration that the caller states. The documents state no law; this one is ours.
 """
 
 from __future__ import annotations

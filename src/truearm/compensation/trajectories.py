@@ -1,9 +1,9 @@
 """Joint readings changed so that the calibrated robot keeps to the path that was meant (Patel, equation 5.22).
 
-The calibrated robot predicts where the tip will be with the readings of the nominal motion. What it is beside the path is
-turned into a change of the readings by the step of least norm, ``J^T (J J^T)^-1 (P_predicted - P_desired)``, which is
-subtracted (the document's text leaves the sign open; added, it would double the error), and the prediction is made
-again until the tip is where it shall be. The norm counts rad, and m for sliding joints.
+The calibrated robot predicts where the tip will be with the readings of the nominal motion. By how much it is beside
+the path is turned into a change of the readings by the step of least norm, ``J^T (J J^T)^-1 (P_predicted -
+P_desired)``. That is subtracted (the document does not say so; added, it would double the error), and the prediction is
+made again until the tip is where it shall be. The norm counts rad, and m for sliding joints.
 
 Readings are changed by fractions of a degree. The velocities and accelerations of the nominal motion are therefore kept
 for the moments that bend the arm in motion.

@@ -97,8 +97,8 @@ def joint_motion(
     Raises
     ------
     InputError
-        If the motion cannot begin, leaves the reach or the limits, or comes to a singular posture: with the place on the
-        path, the time, and the joint.
+        If the motion cannot begin, leaves the reach or the limits, or comes to a singular posture: with the place on
+        the path, the time, and the joint.
     """
     return _Follower(robot, trajectory, target, orientation, rotation).motion(seed)
 
@@ -160,7 +160,7 @@ class _Follower:
                 came=found.advice(0).rstrip("."),
                 cure=None if self._orientation == "free" else "A free orientation asks less of the arm.",
             )
-        return found.joints[0]
+        return np.asarray(found.joints[0])
 
     def _followed(self, start: Array) -> Array:
         """Return readings for every sample, or refuse the first one that has none."""
@@ -190,7 +190,7 @@ class _Follower:
                     came=f"{self._names[int(jump.argmax())]} by {math.degrees(jump.max()):.3g} deg",
                     cure="Take shorter steps in time. If it still jumps, move the path away from singular postures.",
                 )
-        return scaled * self._scale
+        return np.asarray(scaled * self._scale)
 
     def _solved(self, k: int, guess: Array, posture: Array) -> tuple[Array, Array] | None:
         """Return scaled readings for a sample, and the rows of its Jacobian; None if the steps do not end."""
@@ -252,7 +252,7 @@ class _Follower:
 
 def _checked(trajectory: Trajectory) -> Trajectory:
     count = len(trajectory.time)
-    if count == 0 or not (np.diff(trajectory.time) > 0).all():
+    if count == 0 or not (np.isfinite(trajectory.time).all() and (np.diff(trajectory.time) > 0).all()):
         raise InputError("times do not rise, or there are none", where="trajectory", came=f"{count} samples")
     for name in ("position", "velocity", "acceleration"):
         values = getattr(trajectory, name)

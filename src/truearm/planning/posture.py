@@ -1,9 +1,9 @@
 """Joint readings, velocities and accelerations that a motion of the tip asks for.
 
-A task is ``A(q) dq/dt = S t``: rows ``A = S J`` of the geometric Jacobian, chosen by a constant matrix ``S``, follow the
-tip's twist ``t``. An arm with as many joints as rows has no choice. An arm with more takes, of all readings that give
-the pose, those nearest to a reference posture ``q0``: it returns to the same readings when the tip returns, which steps
-of least norm (``J^T (J J^T)^-1``) alone do not. With multipliers ``l`` that is
+A task is ``A(q) dq/dt = S t``: rows ``A = S J`` of the geometric Jacobian, chosen by a constant matrix ``S``, follow
+the tip's twist ``t``. An arm with as many joints as rows has no choice. An arm with more takes, of all readings that
+give the pose, those nearest to a reference posture ``q0``: it returns to the same readings when the tip returns, which
+steps of least norm (``J^T (J J^T)^-1``) alone do not. With multipliers ``l`` that is
 
     q - q0 = A^T l
 
@@ -47,8 +47,8 @@ def chosen_rows(orientation: Orientation, rotation: Array, length: float) -> Arr
 def jacobian_rates(turning: Array, columns: Array) -> Array:
     """Return the derivative of a geometric Jacobian by every joint, which is linear in each argument.
 
-    With the Jacobian ``(n, 6, joints)`` for both it is the derivative itself; with the Jacobian's derivative by time for
-    one, and for the other, the sum is its derivative by time.
+    With the Jacobian ``(n, 6, joints)`` for both it is the derivative itself. With the Jacobian's derivative by time
+    once for the one and once for the other, the sum is its derivative by time.
 
     Returns
     -------

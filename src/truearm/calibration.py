@@ -20,8 +20,9 @@ from truearm.identification.advice import check_fit
 from truearm.identification.bounds import Bounds, read_bounds
 from truearm.identification.fit import Fit, Redundant, Status, identify, place
 from truearm.identification.losses import LOSSES, Loss
-from truearm.identification.models import MODELS
+from truearm.identification.models import MODELS, Model
 from truearm.identification.plausibility import check_against
+from truearm.identification.selection import AUTO, Selection, select
 from truearm.identification.settling import check_settling
 from truearm.measurement.checks import check_data
 from truearm.measurement.dataset import Dataset
@@ -29,6 +30,7 @@ from truearm.measurement.readers.canonical import read_csv
 from truearm.measurement.statistics import Errors, Spread, errors_of
 from truearm.measurement.table_motion import without_table_motion
 from truearm.modeling.formats.robot_file import robot_text
+from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.robots import load_robot, urdf_source
@@ -77,6 +79,8 @@ class Calibration:
         How to run it again.
     urdf
         The user's own URDF, if that is where the robot came from.
+    selection
+        How the model was chosen; None if it was named.
     """
 
     fit: Fit
@@ -90,6 +94,7 @@ class Calibration:
     command: str
     history: str
     urdf: bytes | None = None
+    selection: Selection | None = None
 
     @cached_property
     def robot(self) -> Robot:
@@ -118,7 +123,9 @@ class Calibration:
             **self.summary(),
             "command": self.command,
             "history": self.history,
+            "model": {"name": self.fit.model.name, "effects": list(self.fit.model.effects)},
             "parameters": list(self._parameters()),
+            **({} if self.selection is None else {"selection": selection_summary(self.selection)}),
         }
 
     def _parameters(self) -> Sequence[dict[str, Any]]:
@@ -164,6 +171,7 @@ class Calibration:
             warnings=self.warnings,
             command=self.command,
             history=self.history,
+            selection=self.selection,
         )
         files: dict[str, str | bytes] = {
             "calibrated.yaml": robot_text(self.robot),
@@ -186,6 +194,8 @@ def calibrate(
     loss: Loss = "linear",
     redundancy: Redundant = "prior",
     bounds: Bounds | str | Path | None = None,
+    payload: Payload | None = None,
+    gravity: tuple[float, float, float] | None = None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Calibration:
     """Calibrate a robot and judge it on configurations the fit has not seen.
@@ -197,8 +207,8 @@ def calibrate(
     data
         Readings, or a canonical CSV file.
     model
-        ``offsets`` (joint zeros), ``joints`` (zeros and gains) or ``geometric`` (every geometric parameter and the
-        joint zeros).
+        One of :data:`truearm.identification.models.MODELS` by name, or ``auto``: the joint effects that
+        cross-validation on the training part says the data can carry.
     train
         How many configurations to train on, drawn with `seed`; the rest is held out. None is 70 %; ``all`` holds
         nothing out.
@@ -210,6 +220,8 @@ def calibrate(
         ``prior`` or ``drop``, see :func:`truearm.identification.fit.identify`.
     bounds
         Limits of parameter values, or a bounds file.
+    payload, gravity
+        What the robot carried and how it was mounted, see :meth:`truearm.modeling.robot.Robot.carrying`.
     progress
         Called with a few words at each step.
 
@@ -219,7 +231,7 @@ def calibrate(
         For anything that cannot be used, with a message that says what to do.
     """
     urdf = None
-    chosen = _chosen(model, {m.name: m for m in MODELS}, "model")
+    named = _chosen(model, {m.name: m for m in MODELS} | {AUTO: None}, "model")
     _chosen(loss, {name: name for name in LOSSES}, "loss")
     _chosen(redundancy, {name: name for name in get_args(Redundant)}, "redundancy")
     words = ["truearm", "calibrate", str(robot) if isinstance(robot, str | Path) else "ROBOT"]
@@ -228,6 +240,7 @@ def calibrate(
         source = urdf_source(robot)
         urdf = None if source is None else read_bytes(source[0])
         robot = load_robot(robot)
+    robot = robot.carrying(payload, gravity)
     digest = ""
     if isinstance(data, str | Path):
         progress("reading the data")
@@ -252,6 +265,10 @@ def calibrate(
     data = without_table_motion(data)
     first = data.of_configurations(training)
     second = data.of_configurations(held_out) if len(held_out) else None
+    selection = None
+    if named is None:
+        selection = select(robot, first, loss=loss, redundancy=redundancy, bounds=bounds, seed=seed, progress=progress)
+    chosen: Model = named if selection is None else selection.model
     progress("placing the nominal robot")
     nominal = place(robot, first, loss)
     progress(f"identifying the {chosen.name} model on {count} configurations")
@@ -265,6 +282,9 @@ def calibrate(
     words += ["--loss", loss] if loss != "linear" else []
     words += ["--redundancy", redundancy] if redundancy != "prior" else []
     words += ["--bounds", bounds_file] if bounds is not None else []
+    if payload is not None:
+        words += ["--payload", ",".join([f"{payload.mass:g}kg", *(f"{v * 1e3:g}mm" for v in payload.cog)])]
+    words += ["--gravity", ",".join(f"{v:g}" for v in gravity)] if gravity is not None else []
     history = (
         f"calibrated by truearm {__version__}: model {chosen.name}, {count} of {n} configurations of"
         f" {Path(data.source).name}{digest}, seed {seed}, loss {loss}, redundancy {redundancy}"
@@ -286,6 +306,7 @@ def calibrate(
         command=shlex.join(words),
         history=history,
         urdf=urdf,
+        selection=selection,
     )
 
 
@@ -313,8 +334,23 @@ def check(data: Dataset | str | Path, robot: Robot | str | Path | None = None) -
     return (*check_data(data, suspects), *against)
 
 
-def validate(robot: Robot | str | Path, data: Dataset | str | Path) -> Errors:
+def validate(
+    robot: Robot | str | Path,
+    data: Dataset | str | Path,
+    *,
+    payload: Payload | None = None,
+    gravity: tuple[float, float, float] | None = None,
+) -> Errors:
     """Judge a calibrated robot on new data taken in the same frames.
+
+    Parameters
+    ----------
+    robot
+        A calibrated robot, or its file.
+    data
+        Readings, or a canonical CSV file.
+    payload, gravity
+        What the robot carried and how it was mounted this time, if that differs from the calibration.
 
     Raises
     ------
@@ -330,6 +366,13 @@ def validate(robot: Robot | str | Path, data: Dataset | str | Path) -> Errors:
             cure="Use the calibrated.yaml that 'truearm calibrate' wrote: it holds base and targets.",
         )
     check_joints(robot, data)
+    robot = robot.carrying(payload, gravity)
+    if data.temperature is None and any(effect.warmed for effect in robot.effects):
+        raise InputError(
+            "the robot was calibrated with its temperature, and the data do not say theirs",
+            where=data.source,
+            cure="Add the column temperature [degC].",
+        )
     for name in data.targets:
         robot.target(name)
     if not (data.has_position | data.has_orientation).any():
@@ -361,6 +404,24 @@ def check_joints(robot: Robot, data: Dataset) -> None:
                 where=f"{data.source}, column joint_{number}",
                 allowed=units[joint.kind],
             )
+
+
+def selection_summary(selection: Selection) -> dict[str, Any]:
+    """Return how a model was chosen, as JSON holds it: errors in mm."""
+    return {
+        "elastic_mm": selection.start * 1e3,
+        "attempts": [
+            {
+                "round": attempt.round,
+                "effect": attempt.effect,
+                "error_mm": attempt.error * 1e3,
+                "gain_mm": attempt.gain * 1e3,
+                "standard_error_mm": attempt.standard_error * 1e3,
+                "taken": attempt.taken,
+            }
+            for attempt in selection.attempts
+        ],
+    }
 
 
 def errors_summary(errors: Errors) -> dict[str, Any]:

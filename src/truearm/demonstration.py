@@ -17,6 +17,7 @@ from truearm.files import exists, read_bytes, read_yaml, write_files, write_new_
 from truearm.measurement.readers.canonical import csv_text
 from truearm.measurement.truths import truth_twin
 from truearm.measurement.twin import measure
+from truearm.measurement.twin_joint import PERFECT
 from truearm.modeling.formats.robot_file import RobotFile, robot_from_file
 from truearm.robots import load_robot
 
@@ -38,7 +39,9 @@ def demonstration(folder: Path, progress: Callable[[str], None] = lambda _: None
     rng = np.random.default_rng(20240)
     robot = load_robot("irb120")
     twin = truth_twin(robot, "tracker-triangular", rng)
-    twin = replace(twin, gear={2: (math.radians(0.006), 0.4), 3: (math.radians(0.006), 1.9)})
+    gears = {2: ((1, math.radians(0.006), 0.4),), 3: ((1, math.radians(0.006), 1.9),)}
+    geared = {number: replace(twin.joints.get(number, PERFECT), gear=gear) for number, gear in gears.items()}
+    twin = replace(twin, joints={**twin.joints, **geared})
     progress("measuring the twin with a simulated laser tracker")
     low, high = np.radians(_REGION)
     data = measure(twin, rng.uniform(low, high, (200, 6)), 0.03e-3, rng)

@@ -124,9 +124,12 @@ def _refusal(error: ValidationError, content: Any, schema: type[BaseModel], wher
     first = error.errors(include_url=False)[0]
     entry = ""
     for part in first["loc"]:  # items of a list count from 1, keys stand as they are
-        item = isinstance(content, list) and isinstance(part, int)
-        entry += f"[{part + 1}]" if item else f".{part}"  # type: ignore[operator]
-        content = content[part] if item else content.get(part) if isinstance(content, Mapping) else None
+        if isinstance(content, list) and isinstance(part, int):
+            entry += f"[{part + 1}]"
+            content = content[part] if part < len(content) else None  # of six numbers the fourth may be missing
+        else:
+            entry += f".{part}"
+            content = content.get(part) if isinstance(content, Mapping) else None
     entry = entry.lstrip(".")
     came: Any = first.get("input")
     if isinstance(came, dict | list):

@@ -16,20 +16,29 @@ from truearm.errors import InputError
 # How many of the unit make one SI unit (lengths, as divisors) or how much SI one unit is (angles, inch):
 # mm to m divides by 1000, which is correctly rounded, where multiplying by 0.001 is not.
 _PER_SI: Final = {"m": 1.0, "mm": 1e3, "um": 1e6}
-_SI_PER: Final = {"in": 0.0254, "rad": 1.0, "deg": math.pi / 180.0, "mrad": 1e-3, "1": 1.0}
+_SI_PER: Final = {
+    **{"in": 0.0254, "rad": 1.0, "deg": math.pi / 180.0, "mrad": 1e-3, "1": 1.0},
+    **{"mrad/(N m)": 1e-3, "mrad/(N m)^2": 1e-3, "mrad/(N m)^3": 1e-3, "um/N": 1e-6, "um/(m K)": 1e-6},
+    **dict.fromkeys(("kg", "N", "N m", "degC"), 1.0),
+}
 
 LENGTH_UNITS: Final = ("mm", "m", "um", "in")
 ANGLE_UNITS: Final = ("deg", "rad")
 SMALL_ANGLE_UNITS: Final = ("mrad", "rad", "deg")
 
 #: The unit in which a quantity of this SI unit is shown and written to files.
-SHOWN_AS: Final = {"m": "mm", "rad": "deg", "1": "1"}
+SHOWN_AS: Final = {
+    **{"m": "mm", "rad": "deg", "1": "1", "m/N": "um/N", "1/K": "um/(m K)"},
+    **{"rad/(N m)": "mrad/(N m)", "rad/(N m)^2": "mrad/(N m)^2", "rad/(N m)^3": "mrad/(N m)^3"},
+}
 
 
 #: No length or angle that is meant is larger, nor anything else in a file [m, rad, 1].
 _LARGEST: Final = 1e6
 #: Lowest and highest standard deviation that is meant, of an angle [rad] and of anything else [m, 1].
 _DEVIATION: Final = {True: (1e-9, 10.0), False: (1e-9, 1e3)}
+#: A compliance of a large robot is small in SI units, and its cubic term smaller.
+_RATE_DEVIATION: Final = (1e-24, 1.0)
 _NUMBER: Final = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 
 
@@ -39,14 +48,14 @@ def as_number(text: str) -> float | None:
 
 
 def to_si(value: float, unit: str) -> float:
-    """Convert one number from `unit` to metres or radians."""
+    """Convert one number from `unit` to SI units."""
     if unit in _PER_SI:
         return value / _PER_SI[unit]
     return value * _SI_PER[unit]
 
 
 def from_si(value: float, unit: str) -> float:
-    """Convert one number from metres or radians to `unit`."""
+    """Convert one number from SI units to `unit`."""
     if unit in _PER_SI:
         return value * _PER_SI[unit]
     return value / _SI_PER[unit]
@@ -55,7 +64,9 @@ def from_si(value: float, unit: str) -> float:
 @cache
 def believable(unit: str, *, deviation: bool = False) -> tuple[float, float]:
     """Return the lowest and highest number in `unit` that can be meant, as a value or as a standard deviation."""
-    low, high = _DEVIATION[unit in SMALL_ANGLE_UNITS] if deviation else (-_LARGEST, _LARGEST)
+    low, high = (-_LARGEST, _LARGEST)
+    if deviation:
+        low, high = _RATE_DEVIATION if "/" in unit else _DEVIATION[unit in SMALL_ANGLE_UNITS]
     return float(f"{from_si(low, unit):.9g}"), float(f"{from_si(high, unit):.9g}")
 
 

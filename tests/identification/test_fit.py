@@ -18,6 +18,7 @@ from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of
 from truearm.measurement.truths import truth_twin
 from truearm.modeling.chain import Array
+from truearm.modeling.parts import Payload
 from truearm.modeling.transform import Transform, quaternion_from_rotation, rotation_from_quaternion
 from truearm.robots import load_robot
 
@@ -29,7 +30,7 @@ GEOMETRIC = BY_NAME["geometric"]
 @pytest.mark.parametrize("with_orientation", [False, True])
 def test_the_jacobian_of_every_model_agrees_with_central_differences(model: Model, with_orientation: bool) -> None:
     rng = np.random.default_rng(4)
-    robot = model.prepared(load_robot("irb120"))
+    robot = model.prepared(load_robot("irb120").carrying(Payload(2.0, (0.05, 0.0, 0.1))))
     frame = Transform((0.1, 0.02, 0.15), (0.6, 0.0, 0.8, 0.0))
     robot = robot.with_frames(Transform((1.0, 0.2, -0.3), (0.5, 0.5, 0.5, 0.5)), {"1": frame, "2": (0.1, 0.1, 0.1)})
     free = model.free(robot)
@@ -48,16 +49,17 @@ def test_the_jacobian_of_every_model_agrees_with_central_differences(model: Mode
         np.repeat([0, 1], 7),
         rng.normal(size=(14, 3)),
         quaternion,
+        approach=rng.choice([-1.0, 1.0], (7, 6)),
     )
     problem = Problem(robot, data, free, {"position": 1.0, "orientation": 1.0})
-    x = free.start + 1e-2 * rng.normal(size=len(free.names))
+    size = np.minimum(free.prior, 1.0)
+    x = free.start + 1e-2 * size * rng.normal(size=len(free.names))
     _, J = problem.linearised(x)
-    h = 1e-6
     for i, name in enumerate(free.names):
         step = np.zeros(len(x))
-        step[i] = h
+        step[i] = h = 1e-4 * size[i]
         central = (problem.residual(x + step) - problem.residual(x - step)) / (2 * h)
-        np.testing.assert_allclose(J[:, i], central, atol=2e-8, err_msg=name)
+        np.testing.assert_allclose(J[:, i] * size[i], central * size[i], rtol=1e-6, atol=1e-10, err_msg=name)
 
 
 def test_intervals_contain_the_truth_as_often_as_they_say() -> None:

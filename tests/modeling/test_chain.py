@@ -107,9 +107,13 @@ def test_library_robot_agrees_with_pinocchio(robot_id: str, seed: int) -> None:
 # -- derivatives -----------------------------------------------------------------------------------------
 
 
-def random_robot(convention: Convention, effects: tuple[str, ...], rng: np.random.Generator) -> Robot:
+def random_robot(
+    convention: Convention,
+    effects: tuple[str, ...],
+    rng: np.random.Generator,
+    kinds: tuple[JointKind, ...] = ("revolute", "prismatic", "revolute", "revolute"),
+) -> Robot:
     """A robot with turning and sliding joints, every column of the convention given, and two targets."""
-    kinds: tuple[JointKind, ...] = ("revolute", "prismatic", "revolute", "revolute")
     joints = []
     for number, kind in enumerate(kinds, 1):
         units = convention.row_units(kind)

@@ -11,9 +11,9 @@ from scipy.linalg import expm
 from tests.modeling.test_chain import random_robot, random_unit
 
 from truearm.errors import InputError
-from truearm.modeling.chain import Array
+from truearm.modeling.chain import Array, Direction
 from truearm.modeling.conventions import CONVENTIONS, Convention, JointKind, convention, parallel_joints_without_beta
-from truearm.modeling.conventions.cpc import Direction, published_direction, rotation_to, small_rotations
+from truearm.modeling.conventions.cpc import published_direction, rotation_to, small_rotations
 from truearm.modeling.formats.robot_file import read_robot, robot_text
 from truearm.modeling.parts import Joint
 from truearm.modeling.robot import Robot

@@ -115,6 +115,22 @@ def changed(old: str, new: str) -> str:
             ["masses[1].mass", "greater than or equal to 0", "got -1"],
             id="mass < 0",
         ),
+        *(
+            pytest.param(
+                changed("cog: [140, 0, 0]", f"cog: [140, 0, 0], inertia: {moments}"),
+                ["masses[1].inertia", *parts],
+                id=f"inertia {moments}",
+            )
+            for moments, parts in (
+                ("[1, 2, 3.1, 0, 0, 0]", ["no body", "1, 2 and 3.1 kg m^2", "sum of the two"]),
+                ("[-1, 1, 1, 0, 0, 0]", ["no body", "-1, 1 and 1 kg m^2", "none can be negative"]),
+                ("[1, 1, 1, 1.5, 0, 0]", ["no body", "-0.5, 1 and 2.5 kg m^2", "xy, xz, yz"]),
+                ("[-1, -1, -1, 0, 0, 0]", ["no body", "none can be negative"]),
+                ("[1e99, 1e99, 1e99, 0, 0, 0]", ["too large"]),
+                ("[1, 1, .nan, 0, 0, 0]", ["finite", "got nan"]),
+                ("[1, 1, 1]", ["inertia[4]", "missing"]),
+            )
+        ),
         pytest.param(changed("link: 2", "link: '2'"), ["masses[1].link", "valid integer", "got '2'"], id="text link"),
         pytest.param(
             changed("link: 2", "link: 4"),
@@ -441,6 +457,23 @@ def test_urdf_like_robot_round_trips(tmp_path: Path) -> None:
     assert again.joints[1].limits == (-0.1, 0.1)
     q = np.array([[0.3, 0.05]])
     assert_allclose(again.poses(q)[0], robot.poses(q)[0], rtol=0, atol=1e-15)
+
+
+def test_inertia_round_trips(tmp_path: Path) -> None:
+    moments = (0.05, 0.0412345678901234, 0.07, -0.001, 0.0, 0.002)
+    robot = read(tmp_path, changed("cog: [140, 0, 0]", f"cog: [140, 0, 0], inertia: {list(moments)}"))
+    assert robot.masses[0].inertia == moments
+    text = robot_text(robot)
+    again = read(tmp_path, text)
+    assert again.masses == robot.masses
+    assert robot_text(again) == text
+    assert "inertia" not in robot_text(read(tmp_path, PLAIN))
+
+
+@pytest.mark.parametrize("moments", ["[0, 2, 2, 0, 0, 0]", "[0.333333, 0.666667, 1, 0, 0, 0]", "[0, 0, 0, 0, 0, 0]"])
+def test_inertia_of_thin_and_flat_bodies_is_read(moments: str, tmp_path: Path) -> None:
+    robot = read(tmp_path, changed("cog: [140, 0, 0]", f"cog: [140, 0, 0], inertia: {moments}"))
+    assert str(list(robot.masses[0].inertia)) == str([float(v) for v in moments.strip("[]").split(",")])
 
 
 def test_two_targets_of_one_name_are_refused(tmp_path: Path) -> None:

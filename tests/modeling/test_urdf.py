@@ -687,7 +687,7 @@ def test_new_file_says_what_it_does_not_know() -> None:
     text, left_out = urdf_text(load_robot("irb120"))
     assert left_out == [
         "Effort and velocity limits are not known and stand as 0.",
-        "Inertia tensors are not known and stand as 0.",
+        "Inertia tensors are not written and stand as 0.",
     ]
     assert '<axis xyz="0.0 0.0 1.0"/>' in text
     assert 'effort="0" velocity="0"' in text

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from truearm.cli.loading import GravityText, PayloadText, read_gravity, read_payload
 from truearm.cli.output import Json, error_line, print_json, progress
 from truearm.errors import InputError
 
@@ -19,7 +20,11 @@ def calibrate(
     data: Annotated[str, typer.Argument(metavar="DATA.csv", help="Measurements in the canonical CSV.")],
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the results.")],
     model: Annotated[
-        str, typer.Option(metavar="MODEL", help="offsets, joints (zeros and gains) or geometric.")
+        str,
+        typer.Option(
+            metavar="MODEL",
+            help="offsets, joints, geometric, elastic, tilting, full, or auto: the effects that the data can carry.",
+        ),
     ] = "geometric",
     train: Annotated[
         str | None,
@@ -33,6 +38,8 @@ def calibrate(
     bounds: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Limits of parameter values.", show_default=False)
     ] = None,
+    payload: PayloadText = None,
+    gravity: GravityText = None,
     json: Json = False,
 ) -> None:
     """Identify the real robot from measurements and judge it on configurations it has not seen.
@@ -59,6 +66,8 @@ def calibrate(
             loss=loss,  # type: ignore[arg-type]
             redundancy=redundancy,  # type: ignore[arg-type]
             bounds=bounds,
+            payload=read_payload(payload),
+            gravity=read_gravity(gravity),
             progress=say,
         )
         calibration.save(out, say)
@@ -83,6 +92,8 @@ def print_calibration(calibration: Calibration) -> None:
         typer.echo(f"Nothing was held out; on the {summary['train']['configurations']} training configurations:")
         typer.echo(f"  nominal     {error_line(summary['nominal'])}")
     typer.echo(f"  calibrated  {error_line(summary['train'])}")
+    if calibration.selection is not None:
+        typer.echo(f"Chosen model: {calibration.fit.model.summary}")
     typer.echo(f"Status: {summary['status']}. {calibration.status.advice}")
     for warning in summary["warnings"]:
         typer.echo(f"Warning ({warning['code']}): {warning['message']}")

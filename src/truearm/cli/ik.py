@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from truearm.cli.loading import GravityText, PayloadText, read_gravity, read_payload
 from truearm.cli.output import Json, print_json
 from truearm.errors import InputError
 
@@ -45,6 +46,8 @@ def ik(
     axis_only: Annotated[
         bool, typer.Option("--axis-only", help="Keep the z axis alone, free to turn about it.")
     ] = False,
+    payload: PayloadText = None,
+    gravity: GravityText = None,
     json: Json = False,
 ) -> None:
     """Find the joint readings that bring a robot to poses, with its calibration and joint effects."""
@@ -58,7 +61,8 @@ def ik(
     writable_folder(out.parent)
     if position_only and axis_only:
         raise InputError("only one of them can hold", where="--position-only, --axis-only", cure="Leave one out.")
-    loaded, wanted = load_robot(robot), read_poses(poses)
+    loaded = load_robot(robot).carrying(read_payload(payload), read_gravity(gravity))
+    wanted = read_poses(poses)
     if wanted.quaternion is None and not position_only:
         raise InputError(
             "the poses have no orientation",

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from truearm.cli.loading import GravityText, PayloadText, read_gravity, read_payload
+
 
 def simulate(
     robot: Annotated[str, typer.Argument(metavar="ROBOT", help="A library id, a robot file or a URDF.")],
@@ -20,8 +22,12 @@ def simulate(
     noise: Annotated[float, typer.Option(metavar="MM", min=0.0, help="Standard deviation per coordinate.")],
     out: Annotated[Path, typer.Option("--out", metavar="DATA.csv", help="File to write.")],
     seed: Annotated[int, typer.Option(metavar="S", min=0, help="Of configurations and noise.")] = 0,
+    payload: PayloadText = None,
+    gravity: GravityText = None,
 ) -> None:
     """Measure a digital twin whose truth is known, with a simulated tracker."""
+    from dataclasses import replace
+
     import numpy as np
 
     from truearm.cli.output import progress
@@ -38,6 +44,7 @@ def simulate(
     rng = np.random.default_rng(seed)
     nominal = load_robot(robot)
     twin = truth_twin(nominal, truth, rng)
+    twin = replace(twin, robot=twin.robot.carrying(read_payload(payload), read_gravity(gravity)))
     with progress() as say:
         say(f"measuring {poses} configurations")
         data = measure(twin, nominal.random_configurations(poses, rng), sigma, rng)

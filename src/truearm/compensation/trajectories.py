@@ -75,7 +75,7 @@ def path_error(robot: Robot, motion: JointMotion, desired: Array, target: str | 
     error
         Predicted less desired position, in the base frame, ``(n, 3)`` [m].
     """
-    return Tip(robot, target).positions(motion.configurations()) - _desired(motion, desired)
+    return Tip(robot, target).positions(motion.postures()) - _desired(motion, desired)
 
 
 def corrected(robot: Robot, motion: JointMotion, desired: Array, target: str | None = None) -> JointCorrection:
@@ -103,7 +103,7 @@ def corrected(robot: Robot, motion: JointMotion, desired: Array, target: str | N
     before = after = np.zeros(0)
     rounds = 0
     while True:
-        state = tip.at(motion.configurations(joints))
+        state = tip.at(motion.postures(joints))
         error = state.position - wanted
         distance = np.linalg.norm(error, axis=1)
         if rounds == 0:

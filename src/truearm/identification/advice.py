@@ -10,6 +10,8 @@ from truearm.notices import Notice
 
 #: Priors that a parameter may move before the robot, its units or its joint order are doubted.
 _FAR: Final = 6.0
+#: Standard deviations below zero from which a stiffness or a play is doubted.
+_NEGATIVE: Final = 4.0
 
 
 def check_fit(fit: Fit) -> list[Notice]:
@@ -59,7 +61,7 @@ def check_fit(fit: Fit) -> list[Notice]:
     far = [
         p.name
         for p in robot.parameters.values()
-        if p.group not in ("base", "target") and abs(p.value - p.nominal) > _FAR * p.prior
+        if p.group in ("joint zero", "geometry", "gain") and abs(p.value - p.nominal) > _FAR * p.prior
     ]
     if far:
         found.append(
@@ -79,14 +81,60 @@ def check_fit(fit: Fit) -> list[Notice]:
                 "deviations of the parameters are widened by that factor.",
             )
         )
+    found += _check_effects(fit)
     if fit.robot.effect_names:
-        gains = ", ".join(fit.robot.effect_names)
+        effects = ", ".join(fit.robot.effect_names)
+        own = [p.name for effect in robot.effects for p in effect.parameters]
         found.append(
             Notice(
                 "urdf-partial",
-                f"calibrated.urdf holds the geometry and the joint zeros; a URDF cannot hold: {gains} "
-                f"({', '.join(p.name for p in robot.parameters.values() if p.group == 'gain')}), nor the base "
+                f"calibrated.urdf holds the geometry and the joint zeros; a URDF cannot hold: {effects} "
+                f"({', '.join(own[:6])}{', ..' if len(own) > 6 else ''}), nor the base "
                 "and the targets in the instrument's frame. calibrated.yaml holds everything.",
+            )
+        )
+    return found
+
+
+def _check_effects(fit: Fit) -> list[Notice]:
+    """Say which joint effects the data know nothing about, and which came out as no spring can be."""
+    robot, found = fit.robot, []
+    effects = {p.name for effect in robot.effects for p in effect.parameters}
+    own = [name for name in fit.free.names if name in effects]
+    unknown = [name for name in own if fit.standing(name) == "uninformed"]
+    unknown += [r.dropped for r in fit.redundancies if r.dropped in effects]
+    masses = (robot.payload.mass, *(link.mass for link in robot.masses))
+    if any(effect.loaded for effect in robot.effects) and not any(masses):
+        found.append(
+            Notice(
+                "no-loads",
+                "The robot has no link masses and no payload, so nothing loads its joints and compliance cannot be "
+                "found. Give masses in the robot file, or --payload.",
+            )
+        )
+    elif unknown:
+        found.append(
+            Notice(
+                "effects-uninformed",
+                f"The data say nothing about {', '.join(unknown)}: nothing loads these joints that way (gravity does "
+                "not turn a vertical axis), or there are too few configurations for so many effects. They stay near "
+                "nothing.",
+            )
+        )
+    soft = [
+        p.name
+        for p in (robot.parameters[name] for name in own)
+        if p.group in ("compliance", "bearing-compliance", "backlash", "clearance")
+        and p.deviation is not None
+        and p.value < -_NEGATIVE * p.deviation
+        and fit.standing(p.name) == "identified"
+    ]
+    if soft:
+        found.append(
+            Notice(
+                "negative-effect",
+                f"{', '.join(soft)} came out negative, as no spring and no play is: masses, payload or gravity may be "
+                "wrong, or the parameter stands for something else that the model lacks.",
             )
         )
     return found

@@ -20,9 +20,9 @@ class Model:
     summary
         What it frees, in words.
     groups
-        Parameter groups that are free besides base and targets.
+        Parameter groups that are free besides base, targets and the effects' own.
     effects
-        Joint effects that are added.
+        Joint effects that are added and free.
     """
 
     name: str
@@ -37,13 +37,28 @@ class Model:
 
     def free(self, robot: Robot) -> FreeParameters:
         """Return the free parameters of a robot, base first, targets last."""
-        groups = ("base", "target", *self.groups)
+        groups = ("base", "target", *self.groups, *self.effects)
         return FreeParameters(tuple(p for p in robot.parameters.values() if p.group in groups))
 
+
+_LEVEL_2: Final[tuple[Group, ...]] = ("joint zero", "geometry")
 
 FRAMES: Final = Model("frames", "where the robot stands and where its targets are", ())
 MODELS: Final = (
     Model("offsets", "joint zeros", ("joint zero",)),
-    Model("joints", "joint zeros and gains (level 1)", ("joint zero", "gain"), ("gain",)),
-    Model("geometric", "every geometric parameter and the joint zeros (level 2)", ("joint zero", "geometry")),
+    Model("joints", "joint zeros and gains (level 1)", ("joint zero",), ("gain",)),
+    Model("geometric", "every geometric parameter and the joint zeros (level 2)", _LEVEL_2),
+    Model("elastic", "geometric, and linear compliance of the joints (level 3)", _LEVEL_2, ("compliance",)),
+    Model(
+        "tilting",
+        "elastic, and clearance tilt and backlash by the sign of the load",
+        _LEVEL_2,
+        ("compliance", "clearance", "backlash"),
+    ),
+    Model(
+        "full",
+        "geometric, and hardening compliance, Fourier series, backlash and approach direction of the joints",
+        _LEVEL_2,
+        ("compliance", "hardening", "fourier", "backlash", "approach"),
+    ),
 )

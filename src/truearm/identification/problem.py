@@ -18,6 +18,7 @@ from truearm.measurement.dataset import Dataset
 from truearm.measurement.observations import OBSERVATIONS, Observation
 from truearm.modeling.chain import Array, Sweep
 from truearm.modeling.parameters import FreeParameters
+from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
 
 
@@ -88,6 +89,11 @@ class Problem:
                     made.append(Block(observation, name, readings, slice(None) if everywhere else seen, sigma))
         return tuple(made)
 
+    @cached_property
+    def postures(self) -> Postures:
+        """The configurations, with the loads of `robot` at its own parameter values."""
+        return self.robot.loaded(self.data.postures)
+
     @property
     def readings(self) -> int:
         """Number of readings of three rows each."""
@@ -154,7 +160,7 @@ class Evaluation:
         for block, rows in self._rows():
             observation, sigma = block.observation, block.sigma[:, None]
             derivative = problem.robot.linear if observation.velocity == "linear" else problem.robot.angular
-            velocity = derivative(self._sweeps[block.target], problem.data.joints, names, self._values)
+            velocity = derivative(self._sweeps[block.target], problem.postures, names, self._values)
             moved = observation.jacobian(r[..., rows, :] * sigma, velocity[..., block.configurations])
             np.divide(moved, sigma, out=by_parameter[..., rows, :])
         return np.swapaxes(J.reshape(*J.shape[:-2], -1), -1, -2)
@@ -174,10 +180,34 @@ class Evaluation:
     def _sweeps(self) -> dict[str, Sweep]:
         """The sweep to each target; all go on from one to the flange."""
         robot = self.problem.robot
-        variables = robot.variables(self.problem.data.joints, self._values)
+        variables = robot.variables(self.problem.postures, self._values)
         trunk = robot.trunk.sweep(variables, self._values)
         names = dict.fromkeys(block.target for block in self.problem.blocks)
         return {name: robot.target(name).chain.sweep(variables, self._values, trunk) for name in names}
+
+
+def check_circumstances(robot: Robot, data: Dataset) -> None:
+    """Refuse joint effects that need to know what the data do not tell.
+
+    Raises
+    ------
+    InputError
+        Naming the effect and what is missing.
+    """
+    for effect in robot.effects:
+        if effect.ordered and data.approach is None:
+            raise InputError(
+                f"the effect {effect.name} needs the order in which the configurations were measured",
+                where=data.source,
+                came="configurations that are not numbered",
+                cure="Number the configurations 1, 2, 3 .. in the order of measurement, or choose another model.",
+            )
+        if effect.warmed and data.temperature is None:
+            raise InputError(
+                f"the effect {effect.name} needs the temperature of the arm",
+                where=data.source,
+                cure="Add the column temperature [degC], or choose another model.",
+            )
 
 
 def check_solvable(problem: Problem) -> None:

@@ -23,7 +23,7 @@ from truearm.modeling.chain import Array
 from truearm.modeling.parameters import FreeParameters, Parameter
 from truearm.modeling.robot import Robot
 
-_ORDER: Final = ("base", "target", "gain", "joint zero", "geometry")
+_ORDER: Final = ("base", "target", "", "joint zero", "geometry")  # "" is every joint effect
 _APART: Final = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)  # share of a column outside the span of the others
 _MEMBER: Final = 1e-9  # priors per prior below which a parameter takes no part in a combination
 _SHOWN: Final = 0.02
@@ -78,7 +78,11 @@ def find_redundancies(problem: Problem, vector: Array, held: Sequence[str] = ())
 
 
 def _in_order(free: FreeParameters) -> list[int]:
-    return sorted(range(len(free.parameters)), key=lambda i: _ORDER.index(free.parameters[i].group))
+    return sorted(range(len(free.parameters)), key=lambda i: _ORDER.index(_place(free.parameters[i].group)))
+
+
+def _place(group: str) -> str:
+    return group if group in _ORDER else ""
 
 
 def _independent(A: Array, among: Iterable[int], free: FreeParameters) -> list[int]:
@@ -159,7 +163,7 @@ def unseen_but_felt(robot: Robot, data: Dataset, free: FreeParameters, seed: int
     unseen = Vt[int((s > _UNSEEN * s[0]).sum()) :]
     if len(unseen) == 0:
         return ()
-    q = robot.random_configurations(40, np.random.default_rng(seed))
+    q = robot.loaded(robot.random_configurations(40, np.random.default_rng(seed)))
     felt = np.zeros((0, len(free.names)))
     for target in robot.targets:
         sweep = robot.sweep(q, target.name)

@@ -73,9 +73,9 @@ def settling(fit: Fit, data: Dataset) -> Settling | None:
 
 def _by_arrival(fit: Fit, data: Dataset, block: Block, arrived: Array) -> Array:
     """Return how the whitened readings of a block move with the lag of each joint, ``(joints, k, 3)``."""
-    sweep = fit.robot.sweep(data.joints, block.target)
+    sweep = fit.robot.sweep(data.postures, block.target)
     by_joint = sweep.linear if block.observation.velocity == "linear" else sweep.angular
-    velocity = (by_joint(fit.robot.moving) * arrived)[..., block.configurations]
+    velocity = (by_joint(fit.robot.moving[: len(fit.robot.joints)]) * arrived)[..., block.configurations]
     residual = block.observation.residual(sweep, data, block.readings)
     return np.asarray(block.observation.jacobian(residual, velocity) / block.sigma[:, None])
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.modeling.chain import Array
+from truearm.modeling.postures import Postures
 
 IntArray = NDArray[np.intp]
 
@@ -39,6 +40,14 @@ class Dataset:
         Declared standard deviation per coordinate [m], ``(readings,)``; None if the file declares none.
     sigma_rot
         Declared standard deviation per rotation axis [rad], ``(readings,)``; None if the file declares none.
+    approach
+        Sign of the last move of each joint, ``(configurations, joints)``: 1, -1, or 0 where it is not known; None if
+        the order of measurement is not known.
+    temperature
+        Of the arm [degC], ``(configurations,)``; None if it was not recorded.
+    wrench
+        External force [N] and moment [N m] on the flange, about its origin, in the axes of the base,
+        ``(configurations, 6)``; None without any.
     references
         Fixed points beside the robot that were measured along with the targets, with the same fields; None if
         there are none.
@@ -55,7 +64,15 @@ class Dataset:
     quaternion: Array | None = None
     sigma: Array | None = None
     sigma_rot: Array | None = None
+    approach: Array | None = None
+    temperature: Array | None = None
+    wrench: Array | None = None
     references: Dataset | None = None
+
+    @property
+    def postures(self) -> Postures:
+        """What the arm's shape depended on at each configuration."""
+        return Postures(self.joints, approach=self.approach, temperature=self.temperature, wrench=self.wrench)
 
     @property
     def configurations(self) -> int:
@@ -84,6 +101,9 @@ class Dataset:
         def part(values: Array | None) -> Array | None:
             return None if values is None else values[kept]
 
+        def of_each(values: Array | None) -> Array | None:
+            return None if values is None else values[indices]
+
         return replace(
             self,
             labels=tuple(self.labels[i] for i in indices),
@@ -94,5 +114,8 @@ class Dataset:
             quaternion=part(self.quaternion),
             sigma=part(self.sigma),
             sigma_rot=part(self.sigma_rot),
+            approach=of_each(self.approach),
+            temperature=of_each(self.temperature),
+            wrench=of_each(self.wrench),
             references=None if self.references is None else self.references.of_configurations(indices),
         )

@@ -91,11 +91,12 @@ def errors_of(robot: Robot, data: Dataset) -> Errors:
     position = np.full((len(data.target), 3), np.nan)
     orientation = np.full((len(data.target), 3), np.nan) if data.has_orientation.any() else None
     kinds = ((Position(), position), (Orientation(), orientation))
+    at = robot.loaded(data.postures)
     for index, name in enumerate(data.targets):
         mine = data.target == index
         if not mine.any():
             continue
-        sweep = robot.sweep(data.joints, name)
+        sweep = robot.sweep(at, name)
         is_point = robot.target(name).quaternion is None
         for kind, errors in kinds:
             if is_point and isinstance(kind, Orientation):

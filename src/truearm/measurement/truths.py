@@ -11,8 +11,10 @@ import numpy as np
 from truearm.errors import InputError, nearest_names
 from truearm.files import exists
 from truearm.measurement.twin import Twin
+from truearm.measurement.twin_joint import Contact, JointTruth
 from truearm.modeling.chain import Array
-from truearm.modeling.parts import Tool
+from truearm.modeling.effects.fourier import HARMONICS
+from truearm.modeling.parts import NO_PAYLOAD, Payload, Tool
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform, rotation_from_quaternion
 from truearm.robots import load_robot
@@ -51,7 +53,8 @@ def truth_twin(robot: Robot, truth: str, rng: np.random.Generator) -> Twin:
     if truth in robot.truths:
         published = robot.truths[truth]
         true = robot.with_values(published.values)
-        return Twin(_stationed(true, tool), published.compliance, payload=(tool.mass, tool.cog))
+        sprung = {number: JointTruth(compliance) for number, compliance in published.compliance.items()}
+        return Twin(_stationed(true, tool), sprung)
     if truth == "nominal":
         return Twin(_stationed(robot, tool))
     if truth == "random":
@@ -79,12 +82,44 @@ def truth_twin(robot: Robot, truth: str, rng: np.random.Generator) -> Twin:
             came=f"{len(other.joints)} joints",
             allowed=f"{len(robot.joints)}, of the same kinds",
         )
-    return Twin(other if other.targets else _stationed(other, tool))
+    contact: Contact = "document" if "clearance-linear-contact" in other.effect_names else "exact"
+    return Twin(other if other.targets else _stationed(other, tool), joint_truths(other), contact)
+
+
+def joint_truths(robot: Robot) -> dict[int, JointTruth]:
+    """Return what the joint effects of a robot file say about each joint."""
+    values = robot.values
+
+    def of(name: str, number: int) -> float:
+        return values.get(f"{name}_{number}", 0.0)
+
+    def sines(number: int) -> tuple[tuple[int, float, float], ...]:
+        parts = ((k, of(f"fourier_sin{k}", number), of(f"fourier_cos{k}", number)) for k in HARMONICS)
+        return tuple((k, math.hypot(sine, cosine), math.atan2(cosine, sine)) for k, sine, cosine in parts)
+
+    return {
+        number: JointTruth(
+            compliance=of("compliance", number),
+            quadratic=of("compliance_quadratic", number),
+            cubic=of("compliance_cubic", number),
+            backlash=of("backlash", number),
+            clearance=of("clearance", number),
+            bearing=of("bearing_compliance", number),
+            gear=sines(number),
+            hysteresis=of("approach", number),
+            growth=of("thermal_growth", number),
+        )
+        for number in range(1, len(robot.joints) + 1)
+    }
 
 
 def _stationed(robot: Robot, tool: Tool) -> Robot:
-    """Return the robot with its base as it is, seen from the station, carrying the tool."""
+    """Return the robot with its base as it is, seen from the station, carrying the tool.
+
+    A payload that the robot has already includes the tool's mass.
+    """
     base, R = robot.base, rotation_from_quaternion(np.array(STATION.quaternion))
     moved: Array = R @ np.array(base.translation) + np.array(STATION.translation)
     placed = robot.with_frames(Transform.from_matrix(R @ base.rotation, moved), tool.targets)
-    return replace(placed, history=(*robot.history, "simulated truth"))
+    payload = Payload(tool.mass, tool.cog) if robot.payload == NO_PAYLOAD else robot.payload
+    return replace(placed, payload=payload, history=(*robot.history, "simulated truth"))

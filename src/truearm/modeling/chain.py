@@ -36,6 +36,7 @@ Number = float | Array
 #: Of a point in a frame, or of the frame itself in the world.
 Coordinates = tuple[Number, Number, Number]
 Axes = tuple[Array, Array, Array]
+Direction = tuple[float, float, float]
 N = TypeVar("N", float, Array, Number)
 #: What an element does: () if nothing, a slide's distance [m], a turn's cosine and sine, or, about an axis of any
 #: direction, the nine entries of its rotation matrix row by row.
@@ -74,7 +75,7 @@ class Element:
     value: float = 0.0
     parameter: str | None = None
     variable: int | None = None
-    axis: tuple[float, float, float] | None = None
+    axis: Direction | None = None
     turns: bool = field(init=False, repr=False, compare=False)
     along: int = field(init=False, repr=False, compare=False)
 
@@ -154,7 +155,7 @@ class Sweep:
             if not element.turns:
                 row[...] = _axis(element, axes)
             elif element.axis is not None:
-                row[...] = _combined(_cross(element.axis, self._tips[index]), axes)
+                row[...] = _combined(cross(element.axis, self._tips[index]), axes)
             else:
                 i, j = _TURNED[element.along]
                 tip = self._tips[index]
@@ -204,7 +205,7 @@ class Sweep:
         tips = [tip]
         for element, move in zip(reversed(self.elements), reversed(self.moves), strict=True):
             if move:
-                tip = _seen_before(tip, element, move)
+                tip = seen_before(tip, element, move)
             tips.append(tip)
         tips.reverse()
         return tips
@@ -284,6 +285,8 @@ class Chain:
 
 #: The two axes that a turn about axis k turns, the first towards the second.
 _TURNED: Final = ((1, 2), (2, 0), (0, 1))
+_TURNS: Final[tuple[Motion, Motion, Motion]] = ("Rx", "Ry", "Rz")
+_UNITS: Final[tuple[Direction, Direction, Direction]] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 def _move(element: Element, amount: Number) -> Move:
@@ -326,7 +329,7 @@ def _turned(axes: Axes, element: Element, move: Move) -> Axes:
     return turned[0], turned[1], turned[2]
 
 
-def _seen_before(point: Coordinates, element: Element, move: Move) -> Coordinates:
+def seen_before(point: Coordinates, element: Element, move: Move) -> Coordinates:
     """Return a point seen from the frame before an element, from how it is seen from the frame behind."""
     if element.axis is not None:
         if element.turns:
@@ -344,6 +347,46 @@ def _seen_before(point: Coordinates, element: Element, move: Move) -> Coordinate
     return seen[0], seen[1], seen[2]
 
 
+def seen_behind(vector: Coordinates, element: Element, move: Move) -> Coordinates:
+    """Return a vector seen from the frame behind a turn, from how it is seen from the frame before."""
+    if element.axis is not None:
+        return _combined(move[0::3], vector), _combined(move[1::3], vector), _combined(move[2::3], vector)
+    seen = list(vector)
+    i, j = _TURNED[element.along]
+    c, s = move
+    seen[i] = c * vector[i] + s * vector[j]
+    seen[j] = c * vector[j] - s * vector[i]
+    return seen[0], seen[1], seen[2]
+
+
+def axis_of(element: Element) -> Direction:
+    """Return the unit vector an element moves about or along, in its moving frame."""
+    return _UNITS[element.along] if element.axis is None else element.axis
+
+
+def across(element: Element) -> tuple[Direction, Direction]:
+    """Return two unit vectors across an element's axis, in its moving frame: x and y of the joint's own axes.
+
+    With the axis as z they are right-handed. For an axis of any direction they are those of the smallest turn from
+    z to the axis (Duff et al. 2017, "Building an orthonormal basis, revisited", equation 5), so that they are x and
+    y for z itself; close to -z those of the smallest turn from -z to the axis, with y reversed.
+    """
+    if element.axis is None:
+        i, j = _TURNED[element.along]
+        return _UNITS[i], _UNITS[j]
+    x, y, z = element.axis
+    s = 1.0 if z > -0.9 else -1.0
+    a = -1.0 / (s + z)
+    return (1.0 + s * a * x * x, s * a * x * y, -s * x), (a * x * y, s + a * y * y, -y)
+
+
+def turn_about(axis: Direction, variable: int) -> Element:
+    """Return the element that turns by a variable alone about a unit vector in the moving frame."""
+    if axis in _UNITS:
+        return Element(_TURNS[_UNITS.index(axis)], variable=variable)
+    return Element("R", axis=axis, variable=variable)
+
+
 def _axis(element: Element, axes: Axes) -> Array:
     """Return the axis of an element in the world, from the axes of the frame before it."""
     return axes[element.along] if element.axis is None else _combined(element.axis, axes)
@@ -353,5 +396,6 @@ def _combined(weights: Sequence[Number], parts: Sequence[N]) -> N:
     return weights[0] * parts[0] + weights[1] * parts[1] + weights[2] * parts[2]  # type: ignore[return-value]
 
 
-def _cross(a: tuple[float, float, float], b: Coordinates) -> Coordinates:
+def cross(a: Coordinates, b: Coordinates) -> Coordinates:
+    """Return the cross product of two vectors."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

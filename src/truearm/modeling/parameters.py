@@ -14,8 +14,24 @@ import numpy as np
 
 from truearm.modeling.chain import Array
 
-Group = Literal["base", "joint zero", "gain", "geometry", "target"]
-Unit = Literal["m", "rad", "1"]
+Group = Literal[
+    "base",
+    "joint zero",
+    "geometry",
+    "target",
+    # of joint effects, by their names
+    "gain",
+    "fourier",
+    "compliance",
+    "hardening",
+    "backlash",
+    "bearing-compliance",
+    "clearance",
+    "clearance-linear-contact",
+    "approach",
+    "thermal-growth",
+]
+Unit = Literal["m", "rad", "1", "rad/(N m)", "m/N", "rad/(N m)^2", "rad/(N m)^3", "1/K"]
 
 #: What a nominal value is believed to be good for (one standard deviation) unless the robot file says otherwise.
 #: Machined links and mastered joints are good to about 1 mm and 0.1 deg; where robot and reflectors stand is unknown.
@@ -28,7 +44,6 @@ PRIOR: Final[Mapping[tuple[str, str], float]] = {
     ("joint zero", "rad"): math.radians(0.1),
     ("geometry", "m"): 1e-3,
     ("geometry", "rad"): math.radians(0.1),
-    ("gain", "1"): 1e-3,
 }
 
 
@@ -41,7 +56,7 @@ class Parameter:
     name
         Stable and the same in files, reports and messages: ``theta_offset_2``, ``base_x``.
     unit
-        SI unit of all values here: ``m``, ``rad`` or ``1``.
+        SI unit of all values here.
     group
         What the parameter describes; models free whole groups.
     nominal
@@ -65,6 +80,11 @@ class Parameter:
     deviation: float | None = None
     informed: float | None = None
 
+    @classmethod
+    def plain(cls, name: str, unit: Unit, group: Group, nominal: float, prior: float) -> Parameter:
+        """Make a parameter at its nominal value."""
+        return cls(name, unit, group, nominal, nominal, prior)
+
     def restarted(self, nominal: float | None = None) -> Parameter:
         """Return the parameter as before any identification, at `nominal` if that is given."""
         start = self.nominal if nominal is None else nominal
@@ -82,7 +102,7 @@ def parameter(name: str, unit: Unit, group: Group, nominal: float, priors: Mappi
     prior = PRIOR[group, unit]
     if group in ("geometry", "joint zero"):
         prior = priors.get(unit, prior)
-    return Parameter(name, unit, group, nominal, nominal, prior)
+    return Parameter.plain(name, unit, group, nominal, prior)
 
 
 @dataclass(frozen=True)

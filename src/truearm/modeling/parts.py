@@ -13,6 +13,8 @@ from truearm.modeling.transform import fixed_rotation
 
 #: Standard gravity, with the base's z upwards [m/s^2].
 GRAVITY: Final = (0.0, 0.0, -9.80665)
+Inertia = tuple[float, float, float, float, float, float]
+POINT_MASS: Final[Inertia] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 SLIDES: Final[tuple[tuple[str, Motion], ...]] = (("x", "Tx"), ("y", "Ty"), ("z", "Tz"))
 TURNS: Final[tuple[tuple[str, Motion], ...]] = (("rx", "Rx"), ("ry", "Ry"), ("rz", "Rz"))
 
@@ -52,14 +54,14 @@ class LinkMass:
     cog
         Centre of gravity in the link's frame [m].
     inertia
-        Moments of inertia xx, yy, zz, xy, xz, yz about the centre of gravity, in the axes of the link's frame
-        [kg m^2]; zero is a point mass.
+        Entries xx, yy, zz, xy, xz, yz of the inertia tensor about the centre of gravity, in the axes of the link's
+        frame [kg m^2], so that xy is minus the integral of x y; zero is a point mass.
     """
 
     joint: int
     mass: float
     cog: tuple[float, float, float]
-    inertia: tuple[float, float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    inertia: Inertia = POINT_MASS
 
 
 @dataclass(frozen=True)

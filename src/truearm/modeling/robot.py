@@ -2,21 +2,29 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Final
 
 import numpy as np
 
 from truearm.errors import InputError, nearest_names
-from truearm.modeling.chain import Array, Chain, Element, Sweep
+from truearm.modeling.chain import Array, Chain, Element, Sweep, across, turn_about
 from truearm.modeling.conventions import Convention, convention
-from truearm.modeling.effects import EFFECTS, Effect
+from truearm.modeling.effects import EFFECTS, Effect, Layout
+from truearm.modeling.loads import joint_loads
 from truearm.modeling.parameters import Group, Parameter, Unit, parameter
 from truearm.modeling.parts import GRAVITY, NO_PAYLOAD, SLIDES, TURNS, Joint, LinkMass, Payload, Target, Tool, Truth
+from truearm.modeling.postures import Postures
 from truearm.modeling.transform import IDENTITY, Transform, fixed_rotation
 
 Values = Mapping[str, float | Array]
+
+#: Rounds until loads and deflections agree, and how well [rad, m]. Each round leaves a hundredth or less.
+_ROUNDS: Final = 12
+_SETTLED: Final = 1e-11
 
 
 @dataclass(frozen=True)
@@ -110,15 +118,40 @@ class Robot:
 
     @cached_property
     def trunk(self) -> Chain:
-        """The chain from the world to the flange."""
-        links = (element for link in self.link_elements for element in link)
+        """The chain from the world to the flange, with what joint effects tilt and stretch."""
+        links = (element for link in self.moved_links for element in link)
         return Chain((*self.base_elements, *links, *self.flange_elements))
+
+    @cached_property
+    def moved_links(self) -> tuple[tuple[Element, ...], ...]:
+        """The way along each link, as :attr:`link_elements`, with what joint effects tilt and stretch."""
+        tilts = any(effect.tilts for effect in self.effects)
+        stretches = any(effect.stretches for effect in self.effects)
+        slides = iter(range(len(self.layout.lengths)))
+
+        def moved(joint: int, element: Element) -> tuple[Element, ...]:
+            if stretches and _has_length(element):
+                return (replace(element, variable=self.layout.length(next(slides))),)
+            if tilts and element.variable is not None:
+                across_it = zip(across(element), self.layout.tilt(joint), strict=True)
+                return (element, *(turn_about(axis, variable) for axis, variable in across_it))
+            return (element,)
+
+        return tuple(
+            tuple(part for element in link for part in moved(joint, element))
+            for joint, link in enumerate(self.link_elements)
+        )
+
+    @cached_property
+    def layout(self) -> Layout:
+        """The variables of the trunk."""
+        lengths = [(i, e.value) for i, link in enumerate(self.link_elements) for e in link if _has_length(e)]
+        return Layout(tuple(joint.kind for joint in self.joints), tuple(lengths))
 
     @cached_property
     def effects(self) -> tuple[Effect, ...]:
         """The joint effects of the model."""
-        kinds = tuple(joint.kind for joint in self.joints)
-        return tuple(effect(kinds) for effect in EFFECTS if effect.name in self.effect_names)
+        return tuple(effect(self.layout) for effect in EFFECTS if effect.name in self.effect_names)
 
     @cached_property
     def parameters(self) -> Mapping[str, Parameter]:
@@ -139,8 +172,8 @@ class Robot:
                 group: Group = "joint zero" if name in zeros else "geometry"
                 add(name, _unit(element), "base" if name.startswith("base_") else group, element.value)
         for effect in self.effects:
-            for name, value in effect.nominal.items():
-                add(name, "1", "gain", value)
+            for plain in effect.parameters:
+                found[plain.name] = self.known.get(plain.name, plain)
         for target in self.targets:
             for element in target.chain.elements:
                 if element.parameter is not None:
@@ -149,7 +182,7 @@ class Robot:
 
     @cached_property
     def values(self) -> Mapping[str, float]:
-        """Current value of every parameter [m, rad, 1]."""
+        """Current value of every parameter [SI]."""
         return {name: p.value for name, p in self.parameters.items()}
 
     @property
@@ -184,13 +217,37 @@ class Robot:
         return replace(self, known={**self.known, **changed})
 
     def with_values(self, values: Mapping[str, float]) -> Robot:
-        """Return the robot with some parameter values replaced [m, rad, 1]."""
+        """Return the robot with some parameter values replaced [SI]."""
         for name in values:
             if name not in self.parameters:
                 near = nearest_names(name, self.parameters)
                 cure = f"Did you mean {' or '.join(near)}?" if near else None
                 raise InputError("the robot has no such parameter", where=self.name, came=name, cure=cure)
         return self.with_parameters(replace(self.parameters[n], value=float(v)) for n, v in values.items())
+
+    def carrying(self, payload: Payload | None = None, gravity: tuple[float, float, float] | None = None) -> Robot:
+        """Return the robot with another payload, or mounted another way; None leaves what it has.
+
+        Raises
+        ------
+        InputError
+            If the mass is negative, or the gravity is none.
+        """
+        if payload is not None and payload.mass < 0.0:
+            raise InputError("a mass cannot be negative", where="payload", came=f"{payload.mass:g} kg")
+        if gravity is not None and not 0.1 <= math.hypot(*gravity) <= 100.0:
+            raise InputError(
+                "this is no acceleration of free fall",
+                where="gravity",
+                came=f"{math.hypot(*gravity):g} m/s^2",
+                allowed="about 9.81 m/s^2 on Earth, 0.1 to 100",
+                cure="Give x, y and z in the robot's base frame: 0,0,-9.81 stands, 0,0,9.81 hangs.",
+            )
+        return replace(
+            self,
+            payload=self.payload if payload is None else payload,
+            gravity=self.gravity if gravity is None else gravity,
+        )
 
     def with_effects(self, names: Sequence[str]) -> Robot:
         """Return the robot with these joint effects added."""
@@ -219,31 +276,66 @@ class Robot:
 
     # -- kinematics ----------------------------------------------------------------------------------------
 
-    def variables(self, q: Array, values: Values) -> Array:
-        """Return the true joint variables ``(joints, ..., n)`` behind the readings `q`."""
-        readings = np.ascontiguousarray(np.asarray(q, float).T)
-        if readings.ndim != 2 or len(readings) != len(self.joints):
+    def loaded(self, q: Array | Postures) -> Postures:
+        """Return postures with the loads at every joint, if the robot has effects that depend on them.
+
+        The loads are those of the arm at rest in its own deflections, with the robot's own parameter values: what a
+        solver tries meanwhile moves them by less than a hundredth, and it asks again where it has come to.
+        """
+        at = Postures.of(q)
+        if at.joints.ndim != 2 or at.joints.shape[1] != len(self.joints):
             raise InputError(
                 "wrong number of joint positions",
                 where=self.name,
-                came=f"an array of shape {np.shape(q)}",
+                came=f"an array of shape {at.joints.shape}",
                 allowed=f"(n, {len(self.joints)})",
             )
-        variables = readings
-        for effect in self.effects:
-            deflection = effect.deflection(readings, values)
-            if deflection.ndim > variables.ndim:
-                variables = variables[:, None, :]
-            variables = variables + deflection
-        return variables
+        if at.loads is not None or not any(effect.loaded for effect in self.effects):
+            return at
+        rates = {
+            "velocity": None if at.velocity is None else at.velocity.T,
+            "acceleration": None if at.acceleration is None else at.acceleration.T,
+            "wrench": None if at.wrench is None else at.wrench.T,
+        }
+        variables = self._rows({}, np.ascontiguousarray(at.joints.T))
+        for _ in range(_ROUNDS):
+            loads = joint_loads(self, variables, **rates)
+            at = replace(at, loads=loads)
+            before, variables = variables, self.variables(at, self.values)
+            if np.abs(variables - before).max(initial=0.0) < _SETTLED:
+                break
+        return at
 
-    def sweep(self, q: Array, target: str | None = None, values: Values | None = None) -> Sweep:
+    def variables(self, q: Array | Postures, values: Values) -> Array:
+        """Return the variables ``(joints or more, ..., n)`` of the trunk behind the readings `q`.
+
+        Those of the joints come first; the rest of :attr:`layout` is there if some effect tilts or stretches.
+        """
+        at = self.loaded(q)
+        readings = np.ascontiguousarray(at.joints.T)
+        moved: dict[int, Array] = {}
+        for effect in self.effects:
+            for variable, part in effect.deflection(at, values).items():
+                moved[variable] = moved[variable] + part if variable in moved else part
+        if not moved:
+            return readings if len(self.moving) == len(readings) else self._rows({}, readings)
+        return self._rows(moved, readings)
+
+    def _rows(self, moved: Mapping[int, Array], readings: Array) -> Array:
+        shape = np.broadcast_shapes(readings.shape[1:], *(part.shape for part in moved.values()))
+        rows = np.zeros((len(self.moving), *shape))
+        rows[: len(readings)] = readings if len(shape) == 1 else readings[:, None, :]
+        for variable, part in moved.items():
+            rows[variable] += part
+        return rows
+
+    def sweep(self, q: Array | Postures, target: str | None = None, values: Values | None = None) -> Sweep:
         """Run through the chain to the flange, or to a target.
 
         Parameters
         ----------
         q
-            Joint readings, ``(n, joints)``.
+            Joint readings ``(n, joints)``, or postures.
         target
             Name of a target; the flange if None.
         values
@@ -254,20 +346,20 @@ class Robot:
         trunk = self.trunk.sweep(variables, values)
         return trunk if target is None else self.target(target).chain.sweep(variables, values, trunk)
 
-    def poses(self, q: Array, target: str | None = None) -> tuple[Array, Array]:
+    def poses(self, q: Array | Postures, target: str | None = None) -> tuple[Array, Array]:
         """Return positions ``(n, 3)`` [m] and rotations ``(n, 3, 3)`` of the flange or a target in the world."""
         sweep = self.sweep(q, target)
         return np.ascontiguousarray(sweep.position.T), np.ascontiguousarray(sweep.matrix())
 
-    def joint_jacobian(self, q: Array, target: str | None = None) -> Array:
+    def joint_jacobian(self, q: Array | Postures, target: str | None = None) -> Array:
         """Return the geometric Jacobian ``(n, 6, joints)`` in the world, linear rows first [m, rad per rad or m].
 
         Rates are those of the true joint variables.
         """
         sweep = self.sweep(q, target)
-        return np.moveaxis(np.concatenate(sweep.derivatives(self.moving), axis=1), (0, 1), (2, 1))
+        return np.moveaxis(np.concatenate(sweep.derivatives(self.moving[: len(self.joints)]), axis=1), (0, 1), (2, 1))
 
-    def linear(self, sweep: Sweep, q: Array, names: Sequence[str], values: Values | None = None) -> Array:
+    def linear(self, sweep: Sweep, q: Array | Postures, names: Sequence[str], values: Values | None = None) -> Array:
         """Return the velocity of the tip of a sweep by the parameters `names` [m per unit of the parameter].
 
         Parameters
@@ -282,7 +374,7 @@ class Robot:
         """
         return self._by_parameters(sweep, sweep.linear, q, names, values)
 
-    def angular(self, sweep: Sweep, q: Array, names: Sequence[str], values: Values | None = None) -> Array:
+    def angular(self, sweep: Sweep, q: Array | Postures, names: Sequence[str], values: Values | None = None) -> Array:
         """Return the angular velocity of the tip of a sweep by the parameters `names` [rad per unit of the parameter].
 
         Parameters and the shape of what is returned are as for :meth:`linear`.
@@ -290,7 +382,7 @@ class Robot:
         return self._by_parameters(sweep, sweep.angular, q, names, values)
 
     def derivatives(
-        self, sweep: Sweep, q: Array, names: Sequence[str], values: Values | None = None
+        self, sweep: Sweep, q: Array | Postures, names: Sequence[str], values: Values | None = None
     ) -> tuple[Array, Array]:
         """Return :meth:`linear` and :meth:`angular`."""
         return self.linear(sweep, q, names, values), self.angular(sweep, q, names, values)
@@ -299,27 +391,29 @@ class Robot:
         self,
         sweep: Sweep,
         by_elements: Callable[[Sequence[int | None]], Array],
-        q: Array,
+        q: Array | Postures,
         names: Sequence[str],
         values: Values | None,
     ) -> Array:
         places = [sweep.places.get(name) for name in names]
         derivative = by_elements(places)
         if self.effects and None in places:
-            by_joint = by_elements(self.moving)
-            readings = np.asarray(q, float).T
+            at = self.loaded(q)
             values = self.values if values is None else values
-            rates = {n: r for effect in self.effects for n, r in effect.derivative(readings, values).items()}
+            rates = {n: r for effect in self.effects for n, r in effect.derivative(at, values).items() if n in names}
+            needed = sorted({variable for rate in rates.values() for variable in rate})
+            by_variable = dict(zip(needed, by_elements([self.moving[v] for v in needed]), strict=True))
             for i, name in enumerate(names):
-                for joint, rate in rates.get(name, {}).items():
-                    derivative[i] += rate * by_joint[joint]
+                for variable, rate in rates.get(name, {}).items():
+                    derivative[i] += rate * by_variable[variable]
         return derivative
 
     @cached_property
     def moving(self) -> list[int]:
-        """Index of the element that each joint variable moves."""
+        """Index of the element that each variable of the trunk moves, joints first."""
         places = {e.variable: i for i, e in enumerate(self.trunk.elements) if e.variable is not None}
-        return [places[i] for i in range(len(self.joints))]
+        count = self.layout.variables if len(places) > len(self.joints) else len(self.joints)
+        return [places.get(i, -1) for i in range(count)]
 
     def random_configurations(self, count: int, rng: np.random.Generator) -> Array:
         """Return joint readings ``(count, joints)`` drawn evenly within the limits (or a turn, or 1 m)."""
@@ -330,3 +424,7 @@ class Robot:
 
 def _unit(element: Element) -> Unit:
     return "rad" if element.turns else "m"
+
+
+def _has_length(element: Element) -> bool:
+    return not element.turns and element.variable is None and element.value != 0.0

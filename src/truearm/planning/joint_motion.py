@@ -24,6 +24,7 @@ from truearm.modeling.inverse import PoseStatus, inverse
 from truearm.modeling.inverse.kinematics import NEAR_SINGULAR, reach
 from truearm.modeling.inverse.pose_solver import Orientation
 from truearm.modeling.inverse.turns import beyond_limits
+from truearm.modeling.postures import Postures, approach_of
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import rotation_vector
 from truearm.planning.posture import chosen_rows, step, velocity_and_acceleration
@@ -62,9 +63,10 @@ class JointMotion:
     singular_value: Array
     joint_names: tuple[str, ...]
 
-    def configurations(self, joints: Array | None = None) -> Array:
-        """Return what a robot is asked with: this motion, or one with other readings and the same rates."""
-        return self.joints if joints is None else joints
+    def postures(self, joints: Array | None = None) -> Postures:
+        """Return what a robot is asked with: this motion, or other readings ``(n, joints)`` with the same rates."""
+        approach = approach_of(self.joints, np.arange(len(self.time)))
+        return Postures(self.joints if joints is None else joints, self.velocity, self.acceleration, approach)
 
 
 def joint_motion(

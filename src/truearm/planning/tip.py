@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from truearm.modeling.chain import Array
+from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
 
 
@@ -47,16 +48,10 @@ class Tip:
         base = robot.base
         self._rotation, self._origin = base.rotation, np.array(base.translation)
 
-    def at(self, configurations: Array) -> TipState:
-        """Return where the tip is.
-
-        Parameters
-        ----------
-        configurations
-            What :meth:`Robot.sweep` takes: joint readings ``(n, joints)`` [rad or m].
-        """
-        sweep = self.robot.sweep(configurations, self.target)
-        linear, angular = sweep.derivatives(self.robot.moving)  # (joints, 3, n)
+    def at(self, q: Array | Postures) -> TipState:
+        """Return where the tip is with readings ``(n, joints)`` [rad or m], or in postures."""
+        sweep = self.robot.sweep(q, self.target)
+        linear, angular = sweep.derivatives(self.robot.moving[: len(self.robot.joints)])  # (joints, 3, n)
         to_base = self._rotation.T
         return TipState(
             (sweep.position.T - self._origin) @ self._rotation,
@@ -64,7 +59,7 @@ class Tip:
             np.concatenate([to_base @ part.transpose(2, 1, 0) for part in (linear, angular)], axis=1),
         )
 
-    def positions(self, configurations: Array) -> Array:
+    def positions(self, q: Array | Postures) -> Array:
         """Return positions alone, ``(n, 3)`` [m]."""
-        position = self.robot.sweep(configurations, self.target).position
+        position = self.robot.sweep(q, self.target).position
         return np.asarray((position.T - self._origin) @ self._rotation)

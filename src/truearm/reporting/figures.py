@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import html
-import math
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,16 +14,10 @@ from truearm.identification.fit import Fit
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
 from truearm.modeling.transform import Transform
+from truearm.reporting.drawing import AFTER, BEFORE, Figure, axis, figure, logarithmic_axis, scene_axis
 from truearm.reporting.numbers import rounded, rounded_to, significant
 
-Figure = dict[str, Any]
-
-BEFORE: Final = "#b8ab97"
-AFTER: Final = "#1d5f8a"
 _MARK: Final = "#b3261e"
-_INK: Final = "#2b2f33"
-_GRID: Final = "#e4e6e8"
-_FONT: Final = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"
 _ERROR_SCALE: Final = [[0.0, "#c3d5e3"], [0.5, "#2c6f9c"], [0.75, "#4b3a63"], [1.0, "#b3261e"]]
 _SIGNED_SCALE: Final = [[0.0, "#b3261e"], [0.5, "#ffffff"], [1.0, AFTER]]
 _AXIS_COLOURS: Final = ("#b3261e", "#3b7d3b", "#2456a6")
@@ -69,10 +62,10 @@ def histogram(before: Array, after: Array, unit: str, what: str) -> Figure:
         }
         for name, errors, colour in (("before", before, BEFORE), ("after", after, AFTER))
     ]
-    x = _axis(f"{what} [{unit}]")
+    x = axis(f"{what} [{unit}]")
     if logarithmic:
-        x = _logarithmic_axis(f"{what} [{unit}]", float(edges[0]), float(edges[-1]))
-    return _figure(traces, 330, xaxis=x, yaxis=_axis("readings"), barmode="overlay", bargap=0)
+        x = logarithmic_axis(f"{what} [{unit}]", float(edges[0]), float(edges[-1]))
+    return figure(traces, 330, xaxis=x, yaxis=axis("readings"), barmode="overlay", bargap=0)
 
 
 def workspace(part: Dataset, base: Transform, before: Array, after: Array) -> Figure:
@@ -146,8 +139,8 @@ def workspace(part: Dataset, base: Transform, before: Array, after: Array) -> Fi
         "bgcolor": "#ffffff",
         "bordercolor": "#c8ccd0",
     }
-    scene = {name: _scene_axis(f"{name[0]} [mm]") for name in ("xaxis", "yaxis", "zaxis")}
-    return _figure(
+    scene = {name: scene_axis(f"{name[0]} [mm]") for name in ("xaxis", "yaxis", "zaxis")}
+    return figure(
         [cloud, *_base_axes(0.25 * reach)],
         640,
         scene={"aspectmode": "data", "camera": _CAMERA, **scene},
@@ -216,12 +209,12 @@ def residuals(
             }
         )
     shown = np.concatenate([np.asarray(trace["y"], float) for trace in traces]) if traces else np.ones(1)
-    y = _axis("position error [mm]")
+    y = axis("position error [mm]")
     if shown.max() > 2 * _LOGARITHMIC * float(np.median(shown)) and shown.min() > 0:
-        y = _logarithmic_axis("position error [mm]", float(shown.min()), float(shown.max()))
+        y = logarithmic_axis("position error [mm]", float(shown.min()), float(shown.max()))
     else:
         y["rangemode"] = "tozero"
-    return _figure(traces, 360, xaxis=_axis("configuration, in measuring order"), yaxis=y)
+    return figure(traces, 360, xaxis=axis("configuration, in measuring order"), yaxis=y)
 
 
 def correlation_map(fit: Fit) -> Figure:
@@ -242,7 +235,7 @@ def correlation_map(fit: Fit) -> Figure:
         "colorbar": {"thickness": 14, "outlinewidth": 0, "tickvals": [-1, -0.5, 0, 0.5, 1]},
         "hovertemplate": "%{y}, %{x}: %{z:.2f}<extra></extra>",
     }
-    return _figure(
+    return figure(
         [trace],
         max(260, round(size * len(names)) + 130),
         xaxis={"automargin": True, "tickangle": -90, "constrain": "domain", **ticks},
@@ -271,49 +264,3 @@ def _base_axes(length: float) -> list[Figure]:
         }
         for name, colour in zip("xyz", _AXIS_COLOURS, strict=True)
     ]
-
-
-def _axis(title: str) -> Figure:
-    return {
-        "title": {"text": title},
-        "gridcolor": _GRID,
-        "zeroline": False,
-        "linecolor": "#9aa0a6",
-        "showline": True,
-        "automargin": True,
-    }
-
-
-def _logarithmic_axis(title: str, low: float, high: float) -> Figure:
-    """Make an axis with ticks at 1, 2 and 5 in every decade, or at whole decades where there are many."""
-    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
-    steps = (1, 2, 5) if len(decades) <= 5 else (1,)
-    ticks = [float(f"{step}e{decade}") for decade in decades for step in steps]
-    return _axis(f"{title}, logarithmic") | {
-        "type": "log",
-        "tickvals": ticks,
-        "ticktext": [f"{tick:g}" for tick in ticks],
-    }
-
-
-def _scene_axis(title: str) -> Figure:
-    return {
-        "title": {"text": title},
-        "gridcolor": "#d5d8db",
-        "showbackground": False,
-        "zeroline": False,
-        "showspikes": False,
-    }
-
-
-def _figure(traces: list[Figure], height: int, **layout: Any) -> Figure:
-    common = {
-        "height": height,
-        "font": {"family": _FONT, "size": 13, "color": _INK},
-        "paper_bgcolor": "#ffffff",
-        "plot_bgcolor": "#ffffff",
-        "margin": {"l": 60, "r": 20, "t": 36, "b": 50},
-        "legend": {"orientation": "h", "x": 0, "y": 1.02, "xanchor": "left", "yanchor": "bottom"},
-        "hoverlabel": {"bgcolor": "#ffffff", "bordercolor": "#9aa0a6", "font": {"color": _INK}},
-    }
-    return {"data": traces, "layout": {**common, **layout}}

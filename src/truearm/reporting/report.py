@@ -18,19 +18,13 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from truearm.identification.fit import Fit
+from truearm.identification.selection import Selection
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import Errors
 from truearm.modeling.chain import Array
 from truearm.notices import Notice
-from truearm.reporting.figures import (
-    AFTER,
-    BEFORE,
-    Figure,
-    correlation_map,
-    histogram,
-    residuals,
-    workspace,
-)
+from truearm.reporting.drawing import AFTER, BEFORE, Figure
+from truearm.reporting.figures import correlation_map, histogram, residuals, workspace
 from truearm.reporting.tables import (
     SpreadRow,
     noise_rows,
@@ -73,6 +67,8 @@ class Report:
         How to run it again.
     history
         What was done, in one line with the hash of the data.
+    selection
+        How the model was chosen, if it was not named.
     """
 
     fit: Fit
@@ -85,6 +81,7 @@ class Report:
     warnings: Sequence[Notice]
     command: str
     history: str
+    selection: Selection | None = None
 
     @property
     def judged(self) -> Errors:

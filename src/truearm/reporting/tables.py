@@ -14,7 +14,10 @@ from truearm.reporting.numbers import significant
 from truearm.units import SHOWN_AS, from_si
 
 #: Decimals of a parameter value: a micrometre, two micrometres at a metre, a millionth.
-_DECIMALS: Final = {"mm": 3, "deg": 4, "1": 6}
+_DECIMALS: Final = {
+    **{"mm": 3, "deg": 4, "1": 6, "um/N": 3, "um/(m K)": 2},
+    **{"mrad/(N m)": 4, "mrad/(N m)^2": 5, "mrad/(N m)^3": 7},
+}
 #: Correlated pairs that are listed.
 _PAIRS: Final = 10
 _SIGMA_SHOWN: Final = {"position": ("mm", 1e3), "orientation": ("mrad", 1e3)}

@@ -6,7 +6,7 @@ import csv
 import io
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -16,23 +16,30 @@ from truearm.errors import InputError, nearest_names
 from truearm.files import read_text
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.readers.cells import Cells, Layout, read_cells
-from truearm.measurement.readers.rows import Readings, dataset_of, found_configurations
+from truearm.measurement.readers.rows import Readings, dataset_of, found_configurations, same_everywhere
 from truearm.modeling.chain import Array
 from truearm.units import ANGLE_UNITS, LENGTH_UNITS, SMALL_ANGLE_UNITS, checked_unit, written
 
 _POSITION: Final = ("x", "y", "z")
 _QUATERNION: Final = ("qw", "qx", "qy", "qz")
 _ROLES: Final = ("target", "reference")
-_UNITS: Final[dict[str, tuple[str, ...]]] = dict.fromkeys((*_POSITION, "sigma"), LENGTH_UNITS) | {
-    "sigma_rot": SMALL_ANGLE_UNITS
-}
+_FORCE: Final = ("force_x", "force_y", "force_z")
+_MOMENT: Final = ("moment_x", "moment_y", "moment_z")
+_UNITS: Final[dict[str, tuple[str, ...]]] = (
+    dict.fromkeys((*_POSITION, "sigma"), LENGTH_UNITS)
+    | {"sigma_rot": SMALL_ANGLE_UNITS, "temperature": ("degC",)}
+    | dict.fromkeys(_FORCE, ("N",))
+    | dict.fromkeys(_MOMENT, ("N m",))
+)
 _PLAIN: Final = ("configuration", "target", "role", *_QUATERNION)
 #: Every column as one writes it, for messages.
 _SHOWN: Final = (
     {"configuration": "configuration", "joint_1": "joint_1 [deg]", "target": "target", "role": "role"}
     | {axis: f"{axis} [mm]" for axis in _POSITION}
     | {part: part for part in _QUATERNION}
-    | {"sigma": "sigma [mm]", "sigma_rot": "sigma_rot [mrad]"}
+    | {"sigma": "sigma [mm]", "sigma_rot": "sigma_rot [mrad]", "temperature": "temperature [degC]"}
+    | {name: f"{name} [N]" for name in _FORCE}
+    | {name: f"{name} [N m]" for name in _MOMENT}
 )
 _ALLOWED: Final = ", ".join(_SHOWN.values()).replace("[deg]", "[deg] ..")
 _HEADING: Final = re.compile(r"(?P<name>[^\[]*?)\s*(?:\[(?P<unit>[^\]]*)\])?")
@@ -83,7 +90,20 @@ def read_csv(path: Path) -> Dataset:
         sigma=numbers("sigma", deviation=True)[:, 0] if "sigma" in columns else None,
         sigma_rot=numbers("sigma_rot", deviation=True)[:, 0] if "sigma_rot" in columns else None,
     )
-    return dataset_of(readings, configurations)
+
+    def circumstance(name: str) -> Array:
+        column = columns[name]
+        return same_everywhere(cells, configurations, column.place, column.unit)
+
+    wrench = None
+    if "force_x" in columns:
+        still = np.zeros(len(configurations.labels))
+        wrench = np.column_stack([circumstance(n) if n in columns else still for n in (*_FORCE, *_MOMENT)])
+    return replace(
+        dataset_of(readings, configurations),
+        temperature=circumstance("temperature") if "temperature" in columns else None,
+        wrench=wrench,
+    )
 
 
 def refuse_other_separators(text: str, where: str) -> None:
@@ -166,6 +186,16 @@ def _refuse_missing(cells: Cells, columns: dict[str, _Column]) -> None:
             allowed="qw, qx, qy, qz, or none of them",
             cure=f"Add {', '.join(n for n in _QUATERNION if n not in there)}.",
         )
+    for needed, group in ((_FORCE, (*_FORCE, *_MOMENT)), (_MOMENT, _MOMENT)):
+        if any(name in columns for name in group):
+            for name in needed:
+                if name not in columns:
+                    raise InputError(
+                        f"the column {name} is missing",
+                        where=where,
+                        allowed=f"{', '.join(_SHOWN[n] for n in needed)}, or none of them",
+                        cure=f"Add {_SHOWN[name]}; it may be zero.",
+                    )
     if "sigma_rot" in columns and not there:
         raise InputError(
             "the column sigma_rot is there, and no orientation",
@@ -212,6 +242,9 @@ def csv_text(dataset: Dataset, length_unit: str = "mm", angle_unit: str = "deg")
     oriented = any(part.quaternion is not None or part.sigma_rot is not None for part in parts)
     with_sigma = any(part.sigma is not None for part in parts)
     with_sigma_rot = any(part.sigma_rot is not None for part in parts)
+    circumstances = {} if dataset.temperature is None else {"temperature": dataset.temperature}
+    if dataset.wrench is not None:
+        circumstances |= dict(zip((*_FORCE, *_MOMENT), dataset.wrench.T, strict=True))
     units = [angle_unit if kind == "revolute" else length_unit for kind in dataset.joint_kinds]
     heading = [
         "configuration",
@@ -222,6 +255,7 @@ def csv_text(dataset: Dataset, length_unit: str = "mm", angle_unit: str = "deg")
         *(_QUATERNION if oriented else ()),
         *([f"sigma [{length_unit}]"] if with_sigma else []),
         *(["sigma_rot [mrad]"] if with_sigma_rot else []),
+        *(_SHOWN[name] for name in circumstances),
     ]
     joints = [[_shown(v, unit) for v, unit in zip(row, units, strict=True)] for row in dataset.joints.tolist()]
     rows: list[list[list[str]]] = [[] for _ in dataset.labels]
@@ -237,6 +271,7 @@ def csv_text(dataset: Dataset, length_unit: str = "mm", angle_unit: str = "deg")
                 row += _cells(part.sigma, reading, length_unit, 1)
             if with_sigma_rot:
                 row += _cells(part.sigma_rot, reading, "mrad", 1)
+            row += [_shown(float(values[configuration]), "1") for values in circumstances.values()]
             rows[configuration].append(row)
     unseen = next((label for label, found in zip(dataset.labels, rows, strict=True) if not found), None)
     if unseen is not None:

@@ -12,6 +12,7 @@ from truearm.errors import InputError
 from truearm.files import is_one_line, read_text
 from truearm.measurement.dataset import Dataset, IntArray
 from truearm.modeling.chain import Array
+from truearm.modeling.postures import approach_of
 from truearm.units import ANGLE_UNITS, LENGTH_UNITS, checked_unit, sized_si
 
 
@@ -89,6 +90,7 @@ def read_matrices(
             configuration=configuration,
             target=np.tile(np.arange(len(names), dtype=np.intp), len(values)),
             position=np.stack([positions[name] for name in names], axis=1).reshape(-1, 3),
+            approach=approach_of(values, np.arange(len(values))),
             references=beside,
         )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -12,6 +13,7 @@ from truearm.errors import InputError
 from truearm.measurement.dataset import Dataset, IntArray
 from truearm.measurement.readers.cells import Cells
 from truearm.modeling.chain import Array
+from truearm.modeling.postures import approach_of
 
 #: How far the norm of a quaternion may be from 1; files round quaternions to four digits or more.
 QUATERNION_TOLERANCE = 1e-3
@@ -63,6 +65,32 @@ def found_configurations(
         )
     kinds = tuple("revolute" if unit in ("deg", "rad") else "prismatic" for unit in units)
     return Configurations(tuple(place), joints[first], kinds, of_row)
+
+
+def same_everywhere(cells: Cells, configurations: Configurations, column: int, unit: str) -> Array:
+    """Return a number for each configuration that every one of its rows repeats, ``(configurations,)``."""
+    numbers = cells.numbers(column, unit)
+    _, first = np.unique(configurations.of_row, return_index=True)
+    differs = np.flatnonzero(numbers != numbers[first[configurations.of_row]])
+    if len(differs):
+        row = int(differs[0])
+        before = int(first[configurations.of_row[row]])
+        raise InputError(
+            f"{cells.names[column]} differs from line {cells.lines[before]}, which has the same configuration",
+            where=cells.place(row, column),
+            came=cells.columns[column][row],
+            allowed=f"{cells.columns[column][before]}, as on line {cells.lines[before]}",
+            cure="A configuration is one standstill of the robot: give what changed another label.",
+        )
+    return np.asarray(numbers[first])
+
+
+def _approach(configurations: Configurations) -> Array | None:
+    """Return where each joint came from, if the configurations are numbered as they were measured."""
+    labels = configurations.labels
+    if not all(re.fullmatch("[0-9]{1,9}", label) for label in labels) or len({int(n) for n in labels}) < len(labels):
+        return None
+    return approach_of(configurations.joints, np.array([int(label) for label in labels]))
 
 
 @dataclass(frozen=True)
@@ -120,7 +148,7 @@ def dataset_of(readings: Readings, configurations: Configurations) -> Dataset:
     if readings.reference.any():
         references = _part(readings, configurations, readings.reference, position, quaternion)
     targets = _part(readings, configurations, ~readings.reference, position, quaternion)
-    return replace(targets, references=references)
+    return replace(targets, references=references, approach=_approach(configurations))
 
 
 def _part(

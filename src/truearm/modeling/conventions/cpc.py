@@ -26,11 +26,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from truearm.modeling.chain import Array, Element
+from truearm.modeling.chain import Array, Direction, Element
 from truearm.modeling.conventions.convention import JOINT, Convention, JointKind, direction
 from truearm.modeling.conventions.displaced import small_turns
 
-Direction = tuple[float, float, float]
 _Z = (0.0, 0.0, 1.0)
 
 

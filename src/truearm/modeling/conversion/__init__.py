@@ -23,7 +23,7 @@ from truearm.modeling.conversion.directions import cpc, mcpc, translations
 from truearm.modeling.conversion.links import Links
 from truearm.modeling.conversion.origins import origins
 from truearm.modeling.lines import at_zero, base_and_flange
-from truearm.modeling.parts import LinkMass
+from truearm.modeling.parts import Inertia, LinkMass
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 
@@ -52,11 +52,11 @@ _UPRIGHT: Final = float(np.cos(np.radians(1.0)))
 def converted(robot: Robot, convention_name: str) -> Robot:
     """Return a robot in another convention, every pose the same; its current values become the nominal ones.
 
-    Targets, limits, joint effects and tools stay. Link masses move with their links' frames. The base frame stays
-    where the convention can start from it; one that starts on the first axis (DH, Hayati, S-model, CPC, MCPC) gets
-    the frame on that axis which is nearest to the base. If that turns the base's z, against which weights hang, by
-    more than 1 deg, the masses are left out. Truths are left out too, because they are values of parameters that are
-    no more. The robot's history says whether the base moved and what was left out.
+    Targets, limits, joint effects, tools and payload stay. Link masses move with their links' frames. The base frame
+    stays where the convention can start from it; one that starts on the first axis (DH, Hayati, S-model, CPC, MCPC)
+    gets the frame on that axis which is nearest to the base, and gravity is given in it. If that turns the base's z,
+    against which weights hang, by more than 1 deg, the masses are left out. Truths are left out too, because they are
+    values of parameters that are no more. The robot's history says whether the base moved and what was left out.
 
     Raises
     ------
@@ -94,7 +94,8 @@ def converted(robot: Robot, convention_name: str) -> Robot:
         known=stay,
     )
     if moved and links.base is not None:
-        made = _based(made, links.base)
+        x, y, z = (round(float(v), _DECIMALS) + 0.0 for v in links.base[:3, :3].T @ base[:3, :3] @ robot.gravity)
+        made = replace(_based(made, links.base), gravity=(x, y, z))
     behind = np.linalg.inv(at_zero(made, made.trunk.elements)) @ flange
     if np.abs(behind - np.eye(4)).max() > _SAME:
         made = replace(made, flange=_transform(behind))
@@ -143,6 +144,14 @@ def _moved_masses(before: Robot, after: Robot) -> tuple[LinkMass, ...]:
             at_zero(r, [*r.base_elements, *(e for link in r.link_elements[: mass.joint] for e in link)])
             for r in (before, after)
         )
-        x, y, z, _ = (round(float(v), _DECIMALS) + 0.0 for v in np.linalg.inv(new) @ old @ [*mass.cog, 1.0])
-        masses.append(replace(mass, cog=(x, y, z)))
+        place = np.linalg.inv(new) @ old
+        x, y, z, _ = (round(float(v), _DECIMALS) + 0.0 for v in place @ [*mass.cog, 1.0])
+        masses.append(replace(mass, cog=(x, y, z), inertia=_turned(mass.inertia, place[:3, :3])))
     return tuple(masses)
+
+
+def _turned(inertia: Inertia, R: Array) -> Inertia:
+    xx, yy, zz, xy, xz, yz = inertia
+    turned = np.round(R @ [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]] @ R.T, _DECIMALS) + 0.0
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = turned.tolist()
+    return xx, yy, zz, xy, xz, yz

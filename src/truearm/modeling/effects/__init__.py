@@ -1,12 +1,31 @@
-"""Joint effects: what makes a joint turn by something else than its reading. One effect a file."""
+"""Joint effects: what moves a joint by something else than its reading. One effect a file."""
 
 from __future__ import annotations
 
 from typing import Final
 
-from truearm.modeling.effects.effect import Effect
+from truearm.modeling.effects.approach import Approach
+from truearm.modeling.effects.backlash import Backlash
+from truearm.modeling.effects.bearing import BearingCompliance
+from truearm.modeling.effects.clearance import Clearance, LinearContactClearance
+from truearm.modeling.effects.compliance import Compliance
+from truearm.modeling.effects.effect import Effect, Layout
+from truearm.modeling.effects.fourier import Fourier
 from truearm.modeling.effects.gain import Gain
+from truearm.modeling.effects.hardening import Hardening
+from truearm.modeling.effects.thermal import ThermalGrowth
 
-EFFECTS: Final[tuple[type[Effect], ...]] = (Gain,)
+EFFECTS: Final[tuple[type[Effect], ...]] = (
+    Gain,
+    Fourier,
+    Compliance,
+    Hardening,
+    Backlash,
+    BearingCompliance,
+    Clearance,
+    LinearContactClearance,
+    Approach,
+    ThermalGrowth,
+)
 
-__all__ = ["EFFECTS", "Effect", "Gain"]
+__all__ = ["EFFECTS", "Effect", "Gain", "Layout"]

@@ -7,32 +7,131 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+
 from truearm.modeling.chain import Array
 from truearm.modeling.conventions import JointKind
+from truearm.modeling.parameters import Parameter
+from truearm.modeling.postures import Postures
+
+#: A derivative of the chain's variables: by parameter, and for each the variables it moves.
+Rates = Mapping[str, Mapping[int, Array]]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Which variables the chain of a robot has: its joints, two tilts behind each of them, and its lengths.
+
+    Attributes
+    ----------
+    kinds
+        Kind of each joint; variable i moves joint i, from 0.
+    lengths
+        Joint (from 0) and nominal value [m] of each slide of fixed length along the links.
+    """
+
+    kinds: tuple[JointKind, ...]
+    lengths: tuple[tuple[int, float], ...] = ()
+
+    @property
+    def joints(self) -> range:
+        """The variables of the joints."""
+        return range(len(self.kinds))
+
+    @property
+    def turning(self) -> tuple[int, ...]:
+        """The revolute joints."""
+        return tuple(i for i in self.joints if self.kinds[i] == "revolute")
+
+    @property
+    def variables(self) -> int:
+        """How many variables there are."""
+        return 3 * len(self.kinds) + len(self.lengths)
+
+    def tilt(self, joint: int) -> tuple[int, int]:
+        """Return the variables of the tilts of a joint about its x and its y, which turns with the joint."""
+        first = len(self.kinds) + 2 * joint
+        return first, first + 1
+
+    def length(self, number: int) -> int:
+        """Return the variable that is added to entry `number` of `lengths`."""
+        return 3 * len(self.kinds) + number
 
 
 @dataclass(frozen=True)
 class Effect(ABC):
-    """A small deflection of every joint about or along its own axis.
+    """Small deflections of the joints: about or along their own axes, across them, or of the links' lengths.
 
     Parameters
     ----------
-    joints
-        Kind of each joint of the robot.
+    layout
+        The variables of the robot's chain.
+
+    Attributes
+    ----------
+    name
+        As files and models spell it; also the group of its parameters.
+    loaded, ordered, warmed
+        Whether it depends on loads, on the order in which configurations were reached, on the temperature.
+    tilts, stretches
+        Whether it tilts joints, or changes lengths.
     """
 
+    layout: Layout
     name: ClassVar[str]
-    joints: tuple[JointKind, ...]
+    loaded: ClassVar[bool] = False
+    ordered: ClassVar[bool] = False
+    warmed: ClassVar[bool] = False
+    tilts: ClassVar[bool] = False
+    stretches: ClassVar[bool] = False
 
     @property
     @abstractmethod
-    def nominal(self) -> Mapping[str, float]:
-        """Parameter names and the values at which the effect does nothing."""
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Its parameters, at the values at which it does nothing."""
 
     @abstractmethod
-    def deflection(self, q: Array, values: Mapping[str, float | Array]) -> Array:
-        """Return what is added to the joint variables `q` [rad or m], ``(joints, ..., n)``."""
+    def deflection(self, at: Postures, values: Mapping[str, float | Array]) -> Mapping[int, Array]:
+        """Return what is added to each variable that it moves [rad or m], each ``(n,)`` or ``(trials, n)``.
+
+        Parameters
+        ----------
+        at
+            The postures, with their loads where the effect depends on them.
+        values
+            Parameter values, each a number or ``(trials, 1)``.
+        """
 
     @abstractmethod
-    def derivative(self, q: Array, values: Mapping[str, float | Array]) -> Mapping[str, Mapping[int, Array]]:
-        """Return, for each parameter, its derivative of the deflection of the joints it acts on, each ``(n,)``."""
+    def derivative(self, at: Postures, values: Mapping[str, float | Array]) -> Rates:
+        """Return, for each parameter, its derivative of the variables it moves. Loads are held."""
+
+
+@dataclass(frozen=True)
+class LinearEffect(Effect):
+    """An effect whose deflection is a sum of parameters times shapes that depend on the posture alone."""
+
+    @abstractmethod
+    def shapes(self, at: Postures) -> Rates:
+        """Return what one unit of each parameter does to the variables it moves, each ``(n,)``."""
+
+    def deflection(self, at: Postures, values: Mapping[str, float | Array]) -> Mapping[int, Array]:
+        """Return the sum of parameters, counted from where they do nothing, times shapes."""
+        nothing = {p.name: p.nominal for p in self.parameters}
+        moved: dict[int, Array] = {}
+        for name, shape in self.shapes(at).items():
+            amount = np.asarray(values[name]) - nothing[name]
+            for variable, part in shape.items():
+                moved[variable] = moved[variable] + amount * part if variable in moved else amount * part
+        return moved
+
+    def derivative(self, at: Postures, values: Mapping[str, float | Array]) -> Rates:
+        """Return the shapes."""
+        return self.shapes(at)
+
+
+def effort(at: Postures, layout: Layout, joint: int) -> Array:
+    """Return the load that turns a revolute joint forward [N m], or pushes a prismatic one [N], ``(n,)``."""
+    if at.loads is None:
+        raise ValueError("the postures have no loads; ask Robot.loaded for them")
+    return np.asarray(at.loads[joint, 5 if layout.kinds[joint] == "revolute" else 2])

@@ -5,32 +5,25 @@ The offset k0 is no effect: it is the value of the joint's own element, ``theta_
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-
-from truearm.modeling.chain import Array
-from truearm.modeling.effects.effect import Effect
+from truearm.modeling.effects.effect import LinearEffect, Rates
+from truearm.modeling.parameters import Parameter
+from truearm.modeling.postures import Postures
 
 
 @dataclass(frozen=True)
-class Gain(Effect):
+class Gain(LinearEffect):
     """Parameters ``gain_i``, 1 for a perfect joint."""
 
     name: ClassVar[str] = "gain"
 
     @property
-    def nominal(self) -> Mapping[str, float]:
-        """One gain a joint."""
-        return {f"gain_{i + 1}": 1.0 for i in range(len(self.joints))}
+    def parameters(self) -> tuple[Parameter, ...]:
+        """One gain a joint, believed to be good for 1 in 1000."""
+        return tuple(Parameter.plain(f"gain_{i + 1}", "1", "gain", 1.0, 1e-3) for i in self.layout.joints)
 
-    def deflection(self, q: Array, values: Mapping[str, float | Array]) -> Array:
-        """Return (k1 - 1) q."""
-        turned = [(np.asarray(values[f"gain_{i + 1}"]) - 1.0) * reading for i, reading in enumerate(q)]
-        return np.stack(np.broadcast_arrays(*turned))
-
-    def derivative(self, q: Array, values: Mapping[str, float | Array]) -> Mapping[str, Mapping[int, Array]]:
-        """Return q."""
-        return {f"gain_{i + 1}": {i: reading} for i, reading in enumerate(q)}
+    def shapes(self, at: Postures) -> Rates:
+        """Return the readings."""
+        return {f"gain_{i + 1}": {i: at.joints[:, i]} for i in self.layout.joints}

@@ -14,6 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
+import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints, model_validator
 
 from truearm.errors import InputError, nearest_names
@@ -21,18 +22,31 @@ from truearm.files import is_one_line, read_yaml
 from truearm.modeling.conventions import convention
 from truearm.modeling.effects import EFFECTS
 from truearm.modeling.parameters import Parameter
-from truearm.modeling.parts import Joint, LinkMass, Target, Tool, Truth
+from truearm.modeling.parts import (
+    GRAVITY,
+    NO_PAYLOAD,
+    POINT_MASS,
+    Inertia,
+    Joint,
+    LinkMass,
+    Payload,
+    Target,
+    Tool,
+    Truth,
+)
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 from truearm.units import SHOWN_AS, sized_si, to_si, written
 
 SCHEMA = "truearm-robot/1"
+#: Groups of parameters that cannot be negative. An identified value may come out so; what somebody states may not.
+_POSITIVE: Final = ("compliance", "bearing-compliance", "backlash", "clearance", "clearance-linear-contact")
 #: What a robot and a joint may be called.
 NAME: Final = r"[A-Za-z0-9][A-Za-z0-9_.-]*"
 
 Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=True)]
-Mass = Annotated[float, Field(ge=0, allow_inf_nan=False, strict=True)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False, strict=True)]
 Triple = tuple[Number, Number, Number]
 
 
@@ -42,7 +56,20 @@ def _unit_length(q: tuple[float, float, float, float]) -> tuple[float, float, fl
     return q
 
 
+def _of_a_body(inertia: Inertia) -> Inertia:
+    """Refuse moments that no mass distribution has: the largest principal one exceeds the sum of the others."""
+    xx, yy, zz, xy, xz, yz = inertia
+    small, middle, large = (float(v) for v in np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+    if small + middle < large * (1.0 - 1e-6):  # small < 0 included; files round a flat or thin body
+        raise ValueError(
+            f"no body has these moments of inertia (xx, yy, zz, xy, xz, yz): the principal ones are {small:.6g}, "
+            f"{middle:.6g} and {large:.6g} kg m^2, but none can be negative or exceed the sum of the two others"
+        )
+    return inertia
+
+
 Quaternion = Annotated[tuple[Number, Number, Number, Number], AfterValidator(_unit_length)]
+Moments = Annotated[tuple[Number, Number, Number, Number, Number, Number], AfterValidator(_of_a_body)]
 Name = Annotated[str, StringConstraints(pattern=f"^{NAME}$", strict=True)]
 
 
@@ -81,20 +108,32 @@ class _Place(_Entry):
 
 class _Mass(_Entry):
     link: Annotated[int, Field(strict=True)]
-    mass: Mass
+    mass: NotNegative
     cog: Triple
+    inertia: Moments = POINT_MASS
 
 
 class _Tool(_Entry):
     targets: dict[TargetName, Triple]
-    mass: Mass = 0.0
+    mass: NotNegative = 0.0
     cog: Triple = (0.0, 0.0, 0.0)
+
+
+class _Payload(_Entry):
+    mass: NotNegative
+    cog: Triple = (0.0, 0.0, 0.0)
+
+
+def _falls(gravity: tuple[float, float, float]) -> tuple[float, float, float]:
+    if not 0.1 <= math.hypot(*gravity) <= 100.0:
+        raise ValueError(f"free fall of 0.1 to 100 m/s^2 belongs here, this one has {math.hypot(*gravity):.6g}")
+    return gravity
 
 
 class _Truth(_Entry):
     source: str
     values: dict[str, Number]
-    compliance: dict[Annotated[int, Field(strict=True)], Number] = {}
+    compliance: dict[Annotated[int, Field(strict=True)], NotNegative] = {}
 
 
 class _Target(_Entry):
@@ -140,6 +179,8 @@ class RobotFile(_Entry):
     joints: list[_Joint] = Field(min_length=1)
     flange: _Place = _Place()
     masses: list[_Mass] = []
+    payload: _Payload | None = None
+    gravity: Annotated[Triple, AfterValidator(_falls)] = GRAVITY
     tools: dict[Name, _Tool] = {}
     truths: dict[Name, _Truth] = {}
     priors: _Priors = _Priors()
@@ -204,9 +245,18 @@ def robot_from_file(content: RobotFile, where: str) -> Robot:
             metres(content.flange.translation, "flange.translation"), content.flange.quaternion or (1.0, 0.0, 0.0, 0.0)
         ),
         masses=tuple(
-            LinkMass(m.link, si(m.mass, "1", f"masses[{i}].mass"), metres(m.cog, f"masses[{i}].cog"))
+            LinkMass(
+                m.link,
+                si(m.mass, "1", f"masses[{i}].mass"),
+                metres(m.cog, f"masses[{i}].cog"),
+                _inertia(m.inertia, f"{where}, masses[{i}].inertia"),
+            )
             for i, m in enumerate(content.masses, 1)
         ),
+        payload=NO_PAYLOAD
+        if content.payload is None
+        else Payload(si(content.payload.mass, "1", "payload.mass"), metres(content.payload.cog, "payload.cog")),
+        gravity=content.gravity,
         base_quaternion=content.base_quaternion,
         targets=tuple(Target(t.name, t.quaternion) for t in content.targets),
         effect_names=tuple(content.effects),
@@ -228,7 +278,7 @@ def robot_from_file(content: RobotFile, where: str) -> Robot:
         },
         history=tuple(content.history),
     )
-    shown = {"m": length, "rad": angle, "1": "1"}
+    shown = {**SHOWN_AS, "m": length, "rad": angle}
 
     def known(name: str, entry: str) -> Parameter:
         if name in robot.parameters:
@@ -253,6 +303,13 @@ def robot_from_file(content: RobotFile, where: str) -> Robot:
         place = f"parameters.{name}"
         plain = known(name, "parameters")
         unit = shown[plain.unit]
+        if plain.group in _POSITIVE and entry.nominal < 0.0:
+            raise InputError(
+                "no joint has a negative one",
+                where=f"{where}, {place}.nominal",
+                came=f"{entry.nominal:g} {unit}",
+                allowed="0 or more",
+            )
         if entry.unit != unit:
             raise InputError(
                 "the unit differs from the file's", where=f"{where}, {place}", came=entry.unit, allowed=unit
@@ -323,6 +380,11 @@ def _vector(name: str, value: object, unit: str, where: str, *, direction: bool)
     return {f"{name}_{a}": sized_si(v, unit, where) for a, v in zip("xyz", numbers, strict=True)}
 
 
+def _inertia(moments: Inertia, where: str) -> Inertia:
+    xx, yy, zz, xy, xz, yz = (sized_si(v, "1", where) for v in moments)
+    return xx, yy, zz, xy, xz, yz
+
+
 def _number(value: object, where: str) -> float:
     try:
         if not isinstance(value, bool) and isinstance(value, int | float) and math.isfinite(value):
@@ -389,7 +451,17 @@ def robot_text(robot: Robot) -> str:
             "quaternion": listed(list(robot.flange.quaternion)),
         }
     if robot.masses:
-        content["masses"] = [flow({"link": m.joint, "mass": m.mass, "cog": mm(m.cog)}) for m in robot.masses]
+        content["masses"] = [
+            flow(
+                {"link": m.joint, "mass": m.mass, "cog": mm(m.cog)}
+                | ({"inertia": listed(list(m.inertia))} if any(m.inertia) else {})
+            )
+            for m in robot.masses
+        ]
+    if robot.payload != NO_PAYLOAD:
+        content["payload"] = flow({"mass": robot.payload.mass, "cog": mm(robot.payload.cog)})
+    if robot.gravity != GRAVITY:
+        content["gravity"] = listed(list(robot.gravity))
     if robot.tools:
         content["tools"] = {
             name: {"targets": {text(t): mm(p) for t, p in tool.targets.items()}, "mass": tool.mass, "cog": mm(tool.cog)}

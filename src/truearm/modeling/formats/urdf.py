@@ -145,7 +145,7 @@ def urdf_text(robot: Robot) -> tuple[str, list[str]]:
     if any(joint.limits for joint in robot.joints):
         left_out.append("Effort and velocity limits are not known and stand as 0.")
     if robot.masses:
-        left_out.append("Inertia tensors are not known and stand as 0.")
+        left_out.append("Inertia tensors are not written and stand as 0.")
     return "\n".join([*lines, "</robot>", ""]), left_out
 
 
@@ -411,7 +411,7 @@ def _left_out(robot: Robot) -> list[str]:
     """Say what of this robot a URDF cannot hold."""
     said = []
     for effect in robot.effects:
-        names = [name for name, plain in effect.nominal.items() if robot.values[name] != plain]
+        names = [plain.name for plain in effect.parameters if robot.values[plain.name] != plain.value]
         if names:
             said.append(f"A URDF cannot hold the joint effect {effect.name}; left out: {', '.join(names)}.")
     base = [name for name, p in robot.parameters.items() if p.group == "base" and p.value != 0.0]

@@ -1,0 +1,168 @@
+"""Where the parts of the digital twin are and what each joint carries, by 4x4 matrices alone.
+
+A frame is a matrix T, and its motion is T with its first and second derivatives by time: the product rule along the
+chain gives velocity and acceleration of every point of a link without a recursion over angular velocities. A body is
+the matrix of its second moments ``J = sum of m x x^T`` over its points x = (x, y, z, 1), so that with gravity G in
+the last column the sum of ``p f^T`` over its points p and the forces f on them is ``T J (G - T'')^T``: its last row
+is the force, its antisymmetric part the moment (Uicker 1965, "On the dynamic analysis of spatial linkages using 4x4
+matrices", the same in Paul 1981, "Robot Manipulators", chapter 6).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from truearm.modeling.chain import Array, Element
+from truearm.modeling.parts import LinkMass
+
+#: A frame with its first and second derivative by time, (3, 4, 4).
+Moving = Array
+
+
+@dataclass(frozen=True, eq=False)
+class Link:
+    """One link: the way to its joint, the joint, the way on to the link's frame.
+
+    Attributes
+    ----------
+    before, after
+        Constant matrices ``(4, 4)``.
+    generator
+        Derivative of the joint's matrix by its variable at zero ``(4, 4)``.
+    turns
+        Whether the joint turns.
+    zero
+        Value of the joint's own element [rad or m].
+    axes
+        The joint's axes in the frame behind its element, z along the joint, as columns of ``(4, 4)``.
+    body
+        Second moments of the link's masses in the link's frame ``(4, 4)``.
+    """
+
+    before: Array
+    generator: Array
+    turns: bool
+    zero: float
+    axes: Array
+    after: Array
+    body: Array
+
+    @classmethod
+    def made_of(
+        cls, elements: Sequence[Element], values: Mapping[str, float], growth: float, masses: Sequence[LinkMass]
+    ) -> Link:
+        """Return the link of some elements, one of which is its joint, each nominal length longer by `growth`."""
+        place = next(i for i, element in enumerate(elements) if element.variable is not None)
+        joint = elements[place]
+        return cls(
+            before=product(elements[:place], values, growth),
+            generator=generator(joint),
+            turns=joint.turns,
+            zero=amount(joint, values, growth),
+            axes=_joint_axes(joint),
+            after=product(elements[place + 1 :], values, growth),
+            body=sum((second_moments(mass.mass, mass.cog, mass.inertia) for mass in masses), np.zeros((4, 4))),
+        )
+
+
+def product(elements: Sequence[Element], values: Mapping[str, float], growth: float = 0.0) -> Array:
+    """Return the matrix of some elements with no joint among them."""
+    T = np.eye(4)
+    for element in elements:
+        T = T @ exponential(generator(element), amount(element, values, growth), element.turns)
+    return T
+
+
+def amount(element: Element, values: Mapping[str, float], growth: float) -> float:
+    """Return how far an element turns or slides at reading zero [rad or m]."""
+    own = element.value if element.parameter is None else values[element.parameter]
+    return own if element.turns else own + growth * element.value
+
+
+def generator(element: Element) -> Array:
+    """Return the derivative of an element's matrix by its amount, at zero."""
+    x, y, z = _axis(element)
+    S = np.zeros((4, 4))
+    if element.turns:
+        S[:3, :3] = [[0, -z, y], [z, 0, -x], [-y, x, 0]]
+    else:
+        S[:3, 3] = x, y, z
+    return S
+
+
+def exponential(S: Array, amount: float, turns: bool) -> Array:
+    """Return the matrix of a turn or a slide by its generator."""
+    if turns:
+        return np.eye(4) + math.sin(amount) * S + (1 - math.cos(amount)) * S @ S
+    return np.eye(4) + amount * S
+
+
+def second_moments(
+    mass: float, cog: tuple[float, float, float], inertia: tuple[float, float, float, float, float, float] = (0.0,) * 6
+) -> Array:
+    """Return the sum of ``m x x^T`` over the points of a body, from its inertia about the centre of gravity."""
+    xx, yy, zz, xy, xz, yz = inertia
+    about = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    J = np.zeros((4, 4))
+    J[:3, :3] = np.trace(about) / 2 * np.eye(3) - about
+    centre = np.array([*cog, 1.0])
+    return J + mass * np.outer(centre, centre)
+
+
+def moved(T: Moving, link: Link, variable: float, velocity: float, acceleration: float) -> Moving:
+    """Return the frame right behind a link's joint."""
+    S = link.generator
+    A = exponential(S, link.zero + variable, link.turns)
+    A1 = velocity * A @ S
+    A2 = acceleration * A @ S + velocity * A1 @ S
+    at, rate, change = T @ link.before
+    return np.stack([at @ A, rate @ A + at @ A1, change @ A + 2 * rate @ A1 + at @ A2])
+
+
+def weight(body: Array, T: Moving, gravity: Array) -> Array:
+    """Return weight and inertial forces on a body: the sum of ``p f^T`` over its points ``(4, 4)``."""
+    pull = -T[2]
+    pull[:3, 3] += gravity
+    return np.asarray(T[0] @ body @ pull.T)
+
+
+def wrench_at(carried: Array, frame: Array) -> Array:
+    """Return force and moment ``(6,)`` of the forces behind a sum of ``p f^T``, about and in the axes of a frame."""
+    force = carried[3, :3]
+    p = carried[:3, :3] - np.outer(frame[:3, 3], force)
+    moment = np.array([p[1, 2] - p[2, 1], p[2, 0] - p[0, 2], p[0, 1] - p[1, 0]])
+    return np.concatenate([force @ frame[:3, :3], moment @ frame[:3, :3]])
+
+
+def forces_of(wrench: Array, point: Array) -> Array:
+    """Return a sum of ``p f^T`` that acts as a force and a moment about a point ``(3,)`` do."""
+    force, (x, y, z) = wrench[:3], wrench[3:] / 2
+    carried = np.zeros((4, 4))
+    carried[3, :3] = force
+    carried[:3, :3] = np.outer(point, force) + np.array([[0, z, -y], [-z, 0, x], [y, -x, 0]])
+    return carried
+
+
+def leaning(alpha: float, beta: float) -> Array:
+    """Return ``Rx(alpha) Ry(beta)``."""
+    about_x, about_y = generator(Element("Rx")), generator(Element("Ry"))
+    return exponential(about_x, alpha, turns=True) @ exponential(about_y, beta, turns=True)
+
+
+def _axis(element: Element) -> Array:
+    return np.array(element.axis) if element.axis else np.eye(3)["xyz".index(element.motion[1])]
+
+
+def _joint_axes(element: Element) -> Array:
+    """Return axes with z along the joint: those of the frame itself for a joint about z, else some across it."""
+    z = _axis(element)
+    least = np.eye(3)[np.argmin(np.abs(z))]
+    y = np.cross(z, least) / np.linalg.norm(np.cross(z, least))
+    axes = np.eye(4)
+    if z[2] != 1.0:
+        axes[:3, :3] = np.column_stack([np.cross(y, z), y, z])
+    return axes

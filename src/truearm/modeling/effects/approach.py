@@ -1,0 +1,37 @@
+"""Approach direction: friction stops a joint short of where it was sent, on the side it came from (hysteresis)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar, Final
+
+from truearm.modeling.effects.effect import LinearEffect, Rates
+from truearm.modeling.parameters import Parameter
+from truearm.modeling.postures import Postures
+
+_PRIOR: Final = math.radians(0.02)
+
+
+@dataclass(frozen=True)
+class Approach(LinearEffect):
+    """Parameters ``approach_i`` [rad, m]: what is added to a joint that was reached moving forward."""
+
+    name: ClassVar[str] = "approach"
+    ordered: ClassVar[bool] = True
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """One a joint."""
+        return tuple(
+            Parameter.plain(f"approach_{i + 1}", "rad", "approach", 0.0, _PRIOR)
+            if self.layout.kinds[i] == "revolute"
+            else Parameter.plain(f"approach_{i + 1}", "m", "approach", 0.0, 1e-4)
+            for i in self.layout.joints
+        )
+
+    def shapes(self, at: Postures) -> Rates:
+        """Return the signs of the last moves; nothing where they are not known."""
+        if at.approach is None:
+            return {}
+        return {f"approach_{i + 1}": {i: at.approach[:, i]} for i in self.layout.joints}

@@ -1,0 +1,40 @@
+"""Bearing compliance: the load tilts a joint across its axis, in proportion to the moment that its bearings carry.
+
+Stiffer than about the axis, but it acts on every joint, and on a vertical first axis under gravity too. The tilts are
+those of :mod:`truearm.modeling.effects.clearance`, right behind the joint's own turn.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from truearm.modeling.effects.effect import LinearEffect, Rates
+from truearm.modeling.parameters import Parameter
+from truearm.modeling.postures import Postures
+
+
+@dataclass(frozen=True)
+class BearingCompliance(LinearEffect):
+    """Parameters ``bearing_compliance_i`` [rad/(N m)], alike about x and y."""
+
+    name: ClassVar[str] = "bearing-compliance"
+    loaded: ClassVar[bool] = True
+    tilts: ClassVar[bool] = True
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """One a turning joint."""
+        return tuple(
+            Parameter.plain(f"bearing_compliance_{i + 1}", "rad/(N m)", "bearing-compliance", 0.0, 1e-4)
+            for i in self.layout.turning
+        )
+
+    def shapes(self, at: Postures) -> Rates:
+        """Return the moments across the axes."""
+        if at.loads is None:
+            raise ValueError("the postures have no loads; ask Robot.loaded for them")
+        return {
+            f"bearing_compliance_{i + 1}": dict(zip(self.layout.tilt(i), at.loads[i, 3:5], strict=True))
+            for i in self.layout.turning
+        }

@@ -1,0 +1,32 @@
+"""Joint compliance: the load turns the joint on, or pushes it (Nubiola, section 2.4.2 and annex I; Patel, 4.15)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from truearm.modeling.effects.effect import LinearEffect, Rates, effort
+from truearm.modeling.parameters import Parameter
+from truearm.modeling.postures import Postures
+
+
+@dataclass(frozen=True)
+class Compliance(LinearEffect):
+    """Parameters ``compliance_i`` [rad/(N m), m/N], the inverse of a stiffness."""
+
+    name: ClassVar[str] = "compliance"
+    loaded: ClassVar[bool] = True
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """One compliance a joint."""
+        return tuple(
+            Parameter.plain(f"compliance_{i + 1}", "rad/(N m)", "compliance", 0.0, 1e-3)
+            if self.layout.kinds[i] == "revolute"
+            else Parameter.plain(f"compliance_{i + 1}", "m/N", "compliance", 0.0, 1e-5)
+            for i in self.layout.joints
+        )
+
+    def shapes(self, at: Postures) -> Rates:
+        """Return the loads' moments about the axes, and forces along them."""
+        return {f"compliance_{i + 1}": {i: effort(at, self.layout, i)} for i in self.layout.joints}

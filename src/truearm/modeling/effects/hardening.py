@@ -1,0 +1,45 @@
+"""Hardening stiffness: gears and bearings give way more to the first newton metres than to the last.
+
+What is added to the linear compliance: c2 M |M| + c3 M^3, odd in the moment M, with c2 negative where the joint
+hardens.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from truearm.modeling.effects.effect import LinearEffect, Rates, effort
+from truearm.modeling.parameters import Parameter
+from truearm.modeling.postures import Postures
+
+
+@dataclass(frozen=True)
+class Hardening(LinearEffect):
+    """Parameters ``compliance_quadratic_i`` [rad/(N m)^2] and ``compliance_cubic_i`` [rad/(N m)^3]."""
+
+    name: ClassVar[str] = "hardening"
+    loaded: ClassVar[bool] = True
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Two a turning joint."""
+        return tuple(
+            plain
+            for i in self.layout.turning
+            for plain in (
+                Parameter.plain(f"compliance_quadratic_{i + 1}", "rad/(N m)^2", "hardening", 0.0, 3e-5),
+                Parameter.plain(f"compliance_cubic_{i + 1}", "rad/(N m)^3", "hardening", 0.0, 3e-7),
+            )
+        )
+
+    def shapes(self, at: Postures) -> Rates:
+        """Return the square, with its sign, and the cube of the moments."""
+        found = {}
+        for i in self.layout.turning:
+            moment = effort(at, self.layout, i)
+            found[f"compliance_quadratic_{i + 1}"] = {i: moment * np.abs(moment)}
+            found[f"compliance_cubic_{i + 1}"] = {i: moment**3}
+        return found

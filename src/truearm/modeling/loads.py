@@ -1,0 +1,174 @@
+"""What every joint carries: weight and inertia of all that lies beyond it, and what pulls at the flange.
+
+There is one sign: the wrench is the load's, weight and the inertial forces that oppose acceleration (d'Alembert), so a
+positive moment about a joint's axis turns the joint forward and a compliant joint sags that way (Nubiola, equation
+I.10, ``(c x f)_z``). The reaction that holds the load, which textbooks and RNEA codes return (Craig, "Introduction to
+Robotics", equations 6.51 and 6.52), is its opposite.
+
+It is the recursive Newton-Euler method (Luh, Walker and Paul 1980, "On-line computational scheme for mechanical
+manipulators"), element by element of the chain and for all configurations together. Forward goes what each frame
+feels: free fall, which is gravity less the acceleration of the frame's origin, and in motion its angular velocity and
+acceleration; they give each body's wrench. Backward go force and moment, summed, about the origin and in the axes of
+the frame at hand. At rest that is one vector forward and two backward.
+"""
+
+from __future__ import annotations
+
+from itertools import accumulate, chain
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from truearm.errors import InputError
+from truearm.modeling.chain import (
+    Array,
+    Chain,
+    Coordinates,
+    Direction,
+    Number,
+    across,
+    axis_of,
+    cross,
+    seen_before,
+    seen_behind,
+)
+from truearm.modeling.parts import POINT_MASS, Inertia
+
+if TYPE_CHECKING:
+    from truearm.modeling.robot import Robot
+
+_NOTHING: Final[Coordinates] = (0.0, 0.0, 0.0)
+
+
+def joint_loads(
+    robot: Robot,
+    variables: Array,
+    *,
+    velocity: Array | None = None,
+    acceleration: Array | None = None,
+    wrench: Array | None = None,
+) -> Array:
+    """Return force [N] and moment [N m] of the load at every joint, about its origin and in its own axes.
+
+    A joint's own axes are those of :func:`truearm.modeling.chain.across` and its axis as z, and its origin is that of
+    the frame right behind it: behind the turn, or the slide of a prismatic joint. The place of the base in the world
+    does not matter, because gravity is given in the base frame.
+
+    Parameters
+    ----------
+    variables
+        Variables of the trunk [rad or m], ``(joints or more, n)``; those beyond the joints are at rest.
+    velocity, acceleration
+        Of the joints, ``(joints, n)`` [rad/s and rad/s^2, or m/s and m/s^2]; zero if None.
+    wrench
+        External force [N], then moment [N m], on the flange at its origin, in the axes of the base, ``(6, n)``.
+
+    Returns
+    -------
+    loads
+        ``(joints, 6, n)``, force first. A positive moment about z turns the joint forward.
+
+    Raises
+    ------
+    InputError
+        If an array has another shape.
+    """
+    count, size = len(robot.joints), np.shape(variables)[-1]
+    for name, given, rows in (
+        ("velocity", velocity, count),
+        ("acceleration", acceleration, count),
+        ("wrench", wrench, 6),
+    ):
+        if given is not None and np.shape(given) != (rows, size):
+            raise InputError(
+                f"the {name} has another shape than it should",
+                where=robot.name,
+                came=f"an array of shape {np.shape(given)}",
+                allowed=f"({rows}, {size}): one column for each configuration",
+            )
+    elements = (*chain.from_iterable(robot.moved_links), *robot.flange_elements)
+    moves = Chain(elements).sweep(variables, robot.values).moves
+    ends = [0, *accumulate(len(link) for link in robot.moved_links)]
+    bodies = [(ends[link.joint], link.mass, link.cog, link.inertia) for link in robot.masses]
+    bodies.append((len(elements), robot.payload.mass, robot.payload.cog, POINT_MASS))
+    bodies = [(end, mass, cog, inertia) for end, mass, cog, inertia in bodies if mass or any(inertia)]
+    moving = velocity is not None or acceleration is not None
+    rest = np.zeros((count, 1))
+    qd = rest if velocity is None else velocity
+    qdd = rest if acceleration is None else acceleration
+
+    fall: Coordinates = robot.gravity
+    omega = alpha = force = moment = _NOTHING
+    if wrench is not None:
+        force, moment = (wrench[0], wrench[1], wrench[2]), (wrench[3], wrench[4], wrench[5])
+    applied: dict[int, list[tuple[Coordinates, Coordinates]]] = {}
+    for place, (element, move) in enumerate(zip(elements, moves, strict=True), 1):
+        if move and element.turns:
+            fall = seen_behind(fall, element, move)
+            if moving:
+                omega, alpha = seen_behind(omega, element, move), seen_behind(alpha, element, move)
+            if wrench is not None:
+                force, moment = seen_behind(force, element, move), seen_behind(moment, element, move)
+        elif move and moving:
+            fall = _less(fall, _swing(omega, alpha, _scaled(axis_of(element), move[0])))
+        if moving and element.variable is not None and element.variable < count:
+            rate = _scaled(axis_of(element), qd[element.variable])
+            surge = _scaled(axis_of(element), qdd[element.variable])
+            turned = cross(omega, rate)  # by Coriolis once for a turn, twice for a slide
+            if element.turns:
+                alpha, omega = _plus(_plus(alpha, turned), surge), _plus(omega, rate)
+            else:
+                fall = _less(fall, _plus(_plus(turned, turned), surge))
+        for end, mass, cog, inertia in bodies:
+            if end == place:
+                felt = _less(fall, _swing(omega, alpha, cog)) if moving else fall
+                pull = _scaled(felt, mass)
+                turn = cross(cog, pull)
+                if moving and any(inertia):
+                    turn = _less(turn, _plus(_times(inertia, alpha), cross(omega, _times(inertia, omega))))
+                applied.setdefault(place, []).append((pull, turn))
+
+    loads = np.empty((count, 6, size))
+    for place in range(len(elements), 0, -1):
+        element, move = elements[place - 1], moves[place - 1]
+        for pull, turn in applied.get(place, ()):
+            force, moment = _plus(force, pull), _plus(moment, turn)
+        if element.variable is not None and element.variable < count:
+            for k, axis in enumerate((*across(element), axis_of(element))):
+                loads[element.variable, k] = _along(axis, force)
+                loads[element.variable, 3 + k] = _along(axis, moment)
+        if move and element.turns:
+            force, moment = seen_before(force, element, move), seen_before(moment, element, move)
+        elif move:
+            moment = _plus(moment, cross(_scaled(axis_of(element), move[0]), force))
+    return loads
+
+
+# -- vectors whose entries are numbers or arrays -----------------------------------------------------------
+
+
+def _swing(omega: Coordinates, alpha: Coordinates, arm: Coordinates) -> Coordinates:
+    """Return the acceleration of the end of an arm that turns about its other end [m/s^2]."""
+    return _plus(cross(alpha, arm), cross(omega, cross(omega, arm)))
+
+
+def _times(inertia: Inertia, vector: Coordinates) -> Coordinates:
+    xx, yy, zz, xy, xz, yz = inertia
+    x, y, z = vector
+    return xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z
+
+
+def _scaled(vector: Coordinates, size: Number) -> Coordinates:
+    return vector[0] * size, vector[1] * size, vector[2] * size
+
+
+def _plus(a: Coordinates, b: Coordinates) -> Coordinates:
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+def _less(a: Coordinates, b: Coordinates) -> Coordinates:
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def _along(axis: Direction, vector: Coordinates) -> Number:
+    return axis[0] * vector[0] + axis[1] * vector[1] + axis[2] * vector[2]

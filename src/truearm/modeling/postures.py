@@ -1,0 +1,87 @@
+"""Postures: joint readings, and what else the shape of an arm depends on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.modeling.chain import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Postures:
+    """Joint readings under known circumstances.
+
+    Attributes
+    ----------
+    joints
+        Readings [rad; m for sliding joints], ``(n, joints)``.
+    velocity, acceleration
+        Of the joints [rad/s, m/s and so on], ``(n, joints)``; at rest if None.
+    approach
+        Sign of the last move of each joint, ``(n, joints)``: 1, -1, or 0 where it is not known; None if it is known
+        nowhere.
+    temperature
+        Of the arm [degC], ``(n,)``.
+    wrench
+        External force [N] and moment [N m] on the flange, about its origin, in the axes of the base, ``(n, 6)``.
+    loads
+        Force and moment of everything beyond each joint, in the joint's own axes, ``(joints, 6, n)``, as
+        :meth:`truearm.modeling.robot.Robot.loaded` finds them.
+    """
+
+    joints: Array
+    velocity: Array | None = None
+    acceleration: Array | None = None
+    approach: Array | None = None
+    temperature: Array | None = None
+    wrench: Array | None = None
+    loads: Array | None = None
+
+    @classmethod
+    def of(cls, q: Array | Postures) -> Postures:
+        """Return plain readings ``(n, joints)`` as postures at rest."""
+        return q if isinstance(q, Postures) else cls(np.asarray(q, float))
+
+    def __len__(self) -> int:
+        return len(self.joints)
+
+    def at(self, indices: NDArray[np.intp]) -> Postures:
+        """Return some of them, without their loads."""
+
+        def part(values: Array | None) -> Array | None:
+            return None if values is None else values[indices]
+
+        return replace(
+            self,
+            joints=self.joints[indices],
+            velocity=part(self.velocity),
+            acceleration=part(self.acceleration),
+            approach=part(self.approach),
+            temperature=part(self.temperature),
+            wrench=part(self.wrench),
+            loads=None,
+        )
+
+
+def approach_of(joints: Array, order: NDArray[np.int64]) -> Array:
+    """Return the sign of the last move of each joint, ``(n, joints)``.
+
+    Parameters
+    ----------
+    joints
+        Readings ``(n, joints)``.
+    order
+        Number of each row in the sequence of measurement, ``(n,)``. A row whose predecessor is not there came from
+        nowhere known: its signs are 0. A joint that did not move keeps the sign of its move before.
+    """
+    signs = np.zeros_like(joints)
+    rows = np.argsort(order, kind="stable")
+    for before, row in pairwise(rows):
+        if order[row] == order[before] + 1:
+            moved = np.sign(joints[row] - joints[before])
+            signs[row] = np.where(moved == 0.0, signs[before], moved)
+    return signs

@@ -1,0 +1,63 @@
+"""What all pictures have in common: plain Plotly figures, that is dictionaries, so that Plotly need not be imported."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+Figure = dict[str, Any]
+
+BEFORE: Final = "#b8ab97"
+AFTER: Final = "#1d5f8a"
+_INK: Final = "#2b2f33"
+_GRID: Final = "#e4e6e8"
+_FONT: Final = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"
+
+
+def axis(title: str) -> Figure:
+    """Make an axis of a plane picture."""
+    return {
+        "title": {"text": title},
+        "gridcolor": _GRID,
+        "zeroline": False,
+        "linecolor": "#9aa0a6",
+        "showline": True,
+        "automargin": True,
+    }
+
+
+def logarithmic_axis(title: str, low: float, high: float) -> Figure:
+    """Make an axis with ticks at 1, 2 and 5 in every decade, or at whole decades where there are many."""
+    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    steps = (1, 2, 5) if len(decades) <= 5 else (1,)
+    ticks = [float(f"{step}e{decade}") for decade in decades for step in steps]
+    return axis(f"{title}, logarithmic") | {
+        "type": "log",
+        "tickvals": ticks,
+        "ticktext": [f"{tick:g}" for tick in ticks],
+    }
+
+
+def scene_axis(title: str) -> Figure:
+    """Make an axis of a picture in space."""
+    return {
+        "title": {"text": title},
+        "gridcolor": "#d5d8db",
+        "showbackground": False,
+        "zeroline": False,
+        "showspikes": False,
+    }
+
+
+def figure(traces: list[Figure], height: int, **layout: Any) -> Figure:
+    """Put traces into the house's layout, `height` pixels high; `layout` adds to it."""
+    common = {
+        "height": height,
+        "font": {"family": _FONT, "size": 13, "color": _INK},
+        "paper_bgcolor": "#ffffff",
+        "plot_bgcolor": "#ffffff",
+        "margin": {"l": 60, "r": 20, "t": 36, "b": 50},
+        "legend": {"orientation": "h", "x": 0, "y": 1.02, "xanchor": "left", "yanchor": "bottom"},
+        "hoverlabel": {"bgcolor": "#ffffff", "bordercolor": "#9aa0a6", "font": {"color": _INK}},
+    }
+    return {"data": traces, "layout": {**common, **layout}}

@@ -1,0 +1,54 @@
+"""The Katana of the thesis with its 17 parameters (Patel, tables 3.1 and 3.2)."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.twin import Twin, measure
+from truearm.modeling.chain import Array
+from truearm.modeling.robot import Robot
+from truearm.robots import load_robot
+
+#: The document's alpha_0 to alpha_4 are alpha_1 to alpha_5 here. Its tool link is the flange here, so d_6 is z of the
+#: tip, and alpha_6, a turn with an arm of 200 mm, is y of the tip.
+NAMES: Final = (
+    *(f"theta_offset_{i}" for i in range(1, 6)),
+    *(f"alpha_{i}" for i in range(1, 6)),
+    "target_tip_y",
+    "beta_3",
+    "beta_4",
+    "a_3",
+    "a_4",
+    "d_5",
+    "target_tip_z",
+)
+UNITS: Final = {"target_tip_y": 0.2}
+PERTURBATIONS: Final = {"target_tip_y": 0.2 * math.radians(0.05)}
+#: One step of a parameter as the document counts them: rad and mm.
+UNIT: Final = np.array([0.2 if n == "target_tip_y" else 1e-3 if n in NAMES[-4:] else 1.0 for n in NAMES])
+
+
+def katana() -> Robot:
+    robot = load_robot("katana450")
+    return robot.with_frames(robot.base, {"tip": (0.0, 0.0, 0.0)})
+
+
+def values(robot: Robot) -> Array:
+    return np.array([robot.values[name] for name in NAMES])
+
+
+def drawn(size: float, seed: int) -> Robot:
+    """Return a Katana with errors of 0.1 deg and 0.1 mm, one standard deviation, times `size`."""
+    robot = katana()
+    deviation = np.where(UNIT == 1e-3, 1e-4, math.radians(0.1) * UNIT)
+    errors = size * deviation * np.random.default_rng(seed).standard_normal(len(NAMES))
+    return robot.with_values(dict(zip(NAMES, values(robot) + errors, strict=True)))
+
+
+def readings(robot: Robot, poses: int, noise: float, seed: int) -> Dataset:
+    rng = np.random.default_rng(seed)
+    return measure(Twin(robot), robot.random_configurations(poses, rng), noise, rng)

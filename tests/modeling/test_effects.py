@@ -1,0 +1,128 @@
+"""Every registered joint effect: against the twin, against central differences, and where it is off."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from truearm.measurement.truths import joint_truths
+from truearm.measurement.twin import Twin
+from truearm.modeling.effects import EFFECTS, Effect
+from truearm.modeling.effects.backlash import SEATED
+from truearm.modeling.parts import LinkMass, Payload
+from truearm.modeling.postures import Postures, approach_of
+from truearm.modeling.robot import Robot
+from truearm.robots import load_robot
+
+NAMES = tuple(effect.name for effect in EFFECTS if effect.name != "clearance-linear-contact")
+
+
+def loaded_arm(effects: tuple[str, ...], seed: int) -> Robot:
+    """An arm with masses on every link, a payload and effects of the size of their priors."""
+    rng = np.random.default_rng(seed)
+    plain = load_robot("irb120").with_frames(load_robot("irb120").base, {"tip": (0.05, 0.02, 0.15)})
+    masses = tuple(LinkMass(i, float(rng.uniform(1, 4)), tuple(rng.uniform(-0.1, 0.1, 3))) for i in range(1, 7))
+    robot = replace(plain, masses=masses, payload=Payload(2.0, (0.05, 0.03, 0.1))).with_effects(effects)
+    own = [p for effect in robot.effects for p in effect.parameters]
+    return robot.with_values({p.name: p.nominal + 0.3 * p.prior * abs(rng.normal()) for p in own})
+
+
+def circumstances(robot: Robot, count: int, seed: int) -> Postures:
+    """Postures in which every joint carries a moment, so that play is taken up."""
+    rng = np.random.default_rng(seed)
+    wrench = np.column_stack([rng.uniform(-20, 20, (count, 3)), rng.uniform(-8, 8, (count, 3))])
+    signs = rng.choice([-1.0, 1.0], (count, 6))
+    joints = robot.random_configurations(count, rng)
+    at = Postures(joints, approach=signs, temperature=rng.uniform(10, 40, count), wrench=wrench)
+    loads = replace(robot, effect_names=("compliance",), known={}).loaded(at).loads
+    assert loads is not None
+    seated = (np.abs(loads[:, 5]) > 20 * SEATED).all(axis=0)
+    return at.at(np.flatnonzero(seated))
+
+
+@pytest.mark.parametrize("effects", [*((name,) for name in NAMES), NAMES, ("compliance", "clearance-linear-contact")])
+def test_effects_are_those_of_the_twin(effects: tuple[str, ...]) -> None:
+    robot = loaded_arm(effects, 1)
+    at = circumstances(robot, 60, 2)
+    assert len(at) >= 10
+    assert at.approach is not None
+    assert at.temperature is not None
+    assert at.wrench is not None
+    twin = Twin(robot, joint_truths(robot), "document" if "clearance-linear-contact" in effects else "exact")
+    postures = twin.postures(at.joints, approach=at.approach, temperature=at.temperature, wrench=at.wrench)
+    true = np.array([posture.targets["tip"] for posture in postures])
+    position, rotation = robot.poses(at, "tip")
+    assert_allclose(position, true[:, :3, 3], rtol=0, atol=1e-11)
+    assert_allclose(rotation, true[:, :3, :3], rtol=0, atol=1e-11)
+    plain, _ = replace(robot, effect_names=()).poses(at, "tip")
+    assert np.abs(position - plain).max() > 1e-6
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.name)
+def test_derivatives_are_central_differences_under_load(effect: type[Effect]) -> None:
+    robot = loaded_arm((effect.name,), 3)
+    at = robot.loaded(circumstances(robot, 40, 4))
+    names = [p.name for e in robot.effects for p in e.parameters]
+    linear, angular = robot.derivatives(robot.sweep(at, "tip"), at, names)
+    for i, name in enumerate(names):
+        h = 1e-2 * robot.parameters[name].prior
+        ahead, behind = (robot.sweep(at, "tip", {**robot.values, name: robot.values[name] + s * h}) for s in (1, -1))
+        expected = (ahead.position - behind.position) / (2 * h)
+        scale = np.abs(linear[i]).max()
+        assert_allclose(linear[i], expected, rtol=0, atol=1e-6 * scale + 1e-13 / h, err_msg=name)
+        turned = (ahead.matrix() - behind.matrix()) @ np.swapaxes(robot.sweep(at, "tip").matrix(), 1, 2) / (2 * h)
+        vee = np.stack([turned[:, 2, 1], turned[:, 0, 2], turned[:, 1, 0]])
+        assert_allclose(angular[i], vee, rtol=0, atol=1e-6 * np.abs(angular[i]).max() + 1e-13 / h, err_msg=name)
+    assert np.abs(linear).max() > 0
+
+
+@pytest.mark.parametrize("effects", [(effect.name,) for effect in EFFECTS] + [NAMES])
+def test_effects_that_are_off_change_nothing_at_all(effects: tuple[str, ...]) -> None:
+    plain = replace(load_robot("irb120"), payload=Payload(2.0, (0.05, 0.03, 0.1)))
+    robot = plain.with_effects(effects)
+    at = circumstances(robot, 20, 5)
+    for actual, expected in zip(robot.poses(at), plain.poses(at), strict=True):
+        assert_array_equal(actual, expected)
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.name)
+@pytest.mark.parametrize("massless", [True, False])
+def test_nothing_is_nan_where_a_moment_is_zero(effect: type[Effect], massless: bool) -> None:
+    robot = loaded_arm((effect.name,), 6)
+    if massless:
+        robot = replace(robot, masses=(), payload=Payload())
+    straight_up = np.zeros((1, 6))  # no moment about joint 1, nearly none about the others
+    sweep = robot.sweep(straight_up, "tip")
+    linear, angular = robot.derivatives(sweep, straight_up, list(robot.parameters))
+    assert np.isfinite(sweep.position).all()
+    assert np.isfinite(linear).all()
+    assert np.isfinite(angular).all()
+
+
+def test_a_horizontal_arm_sags() -> None:
+    arm = replace(load_robot("irb120"), payload=Payload(3.0)).with_effects(["compliance"])
+    stretched = np.radians([[0, 90, -90, 0, 0, 0.0]])
+    rigid = arm.poses(stretched)[0][0]
+    for joint in (2, 3, 5):
+        bent = arm.with_values({f"compliance_{joint}": 1e-4}).poses(stretched)[0][0]
+        assert bent[2] < rigid[2] - 1e-5
+    hanging = arm.carrying(gravity=(0.0, 0.0, 9.81)).with_values({"compliance_2": 1e-4}).poses(stretched)[0][0]
+    assert hanging[2] > rigid[2] + 1e-5
+
+
+def test_approach_follows_the_numbers_of_the_configurations() -> None:
+    joints = np.array([[0.0, 1.0], [2.0, 1.0], [1.0, 0.0], [5.0, 5.0]])
+    assert_array_equal(approach_of(joints, np.arange(4)), [[0, 0], [1, 0], [-1, -1], [1, 1]])
+    # measured in another order, and the one before the last row is missing
+    assert_array_equal(approach_of(joints, np.array([3, 2, 1, 9])), [[-1, 1], [1, 1], [0, 0], [0, 0]])
+
+
+@pytest.mark.parametrize("effect", ["approach", "thermal-growth"])
+def test_what_is_not_known_does_nothing(effect: str) -> None:
+    robot = loaded_arm((effect,), 7)
+    q = robot.random_configurations(5, np.random.default_rng(8))
+    for actual, expected in zip(robot.poses(q), replace(robot, effect_names=()).poses(q), strict=True):
+        assert_array_equal(actual, expected)

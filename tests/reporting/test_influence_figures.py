@@ -1,0 +1,31 @@
+from __future__ import annotations
+
+import json
+
+import numpy as np
+from tests.katana import NAMES, PERTURBATIONS, katana
+
+from truearm.identification.influence import Influence, influence
+from truearm.reporting.influence_figures import influence_figure
+
+
+def test_the_picture_shows_average_and_range_in_mm() -> None:
+    robot = katana()
+    q = robot.random_configurations(30, np.random.default_rng(1))
+    found = influence(robot, q, NAMES, "tip", PERTURBATIONS)
+    shown = influence_figure(found)
+    (bars,) = shown["data"]
+    assert bars["x"] == list(NAMES)
+    np.testing.assert_allclose(bars["y"], 1e3 * found.size.mean(axis=1), rtol=1e-3)
+    error = bars["error_y"]
+    high, low = np.add(bars["y"], error["array"]), np.subtract(bars["y"], error["arrayminus"])
+    np.testing.assert_allclose(high, 1e3 * found.size.max(axis=1), rtol=2e-3)
+    np.testing.assert_allclose(low, 1e3 * found.size.min(axis=1), rtol=0, atol=1e-3)
+    assert min(error["array"] + error["arrayminus"]) >= 0
+    assert "[mm]" in shown["layout"]["yaxis"]["title"]["text"]
+    json.dumps(shown, allow_nan=False)
+
+
+def test_names_cannot_be_markup() -> None:
+    shown = influence_figure(Influence(("target_<b>_x",), np.ones(1), np.ones((1, 2))))
+    assert shown["data"][0]["x"] == ["target_&lt;b&gt;_x"]

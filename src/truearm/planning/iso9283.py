@@ -1,11 +1,11 @@
 """The cube of ISO 9283 in the workspace of an arm, its diagonal planes and its measuring points.
 
-ISO 9283:1998 tests a robot in the largest cube of its workspace with edges along the base frame, on planes that hold two
-opposite horizontal edges of the cube, at points P1 to P5. Patel (sections 3.4 and 4.4.2) takes 118 poses on these planes
-but does not print them. The construction here is ours.
+ISO 9283:1998 tests a robot in the largest cube of its workspace with edges along the base frame, on planes that hold
+two opposite horizontal edges of the cube, at points P1 to P5. Patel (sections 3.4 and 4.4.2) takes 118 poses on these
+planes but does not print them. The construction here is ours.
 
-Corners C1 to C4 are those of the upper face, beginning at ``(+x, +y)`` and going counter-clockwise seen from above; C5 to
-C8 lie below them. The four diagonal planes are C1-C2-C7-C8, C2-C3-C8-C5, C3-C4-C5-C6 and C4-C1-C6-C7: each goes
+Corners C1 to C4 are those of the upper face, beginning at ``(+x, +y)`` and going counter-clockwise seen from above; C5
+to C8 lie below them. The four diagonal planes are C1-C2-C7-C8, C2-C3-C8-C5, C3-C4-C5-C6 and C4-C1-C6-C7: each goes
 through the centre and is inclined by 45 deg. P1 is the centre. P2 to P5 lie on the two diagonals of the chosen plane,
 which are also diagonals of the cube, at 10 % of their length from their ends.
 """
@@ -142,9 +142,7 @@ class Cube:
         for name, (a, b, _, d) in PLANES.items():
             along, across = (corners[a] - corners[k] for k in (b, d))
             made.append(
-                DiagonalPlane(
-                    name, self.centre, along / self.side, across / (math.sqrt(2.0) * self.side), self.side
-                )
+                DiagonalPlane(name, self.centre, along / self.side, across / (math.sqrt(2.0) * self.side), self.side)
             )
         return tuple(made)
 

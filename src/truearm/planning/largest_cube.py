@@ -1,9 +1,9 @@
 """The largest cube in front of an arm on whose diagonal planes it reaches every point.
 
-Where the tip gets to is first looked up among many random configurations: a point counts as reached if the tip came near
-to it. The best cubes of a coarse lattice are then moved and grown in ever smaller steps, while inverse kinematics
-reaches a grid of points on the diagonal planes, edges and corners included, within the joint limits and in any
-orientation.
+Where the tip gets to is first looked up among many random configurations: a point counts as reached if the tip came
+near to it. The best cubes of a coarse lattice are then moved and grown in ever smaller steps, while damped Newton's
+steps from the nearest of those configurations reach a grid of points on the diagonal planes, edges and corners
+included, within the joint limits and in any orientation.
 """
 
 from __future__ import annotations
@@ -53,8 +53,8 @@ def largest_cube(
     """Return the largest cube in front of an arm on whose diagonal planes it reaches every point of a 9 x 9 grid.
 
     The cube is centred on the plane that holds the z axis of the base frame and the direction `ahead`. Whether the arm
-    touches itself, its tool or its surroundings is not looked at: `nearest` and `floor` keep the cube away from base and
-    table. The search is one of many local ones; its cube may be smaller than the largest there is by about a hundredth.
+    touches itself, its tool or its surroundings is not looked at: `nearest` and `floor` keep the cube away from base
+    and table. Of many local searches the best one counts; the largest cube there is may be a hundredth larger.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ class _Search:
         """Return of which rows ``(n, points, 3)`` all points are reached."""
         wanted = points.reshape(-1, 3)
         missed = np.arange(len(wanted))
-        _, samples = self._tree.query(wanted, _SEEDS)
+        samples = np.asarray(self._tree.query(wanted, _SEEDS)[1])
         for sample in samples.T:
             missed = missed[~self._met(wanted[missed], self._joints[sample[missed]])]
         lost = np.zeros(len(wanted), dtype=bool)

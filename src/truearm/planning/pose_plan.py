@@ -2,10 +2,10 @@
 
 The points are shared evenly among the four diagonal planes and fill each of them from edge to edge
 (:meth:`~truearm.planning.iso9283.DiagonalPlane.spread`). The corners of the largest cube lie on the boundary of the
-workspace, so some points always come near to it. The standard asks for points, an arm of five joints cannot be asked for
-orientations as well, and a calibration learns most from orientations that differ. So readings are those nearest to random
-ones within the limits that bring the tip to the point, in any orientation. Whether the arm touches itself or its
-surroundings is not looked at.
+workspace, so some points come near to it. The standard asks for points, an arm of five joints cannot be asked for
+orientations as well, and a calibration learns most from orientations that differ: each point is reached in the
+orientation that comes from random readings within the limits, by the shortest way from them. Whether the arm touches
+itself or its surroundings is not looked at.
 """
 
 from __future__ import annotations
@@ -116,7 +116,7 @@ def plan_poses(
         raise InputError(
             "no order of the poses was found in which all joints move",
             where=robot.name,
-            came=f"{len(stuck)} of {count - 1} moves in which a joint moves less than {math.degrees(least_move):.3g} deg",
+            came=f"{len(stuck)} of {count - 1} moves with a joint that moves less than {math.degrees(least_move):.3g} deg",
             cure="Ask for a smaller least move or fewer poses.",
         )
     approach = Tip(robot, target).at(joints[order]).rotation[:, :, 2]

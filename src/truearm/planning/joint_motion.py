@@ -177,8 +177,9 @@ class _Follower:
             found = self._solved(k, guess, scaled[0])
             if found is None:
                 raise InputError(
-                    "the path leaves what the arm can reach" + self._holding(),
+                    "the path leaves what the arm can reach, or comes to a singular posture",
                     where=self._place(k),
+                    came=f"orientation '{self._orientation}'",
                     cure="Move the path towards the arm, or ask less of the orientation.",
                 )
             scaled[k], A = found
@@ -248,9 +249,6 @@ class _Follower:
     def _place(self, k: int) -> str:
         return f"{self._travelled[k] * 1e3:.1f} mm along the path, at {self._path.time[k]:.4g} s (sample {k})"
 
-    def _holding(self) -> str:
-        return "" if self._orientation == "free" else f" with orientation '{self._orientation}'"
-
 
 def _checked(trajectory: Trajectory) -> Trajectory:
     count = len(trajectory.time)
@@ -269,6 +267,8 @@ def _checked(trajectory: Trajectory) -> Trajectory:
 
 
 def _orientation_to_keep(orientation: Orientation, rotation: ArrayLike | None) -> Array:
+    if orientation not in ("free", "axis", "full"):
+        raise InputError("there is no such choice", where="orientation", came=orientation, allowed="free, axis, full")
     if rotation is None:
         if orientation != "free":
             raise InputError(

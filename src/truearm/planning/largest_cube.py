@@ -18,7 +18,6 @@ from scipy.spatial import cKDTree
 
 from truearm.errors import InputError
 from truearm.modeling.chain import Array
-from truearm.modeling.inverse.kinematics import reach
 from truearm.modeling.inverse.turns import limits
 from truearm.modeling.robot import Robot
 from truearm.planning.iso9283 import Cube
@@ -87,10 +86,11 @@ class _Search:
         self._robot, self._nearest, self._floor = robot, nearest, floor
         self._ahead = np.zeros(3)
         self._ahead["xy".index(ahead[1])] = 1.0 if ahead[0] == "+" else -1.0
-        self._length = reach(robot, target)
         self._joints = robot.random_configurations(_SAMPLES, np.random.default_rng(0))
         self._limits, self._tip = limits(robot), Tip(robot, target)
-        self._tree = cKDTree(self._tip.positions(self._joints))
+        tips = self._tip.positions(self._joints)
+        self._length = float(np.linalg.norm(tips, axis=1).max())  # the reach
+        self._tree = cKDTree(tips)
 
     def largest(self) -> Cube:
         """Return the largest cube that was found."""

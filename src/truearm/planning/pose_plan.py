@@ -29,7 +29,7 @@ POSES: Final = 118
 #: What every joint moves at least from one pose to the next [rad; m for sliding joints].
 LEAST_MOVE: Final = math.radians(2.0)
 #: How often readings are looked for with other random ones.
-_DRAWS: Final = 12
+_DRAWS: Final = 6
 _ORDERS: Final = 10
 
 
@@ -116,7 +116,7 @@ def plan_poses(
         raise InputError(
             "no order of the poses was found in which all joints move",
             where=robot.name,
-            came=f"{len(stuck)} of {count - 1} moves with a joint that moves less than {math.degrees(least_move):.3g} deg",
+            came=f"{len(stuck)} of {count - 1} moves too small for {math.degrees(least_move):.3g} deg in every joint",
             cure="Ask for a smaller least move or fewer poses.",
         )
     approach = Tip(robot, target).at(joints[order]).rotation[:, :, 2]

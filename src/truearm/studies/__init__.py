@@ -43,6 +43,11 @@ class Entry:
 
 STUDIES: Final = (
     Entry(
+        "irb120-axes",
+        "one joint of an IRB 120 turned at a time: compliance, run-out and backlash (Nubiola 2.4)",
+        "truearm.studies.irb120_axes",
+    ),
+    Entry(
         "irb120-simulation",
         "calibration of a simulated IRB 120, without noise and with noise and wrong masses (Nubiola 2.6)",
         "truearm.studies.irb120_simulation",

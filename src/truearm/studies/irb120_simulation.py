@@ -119,8 +119,8 @@ def study(seeds: int, progress: Callable[[str], None], unseen: int = _UNSEEN) ->
                 "section 2.6",
                 absolute=0.004,
                 explanation="The document explains its 0.004 mm by d 3, dropped as redundant though axis 3 leans a"
-                " little. Dropping it costs next to nothing here: a 3 and the joint zeros take it up. The frame of the payload"
-                " above, or stopping after four iterations, is of the right size.",
+                " little. Dropping it costs next to nothing here: a 3 and the joint zeros take it up. The frame of the"
+                " payload above, or stopping after four iterations, is of the right size.",
             ),
             Row(
                 "after, drawn errors with beta, model without",

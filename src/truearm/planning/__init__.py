@@ -1,0 +1,1 @@
+"""Where to measure: poses, paths, and configurations that tell parameters apart."""

@@ -52,6 +52,11 @@ STUDIES: Final = (
         "calibration of a simulated IRB 120, without noise and with noise and wrong masses (Nubiola 2.6)",
         "truearm.studies.irb120_simulation",
     ),
+    Entry(
+        "katana-influence",
+        "influence of each parameter, and identification by it, on a simulated Katana 450 (Patel 3.5 to 3.7)",
+        "truearm.studies.katana_influence",
+    ),
 )
 
 

@@ -27,7 +27,7 @@ from truearm.errors import InputError
 from truearm.identification.frames import initial_frames
 from truearm.identification.inclination import inclination_derivatives, inclinations_of, upwards
 from truearm.identification.solver import solve
-from truearm.measurement.dataset import Dataset
+from truearm.measurement.dataset import Dataset, IntArray
 from truearm.measurement.inclinometer import InclinometerReadings, Pairs
 from truearm.modeling.chain import Array
 from truearm.modeling.parameters import FreeParameters, Parameter
@@ -43,6 +43,7 @@ STEEPEST: Final = math.radians(60.0)
 #: Moments about, and across, an axis below these leave open where a joint leans [N m]: friction holds it, or the error
 #: of the moment decides.
 UNDECIDED: Final = (0.2, 0.05)
+ENOUGH: Final = f"moments above {UNDECIDED[0]:g} N m about and {UNDECIDED[1]:g} N m across the axis of every joint"
 _UPRIGHT: Final = 0.01  # sine of the angle between gravity and an axis
 
 
@@ -77,9 +78,7 @@ class TiltingFit:
     def believed(self) -> Robot:
         """The robot that believes these values as well as their deviations say, for a fit that frees them again."""
         found = [self.robot.parameters[name] for name in self.names]
-        return self.robot.with_parameters(
-            replace(p.restarted(p.value), prior=p.prior if p.deviation is None else p.deviation) for p in found
-        )
+        return self.robot.with_parameters(replace(p.restarted(p.value), prior=p.deviation or p.prior) for p in found)
 
 
 def calibrate_tilting(robot: Robot, readings: InclinometerReadings, poses: Dataset | None = None) -> TiltingFit:
@@ -99,7 +98,7 @@ def calibrate_tilting(robot: Robot, readings: InclinometerReadings, poses: Datas
     Raises
     ------
     InputError
-        For changes none of which can be used, and for poses that are not in pairs or declare no deviation.
+        For changes or poses none of which can be used, and for poses that are not in pairs or declare no deviation.
     """
     start = robot.with_effects(TILTING)
     start = start.with_parameters(p.restarted() for p in start.parameters.values() if p.group in TILTING)
@@ -160,10 +159,26 @@ class _Problem:
             raise InputError(
                 "no change of inclination can be used",
                 where="inclinometer readings",
-                allowed=f"axes within {math.degrees(STEEPEST):g} deg of the horizontal, and moments above "
-                f"{UNDECIDED[0]:g} N m about and {UNDECIDED[1]:g} N m across every joint's axis",
+                allowed=f"axes within {math.degrees(STEEPEST):g} deg of the horizontal, and {ENOUGH}",
             )
         return used
+
+    @cached_property
+    def pairs(self) -> dict[str, IntArray]:
+        """For each target of the poses, the readings that are compared, ``(pairs, 2)``."""
+        if self.poses is None:
+            return {}
+        poses, found = self.poses, {}
+        clear = np.asarray(decided(self.robot, poses.postures, upright=False).all(axis=1))
+        for index, name in enumerate(poses.targets):
+            reading = np.full(poses.configurations, -1)
+            mine = np.flatnonzero((poses.target == index) & poses.has_position & clear[poses.configuration])
+            reading[poses.configuration[mine]] = mine
+            pair = reading.reshape(-1, 2)
+            found[name] = pair[(pair >= 0).all(axis=1)]
+        if not any(len(pair) for pair in found.values()):
+            raise InputError("no pair of poses can be used", where=poses.source, allowed=ENOUGH)
+        return found
 
     def at(self, vector: Array) -> _Evaluation:
         return _Evaluation(self, vector)
@@ -181,16 +196,14 @@ class _Evaluation:
     @cached_property
     def residual(self) -> Array:
         p = self.problem
-        first, second = (
-            inclinations_of(self._robot, q, self._seats) for q in (p.readings.pairs.first, p.readings.pairs.second)
-        )
+        first, second = (inclinations_of(self._robot, q, self._seats) for q in (self._pairs.first, self._pairs.second))
         change = np.where(p.used, second - first - p.readings.change, 0.0) / p.readings.sigma
         return np.concatenate([change.reshape(-1), *(r for r, _ in self._displacements)])
 
     @cached_property
     def jacobian(self) -> Array:
         p = self.problem
-        change = change_derivatives(self._robot, p.readings.pairs, self._names, self._seats) / p.readings.sigma
+        change = change_derivatives(self._robot, self._pairs, self._names, self._seats) / p.readings.sigma
         change[~p.used] = 0.0
         points = [np.pad(J, ((0, 0), (0, self._seats.size))) for _, J in self._displacements]
         return np.concatenate([change.reshape(-1, len(self.vector)), *points])
@@ -204,6 +217,12 @@ class _Evaluation:
         return self.problem.robot.with_values(dict(zip(self._names, map(float, self.vector), strict=False)))
 
     @cached_property
+    def _pairs(self) -> Pairs:
+        """The postures with their loads."""
+        pairs = self.problem.readings.pairs
+        return Pairs(self._robot.loaded(pairs.first), self._robot.loaded(pairs.second))
+
+    @cached_property
     def _seats(self) -> Array:
         return self.vector[len(self._names) :].reshape(-1, 3)
 
@@ -215,12 +234,7 @@ class _Evaluation:
             return []
         at = self._robot.loaded(poses.postures)
         found = []
-        for index, name in enumerate(poses.targets):
-            reading = np.full(poses.configurations, -1)
-            mine = np.flatnonzero((poses.target == index) & poses.has_position)
-            reading[poses.configuration[mine]] = mine
-            pair = reading.reshape(-1, 2)
-            pair = pair[(pair >= 0).all(axis=1)]
+        for name, pair in self.problem.pairs.items():
             before, after = poses.configuration[pair].T
             sweep = self._robot.sweep(at, name)
             sigma = np.hypot(*poses.sigma[pair].T)[:, None]

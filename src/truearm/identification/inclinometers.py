@@ -15,7 +15,6 @@ joint readings, are compared in the same way (the document's joint 1).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
@@ -25,26 +24,25 @@ from numpy.typing import NDArray
 
 from truearm.errors import InputError
 from truearm.identification.frames import initial_frames
-from truearm.identification.inclination import inclination_derivatives, inclinations_of, upwards
+from truearm.identification.inclination import (
+    ENOUGH,
+    STEEPEST,
+    change_derivatives,
+    decided,
+    inclinations_of,
+    readable,
+)
 from truearm.identification.solver import solve
 from truearm.measurement.dataset import Dataset, IntArray
 from truearm.measurement.inclinometer import InclinometerReadings, Pairs
 from truearm.modeling.chain import Array
 from truearm.modeling.parameters import FreeParameters, Parameter
-from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
 
 #: What the first stage identifies.
 TILTING: Final = ("compliance", "backlash", "clearance")
 #: How well an instrument is aligned with its link, one standard deviation [rad].
 SEAT: Final = math.radians(0.5)
-#: Axes steeper than this are left out: a vertical one does not see small turns [rad].
-STEEPEST: Final = math.radians(60.0)
-#: Moments about, and across, an axis below these leave open where a joint leans [N m]: friction holds it, or the error
-#: of the moment decides.
-UNDECIDED: Final = (0.2, 0.05)
-ENOUGH: Final = f"moments above {UNDECIDED[0]:g} N m about and {UNDECIDED[1]:g} N m across the axis of every joint"
-_UPRIGHT: Final = 0.01  # sine of the angle between gravity and an axis
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,52 +248,6 @@ def tilting_parameters(robot: Robot) -> tuple[list[Parameter], list[Parameter]]:
     every = robot.parameters.values()
     effects = [p for p in every if p.group in TILTING]
     return effects, [p for p in every if p.group in ("joint zero", "geometry") and p.unit == "rad"]
-
-
-def readable(robot: Robot, pairs: Pairs) -> NDArray[np.bool_]:
-    """Return which changes of inclination can be used, ``(n, links, 3)``.
-
-    The axis stands within 60 deg of the horizontal in both postures, and the loads decide to which side every joint up
-    to the link leans. A joint whose axis stands upright does not matter.
-    """
-    usable = np.ones((len(pairs), len(robot.joints), 3), dtype=bool)
-    for posture in (pairs.first, pairs.second):
-        at = robot.loaded(posture)
-        usable &= np.abs(inclinations_of(robot, at)) <= STEEPEST
-        usable &= np.logical_and.accumulate(decided(robot, at, upright=True), axis=1)[..., None]
-    return usable
-
-
-def decided(robot: Robot, posture: Postures, *, upright: bool) -> NDArray[np.bool_]:
-    """Return whether the loads decide to which side each joint leans, ``(n, joints)``.
-
-    Parameters
-    ----------
-    upright
-        Whether a joint may turn to either side about an axis along gravity, which inclinometers do not see.
-    """
-    at = robot.loaded(posture)
-    assert at.loads is not None
-    sweep, up = robot.sweep(at), upwards(robot)
-    clear = np.ones((len(at), len(robot.joints)), dtype=bool)
-    for joint in robot.layout.turning:
-        x, y, z = at.loads[joint, 3:]
-        stands = np.linalg.norm(np.cross(sweep.axis(robot.moving[joint]).T, up), axis=1) < _UPRIGHT
-        clear[:, joint] = (np.abs(z) > UNDECIDED[0]) | (upright & stands)
-        clear[:, joint] &= np.hypot(x, y) > UNDECIDED[1]
-    return clear
-
-
-def change_derivatives(robot: Robot, pairs: Pairs, names: Sequence[str], seats: Array | None = None) -> Array:
-    """Return the derivative of changes of inclination by parameters and seats.
-
-    Returns
-    -------
-    derivatives
-        ``(n, links, 3, len(names) + 3 * links)``.
-    """
-    first, second = (inclination_derivatives(robot, p, names, seats) for p in (pairs.first, pairs.second))
-    return np.asarray(second - first)
 
 
 def _check_pairs(poses: Dataset) -> None:

@@ -17,15 +17,8 @@ from typing import Final
 import numpy as np
 
 from truearm.errors import InputError
-from truearm.identification.inclinometers import (
-    ENOUGH,
-    SEAT,
-    TILTING,
-    change_derivatives,
-    decided,
-    readable,
-    tilting_parameters,
-)
+from truearm.identification.inclination import ENOUGH, change_derivatives, decided, readable
+from truearm.identification.inclinometers import SEAT, TILTING, tilting_parameters
 from truearm.measurement.inclinometer import Pairs
 from truearm.modeling.chain import Array
 from truearm.modeling.postures import Postures

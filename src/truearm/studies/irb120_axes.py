@@ -124,9 +124,9 @@ def study(seeds: int, progress: Callable[[str], None], coarser: int = 1) -> Stud
         title="Single joints of an ABB IRB 120",
         source="A. Nubiola, doctoral thesis, ETS Montreal, section 2.4.1, Table 2.3 and Figure 2.6; truth from Tables"
         " 2.4, 2.6 and 2.7",
-        answer="Compliance alone, with the values that the document identified elsewhere, gives errors of the printed"
-        " size for joints 3, 4 and 5, two thirds of what joint 2 shows, too much for joint 6 and nothing for joint 1."
-        " What is missing there, and the backlash, must be in gears and bearings: sines of"
+        answer="Compliance alone, with the values that the document identified elsewhere, gives the printed errors of"
+        " joints 3, 4 and 5 within three tenths, two thirds of what joint 2 shows, too much for joint 6 and nothing"
+        " for joint 1. What is missing there, and the backlash, must be in gears and bearings: sines of"
         f" {min(a for a, _ in gear.values()):.3f} to {max(a for a, _ in gear.values()):.3f} deg a turn would do.",
         seeds=seeds,
         tables=(

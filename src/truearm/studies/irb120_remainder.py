@@ -24,8 +24,8 @@ _ANGLE: Final = "angle of each joint, three harmonics"
 _WHOLE: Final = "steady drift of the whole robot"
 _EACH: Final = "steady drift of each joint"
 _CAUSES: Final = {
-    _ARRIVAL: "Nothing left: the commanded joints were reached from both sides alike, as far as the model needs.",
-    _ANGLE: "Next to nothing left: gears that run out are in the model.",
+    _ARRIVAL: "Nothing left: it is in the model.",
+    _ANGLE: "Next to nothing left: gears that run out are in the model, with two harmonics.",
     _WHOLE: "The robot creeps against the reflectors on its table from the first configuration to the last, as it does"
     " when it warms up. No effect of the model knows of time.",
     _EACH: "The same, as turns of the joints: which of both it is these data hardly tell.",

@@ -18,6 +18,7 @@ from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of
 from truearm.measurement.truths import truth_twin
 from truearm.modeling.chain import Array
+from truearm.modeling.parts import Payload
 from truearm.modeling.transform import Transform, quaternion_from_rotation, rotation_from_quaternion
 from truearm.robots import load_robot
 

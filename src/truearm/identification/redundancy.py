@@ -163,7 +163,7 @@ def unseen_but_felt(robot: Robot, data: Dataset, free: FreeParameters, seed: int
     unseen = Vt[int((s > _UNSEEN * s[0]).sum()) :]
     if len(unseen) == 0:
         return ()
-    q = robot.random_configurations(40, np.random.default_rng(seed))
+    q = robot.loaded(robot.random_configurations(40, np.random.default_rng(seed)))
     felt = np.zeros((0, len(free.names)))
     for target in robot.targets:
         sweep = robot.sweep(q, target.name)

@@ -95,7 +95,9 @@ def joint_truths(robot: Robot) -> dict[int, JointTruth]:
 
     def sines(number: int) -> tuple[tuple[int, float, float], ...]:
         parts = ((k, of(f"fourier_sin{k}", number), of(f"fourier_cos{k}", number)) for k in HARMONICS)
-        return tuple((k, math.hypot(sine, cosine), math.atan2(cosine, sine)) for k, sine, cosine in parts)
+        periods = robot.joints[number - 1].transmission_periods
+        gear = (periods or 0, of("transmission_sin", number), of("transmission_cos", number))
+        return tuple((k, math.hypot(sine, cosine), math.atan2(cosine, sine)) for k, sine, cosine in (*parts, gear))
 
     return {
         number: JointTruth(

@@ -116,10 +116,10 @@ class Sweep:
         x, y, z = (self._filled(axis) for axis in self._frames[-1])
         return x, y, z
 
-    def matrix(self) -> Array:
-        """Return the rotation of the tip frame, ``(..., n, 3, 3)``."""
+    def matrix(self, index: int = -1) -> Array:
+        """Return the rotation of the tip frame, or of the frame before element `index`, ``(..., n, 3, 3)``."""
         axes = np.empty((3, 3, *self.shape))  # (axis, row, ..., n)
-        for k, axis in enumerate(self._frames[-1]):
+        for k, axis in enumerate(self._frames[index]):
             axes[k] = axis
         return np.moveaxis(axes, (1, 0), (-2, -1))
 
@@ -285,6 +285,7 @@ class Chain:
 
 #: The two axes that a turn about axis k turns, the first towards the second.
 _TURNED: Final = ((1, 2), (2, 0), (0, 1))
+_TURNS: Final[tuple[Motion, Motion, Motion]] = ("Rx", "Ry", "Rz")
 _UNITS: Final[tuple[Direction, Direction, Direction]] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
@@ -377,6 +378,13 @@ def across(element: Element) -> tuple[Direction, Direction]:
     s = 1.0 if z > -0.9 else -1.0
     a = -1.0 / (s + z)
     return (1.0 + s * a * x * x, s * a * x * y, -s * x), (a * x * y, s + a * y * y, -y)
+
+
+def turn_about(axis: Direction, variable: int) -> Element:
+    """Return the element that turns by a variable alone about a unit vector in the moving frame."""
+    if axis in _UNITS:
+        return Element(_TURNS[_UNITS.index(axis)], variable=variable)
+    return Element("R", axis=axis, variable=variable)
 
 
 def _axis(element: Element, axes: Axes) -> Array:

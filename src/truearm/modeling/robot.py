@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from truearm.errors import InputError, nearest_names
-from truearm.modeling.chain import Array, Chain, Element, Sweep, across
+from truearm.modeling.chain import Array, Chain, Element, Sweep, across, turn_about
 from truearm.modeling.conventions import Convention, convention
 from truearm.modeling.effects import EFFECTS, Effect, Layout
 from truearm.modeling.loads import joint_loads
@@ -134,7 +134,7 @@ class Robot:
                 return (replace(element, variable=self.layout.length(next(slides))),)
             if tilts and element.variable is not None:
                 across_it = zip(across(element), self.layout.tilt(joint), strict=True)
-                return (element, *(Element("R", axis=axis, variable=variable) for axis, variable in across_it))
+                return (element, *(turn_about(axis, variable) for axis, variable in across_it))
             return (element,)
 
         return tuple(
@@ -146,7 +146,11 @@ class Robot:
     def layout(self) -> Layout:
         """The variables of the trunk."""
         lengths = [(i, e.value) for i, link in enumerate(self.link_elements) for e in link if _has_length(e)]
-        return Layout(tuple(joint.kind for joint in self.joints), tuple(lengths))
+        return Layout(
+            tuple(joint.kind for joint in self.joints),
+            tuple(lengths),
+            tuple(joint.transmission_periods for joint in self.joints),
+        )
 
     @cached_property
     def effects(self) -> tuple[Effect, ...]:

@@ -53,17 +53,18 @@ def truth_twin(robot: Robot, truth: str, rng: np.random.Generator) -> Twin:
     if truth in robot.truths:
         published = robot.truths[truth]
         true = robot.with_values(published.values)
-        sprung = {number: JointTruth(compliance) for number, compliance in published.compliance.items()}
-        return Twin(_stationed(true, tool), sprung)
+        bent = joint_truths(true)
+        bent |= {number: replace(bent.get(number, JointTruth()), compliance=c) for number, c in published.compliance.items()}
+        return Twin(_stationed(true, tool), bent, _contact(true))
     if truth == "nominal":
-        return Twin(_stationed(robot, tool))
+        return Twin(_stationed(robot, tool), joint_truths(robot), _contact(robot))
     if truth == "random":
         drawn = {
             p.name: p.value + p.prior * float(rng.standard_normal())
             for p in robot.parameters.values()
             if p.group in ("geometry", "joint zero")
         }
-        return Twin(_stationed(robot.with_values(drawn), tool))
+        return Twin(_stationed(robot.with_values(drawn), tool), joint_truths(robot), _contact(robot))
     if not Path(truth).suffix and not exists(Path(truth)):
         known = truth_names(robot)
         near = nearest_names(truth, known)
@@ -82,8 +83,7 @@ def truth_twin(robot: Robot, truth: str, rng: np.random.Generator) -> Twin:
             came=f"{len(other.joints)} joints",
             allowed=f"{len(robot.joints)}, of the same kinds",
         )
-    contact: Contact = "document" if "clearance-linear-contact" in other.effect_names else "exact"
-    return Twin(other if other.targets else _stationed(other, tool), joint_truths(other), contact)
+    return Twin(other if other.targets else _stationed(other, tool), joint_truths(other), _contact(other))
 
 
 def joint_truths(robot: Robot) -> dict[int, JointTruth]:
@@ -95,7 +95,7 @@ def joint_truths(robot: Robot) -> dict[int, JointTruth]:
 
     def sines(number: int) -> tuple[tuple[int, float, float], ...]:
         parts = ((k, of(f"fourier_sin{k}", number), of(f"fourier_cos{k}", number)) for k in HARMONICS)
-        return tuple((k, math.hypot(sine, cosine), math.atan2(cosine, sine)) for k, sine, cosine in parts)
+        return tuple((k, math.hypot(s, c), math.atan2(c, s)) for k, s, c in parts if s or c)
 
     return {
         number: JointTruth(
@@ -111,6 +111,10 @@ def joint_truths(robot: Robot) -> dict[int, JointTruth]:
         )
         for number in range(1, len(robot.joints) + 1)
     }
+
+
+def _contact(robot: Robot) -> Contact:
+    return "document" if "clearance-linear-contact" in robot.effect_names else "exact"
 
 
 def _stationed(robot: Robot, tool: Tool) -> Robot:

@@ -22,6 +22,7 @@ from truearm.identification.selection import Selection
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import Errors
 from truearm.modeling.chain import Array
+from truearm.modeling.parts import GRAVITY
 from truearm.notices import Notice
 from truearm.reporting.drawing import AFTER, BEFORE, Figure
 from truearm.reporting.figures import correlation_map, histogram, residuals, workspace
@@ -164,6 +165,7 @@ def report_html(report: Report) -> str:
             "NumPy": np.__version__,
             "SciPy": installed_version("scipy"),
         },
+        standing=GRAVITY,
         colours={"before": BEFORE, "after": AFTER},
     )
 

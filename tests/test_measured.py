@@ -10,7 +10,9 @@ import pytest
 from ruamel.yaml import YAML
 
 from truearm.calibration import Calibration, calibrate
+from truearm.identification.fit import identify
 from truearm.identification.losses import Loss
+from truearm.identification.models import MODELS
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.readers.canonical import csv_text, read_csv
 from truearm.measurement.readers.matrices import read_matrices
@@ -87,6 +89,22 @@ def test_what_beta_and_the_payload_are_worth(irb120: Dataset) -> None:
 def test_models_with_more_effects_on_the_irb120(irb120: Dataset, model: str, mean: float) -> None:
     runs = [calibrate("irb120", irb120, model=model, payload=PAYLOAD, train=300, seed=seed) for seed in range(5)]
     assert np.median([mean_mm(run) for run in runs]) <= mean
+
+
+def test_the_arm_warmed_up_during_the_campaign(irb120: Dataset) -> None:
+    effects = ("compliance", "bearing-compliance", "hardening", "fourier", "backlash", "approach", "warm-up")
+    model = replace(next(m for m in MODELS if m.name == "full"), effects=effects)
+    held_out = []
+    for seed in range(3):
+        order = np.random.default_rng(seed).permutation(irb120.configurations)
+        robot = load_robot("irb120").carrying(PAYLOAD)
+        fit = identify(robot, irb120.of_configurations(order[:300]), model)
+        spread = errors_of(fit.robot, irb120.of_configurations(order[300:])).position_spread
+        assert spread is not None
+        held_out.append(1e3 * spread.mean)
+        for link in (3, 4):  # the long ones: about 10 K of aluminium
+            assert fit.robot.values[f"warm_up_{link}"] == pytest.approx(2.4e-4, abs=1e-4)
+    assert np.median(held_out) <= 0.055
 
 
 def test_the_chosen_model_on_the_irb120(irb120: Dataset) -> None:

@@ -24,6 +24,7 @@ from truearm.identification.models import MODELS, Model
 from truearm.identification.plausibility import check_against
 from truearm.identification.selection import AUTO, Selection, select
 from truearm.identification.settling import check_settling
+from truearm.identification.transmission import check_transmission
 from truearm.measurement.checks import check_data
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.readers.canonical import read_csv
@@ -308,6 +309,7 @@ def calibrate(
             *check_fit(fit),
             *noticed,
             *check_settling(fit, data),
+            *check_transmission(fit, first),
         ),
         data=data,
         training=training,

@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from truearm.measurement.truths import joint_truths
 from truearm.measurement.twin import Twin
+from truearm.measurement.twin_joint import JointTruth
 from truearm.modeling.effects import EFFECTS, Effect
 from truearm.modeling.effects.backlash import SEATED
 from truearm.modeling.parts import LinkMass, Payload
@@ -17,7 +18,8 @@ from truearm.modeling.postures import Postures, approach_of
 from truearm.modeling.robot import Robot
 from truearm.robots import load_robot
 
-NAMES = tuple(effect.name for effect in EFFECTS if effect.name != "clearance-linear-contact")
+#: All together; of clearance in one form, and the twin knows temperatures where warm-up knows only an order.
+NAMES = tuple(effect.name for effect in EFFECTS if effect.name not in ("clearance-linear-contact", "warm-up"))
 
 
 def loaded_arm(effects: tuple[str, ...], seed: int) -> Robot:
@@ -36,7 +38,9 @@ def circumstances(robot: Robot, count: int, seed: int) -> Postures:
     wrench = np.column_stack([rng.uniform(-20, 20, (count, 3)), rng.uniform(-8, 8, (count, 3))])
     signs = rng.choice([-1.0, 1.0], (count, 6))
     joints = robot.random_configurations(count, rng)
-    at = Postures(joints, approach=signs, temperature=rng.uniform(10, 40, count), wrench=wrench)
+    at = Postures(
+        joints, approach=signs, temperature=rng.uniform(10, 40, count), wrench=wrench, number=np.arange(float(count))
+    )
     loads = replace(robot, effect_names=("compliance",), known={}).loaded(at).loads
     assert loads is not None
     seated = (np.abs(loads[:, 5]) > 20 * SEATED).all(axis=0)
@@ -68,7 +72,7 @@ def test_derivatives_are_central_differences_under_load(effect: type[Effect]) ->
     names = [p.name for e in robot.effects for p in e.parameters]
     linear, angular = robot.derivatives(robot.sweep(at, "tip"), at, names)
     for i, name in enumerate(names):
-        h = 1e-2 * robot.parameters[name].prior
+        h = 1e-3 * robot.parameters[name].prior
         ahead, behind = (robot.sweep(at, "tip", {**robot.values, name: robot.values[name] + s * h}) for s in (1, -1))
         expected = (ahead.position - behind.position) / (2 * h)
         scale = np.abs(linear[i]).max()
@@ -120,7 +124,20 @@ def test_approach_follows_the_numbers_of_the_configurations() -> None:
     assert_array_equal(approach_of(joints, np.array([3, 2, 1, 9])), [[-1, 1], [1, 1], [0, 0], [0, 0]])
 
 
-@pytest.mark.parametrize("effect", ["approach", "thermal-growth"])
+def test_an_arm_that_warms_up_is_one_that_was_colder() -> None:
+    robot = loaded_arm(("warm-up",), 9)
+    at = circumstances(robot, 60, 10)
+    assert at.number is not None
+    assert at.wrench is not None
+    growth = {number: JointTruth(growth=robot.values.get(f"warm_up_{number}", 0.0)) for number in range(1, 7)}
+    colder = 20.0 - np.exp(-at.number / robot.values["warm_up_pace"])
+    twin = Twin(robot, growth).postures(at.joints, wrench=at.wrench, temperature=colder)
+    true = np.array([posture.targets["tip"][:3, 3] for posture in twin])
+    assert_allclose(robot.poses(at, "tip")[0], true, rtol=0, atol=1e-12)
+    assert np.abs(robot.poses(at.joints, "tip")[0] - true).max() > 1e-6
+
+
+@pytest.mark.parametrize("effect", ["approach", "thermal-growth", "warm-up"])
 def test_what_is_not_known_does_nothing(effect: str) -> None:
     robot = loaded_arm((effect,), 7)
     q = robot.random_configurations(5, np.random.default_rng(8))

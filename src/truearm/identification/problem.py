@@ -195,7 +195,7 @@ def check_circumstances(robot: Robot, data: Dataset) -> None:
         Naming the effect and what is missing.
     """
     for effect in robot.effects:
-        if effect.ordered and data.approach is None:
+        if effect.ordered and (data.approach is None or data.number is None):
             raise InputError(
                 f"the effect {effect.name} needs the order in which the configurations were measured",
                 where=data.source,

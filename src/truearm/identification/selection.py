@@ -35,6 +35,8 @@ _CANDIDATES: Final = (
     "clearance",
     "fourier",
     "approach",
+    "warm-up",
+    "transmission-error",
     "thermal-growth",
 )
 
@@ -143,7 +145,7 @@ def select(
     attempts: list[Attempt] = []
     for number in range(1, len(_CANDIDATES) + 1):
         tried: list[tuple[Attempt, Array]] = []
-        for name in _open(effects, data):
+        for name in _open(robot, effects, data):
             progress(f"choosing a model: {', '.join(effects)} and {name}?")
             errors = judged((*effects, name))
             gains = (now - errors)[np.isfinite(errors)]
@@ -166,14 +168,16 @@ def _fold(training: Dataset, held_out: Dataset) -> tuple[Dataset, Dataset]:
     return training, replace(held_out, position=np.where(placed[:, None], held_out.position, np.nan), quaternion=None)
 
 
-def _open(effects: tuple[str, ...], data: Dataset) -> list[str]:
+def _open(robot: Robot, effects: tuple[str, ...], data: Dataset) -> list[str]:
     """Return the effects that are not there yet and that the data say something about."""
     kinds = {effect.name: effect for effect in EFFECTS}
+    geared = any(joint.transmission_periods for joint in robot.joints)
     return [
         name
         for name in _CANDIDATES
         if name not in effects
-        and not (kinds[name].ordered and data.approach is None)
+        and not (kinds[name].ordered and (data.approach is None or data.number is None))
+        and (geared or name != "transmission-error")
         and not (kinds[name].warmed and data.temperature is None)
     ]
 

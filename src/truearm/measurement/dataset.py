@@ -43,6 +43,8 @@ class Dataset:
     approach
         Sign of the last move of each joint, ``(configurations, joints)``: 1, -1, or 0 where it is not known; None if
         the order of measurement is not known.
+    number
+        How many configurations were measured before each, ``(configurations,)``; None if that is not known.
     temperature
         Of the arm [degC], ``(configurations,)``; None if it was not recorded.
     wrench
@@ -65,6 +67,7 @@ class Dataset:
     sigma: Array | None = None
     sigma_rot: Array | None = None
     approach: Array | None = None
+    number: Array | None = None
     temperature: Array | None = None
     wrench: Array | None = None
     references: Dataset | None = None
@@ -72,7 +75,13 @@ class Dataset:
     @property
     def postures(self) -> Postures:
         """What the arm's shape depended on at each configuration."""
-        return Postures(self.joints, approach=self.approach, temperature=self.temperature, wrench=self.wrench)
+        return Postures(
+            self.joints,
+            approach=self.approach,
+            number=self.number,
+            temperature=self.temperature,
+            wrench=self.wrench,
+        )
 
     @property
     def configurations(self) -> int:
@@ -115,6 +124,7 @@ class Dataset:
             sigma=part(self.sigma),
             sigma_rot=part(self.sigma_rot),
             approach=of_each(self.approach),
+            number=of_each(self.number),
             temperature=of_each(self.temperature),
             wrench=of_each(self.wrench),
             references=None if self.references is None else self.references.of_configurations(indices),

@@ -11,7 +11,7 @@ import numpy as np
 from truearm.errors import InputError, nearest_names
 from truearm.files import exists
 from truearm.measurement.twin import Twin
-from truearm.measurement.twin_joint import Contact, JointTruth
+from truearm.measurement.twin_joint import PERFECT, Contact, JointTruth
 from truearm.modeling.chain import Array
 from truearm.modeling.effects.fourier import HARMONICS
 from truearm.modeling.parts import NO_PAYLOAD, Payload, Tool
@@ -53,9 +53,10 @@ def truth_twin(robot: Robot, truth: str, rng: np.random.Generator) -> Twin:
     if truth in robot.truths:
         published = robot.truths[truth]
         true = robot.with_values(published.values)
-        bent = joint_truths(true)
-        bent |= {number: replace(bent.get(number, JointTruth()), compliance=c) for number, c in published.compliance.items()}
-        return Twin(_stationed(true, tool), bent, _contact(true))
+        joints = joint_truths(true)
+        for number, compliance in published.compliance.items():
+            joints[number] = replace(joints.get(number, PERFECT), compliance=compliance)
+        return Twin(_stationed(true, tool), joints, _contact(true))
     if truth == "nominal":
         return Twin(_stationed(robot, tool), joint_truths(robot), _contact(robot))
     if truth == "random":
@@ -95,7 +96,9 @@ def joint_truths(robot: Robot) -> dict[int, JointTruth]:
 
     def sines(number: int) -> tuple[tuple[int, float, float], ...]:
         parts = ((k, of(f"fourier_sin{k}", number), of(f"fourier_cos{k}", number)) for k in HARMONICS)
-        return tuple((k, math.hypot(s, c), math.atan2(c, s)) for k, s, c in parts if s or c)
+        periods = robot.joints[number - 1].transmission_periods
+        gear = (periods or 0, of("transmission_sin", number), of("transmission_cos", number))
+        return tuple((k, math.hypot(s, c), math.atan2(c, s)) for k, s, c in (*parts, gear) if s or c)
 
     return {
         number: JointTruth(

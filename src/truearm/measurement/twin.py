@@ -277,6 +277,7 @@ def measure(
         position=position,
         sigma=np.full(n * len(names), noise) if noise > 0 else None,
         approach=conditions.get("approach", directions(joints)),
+        number=np.arange(float(n)),
         temperature=conditions.get("temperature"),
         wrench=conditions.get("wrench"),
     )

@@ -22,6 +22,7 @@ Group = Literal[
     # of joint effects, by their names
     "gain",
     "fourier",
+    "transmission-error",
     "compliance",
     "hardening",
     "backlash",
@@ -30,6 +31,7 @@ Group = Literal[
     "clearance-linear-contact",
     "approach",
     "thermal-growth",
+    "warm-up",
 ]
 Unit = Literal["m", "rad", "1", "rad/(N m)", "m/N", "rad/(N m)^2", "rad/(N m)^3", "1/K"]
 

@@ -33,12 +33,16 @@ class Joint:
         Nominal value of each column of the convention [m and rad].
     limits
         Lowest and highest reading [rad or m], where known.
+    transmission_periods
+        How often the joint's gear errs in a turn of the joint, where known: for a strain wave gear twice the turns of
+        its wave generator.
     """
 
     name: str
     kind: JointKind
     row: Mapping[str, float]
     limits: tuple[float, float] | None = None
+    transmission_periods: int | None = None
 
 
 @dataclass(frozen=True)

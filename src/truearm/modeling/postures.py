@@ -24,6 +24,8 @@ class Postures:
     approach
         Sign of the last move of each joint, ``(n, joints)``: 1, -1, or 0 where it is not known; None if it is known
         nowhere.
+    number
+        How many configurations were measured before each, ``(n,)``.
     temperature
         Of the arm [degC], ``(n,)``.
     wrench
@@ -37,6 +39,7 @@ class Postures:
     velocity: Array | None = None
     acceleration: Array | None = None
     approach: Array | None = None
+    number: Array | None = None
     temperature: Array | None = None
     wrench: Array | None = None
     loads: Array | None = None
@@ -61,6 +64,7 @@ class Postures:
             velocity=part(self.velocity),
             acceleration=part(self.acceleration),
             approach=part(self.approach),
+            number=part(self.number),
             temperature=part(self.temperature),
             wrench=part(self.wrench),
             loads=None,

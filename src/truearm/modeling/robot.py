@@ -146,7 +146,11 @@ class Robot:
     def layout(self) -> Layout:
         """The variables of the trunk."""
         lengths = [(i, e.value) for i, link in enumerate(self.link_elements) for e in link if _has_length(e)]
-        return Layout(tuple(joint.kind for joint in self.joints), tuple(lengths))
+        return Layout(
+            tuple(joint.kind for joint in self.joints),
+            tuple(lengths),
+            tuple(joint.transmission_periods for joint in self.joints),
+        )
 
     @cached_property
     def effects(self) -> tuple[Effect, ...]:

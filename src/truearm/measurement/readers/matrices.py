@@ -91,6 +91,7 @@ def read_matrices(
             target=np.tile(np.arange(len(names), dtype=np.intp), len(values)),
             position=np.stack([positions[name] for name in names], axis=1).reshape(-1, 3),
             approach=approach_of(values, np.arange(len(values))),
+            number=np.arange(float(len(values))),
             references=beside,
         )
 

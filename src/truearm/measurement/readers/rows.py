@@ -85,12 +85,11 @@ def same_everywhere(cells: Cells, configurations: Configurations, column: int, u
     return np.asarray(numbers[first])
 
 
-def _approach(configurations: Configurations) -> Array | None:
-    """Return where each joint came from, if the configurations are numbered as they were measured."""
-    labels = configurations.labels
+def _order(labels: Sequence[str]) -> IntArray | None:
+    """Return the numbers of the configurations, if they are numbered as they were measured."""
     if not all(re.fullmatch("[0-9]{1,9}", label) for label in labels) or len({int(n) for n in labels}) < len(labels):
         return None
-    return approach_of(configurations.joints, np.array([int(label) for label in labels]))
+    return np.array([int(label) for label in labels])
 
 
 @dataclass(frozen=True)
@@ -148,7 +147,13 @@ def dataset_of(readings: Readings, configurations: Configurations) -> Dataset:
     if readings.reference.any():
         references = _part(readings, configurations, readings.reference, position, quaternion)
     targets = _part(readings, configurations, ~readings.reference, position, quaternion)
-    return replace(targets, references=references, approach=_approach(configurations))
+    order = _order(configurations.labels)
+    return replace(
+        targets,
+        references=references,
+        approach=None if order is None else approach_of(configurations.joints, order),
+        number=None if order is None else order - order.min() + 0.0,
+    )
 
 
 def _part(

@@ -14,10 +14,13 @@ from truearm.modeling.effects.fourier import Fourier
 from truearm.modeling.effects.gain import Gain
 from truearm.modeling.effects.hardening import Hardening
 from truearm.modeling.effects.thermal import ThermalGrowth
+from truearm.modeling.effects.transmission import TransmissionError
+from truearm.modeling.effects.warm_up import WarmUp
 
 EFFECTS: Final[tuple[type[Effect], ...]] = (
     Gain,
     Fourier,
+    TransmissionError,
     Compliance,
     Hardening,
     Backlash,
@@ -26,6 +29,7 @@ EFFECTS: Final[tuple[type[Effect], ...]] = (
     LinearContactClearance,
     Approach,
     ThermalGrowth,
+    WarmUp,
 )
 
 __all__ = ["EFFECTS", "Effect", "Gain", "Layout"]

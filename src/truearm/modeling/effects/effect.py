@@ -28,10 +28,13 @@ class Layout:
         Kind of each joint; variable i moves joint i, from 0.
     lengths
         Joint (from 0) and nominal value [m] of each slide of fixed length along the links.
+    transmission_periods
+        How often each joint's gear errs in a turn, None where that is not known; may be left out.
     """
 
     kinds: tuple[JointKind, ...]
     lengths: tuple[tuple[int, float], ...] = ()
+    transmission_periods: tuple[int | None, ...] = ()
 
     @property
     def joints(self) -> range:

@@ -100,6 +100,7 @@ class _Joint(BaseModel):
     name: Name | None = None
     type: Literal["revolute", "prismatic"] = "revolute"
     limits: tuple[Number, Number] | None = None
+    transmission_periods: Annotated[int, Field(strict=True, ge=1, le=10_000)] | None = None
 
 
 class _Place(_Entry):
@@ -349,7 +350,7 @@ def _joint(content: RobotFile, number: int, entry: _Joint, where: str) -> Joint:
                 f"a joint of convention {content.convention} has no such entry",
                 where=where,
                 came=column,
-                allowed=", ".join(["name", "type", "limits", *allowed]),
+                allowed=", ".join(["name", "type", "limits", "transmission_periods", *allowed]),
                 cure=f"Did you mean {' or '.join(near)}?" if near else None,
             )
         row[column] = sized_si(_number(value, f"{where}.{column}"), shown[units[column]], f"{where}.{column}")
@@ -370,7 +371,7 @@ def _joint(content: RobotFile, number: int, entry: _Joint, where: str) -> Joint:
             allowed=f"limits: [LOWEST, HIGHEST] in {unit}",
             cure="Give what the controller allows.",
         )
-    return Joint(entry.name or f"joint_{number}", entry.type, row, limits)
+    return Joint(entry.name or f"joint_{number}", entry.type, row, limits, entry.transmission_periods)
 
 
 def _vector(name: str, value: object, unit: str, where: str, *, direction: bool) -> dict[str, float]:
@@ -436,6 +437,8 @@ def robot_text(robot: Robot) -> str:
         row |= {name: listed([entries.pop(f"{name}_{a}") for a in "xyz"]) for name in vectors} | entries
         if j.limits:
             row["limits"] = listed([written(v, "deg" if j.kind == "revolute" else "mm") for v in j.limits])
+        if j.transmission_periods:
+            row["transmission_periods"] = j.transmission_periods
         return flow(row)
 
     content: dict[str, Any] = {

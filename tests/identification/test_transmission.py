@@ -1,0 +1,73 @@
+"""Periodic errors of gears: found where they are, not where they are not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from truearm.identification.fit import Fit, identify
+from truearm.identification.models import MODELS
+from truearm.identification.transmission import check_transmission, periodic_errors
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.truths import truth_twin
+from truearm.measurement.twin import measure
+from truearm.measurement.twin_joint import JointTruth
+from truearm.modeling.robot import Robot
+from truearm.robots import load_robot
+
+ELASTIC = next(model for model in MODELS if model.name == "elastic")
+
+
+def unknown_gears(robot: Robot) -> Robot:
+    return replace(robot, joints=tuple(replace(joint, transmission_periods=None) for joint in robot.joints))
+
+
+def campaign(robot: Robot, gears: dict[int, tuple[int, float]], poses: int, seed: int) -> tuple[Fit, Dataset]:
+    rng = np.random.default_rng(seed)
+    twin = truth_twin(robot, "random", rng)
+    erring = {joint: JointTruth(gear=((periods, size, 0.7),)) for joint, (periods, size) in gears.items()}
+    data = measure(replace(twin, joints=erring), robot.random_configurations(poses, rng), 3e-5, rng)
+    return identify(robot.carrying(twin.robot.payload), data, ELASTIC), data
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_gears_that_err_are_found(seed: int) -> None:
+    gears = {2: (242, 6e-5), 3: (200, 1e-4), 5: (102, 2e-4)}
+    fit, data = campaign(unknown_gears(load_robot("irb120")), gears, 150, seed)
+    found = {error.joint: (error.periods, error.amplitude) for error in periodic_errors(fit, data)}
+    assert set(found) == set(gears)
+    for joint, (periods, size) in gears.items():
+        assert found[joint][0] == pytest.approx(periods, abs=1)
+        assert found[joint][1] == pytest.approx(size, rel=0.25)
+    (notice,) = check_transmission(fit, data)
+    assert notice.code == "transmission-error"
+    assert "joint 3 200 times" in notice.message
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_perfect_gears_are_left_in_peace(seed: int) -> None:
+    fit, data = campaign(unknown_gears(load_robot("irb120")), {}, 100, seed)
+    assert check_transmission(fit, data) == []
+
+
+def test_a_gear_that_the_file_describes_is_not_told_again() -> None:
+    fit, data = campaign(load_robot("irb120"), {3: (200, 2e-4)}, 100, 1)
+    assert periodic_errors(fit, data) == ()
+
+
+def test_few_configurations_say_nothing() -> None:
+    fit, data = campaign(unknown_gears(load_robot("irb120")), {3: (200, 2e-3)}, 40, 2)
+    assert periodic_errors(fit, data) == ()
+
+
+def test_the_effect_takes_the_error_out() -> None:
+    robot = load_robot("irb120")
+    fit, data = campaign(robot, {3: (200, 2e-4)}, 80, 3)
+    better = identify(fit.start, data, replace(ELASTIC, effects=("compliance", "transmission-error")))
+    sine, cosine = (better.robot.values[f"transmission_{part}_3"] for part in ("sin", "cos"))
+    assert np.hypot(sine, cosine) == pytest.approx(2e-4, rel=0.05)
+    assert np.arctan2(cosine, sine) == pytest.approx(0.7, abs=0.05)
+    assert better.excess == 1.0
+    assert fit.excess > 1.5

@@ -154,7 +154,7 @@ def dataset_of(readings: Readings, configurations: Configurations) -> Dataset:
         targets,
         references=references,
         approach=None if order is None else approach_of(configurations.joints, order),
-        number=None if order is None else order - min(int(order.min()), _FIRST) + 0.0,
+        number=None if order is None else np.asarray(order - min(int(order.min()), _FIRST), float),
     )
 
 

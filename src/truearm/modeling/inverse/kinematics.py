@@ -184,7 +184,7 @@ def _task(
         base = robot.base
         p, R = p @ base.rotation.T + np.array(base.translation), base.rotation @ R
     x, y, z = np.ascontiguousarray(R.transpose(2, 1, 0))
-    return PoseTask(robot, target, orientation, np.ascontiguousarray(p.T), (x, y, z), _reach(robot, target))
+    return PoseTask(robot, target, orientation, np.ascontiguousarray(p.T), (x, y, z), reach(robot, target))
 
 
 def _array(name: str, given: ArrayLike, *shape: int) -> Array:
@@ -240,7 +240,7 @@ def _seed(robot: Robot, seed: ArrayLike | None, count: int) -> Array:
     return np.broadcast_to(values, (count, joints))
 
 
-def _reach(robot: Robot, target: str | None) -> float:
+def reach(robot: Robot, target: str | None) -> float:
     """Return the length of the stretched arm from its first joint [m]."""
     sweep = robot.sweep(np.zeros((1, len(robot.joints))), target)
     places = [i for i, element in enumerate(sweep.elements) if element.variable is not None]

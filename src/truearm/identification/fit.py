@@ -165,7 +165,10 @@ def identify(
     start = initial_frames(model.prepared(robot), data)
     check_circumstances(start, data)
     free = model.free(start)
-    check_bounds = None if bounds is None else bound_vectors(bounds, free, bounds_file)
+    check_bounds = None
+    if bounds is not None:
+        tried = start.with_effects(model.tried).parameters.values()
+        check_bounds = bound_vectors(bounds, free, bounds_file, tried)
     problem = Problem(start, data, free, dict(_FIRST_NOISE), priors=redundancy == "prior")
     check_solvable(problem)
     dropped: tuple[Redundancy, ...] = ()

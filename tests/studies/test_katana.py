@@ -23,6 +23,7 @@ from truearm.studies.katana import (
     zxz,
 )
 from truearm.studies.katana_influence import study as influence_study
+from truearm.studies.katana_tilting import study as tilting_study
 from truearm.studies.study import Study
 
 
@@ -110,3 +111,28 @@ def test_influence() -> None:
     )
     assert fourth > third
     assert "Plotly" in found.html()
+
+
+def test_tilting() -> None:
+    found = tilting_study(2, lambda _: None, count=40, unseen=60)
+    left = "What is left of the conventional calibration's error on unseen poses"
+    assert median(found, left, "two-stage, tilting first") < 15
+    assert median(found, left, "before any calibration") > 100
+    constants = next(table for table in found.tables if table.title.startswith("Constants"))
+    for row in constants.rows[:-1]:
+        assert row.published is not None
+        assert row.median == pytest.approx(row.published, rel=0.2)
+    side_by_side = "The methods side by side, on unseen poses"
+    by_influence, tilting, conventional = (
+        median(found, side_by_side, method)
+        for method in (
+            "tilting first, then influence-based pose by pose",
+            "two-stage, tilting first",
+            "conventional, geometry alone",
+        )
+    )
+    assert tilting < 0.1 * by_influence
+    assert tilting < 0.15 * conventional
+    contradictions = found.tables[-1].rows
+    assert [row.median < 0 for row in contradictions[:3]] == [False, False, True]
+    assert {picture.name for picture in found.pictures} == {"poses", "errors"}

@@ -63,6 +63,11 @@ STUDIES: Final = (
         "influence of each parameter, and identification by it, on a simulated Katana 450 (Patel 3.5 to 3.7)",
         "truearm.studies.katana_influence",
     ),
+    Entry(
+        "katana-tilting",
+        "joints that tilt, found by inclinometers before the geometry, on a simulated Katana 450 (Patel 4)",
+        "truearm.studies.katana_tilting",
+    ),
 )
 
 

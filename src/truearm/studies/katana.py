@@ -10,12 +10,15 @@ from typing import Final, Literal
 
 import numpy as np
 
+from truearm.identification.inclinometers import TiltingFit, calibrate_tilting
+from truearm.measurement.inclinometer import compare, deviation_of_change, measure_pairs
 from truearm.measurement.twin import Twin
 from truearm.measurement.twin_joint import JointTruth
 from truearm.modeling.chain import Array
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY, Transform
+from truearm.planning.inclinometer import plan_tilting
 from truearm.planning.iso9283 import Cube
 from truearm.planning.largest_cube import largest_cube
 from truearm.robots import load_robot
@@ -47,6 +50,8 @@ UNITS: Final = {"target_tip_y": TOOL}
 PERTURBATIONS: Final = {"target_tip_y": TOOL * math.radians(0.05)}
 #: Resolution of the Optotrak, taken as one standard deviation of a coordinate [m].
 NOISE: Final = 1e-5
+#: Resolution of the inclinometers [rad].
+RESOLUTION: Final = math.radians(0.001)
 
 #: Cube of ISO 9283 whose circle of 0.8 times the side is the circle of section 5.5.1.
 CHAPTER_5_CUBE: Final = Cube((0.0, -0.3, 0.1392893), 0.25)
@@ -168,3 +173,23 @@ def knowing(robot: Robot, tilting: Mapping[str, float]) -> Robot:
     """Return the robot with joint effects at these values."""
     effects = tuple(dict.fromkeys(name.rpartition("_")[0] for name in tilting))
     return replace(robot, effect_names=(*robot.effect_names, *effects)).with_values(tilting)
+
+
+def inclined(nominal: Robot, truth: Twin, rng: np.random.Generator, pairs: tuple[int, int] = (24, 8)) -> TiltingFit:
+    """Return what the first stage finds of a twin's joints: pairs planned for the nominal robot, then measured.
+
+    Parameters
+    ----------
+    pairs
+        How many for inclinometers, and how many for poses.
+    """
+    plan = plan_tilting(
+        nominal,
+        rng,
+        inclined=pairs[0],
+        posed=pairs[1],
+        deviation=deviation_of_change(RESOLUTION),
+        pose_deviation=NOISE,
+    )
+    readings = compare(truth, plan.inclined, RESOLUTION, rng)
+    return calibrate_tilting(nominal, readings, measure_pairs(truth, plan.posed, NOISE, rng))

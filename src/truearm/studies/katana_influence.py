@@ -235,9 +235,9 @@ def _influences(runs: list[_Run]) -> Table:
         ),
         Row(
             "alpha 2 as a share of theta 2 (k8)",
-            "1",
-            [a / b for a, b in zip(means("alpha 2"), means("theta 2"), strict=True)],
-            _ALPHA_2,
+            "%",
+            [100 * a / b for a, b in zip(means("alpha 2"), means("theta 2"), strict=True)],
+            100 * _ALPHA_2,
             "section 3.6",
             relative=0.1,
             explanation="How far the tip is from the common normal of axes 2 and 3, over how far it is from axis 2:"
@@ -334,16 +334,16 @@ def _methods(runs: list[_Run]) -> Table:
         rows.append(
             Row(
                 f"{robot}: influence-based over joint least squares",
-                "1",
+                "times",
                 [run.unseen[robot, _INFLUENCE] / run.unseen[robot, _JOINT] for run in runs],
             )
         )
     rows.append(
         Row(
             f"{_GEOMETRY}: influence-based over minimum norm",
-            "1",
-            [run.unseen[_GEOMETRY, _INFLUENCE] / run.unseen[_GEOMETRY, _NORM] for run in runs],
-            round(0.21 / 0.38, 2),
+            "%",
+            [100 * run.unseen[_GEOMETRY, _INFLUENCE] / run.unseen[_GEOMETRY, _NORM] for run in runs],
+            round(100 * 0.21 / 0.38),
             "Table 3.4",
             relative=_SIMILAR,
             explanation="In the document influence-based identification leaves half of what the standard leaves, on the"

@@ -24,6 +24,7 @@ from truearm.studies.katana import (
 )
 from truearm.studies.katana_influence import study as influence_study
 from truearm.studies.katana_tilting import study as tilting_study
+from truearm.studies.katana_trajectory import study as trajectory_study
 from truearm.studies.study import Study
 
 
@@ -136,3 +137,25 @@ def test_tilting() -> None:
     contradictions = found.tables[-1].rows
     assert [row.median < 0 for row in contradictions[:3]] == [False, False, True]
     assert {picture.name for picture in found.pictures} == {"poses", "errors"}
+
+
+def test_trajectory() -> None:
+    found = trajectory_study(1, lambda _: None, step=0.3, poses=40)
+    predicted = "Predicted distance from the circle, by cause"
+    half, full, stiffness = (
+        median(found, predicted, f"{cause}, mean") for cause in ("tilting", "tilting, full gap", "stiffness alone")
+    )
+    assert stiffness < 0.07 < 0.3 < half < full
+    slow, fast = (median(found, predicted, f"tilting, {speed} m/s against rest, largest") for speed in ("0.1", "1"))
+    assert 0 < slow < fast
+    followed = "Corrected and followed by the twin: geometry from poses"
+    before, geometric, tilting = (
+        median(found, followed, f"{what}, mean") for what in ("before", "geometric", "with tilting")
+    )
+    assert tilting < geometric < before
+    left = "What is left when all tilting is corrected"
+    assert median(found, left, "joint 1 without backlash, model told exactly") < 0.02
+    moments = "Moments of the load along the circle"
+    about, across = (median(found, moments, f"joint 1, {way} its axis, largest") for way in ("about", "across"))
+    assert about < 0.1 * across
+    assert {picture.name for picture in found.pictures} == {"joints", "about", "across", "predicted", "followed"}

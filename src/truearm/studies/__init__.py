@@ -68,6 +68,11 @@ STUDIES: Final = (
         "joints that tilt, found by inclinometers before the geometry, on a simulated Katana 450 (Patel 4)",
         "truearm.studies.katana_tilting",
     ),
+    Entry(
+        "katana-trajectory",
+        "a circle predicted, corrected and followed by a simulated Katana 450 (Patel 5)",
+        "truearm.studies.katana_trajectory",
+    ),
 )
 
 

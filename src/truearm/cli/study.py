@@ -30,15 +30,11 @@ def study(
     json: Json = False,
 ) -> None:
     """Make a published experiment again."""
-    from truearm.files import refuse_overwriting, writable_folder
+    from truearm.files import writable_folder
     from truearm.studies import run_study
     from truearm.studies.study import STUDY_FILES
 
     writable_folder(out)
-    if data is not None:
-        for entry in STUDIES:
-            for file in STUDY_FILES:
-                refuse_overwriting(out / file, [data / needed for needed in entry.files])
     with progress() as say:
         finished = run_study(name, seeds, data, say)
         say("writing the report")
@@ -48,9 +44,9 @@ def study(
         return
     typer.echo(finished.title)
     for table in finished.tables:
+        if table.compares:
+            typer.echo(f"{table.title}:")
         for row in table.rows:
             if row.published is not None:
-                typer.echo(
-                    f"  {row.verdict:8}{row.what}: {row.median:.3g} {row.unit}, published {row.published:g} {row.unit}"
-                )
+                typer.echo(f"  {row.verdict:8}{row.what}: {row.median:.3g}, published {row.published:g} {row.unit}")
     typer.echo(f"Written to {out}: {', '.join(STUDY_FILES)}")

@@ -122,6 +122,7 @@ class _Follower:
         self._rows = chosen_rows(orientation, self._rotation, length)
         self._scale = np.array([length if joint.kind == "prismatic" else 1.0 for joint in robot.joints])
         self._names = tuple(joint.name for joint in robot.joints)
+        self._spare = len(robot.joints) > len(self._rows)
         if len(self._rows) > len(robot.joints):
             raise InputError(
                 "the arm has too few joints to keep this orientation along a path",
@@ -177,10 +178,11 @@ class _Follower:
             found = self._solved(k, guess, scaled[0])
             if found is None:
                 raise InputError(
-                    "the path leaves what the arm can reach, or comes to a singular posture",
+                    "the arm cannot follow the path any further: it leaves the reach, or comes to a singular posture"
+                    + (", or, with joints to spare, to the end of the postures near the first" if self._spare else ""),
                     where=self._place(k),
                     came=f"orientation '{self._orientation}'",
-                    cure="Move the path towards the arm, or ask less of the orientation.",
+                    cure="Move the path towards the arm, begin elsewhere (seed), or ask less of the orientation.",
                 )
             scaled[k], A = found
             self._check_limits(k, scaled[k] * self._scale)

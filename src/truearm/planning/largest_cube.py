@@ -29,10 +29,11 @@ DIRECTIONS: Final = ("+x", "-x", "+y", "-y")
 _SAMPLES: Final = 50_000
 #: A point is near to a sample within this [reach lengths].
 _NEAR: Final = 0.06
-#: The lattice of centres and sides, and the first and last step of the search [reach lengths].
+#: Spacing of the lattice of centres and sides [reach lengths].
 _LATTICE: Final = 1 / 12
-_FIRST_STEP: Final = 1 / 16
-_LAST_STEP: Final = 1 / 500
+#: The search goes from the first step to the second, and for the best from there to the third [reach lengths].
+_STEPS: Final = (1 / 16, 1 / 64, 1 / 500)
+_FINALISTS: Final = 5
 #: Cubes of the lattice from which it is made.
 _STARTS: Final = 24
 _MOVES: Final = np.array([(ahead, up, 0.5) for ahead, up in product((0, -1, 1), repeat=2)])
@@ -94,8 +95,11 @@ class _Search:
 
     def largest(self) -> Cube:
         """Return the largest cube that was found."""
-        starts = self._starts()
-        places = self._grown(starts) if len(starts) else starts
+        places = self._starts()
+        if len(places):
+            places = self._grown(self._shrunk(places), *_STEPS[:2])
+            best = np.argsort(-places[:, 2], kind="stable")[:_FINALISTS]
+            places = self._grown(places[best], *_STEPS[1:])
         if not len(places):
             raise InputError(
                 "the arm reaches no cube there",
@@ -121,15 +125,16 @@ class _Search:
                 starts.append(place)
         return np.array(starts[:_STARTS])
 
-    def _grown(self, places: Array) -> Array:
-        """Return cubes moved and grown as far as small steps lead; without those that are not reached to begin with."""
-        size = np.full(len(places), _FIRST_STEP * self._length)
+    def _shrunk(self, places: Array) -> Array:
+        """Return those cubes that are reached when they are made a little smaller."""
         for _ in range(4):
-            missed = ~self._reached(places)
-            places[missed, 2] -= size[missed] / 2
-        reached = self._reached(places)
-        places, size = places[reached], size[reached]
-        while (active := np.flatnonzero(size > _LAST_STEP * self._length)).size:
+            places[~self._reached(places), 2] -= _STEPS[0] * self._length / 2
+        return places[self._reached(places)]
+
+    def _grown(self, places: Array, first: float, last: float) -> Array:
+        """Return cubes moved and grown as far as steps lead, from the first size down to the last [reach lengths]."""
+        size = np.full(len(places), first * self._length)
+        while (active := np.flatnonzero(size > last * self._length)).size:
             tried = places[active, None] + _MOVES * size[active, None, None]
             good = self._reached(tried.reshape(-1, 3)).reshape(tried.shape[:2])
             better = good.any(axis=1)

@@ -3,9 +3,9 @@
 The points are shared evenly among the four diagonal planes and fill each of them from edge to edge
 (:meth:`~truearm.planning.iso9283.DiagonalPlane.spread`). The corners of the largest cube lie on the boundary of the
 workspace, so some points come near to it. The standard asks for points, an arm of five joints cannot be asked for
-orientations as well, and a calibration learns most from orientations that differ: each point is reached in the
-orientation that comes from random readings within the limits, by the shortest way from them. Whether the arm touches
-itself or its surroundings is not looked at.
+orientations as well, and a calibration learns most from orientations that differ: each point is reached from the
+nearest of many random configurations, in the orientation that comes of it. Whether the arm touches itself or its
+surroundings is not looked at.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from truearm.errors import InputError
 from truearm.modeling.chain import Array
@@ -28,7 +29,8 @@ from truearm.planning.tip import Tip
 POSES: Final = 118
 #: What every joint moves at least from one pose to the next [rad; m for sliding joints].
 LEAST_MOVE: Final = math.radians(2.0)
-#: How often readings are looked for with other random ones.
+#: Random configurations, and how many of those nearest to a point are tried one after the other.
+_STARTS: Final = 5_000
 _DRAWS: Final = 6
 _ORDERS: Final = 10
 
@@ -90,7 +92,7 @@ def plan_poses(
     least_move
         What every joint moves at least from one pose to the next [rad; m for sliding joints].
     seed
-        For the random readings; the same seed gives the same poses.
+        For the random configurations; the same seed gives the same poses.
 
     Raises
     ------
@@ -128,12 +130,14 @@ def _readings(robot: Robot, points: Array, target: str | None, rng: np.random.Ge
     joints = np.zeros((len(points), len(robot.joints)))
     regular, reached = np.zeros((2, len(points)), dtype=bool)
     turning = [joint.kind == "revolute" for joint in robot.joints]
-    for _ in range(_DRAWS):
+    starts = robot.random_configurations(_STARTS, rng)
+    starts[:, turning] = (starts[:, turning] + np.pi) % (2 * np.pi) - np.pi  # a second turn teaches nothing
+    near = cKDTree(Tip(robot, target).positions(starts)).query(points, _DRAWS)[1]
+    for draw in range(_DRAWS):
         left = np.flatnonzero(~regular)
         if not len(left):
             break
-        start = robot.random_configurations(len(left), rng)
-        start[:, turning] = (start[:, turning] + np.pi) % (2 * np.pi) - np.pi  # a second turn teaches nothing
+        start = starts[np.asarray(near)[left, draw]]
         found = inverse(robot, points[left], target=target, orientation="free", seed=start)
         usable = np.array([status.usable for status in found.status])
         joints[left[usable]] = found.joints[usable]

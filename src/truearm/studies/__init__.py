@@ -48,6 +48,12 @@ STUDIES: Final = (
         "truearm.studies.irb120_axes",
     ),
     Entry(
+        "irb120-faro",
+        "a measured IRB 120: what every model leaves, and where it comes from (with --data)",
+        "truearm.studies.irb120_faro",
+        ("joints_commanded.txt", *(f"{kind}_{number}.txt" for kind in ("target", "base") for number in (1, 2, 3))),
+    ),
+    Entry(
         "irb120-simulation",
         "calibration of a simulated IRB 120, without noise and with noise and wrong masses (Nubiola 2.6)",
         "truearm.studies.irb120_simulation",

@@ -4,41 +4,29 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
 
 from truearm.measurement.truths import truth_twin
-from truearm.measurement.twin import Twin, measure
+from truearm.measurement.twin import Twin
 from truearm.measurement.twin_joint import PERFECT, JointTruth
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import Payload
 from truearm.reporting.drawing import AFTER, BEFORE, Figure, axis, figure
 from truearm.reporting.numbers import rounded_to
 from truearm.robots import load_robot
+from truearm.studies.single_joint import AxisTest, Turn, places_of, run_out, turn_of
 from truearm.studies.study import Picture, Row, Study, Table
 
-
-@dataclass(frozen=True)
-class _Test:
-    """A row of Table 2.3: interval and increment [deg], ranges of the errors [mm, deg], backlash [deg]."""
-
-    low: int
-    high: int
-    step: int
-    tangential: float
-    angular: float
-    backlash: float
-
-
 _TESTS: Final = {
-    1: _Test(-60, 60, 5, 0.114, 0.013, 0.004),
-    2: _Test(-40, 40, 1, 1.363, 0.116, 0.002),
-    3: _Test(-40, 40, 1, 0.912, 0.098, 0.004),
-    4: _Test(-155, 155, 5, 0.445, 0.207, 0.037),
-    5: _Test(-90, 90, 5, 0.606, 0.153, 0.017),
-    6: _Test(-400, 400, 1, 0.156, 0.072, 0.037),
+    1: AxisTest(-60, 60, 5, 0.114, 0.013, 0.004),
+    2: AxisTest(-40, 40, 1, 1.363, 0.116, 0.002),
+    3: AxisTest(-40, 40, 1, 0.912, 0.098, 0.004),
+    4: AxisTest(-155, 155, 5, 0.445, 0.207, 0.037),
+    5: AxisTest(-90, 90, 5, 0.606, 0.153, 0.017),
+    6: AxisTest(-400, 400, 1, 0.156, 0.072, 0.037),
 }
 #: The third end-effector, section 2.4.1.
 _PAYLOAD: Final = Payload(2.75, (-0.031, -0.013, 0.085))
@@ -48,41 +36,6 @@ _NOISE: Final = 0.008e-3
 _TABLES: Final = {"tracker-triangular": "2.7", "ctrack-triangular": "2.9", "ctrack-spatial": "2.11"}
 #: The document's own compliances of joints 2 to 5 differ by this much between its three set-ups.
 _SPREAD: Final = 0.25
-
-
-@dataclass(frozen=True)
-class _Turn:
-    """What circle fitting makes of one joint's run, forward and back.
-
-    Attributes
-    ----------
-    angle
-        Commanded [deg], ``(n,)``: forward, then backward.
-    error
-        Angle about the fitted axis beyond the commanded one, zero where the joint is at zero [deg], ``(n,)``.
-    radius
-        [mm].
-    """
-
-    angle: Array
-    error: Array
-    radius: float
-
-    @property
-    def angular(self) -> float:
-        """Range of the angular error [deg]."""
-        return float(np.ptp(self.error))
-
-    @property
-    def tangential(self) -> float:
-        """Range of the tangential error [mm]."""
-        return math.radians(self.angular) * self.radius
-
-    @property
-    def backlash(self) -> float:
-        """How far the joint lags behind, backward minus forward [deg]."""
-        forward, backward = np.split(self.error, 2)
-        return float(np.mean(backward[::-1] - forward))
 
 
 def study(seeds: int, progress: Callable[[str], None], coarser: int = 1) -> Study:
@@ -101,22 +54,22 @@ def study(seeds: int, progress: Callable[[str], None], coarser: int = 1) -> Stud
     seen = {}
     for truth, table in _TABLES.items():
         progress(f"turning joints, compliance of Table {table}")
-        seen[truth] = {number: _places(_twin(truth), number, test) for number, test in tests.items()}
+        seen[truth] = {number: places_of(_twin(truth), number, test) for number, test in tests.items()}
     sprung = seen["tracker-triangular"]
     progress("choosing run-out")
     rng = np.random.default_rng(seeds)
-    gear = {number: _run_out(_turn(_noisy(sprung[number], rng), test), test) for number, test in tests.items()}
+    gear = {number: run_out(turn_of(_noisy(sprung[number], rng), test), test) for number, test in tests.items()}
     chosen = _with_gear(_twin("tracker-triangular"), gear)
-    geared = {number: _places(chosen, number, test) for number, test in tests.items()}
+    geared = {number: places_of(chosen, number, test) for number, test in tests.items()}
     progress("measuring")
     alone, whole = [], []
     for seed in range(seeds):
         rng = np.random.default_rng(seed)
-        alone.append({number: _turn(_noisy(sprung[number], rng), test) for number, test in tests.items()})
-        whole.append({number: _turn(_noisy(geared[number], rng), test) for number, test in tests.items()})
+        alone.append({number: turn_of(_noisy(sprung[number], rng), test) for number, test in tests.items()})
+        whole.append({number: turn_of(_noisy(geared[number], rng), test) for number, test in tests.items()})
     shares = _shares(tests)
     tables = {
-        table: {number: _turn(seen[truth][number], test) for number, test in tests.items()}
+        table: {number: turn_of(seen[truth][number], test) for number, test in tests.items()}
         for truth, table in _TABLES.items()
     }
     return Study(
@@ -124,9 +77,9 @@ def study(seeds: int, progress: Callable[[str], None], coarser: int = 1) -> Stud
         title="Single joints of an ABB IRB 120",
         source="A. Nubiola, doctoral thesis, ETS Montreal, section 2.4.1, Table 2.3 and Figure 2.6; truth from Tables"
         " 2.4, 2.6 and 2.7",
-        answer="Compliance alone, with the values that the document identified elsewhere, gives errors of the printed"
-        " size for joints 3, 4 and 5, two thirds of what joint 2 shows, too much for joint 6 and nothing for joint 1."
-        " What is missing there, and the backlash, must be in gears and bearings: sines of"
+        answer="Compliance alone, with the values that the document identified elsewhere, gives the printed errors of"
+        " joints 3, 4 and 5 within three tenths, two thirds of what joint 2 shows, too much for joint 6 and nothing"
+        " for joint 1. What is missing there, and the backlash, must be in gears and bearings: sines of"
         f" {min(a for a, _ in gear.values()):.3f} to {max(a for a, _ in gear.values()):.3f} deg a turn would do.",
         seeds=seeds,
         tables=(
@@ -161,57 +114,8 @@ def _twin(truth: str) -> Twin:
     return replace(twin, robot=robot)
 
 
-def _angles(test: _Test) -> Array:
-    """Return the commanded angles [deg], forward and then backward."""
-    steps = np.arange(-(-test.low // test.step), test.high // test.step + 1) * float(test.step)
-    return np.concatenate([steps, steps[::-1]])
-
-
-def _places(twin: Twin, number: int, test: _Test) -> Array:
-    """Return where the reflector is during the run of one joint [m], ``(n, 3)``."""
-    joints = np.zeros((len(_angles(test)), 6))
-    joints[:, number - 1] = np.radians(_angles(test))
-    approach = np.zeros_like(joints)
-    approach[:, number - 1] = np.repeat([1.0, -1.0], len(joints) // 2)
-    return measure(twin, joints, 0.0, np.random.default_rng(0), approach=approach).position
-
-
 def _noisy(places: Array, rng: np.random.Generator) -> Array:
     return places + rng.normal(0.0, _NOISE, places.shape)
-
-
-def _turn(places: Array, test: _Test) -> _Turn:
-    """Fit a circle to the places of a reflector [m] and compare its angle with the commanded one."""
-    angle = _angles(test)
-    centred = places - places.mean(axis=0)
-    across, along, _ = np.linalg.svd(centred, full_matrices=False)[2]
-    x, y = centred @ across, centred @ along
-    solved = np.linalg.lstsq(np.column_stack([2 * x, 2 * y, np.ones_like(x)]), x**2 + y**2)[0]
-    turned = np.degrees(np.unwrap(np.arctan2(y - solved[1], x - solved[0])))
-    turned *= np.sign(np.polyfit(angle, turned, 1)[0])
-    error = turned - angle
-    radius = math.sqrt(solved[2] + solved[0] ** 2 + solved[1] ** 2)
-    return _Turn(angle, error - error[angle == 0.0].mean(), radius * 1e3)
-
-
-def _run_out(turn: _Turn, test: _Test) -> tuple[float, float]:
-    """Return amplitude [deg] and phase [rad] of the smallest sine a turn that leaves the printed range and backlash.
-
-    Parameters
-    ----------
-    turn
-        What compliance and noise do.
-    """
-    at = np.radians(turn.angle)
-    lagging = turn.error + np.repeat([-0.5, 0.5], len(at) // 2) * test.backlash
-    amplitudes, phases = np.arange(0.0, 0.2, 0.001), np.radians(np.arange(0, 360, 15))
-    found = []
-    for phase in phases.tolist():
-        ranges = np.ptp(lagging + amplitudes[:, None] * np.sin(at + phase), axis=1)
-        passed = np.flatnonzero(np.sign(ranges - test.angular) != np.sign(ranges[0] - test.angular))
-        if len(passed):
-            found.append((float(amplitudes[passed[0]]), phase))
-    return min(found)
 
 
 def _with_gear(twin: Twin, gear: Mapping[int, tuple[float, float]]) -> Twin:
@@ -226,22 +130,22 @@ def _with_gear(twin: Twin, gear: Mapping[int, tuple[float, float]]) -> Twin:
     return replace(twin, joints=joints)
 
 
-def _shares(tests: Mapping[int, _Test]) -> dict[tuple[int, int], float]:
+def _shares(tests: Mapping[int, AxisTest]) -> dict[tuple[int, int], float]:
     """Return the range [deg] that the compliance of one joint alone makes while joint 2 or 3 is turned."""
     twin = _twin("tracker-triangular")
     shares = {}
     for turned in (2, 3):
         for number, truth in twin.joints.items():
             one: dict[int, JointTruth] = {number: truth}
-            places = _places(replace(twin, joints=one), turned, tests[turned])
-            shares[turned, number] = _turn(places, tests[turned]).angular
+            places = places_of(replace(twin, joints=one), turned, tests[turned])
+            shares[turned, number] = turn_of(places, tests[turned]).angular
     return shares
 
 
 # -- tables ------------------------------------------------------------------------------------------------
 
 
-def _radii(tests: Mapping[int, _Test], alone: list[dict[int, _Turn]]) -> Table:
+def _radii(tests: Mapping[int, AxisTest], alone: list[dict[int, Turn]]) -> Table:
     rows = []
     for number, test in tests.items():
         angular, tangential = test.angular, test.tangential
@@ -264,7 +168,7 @@ def _radii(tests: Mapping[int, _Test], alone: list[dict[int, _Turn]]) -> Table:
 
 
 def _compliance(
-    tests: Mapping[int, _Test], alone: list[dict[int, _Turn]], gear: Mapping[int, tuple[float, float]]
+    tests: Mapping[int, AxisTest], alone: list[dict[int, Turn]], gear: Mapping[int, tuple[float, float]]
 ) -> Table:
     why = {
         1: "Axis 1 is vertical: nothing that sags changes when it turns, so compliance predicts zero, and what we see"
@@ -310,7 +214,7 @@ def _compliance(
     )
 
 
-def _by_table(tests: Mapping[int, _Test], tables: Mapping[str, Mapping[int, _Turn]]) -> Table:
+def _by_table(tests: Mapping[int, AxisTest], tables: Mapping[str, Mapping[int, Turn]]) -> Table:
     return Table(
         "Range of the angular error with each of the document's compliances, without noise",
         "Ours from Tables 2.7, 2.9 and 2.11: median, lowest and highest of the three set-ups, not of seeds.",
@@ -342,7 +246,7 @@ def _shares_table(shares: Mapping[tuple[int, int], float]) -> Table:
 
 
 def _matched(
-    tests: Mapping[int, _Test], whole: list[dict[int, _Turn]], gear: Mapping[int, tuple[float, float]]
+    tests: Mapping[int, AxisTest], whole: list[dict[int, Turn]], gear: Mapping[int, tuple[float, float]]
 ) -> Table:
     rows = []
     for number, test in tests.items():
@@ -377,7 +281,7 @@ def _matched(
     )
 
 
-def _picture(tests: Mapping[int, _Test], alone: Mapping[int, _Turn], whole: Mapping[int, _Turn]) -> Picture:
+def _picture(tests: Mapping[int, AxisTest], alone: Mapping[int, Turn], whole: Mapping[int, Turn]) -> Picture:
     traces: list[Figure] = []
     layout: dict[str, Any] = {}
     labels = []

@@ -23,6 +23,7 @@ from truearm.modeling.robot import Robot
 from truearm.reporting.drawing import AFTER, BEFORE, axis, figure, logarithmic_axis
 from truearm.reporting.numbers import rounded
 from truearm.robots import load_robot
+from truearm.studies.parallel_axes import without_beta
 from truearm.studies.study import Picture, Row, Study, Table
 
 _ELASTIC: Final = next(model for model in MODELS if model.name == "elastic")
@@ -220,10 +221,10 @@ def _run(seed: int, unseen: int) -> _Run:
     drawn_clean = measure(drawn, joints, 0.0, rng)
     told = _told(nominal, drawn)
     spread["drawn exact"], _ = _identified(told, drawn_clean, drawn_truth, "drop")
-    spread["no beta"], _ = _identified(_without_beta(told), drawn_clean, drawn_truth, "drop")
+    spread["no beta"], _ = _identified(without_beta(told), drawn_clean, drawn_truth, "drop")
     parallel = replace(drawn, robot=drawn.robot.with_values({"beta_3": 0.0}))
     clean_parallel, truth_parallel = (measure(parallel, at, 0.0, rng) for at in (joints, others))
-    spread["d_3 held"], _ = _identified(_without_beta(told), clean_parallel, truth_parallel, within={"d_3": 0.0})
+    spread["d_3 held"], _ = _identified(without_beta(told), clean_parallel, truth_parallel, within={"d_3": 0.0})
 
     wrong = _wrong(nominal.carrying(published.robot.payload), rng)
     noisy = measure(published, joints, _NOISE, rng)
@@ -278,13 +279,6 @@ def _drawn(twin: Twin, nominal: Robot, rng: np.random.Generator) -> Twin:
     }
     joints = {number: JointTruth(truth.compliance * rng.uniform(0.5, 1.5)) for number, truth in twin.joints.items()}
     return replace(twin, robot=twin.robot.with_values(values), joints=joints)
-
-
-def _without_beta(robot: Robot) -> Robot:
-    """Return the robot as the document models it: axes 2 and 3 cannot lean sideways against each other."""
-    third = robot.joints[2]
-    row = {column: value for column, value in third.row.items() if column != "beta"}
-    return replace(robot, joints=(*robot.joints[:2], replace(third, row=row), *robot.joints[3:]))
 
 
 def _wrong(robot: Robot, rng: np.random.Generator) -> Robot:

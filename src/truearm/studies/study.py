@@ -205,7 +205,7 @@ class Study:
 
 
 def number(value: float) -> str:
-    """Write one of our figures with three significant digits."""
+    """Write one of our figures with three significant digits; what is smaller than 1e-12 is rounding."""
     if abs(value) >= 100:
         return f"{value:.0f}"
-    return "0" if value == 0 else f"{value:#.3g}".rstrip(".")
+    return "0" if abs(value) < 1e-12 else f"{value:#.3g}".rstrip(".")

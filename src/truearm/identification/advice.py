@@ -131,7 +131,7 @@ def _check_effects(fit: Fit) -> list[Notice]:
                 "too-many-effects",
                 f"Of {len(own)} parameters of joint effects the data know {len(vague)} less than half, "
                 f"{', '.join(vague[:8])}{' and others' if len(vague) > 8 else ''}: there are too few configurations "
-                "for so many effects. Measure more, or let --model auto choose.",
+                f"for so many effects. Measure more{'' if fit.model.tried else ', or let --model auto choose'}.",
             )
         )
     soft = [

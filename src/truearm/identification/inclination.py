@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_right
 from collections.abc import Sequence
 from itertools import accumulate
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.measurement.inclinometer import Pairs
 from truearm.modeling.chain import Array
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
+
+#: Axes steeper than this are left out: a vertical one does not see small turns [rad].
+STEEPEST: Final = math.radians(60.0)
+#: Moments about, and across, an axis below these leave open where a joint leans [N m]: friction holds it, or the error
+#: of the moment decides.
+UNDECIDED: Final = (0.2, 0.05)
+ENOUGH: Final = f"moments above {UNDECIDED[0]:g} N m about and {UNDECIDED[1]:g} N m across the axis of every joint"
+_UPRIGHT: Final = 0.01  # sine of the angle between gravity and an axis
 
 
 def inclinations_of(robot: Robot, q: Array | Postures, seats: Array | None = None) -> Array:
@@ -56,6 +67,52 @@ def inclination_derivatives(
         first = len(names) + 3 * link
         found[:, link, :, first : first + 3] = levers[:, link] @ sweep.matrix(end)
     return found
+
+
+def readable(robot: Robot, pairs: Pairs) -> NDArray[np.bool_]:
+    """Return which changes of inclination can be used, ``(n, links, 3)``.
+
+    The axis stands within 60 deg of the horizontal in both postures, and the loads decide to which side every joint up
+    to the link leans. A joint whose axis stands upright does not matter.
+    """
+    usable = np.ones((len(pairs), len(robot.joints), 3), dtype=bool)
+    for posture in (pairs.first, pairs.second):
+        at = robot.loaded(posture)
+        usable &= np.abs(inclinations_of(robot, at)) <= STEEPEST
+        usable &= np.logical_and.accumulate(decided(robot, at, upright=True), axis=1)[..., None]
+    return usable
+
+
+def decided(robot: Robot, posture: Postures, *, upright: bool) -> NDArray[np.bool_]:
+    """Return whether the loads decide to which side each joint leans, ``(n, joints)``.
+
+    Parameters
+    ----------
+    upright
+        Whether a joint may turn to either side about an axis along gravity, which inclinometers do not see.
+    """
+    at = robot.loaded(posture)
+    assert at.loads is not None
+    sweep, up = robot.sweep(at), upwards(robot)
+    clear = np.ones((len(at), len(robot.joints)), dtype=bool)
+    for joint in robot.layout.turning:
+        x, y, z = at.loads[joint, 3:]
+        stands = np.linalg.norm(np.cross(sweep.axis(robot.moving[joint]).T, up), axis=1) < _UPRIGHT
+        clear[:, joint] = (np.abs(z) > UNDECIDED[0]) | (upright & stands)
+        clear[:, joint] &= np.hypot(x, y) > UNDECIDED[1]
+    return clear
+
+
+def change_derivatives(robot: Robot, pairs: Pairs, names: Sequence[str], seats: Array | None = None) -> Array:
+    """Return the derivative of changes of inclination by parameters and seats.
+
+    Returns
+    -------
+    derivatives
+        ``(n, links, 3, len(names) + 3 * links)``.
+    """
+    first, second = (inclination_derivatives(robot, p, names, seats) for p in (pairs.first, pairs.second))
+    return np.asarray(second - first)
 
 
 def link_ends(robot: Robot) -> list[int]:

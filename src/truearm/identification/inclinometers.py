@@ -15,7 +15,6 @@ joint readings, are compared in the same way (the document's joint 1).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
@@ -25,25 +24,25 @@ from numpy.typing import NDArray
 
 from truearm.errors import InputError
 from truearm.identification.frames import initial_frames
-from truearm.identification.inclination import inclination_derivatives, inclinations_of, upwards
+from truearm.identification.inclination import (
+    ENOUGH,
+    STEEPEST,
+    change_derivatives,
+    decided,
+    inclinations_of,
+    readable,
+)
 from truearm.identification.solver import solve
-from truearm.measurement.dataset import Dataset
+from truearm.measurement.dataset import Dataset, IntArray
 from truearm.measurement.inclinometer import InclinometerReadings, Pairs
 from truearm.modeling.chain import Array
 from truearm.modeling.parameters import FreeParameters, Parameter
-from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
 
 #: What the first stage identifies.
 TILTING: Final = ("compliance", "backlash", "clearance")
 #: How well an instrument is aligned with its link, one standard deviation [rad].
 SEAT: Final = math.radians(0.5)
-#: Axes steeper than this are left out: a vertical one does not see small turns [rad].
-STEEPEST: Final = math.radians(60.0)
-#: Moments about, and across, an axis below these leave open where a joint leans [N m]: friction holds it, or the error
-#: of the moment decides.
-UNDECIDED: Final = (0.2, 0.05)
-_UPRIGHT: Final = 0.01  # sine of the angle between gravity and an axis
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,9 +76,7 @@ class TiltingFit:
     def believed(self) -> Robot:
         """The robot that believes these values as well as their deviations say, for a fit that frees them again."""
         found = [self.robot.parameters[name] for name in self.names]
-        return self.robot.with_parameters(
-            replace(p.restarted(p.value), prior=p.prior if p.deviation is None else p.deviation) for p in found
-        )
+        return self.robot.with_parameters(replace(p.restarted(p.value), prior=p.deviation or p.prior) for p in found)
 
 
 def calibrate_tilting(robot: Robot, readings: InclinometerReadings, poses: Dataset | None = None) -> TiltingFit:
@@ -99,7 +96,7 @@ def calibrate_tilting(robot: Robot, readings: InclinometerReadings, poses: Datas
     Raises
     ------
     InputError
-        For changes none of which can be used, and for poses that are not in pairs or declare no deviation.
+        For changes or poses none of which can be used, and for poses that are not in pairs or declare no deviation.
     """
     start = robot.with_effects(TILTING)
     start = start.with_parameters(p.restarted() for p in start.parameters.values() if p.group in TILTING)
@@ -160,10 +157,26 @@ class _Problem:
             raise InputError(
                 "no change of inclination can be used",
                 where="inclinometer readings",
-                allowed=f"axes within {math.degrees(STEEPEST):g} deg of the horizontal, and moments above "
-                f"{UNDECIDED[0]:g} N m about and {UNDECIDED[1]:g} N m across every joint's axis",
+                allowed=f"axes within {math.degrees(STEEPEST):g} deg of the horizontal, and {ENOUGH}",
             )
         return used
+
+    @cached_property
+    def pairs(self) -> dict[str, IntArray]:
+        """For each target of the poses, the readings that are compared, ``(pairs, 2)``."""
+        if self.poses is None:
+            return {}
+        poses, found = self.poses, {}
+        clear = np.asarray(decided(self.robot, poses.postures, upright=False).all(axis=1))
+        for index, name in enumerate(poses.targets):
+            reading = np.full(poses.configurations, -1)
+            mine = np.flatnonzero((poses.target == index) & poses.has_position & clear[poses.configuration])
+            reading[poses.configuration[mine]] = mine
+            pair = reading.reshape(-1, 2)
+            found[name] = pair[(pair >= 0).all(axis=1)]
+        if not any(len(pair) for pair in found.values()):
+            raise InputError("no pair of poses can be used", where=poses.source, allowed=ENOUGH)
+        return found
 
     def at(self, vector: Array) -> _Evaluation:
         return _Evaluation(self, vector)
@@ -181,16 +194,14 @@ class _Evaluation:
     @cached_property
     def residual(self) -> Array:
         p = self.problem
-        first, second = (
-            inclinations_of(self._robot, q, self._seats) for q in (p.readings.pairs.first, p.readings.pairs.second)
-        )
+        first, second = (inclinations_of(self._robot, q, self._seats) for q in (self._pairs.first, self._pairs.second))
         change = np.where(p.used, second - first - p.readings.change, 0.0) / p.readings.sigma
         return np.concatenate([change.reshape(-1), *(r for r, _ in self._displacements)])
 
     @cached_property
     def jacobian(self) -> Array:
         p = self.problem
-        change = change_derivatives(self._robot, p.readings.pairs, self._names, self._seats) / p.readings.sigma
+        change = change_derivatives(self._robot, self._pairs, self._names, self._seats) / p.readings.sigma
         change[~p.used] = 0.0
         points = [np.pad(J, ((0, 0), (0, self._seats.size))) for _, J in self._displacements]
         return np.concatenate([change.reshape(-1, len(self.vector)), *points])
@@ -204,6 +215,12 @@ class _Evaluation:
         return self.problem.robot.with_values(dict(zip(self._names, map(float, self.vector), strict=False)))
 
     @cached_property
+    def _pairs(self) -> Pairs:
+        """The postures with their loads."""
+        pairs = self.problem.readings.pairs
+        return Pairs(self._robot.loaded(pairs.first), self._robot.loaded(pairs.second))
+
+    @cached_property
     def _seats(self) -> Array:
         return self.vector[len(self._names) :].reshape(-1, 3)
 
@@ -215,12 +232,7 @@ class _Evaluation:
             return []
         at = self._robot.loaded(poses.postures)
         found = []
-        for index, name in enumerate(poses.targets):
-            reading = np.full(poses.configurations, -1)
-            mine = np.flatnonzero((poses.target == index) & poses.has_position)
-            reading[poses.configuration[mine]] = mine
-            pair = reading.reshape(-1, 2)
-            pair = pair[(pair >= 0).all(axis=1)]
+        for name, pair in self.problem.pairs.items():
             before, after = poses.configuration[pair].T
             sweep = self._robot.sweep(at, name)
             sigma = np.hypot(*poses.sigma[pair].T)[:, None]
@@ -236,52 +248,6 @@ def tilting_parameters(robot: Robot) -> tuple[list[Parameter], list[Parameter]]:
     every = robot.parameters.values()
     effects = [p for p in every if p.group in TILTING]
     return effects, [p for p in every if p.group in ("joint zero", "geometry") and p.unit == "rad"]
-
-
-def readable(robot: Robot, pairs: Pairs) -> NDArray[np.bool_]:
-    """Return which changes of inclination can be used, ``(n, links, 3)``.
-
-    The axis stands within 60 deg of the horizontal in both postures, and the loads decide to which side every joint up
-    to the link leans. A joint whose axis stands upright does not matter.
-    """
-    usable = np.ones((len(pairs), len(robot.joints), 3), dtype=bool)
-    for posture in (pairs.first, pairs.second):
-        at = robot.loaded(posture)
-        usable &= np.abs(inclinations_of(robot, at)) <= STEEPEST
-        usable &= np.logical_and.accumulate(decided(robot, at, upright=True), axis=1)[..., None]
-    return usable
-
-
-def decided(robot: Robot, posture: Postures, *, upright: bool) -> NDArray[np.bool_]:
-    """Return whether the loads decide to which side each joint leans, ``(n, joints)``.
-
-    Parameters
-    ----------
-    upright
-        Whether a joint may turn to either side about an axis along gravity, which inclinometers do not see.
-    """
-    at = robot.loaded(posture)
-    assert at.loads is not None
-    sweep, up = robot.sweep(at), upwards(robot)
-    clear = np.ones((len(at), len(robot.joints)), dtype=bool)
-    for joint in robot.layout.turning:
-        x, y, z = at.loads[joint, 3:]
-        stands = np.linalg.norm(np.cross(sweep.axis(robot.moving[joint]).T, up), axis=1) < _UPRIGHT
-        clear[:, joint] = (np.abs(z) > UNDECIDED[0]) | (upright & stands)
-        clear[:, joint] &= np.hypot(x, y) > UNDECIDED[1]
-    return clear
-
-
-def change_derivatives(robot: Robot, pairs: Pairs, names: Sequence[str], seats: Array | None = None) -> Array:
-    """Return the derivative of changes of inclination by parameters and seats.
-
-    Returns
-    -------
-    derivatives
-        ``(n, links, 3, len(names) + 3 * links)``.
-    """
-    first, second = (inclination_derivatives(robot, p, names, seats) for p in (pairs.first, pairs.second))
-    return np.asarray(second - first)
 
 
 def _check_pairs(poses: Dataset) -> None:

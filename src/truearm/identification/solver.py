@@ -24,27 +24,41 @@ _STEPS: Final = {"linear": 60, "huber": 100, "cauchy": 100, "l1": 300}
 
 
 class Solvable(Protocol):
-    """A whitened problem; :class:`truearm.identification.problem.Problem` says what each of these is."""
+    """A whitened problem, such as :class:`truearm.identification.problem.Problem`."""
 
     @property
-    def free(self) -> FreeParameters: ...  # noqa: D102
+    def free(self) -> FreeParameters:
+        """What may change."""
+
     @property
-    def priors(self) -> bool: ...  # noqa: D102
-    def at(self, vector: Array) -> Evaluated: ...  # noqa: D102
-    def prior_rows(self, vector: Array) -> tuple[Array, Array]: ...  # noqa: D102
+    def priors(self) -> bool:
+        """Whether the parameters' priors are rows of the problem."""
+
+    def at(self, vector: Array) -> Evaluated:
+        """Evaluate it at a vector ``(parameters,)``."""
+
+    def prior_rows(self, vector: Array) -> tuple[Array, Array]:
+        """Return the residual of the priors and the diagonal of its Jacobian, both ``(parameters,)``."""
 
 
 class Evaluated(Protocol):
-    """A whitened problem at one vector of its free parameters, with three rows for each reading."""
+    """A whitened problem at one vector of its free parameters."""
 
     @property
-    def problem(self) -> Solvable: ...  # noqa: D102
+    def problem(self) -> Solvable:
+        """What is evaluated."""
+
     @property
-    def vector(self) -> Array: ...  # noqa: D102
+    def vector(self) -> Array:
+        """Where, ``(parameters,)``."""
+
     @property
-    def residual(self) -> Array: ...  # noqa: D102
+    def residual(self) -> Array:
+        """Whitened residual ``(rows,)``, three rows for each reading."""
+
     @property
-    def jacobian(self) -> Array: ...  # noqa: D102
+    def jacobian(self) -> Array:
+        """Derivative of the residual, ``(rows, parameters)``."""
 
 
 @dataclass(frozen=True, eq=False)

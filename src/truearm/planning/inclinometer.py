@@ -17,14 +17,8 @@ from typing import Final
 import numpy as np
 
 from truearm.errors import InputError
-from truearm.identification.inclinometers import (
-    SEAT,
-    TILTING,
-    change_derivatives,
-    decided,
-    readable,
-    tilting_parameters,
-)
+from truearm.identification.inclination import ENOUGH, change_derivatives, decided, readable
+from truearm.identification.inclinometers import SEAT, TILTING, tilting_parameters
 from truearm.measurement.inclinometer import Pairs
 from truearm.modeling.chain import Array
 from truearm.modeling.postures import Postures
@@ -85,7 +79,7 @@ def plan_tilting(
     Raises
     ------
     InputError
-        If nothing may differ within a pair, or hardly any posture decides where every joint leans.
+        If nothing may differ within a pair, or hardly any posture decides to which side the joints lean.
     """
     if not (force >= 0.0 and move >= 0.0 and (move > 0.0 or force > 0.0)):
         raise InputError(
@@ -111,8 +105,8 @@ def plan_tilting(
     candidates = _candidates(model, rng, force, move)
     rows = change_derivatives(model, candidates, names) / deviation
     rows = np.where(readable(model, candidates)[..., None], rows, 0.0).reshape(len(candidates), -1, len(prior))
-    by_inclination, known = _chosen(candidates, rows * prior, inclined, np.eye(len(prior)), len(effects))
-    by_pose = by_inclination.at(np.arange(0))
+    by_inclination, known = _chosen(candidates, rows * prior, inclined, known, len(effects))
+    by_pose = candidates.at(np.arange(0))
     if posed:
         candidates = _candidates(model, rng, force, 0.0)
         rows = _displacement_derivatives(model, candidates, names) / (math.sqrt(2.0) * pose_deviation)
@@ -126,9 +120,18 @@ def plan_tilting(
 
 def _chosen(candidates: Pairs, rows: Array, count: int, known: Array, interest: int) -> tuple[Pairs, Array]:
     """Return the most telling candidates, and what is known once they are measured."""
-    chosen = most_telling(rows, count, known, interest)
+    telling = np.flatnonzero(rows.any(axis=(1, 2)))
+    if len(telling) < count:
+        raise InputError(
+            "hardly any posture decides to which side the joints lean",
+            where="postures to compare",
+            came=f"{len(telling)} of {len(rows)} pairs that can be used",
+            allowed=f"{ENOUGH}, in {count} pairs",
+            cure="Give a larger force, or a payload beside the last axis.",
+        )
+    chosen = telling[most_telling(rows[telling], count, known, interest)]
     told = rows[chosen].reshape(-1, rows.shape[2])
-    return candidates.at(np.array(chosen, dtype=np.intp)), known + told.T @ told
+    return candidates.at(chosen), known + told.T @ told
 
 
 def _candidates(robot: Robot, rng: np.random.Generator, force: float, move: float) -> Pairs:
@@ -139,13 +142,10 @@ def _candidates(robot: Robot, rng: np.random.Generator, force: float, move: floa
     ways = rng.permuted(np.tile(np.arange(6), (_CANDIDATES, 1)), axis=1)  # the first two differ
     pulls = np.zeros((2, _CANDIDATES, 6))
     pulls[..., :3] = force * np.concatenate([np.eye(3), -np.eye(3)])[ways[:, :2].T]
-    return Pairs(Postures(joints, wrench=pulls[0]), Postures(moved, wrench=pulls[1]))
+    return Pairs(*(robot.loaded(Postures(q, wrench=p)) for q, p in zip((joints, moved), pulls, strict=True)))
 
 
 def _displacement_derivatives(robot: Robot, pairs: Pairs, names: Sequence[str]) -> Array:
     """Return the derivative of the flange's displacement within pairs ``(n, 3, parameters)`` [m per unit]."""
-    change: Array | float = 0.0
-    for posture, sign in ((pairs.first, -1.0), (pairs.second, 1.0)):
-        at = robot.loaded(posture)
-        change = change + sign * robot.linear(robot.sweep(at), at, names)
-    return np.moveaxis(np.asarray(change), (0, 2), (2, 0))
+    first, second = (robot.linear(robot.sweep(q), q, names) for q in (pairs.first, pairs.second))
+    return np.moveaxis(second - first, (0, 2), (2, 0))

@@ -16,6 +16,7 @@ from truearm.identification.selection import Selection
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import Errors
 from truearm.modeling.chain import Array
+from truearm.modeling.parts import GRAVITY
 from truearm.notices import Notice
 from truearm.reporting.drawing import Figure
 from truearm.reporting.figures import correlation_map, histogram, residuals, workspace
@@ -145,6 +146,7 @@ def report_html(report: Report) -> str:
         noise_rows=noise_rows(fit),
         noise_sentence=noise_sentence(fit),
         doubted=int(report._doubted().sum()),
+        standing=GRAVITY,
     )
 
 

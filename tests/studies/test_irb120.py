@@ -87,7 +87,9 @@ def part(measured_data: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_the_measured_robot(part: Path) -> None:
+def test_the_measured_robot(part: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(irb120_faro, "_EFFECTS", ("bearing-compliance",))
+    monkeypatch.setattr(irb120_faro, "_TOGETHER", ("bearing-compliance", "hardening", "warm-up"))
     study = irb120_faro.study(1, silent, part, many=100, searches=(0, 0))
     found = medians(study)
     document = study.tables[0].title
@@ -95,6 +97,8 @@ def test_the_measured_robot(part: Path) -> None:
     assert found[document, "elastic: mean"] < found[document, "elastic, no beta: mean"]
     top = "Effects on top of each other, 100 training configurations"
     assert found[top, "elastic, bearing-compliance, hardening"] < 0.85 * found[top, "elastic"]
+    causes = "Error budget: what the rest goes along with"
+    assert found[causes, "elastic: angle of each joint, three harmonics"] < found[causes, "elastic: nothing more"]
     budget = "Error budget: what the model leaves over"
     squares = [
         found[budget, f"elastic: {what}"] ** 2

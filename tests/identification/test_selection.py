@@ -157,3 +157,21 @@ def test_the_held_out_part_has_no_say() -> None:
     spoiled[np.isin(data.configuration, order[28:])] += 1e-3 * np.random.default_rng(0).normal(size=3)
     chosen = [calibrate(arm(), d, model="auto", train=28, seed=3) for d in (data, replace(data, position=spoiled))]
     assert chosen[0].selection == chosen[1].selection
+
+
+def test_effects_with_more_unknowns_than_equations_are_passed_over() -> None:
+    # One target: 9 configurations of a fold give 27 equations, and 25 unknowns are elastic already.
+    data = seen(twin_of(), 12, 9)
+    first = data.target == 0
+    one = replace(
+        data,
+        targets=data.targets[:1],
+        configuration=data.configuration[first],
+        target=data.target[first],
+        position=data.position[first],
+        sigma=None if data.sigma is None else data.sigma[first],
+    )
+    selection = select(arm(), one, redundancy="drop")
+    tried = {attempt.effect for attempt in selection.attempts}
+    assert "compliance" in selection.model.effects
+    assert "fourier" not in tried

@@ -38,22 +38,6 @@ def postures_in_equilibrium(robot: Robot, at: Postures) -> Postures:
     return replace(at, loads=_loads(robot, at, variables))
 
 
-def tilts_in_equilibrium(robot: Robot, variables: Array) -> Array:
-    """Return variables whose tilts are those that the loads make, the joints turned as they are."""
-    tilting = [effect for effect in robot.effects if effect.tilts]
-
-    def tilted(_: NDArray[np.intp], before: Array) -> Array:
-        turned = before[: len(robot.joints)]
-        after = robot.straight(turned)
-        at = Postures(turned.T, loads=joint_loads(robot, before))
-        for effect in tilting:
-            for variable, part in effect.deflection(at, robot.values).items():
-                after[variable] += part
-        return after
-
-    return _settled(tilted, variables)
-
-
 def readings_in_equilibrium(robot: Robot, variables: Array) -> Array:
     """Return the readings ``(joints, n)`` that lead to variables, whose loads are known from the start."""
     loads = joint_loads(robot, variables) if any(effect.loaded for effect in robot.effects) else None

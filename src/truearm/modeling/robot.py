@@ -13,7 +13,8 @@ from truearm.errors import InputError, nearest_names
 from truearm.modeling.chain import Array, Chain, Element, Sweep, across, turn_about
 from truearm.modeling.conventions import Convention, convention
 from truearm.modeling.effects import EFFECTS, Effect, Layout
-from truearm.modeling.equilibrium import postures_in_equilibrium, readings_in_equilibrium, tilts_in_equilibrium
+from truearm.modeling.equilibrium import postures_in_equilibrium, readings_in_equilibrium
+from truearm.modeling.loads import joint_loads
 from truearm.modeling.parameters import Group, Parameter, Unit, parameter
 from truearm.modeling.parts import GRAVITY, NO_PAYLOAD, SLIDES, TURNS, Joint, LinkMass, Payload, Target, Tool, Truth
 from truearm.modeling.postures import Postures
@@ -339,14 +340,20 @@ class Robot:
         return np.concatenate([joints, np.zeros((len(self.moving) - len(joints), *joints.shape[1:]))])
 
     def tilted(self, variables: Array) -> Array:
-        """Return the variables with the tilts that loads make where the joints have turned so.
+        """Return variables ``(joints or more, n)`` with the tilts that the loads of the arm make as it stands there.
 
-        Parameters
-        ----------
-        variables
-            ``(joints or more, n)``; from their tilts the search for the equilibrium starts.
+        What was tilted before counts for the loads alone; asked again for what came out, they are a thousandth nearer
+        to equilibrium.
         """
-        return tilts_in_equilibrium(self, variables) if any(effect.tilts for effect in self.effects) else variables
+        tilting = [effect for effect in self.effects if effect.tilts]
+        if not tilting:
+            return variables
+        joints = variables[: len(self.joints)]
+        tilted, at = self.straight(joints), Postures(joints.T, loads=joint_loads(self, variables))
+        for effect in tilting:
+            for variable, part in effect.deflection(at, self.values).items():
+                tilted[variable] += part
+        return tilted
 
     def sweep(self, q: Array | Postures, target: str | None = None, values: Values | None = None) -> Sweep:
         """Run through the chain to the flange, or to a target.

@@ -7,7 +7,8 @@ its own, and those that are done leave the computation.
 
 The steps are in the true joint variables, by which the joints turn and not what they read. The loads follow from them,
 so that what turns a joint about its own axis need not be known here: the arm is rigid. Tilts across the axes are found
-anew where a step has led; they change so little that the step need not know how.
+anew where a step has led, from the loads of the arm as it was tilted before. The step does not foresee how they change,
+so that once no error is left they have settled.
 """
 
 from __future__ import annotations

@@ -25,6 +25,26 @@ _MOST_ROUNDS: Final = 100
 _SETTLED: Final = 1e-12
 
 
+def settled(following: Callable[[NDArray[np.intp], Array], Array], start: Array) -> Array:
+    """Return where rounds from `start` ``(variables, n)`` settle to 1e-12 rad or m.
+
+    Parameters
+    ----------
+    following
+        Returns what follows on some columns, given their places and what they are now.
+    """
+    found = np.array(start, float)
+    left = np.arange(found.shape[1])
+    for _ in range(_MOST_ROUNDS):
+        if not len(left):
+            break
+        before = found[:, left]
+        after = following(left, before)
+        found[:, left] = after
+        left = left[np.abs(after - before).max(axis=0) > _SETTLED]
+    return found
+
+
 def postures_in_equilibrium(robot: Robot, at: Postures) -> Postures:
     """Return postures with the loads of the arm as it has bent under them."""
 
@@ -34,7 +54,7 @@ def postures_in_equilibrium(robot: Robot, at: Postures) -> Postures:
 
     straight = robot.straight(at.joints.T)
     start = robot.variables(replace(at, loads=_loads(robot, at, straight)), robot.values)
-    variables = _settled(bent, start)
+    variables = settled(bent, start)
     return replace(at, loads=_loads(robot, at, variables))
 
 
@@ -48,23 +68,9 @@ def readings_in_equilibrium(robot: Robot, variables: Array) -> Array:
         missing = turned[:, rows] - robot.variables(at, robot.values)[: len(readings)]
         return np.asarray(readings + missing)
 
-    return _settled(corrected, turned)
+    return settled(corrected, turned)
 
 
 def _loads(robot: Robot, at: Postures, variables: Array) -> Array:
     rates = {"velocity": at.velocity, "acceleration": at.acceleration, "wrench": at.wrench}
     return joint_loads(robot, variables, **{name: None if rate is None else rate.T for name, rate in rates.items()})
-
-
-def _settled(following: Callable[[NDArray[np.intp], Array], Array], start: Array) -> Array:
-    """Return where rounds from `start` ``(variables, n)`` settle; `following` is given some columns and their places."""
-    found = np.array(start, float)
-    left = np.arange(found.shape[1])
-    for _ in range(_MOST_ROUNDS):
-        if not len(left):
-            break
-        before = found[:, left]
-        after = following(left, before)
-        found[:, left] = after
-        left = left[np.abs(after - before).max(axis=0) > _SETTLED]
-    return found

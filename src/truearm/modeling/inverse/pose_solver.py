@@ -7,8 +7,8 @@ its own, and those that are done leave the computation.
 
 The steps are in the true joint variables, by which the joints turn and not what they read. The loads follow from them,
 so that what turns a joint about its own axis need not be known here: the arm is rigid. Tilts across the axes are found
-anew where a step has led, from the loads of the arm as it was tilted before. The step does not foresee how they change,
-so that once no error is left they have settled.
+anew where a step has led, from the loads of the arm as it was tilted before. How they change is foreseen only by late
+steps: near singular postures, where it matters, the others would not end.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.modeling.chain import Array, Sweep
+from truearm.modeling.equilibrium import settled
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import cross, dot
 
@@ -35,6 +36,10 @@ _LONGEST_STEP: Final = 0.5
 #: Keeps the normal matrix of a singular arm invertible; what it takes from a step is far below a tenth.
 _FLOOR: Final = 1e-15
 _MOST_STEPS: Final = 60
+#: Steps before the change of tilts is foreseen; without tilts nearly all poses are met by then.
+_PATIENCE: Final = 8
+#: Of joints, to find how the tilts follow them [rad, m].
+_DIFFERENCE: Final = 1e-6
 _DAMPING: Final = (1e-6, 1e12)
 
 
@@ -84,13 +89,17 @@ class PoseTask:
         cosine = 0.5 * (sum((dot(now, wanted) for now, wanted in pairs), np.zeros(())) - 1.0)
         return np.concatenate([away, _turned(sine, cosine, x)]).T
 
-    def jacobian(self, sweep: Sweep) -> Array:
+    def jacobian(self, sweep: Sweep, tilting: Array | None = None) -> Array:
         """Return how position and orientation follow the true joint variables, ``(n, 3, 5 or 6, joints)``.
 
-        A sliding joint is counted in reach lengths, a turning one in rad.
+        A sliding joint is counted in reach lengths, a turning one in rad. Tilts are held, or follow as `tilting` says.
         """
         joints = self.robot.joints
         linear, angular = sweep.derivatives(self.robot.moving[: len(joints)])  # (joints, 3, n)
+        if tilting is not None:
+            across = self.robot.moving[len(joints) : 3 * len(joints)]
+            for by_joint, by_tilt in zip((linear, angular), sweep.derivatives(across), strict=True):
+                by_joint += np.einsum("tjn,tcn->jcn", tilting, by_tilt)
         rows = [linear / self.length]
         if self.orientation == "full":
             rows.append(angular)
@@ -104,7 +113,18 @@ class PoseTask:
 
     def variables(self, joints: Array) -> Array:
         """Return the variables ``(joints or more, n)`` of the arm with its joints ``(n, joints)`` turned so."""
-        return self.robot.tilted(self.robot.straight(joints.T))
+        return settled(lambda _, variables: self.robot.tilted(variables), self.robot.straight(joints.T))
+
+    def tilting(self, variables: Array) -> Array | None:
+        """Return how the tilts follow the joints, ``(tilts, joints, n)``, by differences; None if nothing tilts."""
+        count = len(self.robot.joints)
+        if len(variables) == count:
+            return None
+        moved = np.repeat(variables[:, None, :], count + 1, axis=1)
+        for i in range(count):
+            moved[i, i] += _DIFFERENCE
+        tilts = self.robot.tilted(moved.reshape(len(variables), -1)).reshape(moved.shape)[count : 3 * count]
+        return np.asarray((tilts[:, :count] - tilts[:, count:]) / _DIFFERENCE)
 
     def sweep(self, variables: Array) -> Sweep:
         """Run through the chain to the tip."""
@@ -155,7 +175,7 @@ def solve(task: PoseTask, starts: Array, *, bold: bool = False) -> Solved:
     sweep = part.sweep(now)
     e, jacobian = part.error(sweep), part.jacobian(sweep)
     error, active = e.copy(), np.arange(len(starts))
-    for _ in range(_MOST_STEPS):
+    for number in range(_MOST_STEPS):
         size = np.linalg.norm(e, axis=1)
         gradient = np.linalg.norm((jacobian * e[:, :, None]).sum(1), axis=1)
         going = (size > CONVERGED) & (gradient > _LEVEL * size * np.minimum(size, 1.0)) & (damping < _DAMPING[1])
@@ -170,7 +190,8 @@ def solve(task: PoseTask, starts: Array, *, bold: bool = False) -> Solved:
         better = (np.linalg.norm(tried_error, axis=1) < size) | bold
         damping = np.where(better, np.maximum(damping / 5, _DAMPING[0]), damping * 10)
         now, e = np.where(better, tried, now), np.where(better[:, None], tried_error, e)
-        jacobian = np.where(better[:, None, None], part.jacobian(sweep), jacobian)
+        tilting = part.tilting(tried) if number >= _PATIENCE else None
+        jacobian = np.where(better[:, None, None], part.jacobian(sweep, tilting), jacobian)
         found[:, active], error[active] = now, e
     return Solved(found, error)
 

@@ -37,7 +37,7 @@ class Candidates:
     variables
         What the readings turn the joints by, with tilts [rad or m], ``(joints or more, candidates)``.
     position_error, orientation_error
-        [m], [rad].
+        [m], [rad]; 0 where the orientation is free.
     reached
         Whether both are zero within 1e-9.
     beyond
@@ -79,17 +79,15 @@ class Candidates:
         # A whole turn on, the arm stands as it stood; a joint effect (a gain) need not be the same there.
         variables[: joints.shape[1], changed] += turns[changed].T
         joints[changed] = robot.readings(variables[:, changed])
-        position = np.linalg.norm(error[:, :3], axis=1) * part.length
-        angle = np.linalg.norm(error[:, 3:], axis=1)
+        position, angle = part.distances(error)
         number = np.full(len(pose), -1)
         if self._rule is not None:
             number = self._rule.numbers(part.sweep(variables))
-        free = part.orientation == "free"
         self.pose = np.concatenate([self.pose, pose])
         self.joints = np.concatenate([self.joints, joints])
         self.variables = np.concatenate([self.variables, variables], axis=1)
         self.position_error = np.concatenate([self.position_error, position])
-        self.orientation_error = np.concatenate([self.orientation_error, np.full(len(pose), np.nan) if free else angle])
+        self.orientation_error = np.concatenate([self.orientation_error, angle])
         self.reached = np.concatenate([self.reached, (position <= REACHED) & (angle <= REACHED)])
         self.beyond = np.concatenate([self.beyond, beyond_limits(robot, joints)])
         self.number = np.concatenate([self.number, number])
@@ -120,7 +118,7 @@ class Candidates:
     def _order(self, wanted: int | None) -> NDArray[np.intp]:
         """Return the candidates with the better ones first."""
         away = np.abs(self.joints - self._seed[self.pose]).max(axis=1)
-        missed = self.position_error / self._task.length + np.nan_to_num(self.orientation_error)
+        missed = self.position_error / self._task.length + self.orientation_error
         keys = (
             away,
             np.where(self.reached, 0.0, missed),

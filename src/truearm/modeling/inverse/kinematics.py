@@ -21,7 +21,7 @@ from truearm.errors import InputError
 from truearm.modeling.chain import Array
 from truearm.modeling.inverse.branch_search import BranchSearch
 from truearm.modeling.inverse.branches import BRANCHES, branch_number, branch_rule
-from truearm.modeling.inverse.candidates import Candidates
+from truearm.modeling.inverse.candidates import REACHED, Candidates
 from truearm.modeling.inverse.closed_form import ClosedForm
 from truearm.modeling.inverse.pose_solver import Orientation, PoseTask, smallest_singular_value
 from truearm.modeling.inverse.solutions import JointSolutions, PoseStatus
@@ -129,6 +129,15 @@ def _by_starts(task: PoseTask, seed: Array, turned: Array) -> JointSolutions:
 def _answer(task: PoseTask, pool: Candidates, rows: NDArray[np.intp], wanted: int | None) -> JointSolutions:
     pose, joints = pool.pose[rows], pool.joints[rows]
     numbers, reached, beyond = pool.number[rows], pool.reached[rows], pool.beyond[rows]
+    position_error, orientation_error = pool.position_error[rows], pool.orientation_error[rows]
+    if any(effect.loaded for effect in task.robot.effects):
+        # A joint that is all but balanced can come to rest on either side of its play, and the arm elsewhere.
+        comes_to_rest = task.robot.variables(joints, task.robot.values)
+        part = task.of(pose)
+        position_error, orientation_error = part.distances(part.error(part.sweep(comes_to_rest)))
+        reached = reached & (position_error <= REACHED) & (orientation_error <= REACHED)
+    if task.orientation == "free":
+        orientation_error = np.full(len(rows), np.nan)
     singular_value = smallest_singular_value(task.of(pose), pool.variables[:, rows])
     status = np.full(len(rows), PoseStatus.REACHED, dtype=object)
     status[singular_value < NEAR_SINGULAR] = PoseStatus.NEAR_SINGULAR
@@ -142,8 +151,8 @@ def _answer(task: PoseTask, pool: Candidates, rows: NDArray[np.intp], wanted: in
         joints=joints,
         status=tuple(status.tolist()),
         branch=tuple(BRANCHES[number] if number >= 0 else "" for number in numbers.tolist()),
-        position_error=pool.position_error[rows],
-        orientation_error=pool.orientation_error[rows],
+        position_error=position_error,
+        orientation_error=orientation_error,
         beyond=beyond,
         singular_value=singular_value,
         joint_names=tuple(joint.name for joint in task.robot.joints),

@@ -89,6 +89,11 @@ class PoseTask:
         cosine = 0.5 * (sum((dot(now, wanted) for now, wanted in pairs), np.zeros(())) - 1.0)
         return np.concatenate([away, _turned(sine, cosine, x)]).T
 
+    def distances(self, error: Array) -> tuple[Array, Array]:
+        """Return the size of errors in position [m] and in orientation [rad], which is 0 if it is free."""
+        position, angle = (np.linalg.norm(part, axis=1) for part in (error[:, :3], error[:, 3:]))
+        return np.asarray(position * self.length), np.asarray(angle)
+
     def jacobian(self, sweep: Sweep, tilting: Array | None = None) -> Array:
         """Return how position and orientation follow the true joint variables, ``(n, 3, 5 or 6, joints)``.
 

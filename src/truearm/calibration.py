@@ -268,7 +268,16 @@ def calibrate(
     second = data.of_configurations(held_out) if len(held_out) else None
     selection = None
     if named is None:
-        selection = select(robot, first, loss=loss, redundancy=redundancy, bounds=bounds, seed=seed, progress=progress)
+        selection = select(
+            robot,
+            first,
+            loss=loss,
+            redundancy=redundancy,
+            bounds=bounds,
+            bounds_file=bounds_file,
+            seed=seed,
+            progress=progress,
+        )
     chosen: Model = named if selection is None else selection.model
     progress("placing the nominal robot")
     nominal = place(robot, first, loss)
@@ -284,8 +293,8 @@ def calibrate(
     words += ["--redundancy", redundancy] if redundancy != "prior" else []
     words += ["--bounds", bounds_file] if bounds is not None else []
     if payload is not None:
-        words += ["--payload", ",".join([f"{payload.mass:g}kg", *(f"{v * 1e3:g}mm" for v in payload.cog)])]
-    words += ["--gravity", ",".join(f"{v:g}" for v in gravity)] if gravity is not None else []
+        words += ["--payload", ",".join([f"{payload.mass:.15g}kg", *(f"{v * 1e3:.15g}mm" for v in payload.cog)])]
+    words += ["--gravity", ",".join(f"{v:.15g}" for v in gravity)] if gravity is not None else []
     history = (
         f"calibrated by truearm {__version__}: model {chosen.name}, {count} of {n} configurations of"
         f" {Path(data.source).name}{digest}, seed {seed}, loss {loss}, redundancy {redundancy}"

@@ -99,3 +99,12 @@ class PinocchioChain:
         external[-1] = data.oMi[model.njoints - 1].actInv(moved)
         pin.rnea(model, data, q, v, a, external)
         return np.array([data.f[i].vector for i in range(1, model.njoints)])
+
+    def tip_motion(self, variables: Array, velocity: Array, acceleration: Array) -> tuple[Array, Array]:
+        """Return the tip's velocity and its derivative by time (6,), linear rows first, in the world."""
+        pin, model = self._pin, self._model
+        data = model.createData()
+        given = (variables, velocity, acceleration)
+        pin.forwardKinematics(model, data, *(np.array([row[i] for i in self._variables], float) for row in given))
+        place = (model, data, self._tip, pin.LOCAL_WORLD_ALIGNED)
+        return pin.getFrameVelocity(*place).vector, pin.getFrameClassicalAcceleration(*place).vector

@@ -130,7 +130,7 @@ def test_an_arm_that_warms_up_is_one_that_was_colder() -> None:
     assert at.number is not None
     assert at.wrench is not None
     growth = {number: JointTruth(growth=robot.values.get(f"warm_up_{number}", 0.0)) for number in range(1, 7)}
-    colder = 20.0 - np.exp(-at.number / robot.values["warm_up_pace"])
+    colder = 20.0 - np.exp(-at.number * robot.values["warm_up_rate"])
     twin = Twin(robot, growth).postures(at.joints, wrench=at.wrench, temperature=colder)
     true = np.array([posture.targets["tip"][:3, 3] for posture in twin])
     assert_allclose(robot.poses(at, "tip")[0], true, rtol=0, atol=1e-12)

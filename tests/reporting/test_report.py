@@ -24,7 +24,8 @@ from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform, quaternion_from_rotation
 from truearm.notices import Notice
 from truearm.reporting.numbers import significant
-from truearm.reporting.report import Report, json_for_script, report_html
+from truearm.reporting.page import json_for_script
+from truearm.reporting.report import Report, report_html
 from truearm.robots import load_robot
 
 HOSTILE: Final = "</script><b>"

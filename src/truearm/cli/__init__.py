@@ -17,6 +17,7 @@ from truearm.cli.importing import app as importing
 from truearm.cli.library import robots, show
 from truearm.cli.simulate import simulate
 from truearm.cli.starting import demo, example, new_robot
+from truearm.cli.study import HELP, study
 from truearm.cli.validate import validate
 from truearm.errors import InputError
 from truearm.version import __version__
@@ -60,6 +61,7 @@ app.command()(robots)
 app.command()(show)
 app.command()(convert)
 app.command("new-robot")(new_robot)
+app.command(help=HELP)(study)
 app.command()(example)
 app.command()(demo)
 

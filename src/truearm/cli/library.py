@@ -31,6 +31,7 @@ def show(
     json: Json = False,
 ) -> None:
     """Show a robot: its joints, its reach at zero, what is known about it."""
+    from truearm.modeling.parts import GRAVITY
     from truearm.robots import load_robot
 
     loaded = load_robot(robot)
@@ -47,11 +48,16 @@ def show(
         typer.echo(f"  {joint['name']} ({joint['type']})  {row}{limits}")
     x, y, z = content["flange_at_zero_mm"]
     typer.echo(f"Flange at zero readings, from the base: x {x:.3f}  y {y:.3f}  z {z:.3f} mm")
-    for key, label in (("masses_kg", "Link masses"), ("truths", "Truths for simulation"), ("targets", "Targets")):
+    if content["masses_kg"]:
+        typer.echo(f"Link masses: {', '.join(f'{k} {v:g} kg' for k, v in content['masses_kg'].items())}")
+    if content["payload"]["mass_kg"]:
+        x, y, z = content["payload"]["cog_mm"]
+        typer.echo(f"Payload: {content['payload']['mass_kg']:g} kg at x {x:g}  y {y:g}  z {z:g} mm of the flange")
+    if loaded.gravity != GRAVITY:
+        typer.echo("Free fall: {:g}, {:g}, {:g} m/s^2 in the base frame".format(*loaded.gravity))
+    for key, label in (("effects", "Joint effects"), ("truths", "Truths for simulation"), ("targets", "Targets")):
         if content[key]:
-            entries = content[key]
-            words = [f"{k} {v:g} kg" for k, v in entries.items()] if isinstance(entries, dict) else entries
-            typer.echo(f"{label}: {', '.join(words)}")
+            typer.echo(f"{label}: {', '.join(content[key])}")
     for line in loaded.history:
         typer.echo(f"History: {line}")
 
@@ -60,7 +66,7 @@ def _content(robot: Robot) -> dict[str, Any]:
     import numpy as np
 
     from truearm.measurement.truths import truth_names
-    from truearm.units import SHOWN_AS, from_si
+    from truearm.units import SHOWN_AS, from_si, written
 
     shown = SHOWN_AS
     base = robot.base
@@ -88,6 +94,11 @@ def _content(robot: Robot) -> dict[str, Any]:
         ],
         "effects": list(robot.effect_names),
         "masses_kg": {f"link {m.joint}": m.mass for m in robot.masses},
+        "payload": {
+            "mass_kg": robot.payload.mass,
+            "cog_mm": [written(v, "mm") for v in robot.payload.cog],
+        },
+        "gravity": list(robot.gravity),
         "tools": list(robot.tools),
         "truths": list(truth_names(robot)),
         "targets": [target.name for target in robot.targets],

@@ -30,8 +30,8 @@ GravityText = Annotated[
         show_default="as the robot file says",
     ),
 ]
-_MASSES = {"kg": 1.0, "g": 1e-3}
-_LENGTHS = {"mm": 1e-3, "m": 1.0}
+_MASSES = ("kg", "g")
+_LENGTHS = ("mm", "m")
 
 
 def read_payload(text: str | None) -> Payload | None:
@@ -56,8 +56,8 @@ def read_payload(text: str | None) -> Payload | None:
     return Payload(mass, (x, y, z))
 
 
-def _quantity(text: str, units: dict[str, float]) -> float:
-    from truearm.units import as_number
+def _quantity(text: str, units: tuple[str, ...]) -> float:
+    from truearm.units import as_number, sized_si
 
     match = re.fullmatch(r"\s*(?P<number>[^a-zA-Z]*(?:[eE][-+0-9]+)?)\s*(?P<unit>[a-zA-Z]*)\s*", text)
     number = None if match is None else as_number(match["number"].strip())
@@ -69,7 +69,7 @@ def _quantity(text: str, units: dict[str, float]) -> float:
             allowed=" or ".join(f"{'2.7' if units is _MASSES else '50'}{unit}" for unit in units),
             cure="Units are never guessed: write 2.7kg,50mm,25mm,100mm.",
         )
-    return number * units[match["unit"]]
+    return sized_si(number, match["unit"], "--payload", came=text)
 
 
 def read_gravity(text: str | None) -> tuple[float, float, float] | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -12,7 +13,7 @@ from truearm.errors import InputError, nearest_names
 from truearm.files import read_yaml
 from truearm.modeling.chain import Array
 from truearm.modeling.parameters import FreeParameters, Parameter
-from truearm.units import to_si
+from truearm.units import SHOWN_AS, to_si
 
 _Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 
@@ -48,8 +49,15 @@ def read_bounds(path: Path) -> Bounds:
     return read_yaml(path, Bounds)
 
 
-def bound_vectors(bounds: Bounds, free: FreeParameters, where: str) -> tuple[Array, Array]:
+def bound_vectors(
+    bounds: Bounds, free: FreeParameters, where: str, others: Iterable[Parameter] = ()
+) -> tuple[Array, Array]:
     """Return lowest and highest value of every free parameter [SI], infinite where the file says nothing.
+
+    Parameters
+    ----------
+    others
+        What is not free, and may be named all the same.
 
     Raises
     ------
@@ -58,14 +66,14 @@ def bound_vectors(bounds: Bounds, free: FreeParameters, where: str) -> tuple[Arr
     """
     low = np.full(len(free.names), -np.inf)
     high = np.full(len(free.names), np.inf)
-    shown = {"m": bounds.units.length, "rad": bounds.units.angle, "1": "1"}
+    shown = {**SHOWN_AS, "m": bounds.units.length, "rad": bounds.units.angle}
     for name, width in bounds.within.items():
-        for i in _places(name, free, f"{where}, within"):
+        for i in _places(name, free, others, f"{where}, within"):
             p = free.parameters[i]
             size = to_si(width, shown[p.unit])
             low[i], high[i] = max(low[i], p.nominal - size), min(high[i], p.nominal + size)
     for name, (lowest, highest) in bounds.between.items():
-        for i in _places(name, free, f"{where}, between"):
+        for i in _places(name, free, others, f"{where}, between"):
             unit = shown[free.parameters[i].unit]
             low[i], high[i] = max(low[i], to_si(lowest, unit)), min(high[i], to_si(highest, unit))
     for i in np.flatnonzero(low > high).tolist():
@@ -75,9 +83,9 @@ def bound_vectors(bounds: Bounds, free: FreeParameters, where: str) -> tuple[Arr
     return low, high
 
 
-def _places(name: str, free: FreeParameters, where: str) -> list[int]:
+def _places(name: str, free: FreeParameters, others: Iterable[Parameter], where: str) -> list[int]:
     found = [i for i, p in enumerate(free.parameters) if name in (p.name, _family(p))]
-    if found:
+    if found or any(name in (p.name, _family(p)) for p in others):
         return found
     known = sorted({*free.names, *(_family(p) for p in free.parameters)})
     near = nearest_names(name, known)

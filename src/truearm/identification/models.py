@@ -23,12 +23,15 @@ class Model:
         Parameter groups that are free besides base, targets and the effects' own.
     effects
         Joint effects that are added and free.
+    tried
+        Joint effects that could have been, had the data said that they help; bounds may name their parameters.
     """
 
     name: str
     summary: str
     groups: tuple[Group, ...]
     effects: tuple[str, ...] = ()
+    tried: tuple[str, ...] = ()
 
     def prepared(self, robot: Robot) -> Robot:
         """Return the robot with the model's effects, every parameter starting anew from its current value."""

@@ -93,6 +93,7 @@ def select(
     loss: Loss = "linear",
     redundancy: Redundant = "prior",
     bounds: Bounds | None = None,
+    bounds_file: str = "bounds",
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Selection:
@@ -100,7 +101,7 @@ def select(
 
     Parameters
     ----------
-    robot, data, loss, redundancy, bounds
+    robot, data, loss, redundancy, bounds, bounds_file
         As :func:`truearm.identification.fit.identify` takes them.
     seed
         Of the folds.
@@ -122,7 +123,7 @@ def select(
         )
     order = np.random.default_rng(seed).permutation(data.configurations)
     folds = [
-        (data.of_configurations(np.setdiff1d(order, part)), data.of_configurations(part))
+        _fold(data.of_configurations(np.setdiff1d(order, part)), data.of_configurations(part))
         for part in np.array_split(order, FOLDS)
     ]
 
@@ -130,7 +131,9 @@ def select(
         model = _model(effects)
         errors = []
         for training, held_out in folds:
-            fit = identify(robot, training, model, loss=loss, redundancy=redundancy, bounds=bounds)
+            fit = identify(
+                robot, training, model, loss=loss, redundancy=redundancy, bounds=bounds, bounds_file=bounds_file
+            )
             spread = errors_of(fit.robot, held_out).position_spread
             errors.append(np.nan if spread is None else spread.mean)
         return np.array(errors)
@@ -159,6 +162,12 @@ def select(
     return Selection(_model(effects), start, tuple(attempts))
 
 
+def _fold(training: Dataset, held_out: Dataset) -> tuple[Dataset, Dataset]:
+    """Return both parts, without those held-out positions whose target the training part does not place."""
+    placed = np.isin(held_out.target, training.target[training.has_position])
+    return training, replace(held_out, position=np.where(placed[:, None], held_out.position, np.nan), quaternion=None)
+
+
 def _open(robot: Robot, effects: tuple[str, ...], data: Dataset) -> list[str]:
     """Return the effects that are not there yet and that the data say something about."""
     kinds = {effect.name: effect for effect in EFFECTS}
@@ -175,4 +184,6 @@ def _open(robot: Robot, effects: tuple[str, ...], data: Dataset) -> list[str]:
 
 def _model(effects: tuple[str, ...]) -> Model:
     names = [effect.name for effect in EFFECTS if effect.name in effects]
-    return Model(AUTO, f"geometric, and what cross-validation chose: {', '.join(names)}", _START.groups, tuple(names))
+    tried = tuple(name for name in _CANDIDATES if name not in effects)
+    summary = f"geometric, and what cross-validation chose: {', '.join(names)}"
+    return Model(AUTO, summary, _START.groups, tuple(names), tried)

@@ -8,19 +8,57 @@ bounds (`scipy.optimize.lsq_linear`). Losses other than the linear one reweight 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 
 from truearm.identification.losses import Loss, robust_scale, weights
-from truearm.identification.problem import Evaluation, Problem
 from truearm.modeling.chain import Array
+from truearm.modeling.parameters import FreeParameters
 
 #: A step this small is the last: the next one would be smaller by the share of the residual that bends, 1e-3 or less.
 _SMALL: Final = 1e-6
 #: Size of a step that counts as one, where the prior is no scale (base and targets) [m or rad].
 _GEOMETRIC: Final = 1e-3
 _STEPS: Final = {"linear": 60, "huber": 100, "cauchy": 100, "l1": 300}
+
+
+class Solvable(Protocol):
+    """A whitened problem, such as :class:`truearm.identification.problem.Problem`."""
+
+    @property
+    def free(self) -> FreeParameters:
+        """What may change."""
+
+    @property
+    def priors(self) -> bool:
+        """Whether the parameters' priors are rows of the problem."""
+
+    def at(self, vector: Array) -> Evaluated:
+        """Evaluate it at a vector ``(parameters,)``."""
+
+    def prior_rows(self, vector: Array) -> tuple[Array, Array]:
+        """Return the residual of the priors and the diagonal of its Jacobian, both ``(parameters,)``."""
+
+
+class Evaluated(Protocol):
+    """A whitened problem at one vector of its free parameters."""
+
+    @property
+    def problem(self) -> Solvable:
+        """What is evaluated."""
+
+    @property
+    def vector(self) -> Array:
+        """Where, ``(parameters,)``."""
+
+    @property
+    def residual(self) -> Array:
+        """Whitened residual ``(rows,)``, three rows for each reading."""
+
+    @property
+    def jacobian(self) -> Array:
+        """Derivative of the residual, ``(rows, parameters)``."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +87,7 @@ class Solution:
     weight: Array
 
 
-def solve(problem: Problem, loss: Loss = "linear", bounds: tuple[Array, Array] | None = None) -> Solution:
+def solve(problem: Solvable, loss: Loss = "linear", bounds: tuple[Array, Array] | None = None) -> Solution:
     """Minimise the whitened residuals under a loss.
 
     Parameters
@@ -116,12 +154,12 @@ def _norms(r: Array) -> Array:
     return np.asarray(np.linalg.norm(r.reshape(-1, 3), axis=1))
 
 
-def _cost(here: Evaluation, w: Array) -> float:
+def _cost(here: Evaluated, w: Array) -> float:
     prior, _ = here.problem.prior_rows(here.vector)
     return float(np.sum(w * np.sum(here.residual.reshape(-1, 3) ** 2, axis=1))) + float(prior @ prior)
 
 
-def _triangle(here: Evaluation, w: Array) -> tuple[Array, Array]:
+def _triangle(here: Evaluated, w: Array) -> tuple[Array, Array]:
     """Return R and c with |R s + c|^2 equal to the linearised cost of a step s, up to a constant."""
     root = np.repeat(np.sqrt(w), 3)
     stacked = np.column_stack([here.jacobian, here.residual]) * root[:, None]

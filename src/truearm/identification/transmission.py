@@ -1,11 +1,13 @@
 """Find gears that err periodically, in what a fit leaves over.
 
 The residuals of each joint are held against sines of its readings, one number of periods in a turn after the other: a
-periodogram on readings at uneven places (Lomb 1976, "Least-squares frequency analysis of unequally spaced data").
+periodogram on readings at uneven places (Lomb 1976, "Least-squares frequency analysis of unequally spaced data"). The
+strongest is taken out before the next one is looked for.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -63,43 +65,51 @@ def periodic_errors(fit: Fit, data: Dataset) -> tuple[PeriodicError, ...]:
         return ()
     at = robot.loaded(data.postures)
     count = len(robot.joints)
-    # Of each configuration, over its position readings: J'r and J'J of each joint, r'r, and how many there are.
-    pull, weight, left, readings = (np.zeros(shape) for shape in ((count, len(at)), (count, len(at)), len(at), len(at)))
+    # Of each configuration, summed over its position readings: J'r and J'J by joints, r'r, and how many there are.
+    pull, weight = np.zeros((len(at), count)), np.zeros((len(at), count, count))
+    left, readings = np.zeros(len(at)), np.zeros(len(at))
     for index, name in enumerate(data.targets):
         mine = np.flatnonzero((data.target == index) & data.has_position)
         where = data.configuration[mine]
         sweep = robot.sweep(at, name)
         rate = sweep.linear(robot.moving[:count])[..., where]
         residual = data.position[mine].T - sweep.position[:, where]
-        np.add.at(pull.T, where, (rate * residual).sum(1).T)
-        np.add.at(weight.T, where, (rate**2).sum(1).T)
+        np.add.at(pull, where, np.einsum("jan,an->nj", rate, residual))
+        np.add.at(weight, where, np.einsum("jan,kan->njk", rate, rate))
         np.add.at(left, where, (residual**2).sum(0))
         np.add.at(readings, where, 1.0)
     # The targets of a configuration share its errors, so that it counts as one reading of three coordinates.
-    seen = int((readings > 0).sum())
-    found = []
-    for joint in range(count):
-        if robot.joints[joint].kind != "revolute" or robot.joints[joint].transmission_periods is not None:
-            continue
-        share, amplitude = _periodogram(at.joints[:, joint], pull[joint], weight[joint], float(left.sum()))
-        best = int(np.argmax(share))
-        chance = count * len(_PERIODS) * float(np.exp(-0.5 * (3 * seen - len(fit.free.names) + 0.0) * share[best]))
-        if chance < _CHANCE:
-            found.append(
-                PeriodicError(joint + 1, int(_PERIODS[best]), float(amplitude[best]), float(share[best]), chance)
-            )
-    return tuple(found)
+    free = 3 * int((readings > 0).sum()) - len(fit.free.names)
+    open_joints = [
+        i for i, joint in enumerate(robot.joints) if joint.kind == "revolute" and joint.transmission_periods is None
+    ]
+    found: list[PeriodicError] = []
+    total = float(left.sum())
+    while open_joints:
+        tried = [(*_strongest(at.joints[:, i], pull[:, i], weight[:, i, i]), i) for i in open_joints]
+        explained, periods, a, b, joint = max(tried)
+        chance = len(open_joints) * len(_PERIODS) * math.exp(-0.5 * free * explained / total)
+        if chance >= _CHANCE:
+            break
+        found.append(PeriodicError(joint + 1, periods, math.hypot(a, b), explained / total, chance))
+        wave = a * np.sin(periods * at.joints[:, joint]) + b * np.cos(periods * at.joints[:, joint])
+        pull -= weight[:, :, joint] * wave[:, None]
+        total -= explained
+        open_joints.remove(joint)
+    return tuple(sorted(found, key=lambda error: error.joint))
 
 
-def _periodogram(q: Array, pull: Array, weight: Array, left: float) -> tuple[Array, Array]:
-    """Return the share of the squared residuals that a sine explains and its amplitude, by number of periods."""
+def _strongest(q: Array, pull: Array, weight: Array) -> tuple[float, int, float, float]:
+    """Return what the best sine explains of the squared residuals [m^2], its periods, and its two amplitudes [rad]."""
     angle = _PERIODS[:, None] * q
     s, c = np.sin(angle), np.cos(angle)
     ss, sc, cc = (s * s) @ weight, (s * c) @ weight, (c * c) @ weight
     ys, yc = s @ pull, c @ pull
     safe = np.maximum(ss * cc - sc * sc, 1e-12 * (ss + cc) ** 2 + 1e-300)
     a, b = (cc * ys - sc * yc) / safe, (ss * yc - sc * ys) / safe
-    return (a * ys + b * yc) / max(left, 1e-300), np.hypot(a, b)
+    explained = a * ys + b * yc
+    best = int(np.argmax(explained))
+    return float(explained[best]), int(_PERIODS[best]), float(a[best]), float(b[best])
 
 
 def check_transmission(fit: Fit, data: Dataset) -> list[Notice]:

@@ -44,7 +44,8 @@ class Dataset:
         Sign of the last move of each joint, ``(configurations, joints)``: 1, -1, or 0 where it is not known; None if
         the order of measurement is not known.
     number
-        How many configurations were measured before each, ``(configurations,)``; None if that is not known.
+        How many configurations of the campaign were measured before each, ``(configurations,)``; None if that is not
+        known.
     temperature
         Of the arm [degC], ``(configurations,)``; None if it was not recorded.
     wrench

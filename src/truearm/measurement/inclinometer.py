@@ -1,13 +1,19 @@
-"""Inclinometers on the links of the digital twin."""
+"""Inclinometers on the links: what they read of the digital twin, alone and in comparisons."""
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from typing import Unpack
 
 import numpy as np
+from numpy.typing import NDArray
 
-from truearm.measurement.twin import Conditions, Twin
+from truearm.errors import InputError
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.twin import Conditions, Twin, measure
 from truearm.modeling.chain import Array
+from truearm.modeling.postures import Postures
 
 
 def inclinations(
@@ -47,3 +53,99 @@ def inclinations(
     read = np.arcsin(np.clip(-pulled, -1.0, 1.0))
     read = read + rng.normal(0.0, 1.0, read.shape) * noise
     return np.asarray(np.round(read / resolution) * resolution if resolution else read)
+
+
+@dataclass(frozen=True, eq=False)
+class Pairs:
+    """Postures in pairs, whose readings are compared.
+
+    Attributes
+    ----------
+    first, second
+        ``n`` postures each, with their wrenches.
+    """
+
+    first: Postures
+    second: Postures
+
+    def __len__(self) -> int:
+        return len(self.first)
+
+    def at(self, indices: NDArray[np.intp]) -> Pairs:
+        """Return some of them."""
+        return Pairs(self.first.at(indices), self.second.at(indices))
+
+    @property
+    def in_turn(self) -> Postures:
+        """All postures, first and second of each pair in turn, as they are measured."""
+        wrenches = [np.zeros((len(p), 6)) if p.wrench is None else p.wrench for p in (self.first, self.second)]
+        joints = np.stack([self.first.joints, self.second.joints], axis=1)
+        return Postures(joints.reshape(2 * len(self), -1), wrench=np.stack(wrenches, axis=1).reshape(2 * len(self), 6))
+
+
+@dataclass(frozen=True, eq=False)
+class InclinometerReadings:
+    """By how much the readings of inclinometers on all links changed from one posture to another.
+
+    Attributes
+    ----------
+    pairs
+        The postures.
+    change
+        Second reading less first of each axis of each link ``(n, links, 3)`` [rad]; NaN where there is none. Axes and
+        readings are those of :func:`inclinations`.
+    sigma
+        Standard deviation of one change [rad]; :func:`deviation_of_change` finds it for an instrument.
+    """
+
+    pairs: Pairs
+    change: Array
+    sigma: float
+
+    def __post_init__(self) -> None:
+        shape = (len(self.pairs), self.pairs.first.joints.shape[1], 3)
+        if self.change.shape != shape:
+            raise InputError(
+                "inclinometers read three axes of every link in every pair of postures",
+                where="inclinometer readings",
+                came=f"an array of shape {self.change.shape}",
+                allowed=str(shape),
+            )
+        if not self.sigma > 0.0:
+            raise InputError(
+                "changes of inclination need a standard deviation",
+                where="inclinometer readings",
+                came=f"{self.sigma:g} rad",
+                allowed="more than 0",
+            )
+
+
+def deviation_of_change(resolution: float, noise: float = 0.0) -> float:
+    """Return the standard deviation of the difference of two readings [rad].
+
+    Rounding to multiples of the resolution spreads a reading evenly over one step (variance ``step^2 / 12``).
+    """
+    return math.sqrt(2.0 * (resolution**2 / 12.0 + noise**2))
+
+
+def compare(
+    twin: Twin, pairs: Pairs, resolution: float, rng: np.random.Generator, noise: float = 0.0
+) -> InclinometerReadings:
+    """Return by how much inclinometers on the links of a twin change their readings between postures.
+
+    Parameters
+    ----------
+    resolution, noise
+        Of each reading [rad]; see :func:`inclinations`.
+    """
+    at = pairs.in_turn
+    assert at.wrench is not None
+    read = inclinations(twin, at.joints, noise, rng, resolution, wrench=at.wrench)
+    return InclinometerReadings(pairs, read[1::2] - read[::2], deviation_of_change(resolution, noise))
+
+
+def measure_pairs(twin: Twin, pairs: Pairs, noise: float, rng: np.random.Generator) -> Dataset:
+    """Return what an instrument reads of a twin's targets at the postures of pairs, in turn; noise in metres."""
+    at = pairs.in_turn
+    assert at.wrench is not None
+    return measure(twin, at.joints, noise, rng, wrench=at.wrench)

@@ -93,7 +93,7 @@ def errors_of(robot: Robot, data: Dataset) -> Errors:
     kinds = ((Position(), position), (Orientation(), orientation))
     at = robot.loaded(data.postures)
     for index, name in enumerate(data.targets):
-        mine = data.target == index
+        mine = (data.target == index) & (data.has_position | data.has_orientation)
         if not mine.any():
             continue
         sweep = robot.sweep(at, name)

@@ -11,7 +11,7 @@ import numpy as np
 from truearm.errors import InputError, nearest_names
 from truearm.files import exists
 from truearm.measurement.twin import Twin
-from truearm.measurement.twin_joint import Contact, JointTruth
+from truearm.measurement.twin_joint import PERFECT, Contact, JointTruth
 from truearm.modeling.chain import Array
 from truearm.modeling.effects.fourier import HARMONICS
 from truearm.modeling.parts import NO_PAYLOAD, Payload, Tool
@@ -53,17 +53,19 @@ def truth_twin(robot: Robot, truth: str, rng: np.random.Generator) -> Twin:
     if truth in robot.truths:
         published = robot.truths[truth]
         true = robot.with_values(published.values)
-        sprung = {number: JointTruth(compliance) for number, compliance in published.compliance.items()}
-        return Twin(_stationed(true, tool), sprung)
+        joints = joint_truths(true)
+        for number, compliance in published.compliance.items():
+            joints[number] = replace(joints.get(number, PERFECT), compliance=compliance)
+        return Twin(_stationed(true, tool), joints, _contact(true))
     if truth == "nominal":
-        return Twin(_stationed(robot, tool))
+        return Twin(_stationed(robot, tool), joint_truths(robot), _contact(robot))
     if truth == "random":
         drawn = {
             p.name: p.value + p.prior * float(rng.standard_normal())
             for p in robot.parameters.values()
             if p.group in ("geometry", "joint zero")
         }
-        return Twin(_stationed(robot.with_values(drawn), tool))
+        return Twin(_stationed(robot.with_values(drawn), tool), joint_truths(robot), _contact(robot))
     if not Path(truth).suffix and not exists(Path(truth)):
         known = truth_names(robot)
         near = nearest_names(truth, known)
@@ -82,8 +84,7 @@ def truth_twin(robot: Robot, truth: str, rng: np.random.Generator) -> Twin:
             came=f"{len(other.joints)} joints",
             allowed=f"{len(robot.joints)}, of the same kinds",
         )
-    contact: Contact = "document" if "clearance-linear-contact" in other.effect_names else "exact"
-    return Twin(other if other.targets else _stationed(other, tool), joint_truths(other), contact)
+    return Twin(other if other.targets else _stationed(other, tool), joint_truths(other), _contact(other))
 
 
 def joint_truths(robot: Robot) -> dict[int, JointTruth]:
@@ -97,7 +98,7 @@ def joint_truths(robot: Robot) -> dict[int, JointTruth]:
         parts = ((k, of(f"fourier_sin{k}", number), of(f"fourier_cos{k}", number)) for k in HARMONICS)
         periods = robot.joints[number - 1].transmission_periods
         gear = (periods or 0, of("transmission_sin", number), of("transmission_cos", number))
-        return tuple((k, math.hypot(sine, cosine), math.atan2(cosine, sine)) for k, sine, cosine in (*parts, gear))
+        return tuple((k, math.hypot(s, c), math.atan2(c, s)) for k, s, c in (*parts, gear) if s or c)
 
     return {
         number: JointTruth(
@@ -113,6 +114,10 @@ def joint_truths(robot: Robot) -> dict[int, JointTruth]:
         )
         for number in range(1, len(robot.joints) + 1)
     }
+
+
+def _contact(robot: Robot) -> Contact:
+    return "document" if "clearance-linear-contact" in robot.effect_names else "exact"
 
 
 def _stationed(robot: Robot, tool: Tool) -> Robot:

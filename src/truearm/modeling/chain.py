@@ -116,10 +116,10 @@ class Sweep:
         x, y, z = (self._filled(axis) for axis in self._frames[-1])
         return x, y, z
 
-    def matrix(self) -> Array:
-        """Return the rotation of the tip frame, ``(..., n, 3, 3)``."""
+    def matrix(self, index: int = -1) -> Array:
+        """Return the rotation of the tip frame, or of the frame before element `index`, ``(..., n, 3, 3)``."""
         axes = np.empty((3, 3, *self.shape))  # (axis, row, ..., n)
-        for k, axis in enumerate(self._frames[-1]):
+        for k, axis in enumerate(self._frames[index]):
             axes[k] = axis
         return np.moveaxis(axes, (1, 0), (-2, -1))
 

@@ -9,6 +9,9 @@ Figure = dict[str, Any]
 
 BEFORE: Final = "#b8ab97"
 AFTER: Final = "#1d5f8a"
+#: Colours of x, y and z, or of the first things that are drawn together.
+COLOURS: Final = ("#b3261e", "#3b7d3b", "#2456a6")
+CAMERA: Final = {"eye": {"x": 1.55, "y": 1.55, "z": 0.8}, "center": {"x": 0, "y": 0, "z": -0.15}}
 _INK: Final = "#2b2f33"
 _GRID: Final = "#e4e6e8"
 _FONT: Final = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"
@@ -47,6 +50,24 @@ def scene_axis(title: str) -> Figure:
         "zeroline": False,
         "showspikes": False,
     }
+
+
+def base_axes(length: float) -> list[Figure]:
+    """Make the axes of the base frame, `length` long."""
+    return [
+        {
+            "type": "scatter3d",
+            "mode": "lines+text",
+            **{letter: [0, length if letter == name else 0] for letter in "xyz"},
+            "text": ["base" if name == "x" else "", name],
+            "textposition": "bottom center" if name == "x" else "top center",
+            "textfont": {"color": colour, "size": 12},
+            "line": {"color": colour, "width": 5},
+            "hoverinfo": "skip",
+            "showlegend": False,
+        }
+        for name, colour in zip("xyz", COLOURS, strict=True)
+    ]
 
 
 def figure(traces: list[Figure], height: int, **layout: Any) -> Figure:

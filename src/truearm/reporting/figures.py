@@ -14,15 +14,22 @@ from truearm.identification.fit import Fit
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
 from truearm.modeling.transform import Transform
-from truearm.reporting.drawing import AFTER, BEFORE, Figure, axis, figure, logarithmic_axis, scene_axis
+from truearm.reporting.drawing import (
+    AFTER,
+    BEFORE,
+    CAMERA,
+    Figure,
+    axis,
+    base_axes,
+    figure,
+    logarithmic_axis,
+    scene_axis,
+)
 from truearm.reporting.numbers import rounded, rounded_to, significant
 
 _MARK: Final = "#b3261e"
 _ERROR_SCALE: Final = [[0.0, "#c3d5e3"], [0.5, "#2c6f9c"], [0.75, "#4b3a63"], [1.0, "#b3261e"]]
 _SIGNED_SCALE: Final = [[0.0, "#b3261e"], [0.5, "#ffffff"], [1.0, AFTER]]
-_AXIS_COLOURS: Final = ("#b3261e", "#3b7d3b", "#2456a6")
-
-_CAMERA: Final = {"eye": {"x": 1.55, "y": 1.55, "z": 0.8}, "center": {"x": 0, "y": 0, "z": -0.15}}
 
 _BINS: Final = 40
 # Largest error over median error after, beyond which equal bins would crowd everything into the first one.
@@ -141,9 +148,9 @@ def workspace(part: Dataset, base: Transform, before: Array, after: Array) -> Fi
     }
     scene = {name: scene_axis(f"{name[0]} [mm]") for name in ("xaxis", "yaxis", "zaxis")}
     return figure(
-        [cloud, *_base_axes(0.25 * reach)],
+        [cloud, *base_axes(0.25 * reach)],
         640,
-        scene={"aspectmode": "data", "camera": _CAMERA, **scene},
+        scene={"aspectmode": "data", "camera": CAMERA, **scene},
         updatemenus=[menu],
         margin={"l": 0, "r": 0, "t": 50, "b": 0},
     )
@@ -247,20 +254,3 @@ def _colour_end(errors: Array) -> float:
     """Return where the colours end: at the largest error, unless outliers would then hide all other differences."""
     end = min(float(errors.max()), 2.0 * float(np.percentile(errors, 90)))
     return float(f"{max(end, 1e-9):.2g}")
-
-
-def _base_axes(length: float) -> list[Figure]:
-    return [
-        {
-            "type": "scatter3d",
-            "mode": "lines+text",
-            **{axis: [0, length if axis == name else 0] for axis in "xyz"},
-            "text": ["base" if name == "x" else "", name],
-            "textposition": "bottom center" if name == "x" else "top center",
-            "textfont": {"color": colour, "size": 12},
-            "line": {"color": colour, "width": 5},
-            "hoverinfo": "skip",
-            "showlegend": False,
-        }
-        for name, colour in zip("xyz", _AXIS_COLOURS, strict=True)
-    ]

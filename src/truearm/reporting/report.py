@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-import json
-import platform
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from importlib.metadata import version as installed_version
-from importlib.resources import files
 from pathlib import Path
 from typing import Final
 
 import numpy as np
-from jinja2 import Environment, StrictUndefined
-from markupsafe import Markup
 from numpy.typing import NDArray
 
 from truearm.identification.fit import Fit
@@ -22,9 +16,11 @@ from truearm.identification.selection import Selection
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import Errors
 from truearm.modeling.chain import Array
+from truearm.modeling.parts import GRAVITY
 from truearm.notices import Notice
-from truearm.reporting.drawing import AFTER, BEFORE, Figure
+from truearm.reporting.drawing import Figure
 from truearm.reporting.figures import correlation_map, histogram, residuals, workspace
+from truearm.reporting.page import page
 from truearm.reporting.tables import (
     SpreadRow,
     noise_rows,
@@ -34,13 +30,10 @@ from truearm.reporting.tables import (
     spread_rows,
     strongest_pairs,
 )
-from truearm.version import __version__
 
 _FRAMES: Final = ("base", "target")
 #: A reading whose weight is less than this share of the median weight was not believed.
 _DOUBTED: Final = 0.5
-#: Characters that could end a script element or a line of JavaScript, as JSON escapes them.
-_UNSAFE: Final = {ord(c): f"\\u{ord(c):04x}" for c in "<>&\u2028\u2029"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,10 +133,9 @@ def report_html(report: Report) -> str:
     """Return the report as one HTML page that holds its scripts and data."""
     fit = report.fit
     rows = parameter_rows(fit)
-    figures = report.figures()
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    page = environment.from_string((files(__package__) / "report.html.jinja").read_text("utf-8"))
-    return page.render(
+    return page(
+        "report.html.jinja",
+        report.figures(),
         report=report,
         fit=fit,
         source=Path(report.data.source).name,
@@ -154,28 +146,8 @@ def report_html(report: Report) -> str:
         noise_rows=noise_rows(fit),
         noise_sentence=noise_sentence(fit),
         doubted=int(report._doubted().sum()),
-        drawn=set(figures),
-        heights={name: figure["layout"]["height"] for name, figure in figures.items()},
-        figures=Markup(json_for_script(figures)),
-        plotly=Markup(_plotly()),
-        versions={
-            "truearm": __version__,
-            "Python": platform.python_version(),
-            "NumPy": np.__version__,
-            "SciPy": installed_version("scipy"),
-        },
-        colours={"before": BEFORE, "after": AFTER},
+        standing=GRAVITY,
     )
-
-
-def json_for_script(value: object) -> str:
-    """Return JSON that can stand inside a script element whatever its texts hold."""
-    return json.dumps(value, separators=(",", ":"), allow_nan=False, ensure_ascii=False).translate(_UNSAFE)
-
-
-def _plotly() -> str:
-    """Return Plotly's own script, which its package brings along."""
-    return (files("plotly") / "package_data" / "plotly.min.js").read_text("utf-8")
 
 
 def _millimetres(errors: Errors) -> Array:

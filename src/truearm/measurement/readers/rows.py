@@ -17,6 +17,8 @@ from truearm.modeling.postures import approach_of
 
 #: How far the norm of a quaternion may be from 1; files round quaternions to four digits or more.
 QUATERNION_TOLERANCE = 1e-3
+#: What the first configuration of a campaign is numbered, unless it is 0. A file may hold a later part.
+_FIRST = 1
 
 
 @dataclass(frozen=True)
@@ -152,7 +154,7 @@ def dataset_of(readings: Readings, configurations: Configurations) -> Dataset:
         targets,
         references=references,
         approach=None if order is None else approach_of(configurations.joints, order),
-        number=None if order is None else order - order.min() + 0.0,
+        number=None if order is None else np.asarray(order - min(int(order.min()), _FIRST), float),
     )
 
 

@@ -39,7 +39,8 @@ from truearm.modeling.transform import Transform
 from truearm.units import SHOWN_AS, sized_si, to_si, written
 
 SCHEMA = "truearm-robot/1"
-#: Groups of parameters that cannot be negative. An identified value may come out so; what somebody states may not.
+#: Groups of parameters that cannot be negative. An identified value may come out so, and the next calibration starts
+#: from it; what somebody states may not, and a file that somebody wrote has no history.
 _POSITIVE: Final = ("compliance", "bearing-compliance", "backlash", "clearance", "clearance-linear-contact")
 #: What a robot and a joint may be called.
 NAME: Final = r"[A-Za-z0-9][A-Za-z0-9_.-]*"
@@ -304,13 +305,14 @@ def robot_from_file(content: RobotFile, where: str) -> Robot:
         place = f"parameters.{name}"
         plain = known(name, "parameters")
         unit = shown[plain.unit]
-        if plain.group in _POSITIVE and entry.nominal < 0.0:
-            raise InputError(
-                "no joint has a negative one",
-                where=f"{where}, {place}.nominal",
-                came=f"{entry.nominal:g} {unit}",
-                allowed="0 or more",
-            )
+        for key, stated in (("nominal", entry.nominal), ("value", entry.value)):
+            if plain.group in _POSITIVE and stated < 0.0 and not content.history:
+                raise InputError(
+                    "no joint has a negative one",
+                    where=f"{where}, {place}.{key}",
+                    came=f"{stated:g} {unit}",
+                    allowed="0 or more",
+                )
         if entry.unit != unit:
             raise InputError(
                 "the unit differs from the file's", where=f"{where}, {place}", came=entry.unit, allowed=unit

@@ -196,7 +196,7 @@ def _task(
     x, y, z = np.ascontiguousarray(R.transpose(2, 1, 0))
     # Without the temperature or the number of a configuration no length is known to have changed.
     known = replace(robot, effect_names=tuple(effect.name for effect in robot.effects if not effect.stretches))
-    return PoseTask(known, target, orientation, np.ascontiguousarray(p.T), (x, y, z), _reach(robot, target))
+    return PoseTask(known, target, orientation, np.ascontiguousarray(p.T), (x, y, z), reach(robot, target))
 
 
 def _array(name: str, given: ArrayLike, *shape: int) -> Array:
@@ -254,7 +254,7 @@ def _seed(robot: Robot, seed: ArrayLike | None, count: int) -> tuple[Array, Arra
     return np.broadcast_to(values, (count, joints)), np.broadcast_to(turned, (count, joints))
 
 
-def _reach(robot: Robot, target: str | None) -> float:
+def reach(robot: Robot, target: str | None) -> float:
     """Return the length of the stretched arm from its first joint [m]."""
     sweep = robot.rigid.sweep(np.zeros((1, len(robot.joints))), target)
     places = [i for i, element in enumerate(sweep.elements) if element.variable is not None]

@@ -1,0 +1,1 @@
+"""What to command, so that the real robot does what was meant."""

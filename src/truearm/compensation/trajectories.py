@@ -1,0 +1,171 @@
+"""Joint readings changed so that the calibrated robot keeps to the path that was meant (Patel, equation 5.22).
+
+The calibrated robot predicts where the tip will be with the readings of the nominal motion. By how much it is beside
+the path is turned into a change of the readings by the step of least norm, ``J^T (J J^T)^-1 (P_predicted -
+P_desired)``. That is subtracted (the document does not say so; added, it would double the error), and the prediction is
+made again until the tip is where it shall be. The norm counts rad, and m for sliding joints.
+
+Readings are changed by fractions of a degree. The velocities and accelerations of the nominal motion are therefore kept
+for the moments that bend the arm in motion.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from truearm.errors import InputError
+from truearm.modeling.chain import Array
+from truearm.modeling.inverse.kinematics import NEAR_SINGULAR, reach
+from truearm.modeling.inverse.turns import beyond_limits
+from truearm.modeling.robot import Robot
+from truearm.planning.joint_motion import JointMotion
+from truearm.planning.tip import Tip
+
+#: The tip is where it shall be within this [m].
+AGREED: Final = 1e-9
+_MOST_ROUNDS: Final = 20
+#: A change of a reading this large corrects no calibration error [rad or m]: something else is wrong.
+_LARGEST_CHANGE: Final = math.radians(10.0)
+
+
+@dataclass(frozen=True, eq=False)
+class JointCorrection:
+    """Corrected joint readings, and what the calibrated robot predicts of them.
+
+    Attributes
+    ----------
+    joints
+        Readings to command [rad or m], ``(n, joints)``.
+    change
+        What was added to the readings of the nominal motion, ``(n, joints)``.
+    before, after
+        Predicted distance from the path without and with the correction [m], ``(n,)``. After is zero within 1e-9
+        unless an effect jumps (backlash where the moment changes its sign) and no reading gives the point.
+    rounds
+        How often the prediction was made again.
+    """
+
+    joints: Array
+    change: Array
+    before: Array
+    after: Array
+    rounds: int
+
+
+def path_error(robot: Robot, motion: JointMotion, desired: Array, target: str | None = None) -> Array:
+    """Return where the robot will be beside the path (Patel, equation 5.21).
+
+    Parameters
+    ----------
+    robot
+        Calibrated, or with the effects alone whose part is wanted.
+    motion
+        What is commanded.
+    desired
+        The path in the robot's base frame, ``(n, 3)`` [m].
+    target
+        Name of the target that follows the path; the flange if None.
+
+    Returns
+    -------
+    error
+        Predicted less desired position, in the base frame, ``(n, 3)`` [m].
+    """
+    return Tip(robot, target).positions(motion.postures()) - _desired(motion, desired)
+
+
+def corrected(robot: Robot, motion: JointMotion, desired: Array, target: str | None = None) -> JointCorrection:
+    """Return joint readings with which the calibrated robot keeps to the path.
+
+    Parameters
+    ----------
+    robot
+        The calibrated robot, with its effects.
+    motion
+        From :func:`truearm.planning.joint_motion.joint_motion` of the nominal robot.
+    desired
+        The path in the base frame, ``(n, 3)`` [m].
+    target
+        Name of the target that follows the path; the flange if None.
+
+    Raises
+    ------
+    InputError
+        If the arm is singular, has to turn by more than 10 deg, or beyond its limits: with time and joint.
+    """
+    tip, wanted = Tip(robot, target), _desired(motion, desired)
+    length = reach(robot, target)
+    joints = best = motion.joints
+    before = after = np.zeros(0)
+    rounds = 0
+    while True:
+        state = tip.at(motion.postures(joints))
+        error = state.position - wanted
+        distance = np.linalg.norm(error, axis=1)
+        if rounds == 0:
+            before = after = distance
+        nearer = distance < after
+        best, after = np.where(nearer[:, None], joints, best), np.where(nearer, distance, after)
+        if (distance <= AGREED).all() or rounds == _MOST_ROUNDS:
+            break
+        joints = joints - _least_norm(state.jacobian[:, :3], error, length, motion)
+        rounds += 1
+        _check_change(joints - motion.joints, motion)
+    _check_limits(robot, best, motion)
+    return JointCorrection(best, best - motion.joints, before, after, rounds)
+
+
+def _least_norm(J: Array, error: Array, length: float, motion: JointMotion) -> Array:
+    """Return ``J^T (J J^T)^-1 error``, ``(n, joints)``."""
+    weak = np.linalg.svd(J, compute_uv=False)[:, -1] / length
+    if (weak < NEAR_SINGULAR).any():
+        raise InputError(
+            "the arm is in a singular posture, where positions cannot be corrected",
+            where=_place(motion, int(np.argmax(weak < NEAR_SINGULAR))),
+            cure="Move the path.",
+        )
+    normal = J @ J.swapaxes(1, 2)
+    return np.asarray((J * np.linalg.solve(normal, error[:, :, None])).sum(1))
+
+
+def _check_change(change: Array, motion: JointMotion) -> None:
+    far = np.argwhere(np.abs(change) > _LARGEST_CHANGE)
+    if len(far):
+        row, joint = far[0]
+        raise InputError(
+            "the readings would have to change by more than a calibration can account for",
+            where=f"{_place(motion, int(row))}, {motion.joint_names[joint]}",
+            allowed=f"{math.degrees(_LARGEST_CHANGE):g} deg",
+            cure="Check that motion, path and target belong together.",
+        )
+
+
+def _check_limits(robot: Robot, joints: Array, motion: JointMotion) -> None:
+    far = np.argwhere(beyond_limits(robot, joints))
+    if len(far):
+        row, joint = far[0]
+        raise InputError(
+            "the correction takes a joint beyond its limits",
+            where=f"{_place(motion, int(row))}, {motion.joint_names[joint]}",
+            cure="Move the path.",
+        )
+
+
+def _place(motion: JointMotion, row: int) -> str:
+    return f"at {motion.time[row]:.4g} s (sample {row})"
+
+
+def _desired(motion: JointMotion, desired: Array) -> Array:
+    values = np.asarray(desired, float)
+    if values.shape != (len(motion.time), 3) or not np.isfinite(values).all():
+        raise InputError(
+            "the path has to have a position for every sample of the motion",
+            where="desired",
+            came=f"an array of shape {values.shape}",
+            allowed=f"({len(motion.time)}, 3), finite",
+        )
+    return values

@@ -1,0 +1,65 @@
+"""One HTML file that needs nothing else, not even a network: style, scripts and data are inside."""
+
+from __future__ import annotations
+
+import json
+import platform
+from collections.abc import Mapping
+from importlib.metadata import version as installed_version
+from importlib.resources import files
+from typing import Any, Final
+
+import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from truearm.reporting.drawing import AFTER, BEFORE, Figure
+from truearm.version import __version__
+
+#: Characters that could end a script element or a line of JavaScript, as JSON escapes them.
+_UNSAFE: Final = {ord(c): f"\\u{ord(c):04x}" for c in "<>&\u2028\u2029"}
+
+
+def page(template: str, figures: Mapping[str, Figure], **content: Any) -> str:
+    """Return a page.
+
+    Parameters
+    ----------
+    template
+        Name of a template in this room; it includes ``style.css.jinja`` and ``script.html.jinja``.
+    figures
+        Pictures by the name of their place on the page.
+    content
+        What the template tells about.
+    """
+    environment = Environment(
+        loader=PackageLoader("truearm.reporting", ""),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template(template).render(
+        **content,
+        drawn=set(figures),
+        heights={name: figure["layout"]["height"] for name, figure in figures.items()},
+        figures=Markup(json_for_script(figures)),
+        plotly=Markup(_plotly()),
+        versions={
+            "truearm": __version__,
+            "Python": platform.python_version(),
+            "NumPy": np.__version__,
+            "SciPy": installed_version("scipy"),
+        },
+        colours={"before": BEFORE, "after": AFTER},
+    )
+
+
+def json_for_script(value: object) -> str:
+    """Return JSON that can stand inside a script element whatever its texts hold."""
+    return json.dumps(value, separators=(",", ":"), allow_nan=False, ensure_ascii=False).translate(_UNSAFE)
+
+
+def _plotly() -> str:
+    """Return Plotly's own script, which its package brings along."""
+    return (files("plotly") / "package_data" / "plotly.min.js").read_text("utf-8")

@@ -1,0 +1,119 @@
+"""Published experiments made again: ours beside the document's, over several seeds.
+
+One study a file. What is here is light: the command's help reads it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Final, cast
+
+from truearm.errors import InputError, nearest_names
+
+if TYPE_CHECKING:
+    from truearm.studies.study import Study
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A study in the list.
+
+    Attributes
+    ----------
+    name
+        As the command line spells it.
+    about
+        What it does, in a few words.
+    module
+        Where its function ``study(seeds, progress)`` is; ``study(seeds, progress, folder)`` if it needs data.
+    files
+        Measured data that its folder must hold; none for a study on digital twins.
+    """
+
+    name: str
+    about: str
+    module: str
+    files: tuple[str, ...] = ()
+
+
+STUDIES: Final = (
+    Entry(
+        "irb120-axes",
+        "one joint of an IRB 120 turned at a time: compliance, run-out and backlash (Nubiola 2.4)",
+        "truearm.studies.irb120_axes",
+    ),
+    Entry(
+        "irb120-faro",
+        "a measured IRB 120: what every model leaves, and where it comes from (with --data)",
+        "truearm.studies.irb120_faro",
+        ("joints_commanded.txt", *(f"{kind}_{number}.txt" for kind in ("target", "base") for number in (1, 2, 3))),
+    ),
+    Entry(
+        "irb120-simulation",
+        "calibration of a simulated IRB 120, without noise and with noise and wrong masses (Nubiola 2.6)",
+        "truearm.studies.irb120_simulation",
+    ),
+)
+
+
+def run_study(name: str, seeds: int = 10, data: str | Path | None = None, progress: Progress = lambda _: None) -> Study:
+    """Run a study.
+
+    Parameters
+    ----------
+    name
+        One of :data:`STUDIES`.
+    seeds
+        How often to do it anew, with seeds 0, 1, 2 and so on.
+    data
+        Folder of the measured data, for a study that needs them.
+    progress
+        Called with a few words at each step.
+
+    Raises
+    ------
+    InputError
+        If there is no such study, or its data are missing, or it needs none.
+    """
+    entry = _entry(name)
+    if seeds < 1:
+        raise InputError("at least one seed is needed", where="--seeds", came=seeds, allowed="1 or more")
+    study = import_module(entry.module).study
+    if not entry.files:
+        if data is not None:
+            raise InputError("this study simulates its data", where="--data", came=str(data), cure="Leave --data out.")
+        return cast("Study", study(seeds, progress))
+    return cast("Study", study(seeds, progress, _folder(entry, data)))
+
+
+def _entry(name: str) -> Entry:
+    for entry in STUDIES:
+        if entry.name == name:
+            return entry
+    names = [entry.name for entry in STUDIES]
+    near = nearest_names(name, names)
+    raise InputError(
+        "there is no such study",
+        where="NAME",
+        came=name,
+        allowed=", ".join(names),
+        cure=f"Did you mean {' or '.join(near)}?" if near else None,
+    )
+
+
+def _folder(entry: Entry, data: str | Path | None) -> Path:
+    needed = f"a folder with {', '.join(entry.files)}"
+    if data is None:
+        raise InputError(
+            "this study needs measured data, which truearm does not bring along", where="--data", allowed=needed
+        )
+    folder = Path(data)
+    missing = [name for name in entry.files if not (folder / name).is_file()]
+    if missing:
+        raise InputError("a file of the measured data is missing", where=str(folder / missing[0]), allowed=needed)
+    return folder

@@ -1,0 +1,128 @@
+"""Rows are judged as stated, reports need nothing but themselves, and what cannot be used is refused."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from truearm.errors import InputError
+from truearm.reporting.drawing import axis, figure
+from truearm.studies import STUDIES, run_study
+from truearm.studies.study import Picture, Row, Study, Table, number
+
+HOSTILE = "</script><b>"
+
+
+def small() -> Study:
+    rows = (
+        Row("near", "mm", [0.9, 1.1, 5.0], 1.0, "Table 1", absolute=0.15),
+        Row("far", "mm", [1.3], 1.0, "Table 1", relative=0.1, explanation=HOSTILE),
+        Row("alone", "deg", [2.0, 4.0]),
+    )
+    drawn = figure([{"type": "scatter", "x": [0, 1], "y": [1, 2]}], 200, xaxis=axis("x"), yaxis=axis("y"))
+    return Study(
+        name="small",
+        title=f"A study {HOSTILE}",
+        source="nobody",
+        answer="It is small.",
+        seeds=3,
+        tables=(Table("A table", "Words.", rows), Table("Another", "No figures printed.", rows[2:])),
+        pictures=(Picture("line", "A line", "Words.", drawn),),
+        notes=("A note.",),
+    )
+
+
+def test_the_median_is_judged_by_the_stated_tolerance() -> None:
+    near, far, alone = small().tables[0].rows
+    assert (near.median, near.lowest, near.highest) == (1.1, 0.9, 5.0)
+    assert [row.verdict for row in (near, far, alone)] == ["agrees", "differs", "no figure published"]
+    assert near.tolerance == 0.15
+    assert far.tolerance == pytest.approx(0.1)
+    assert alone.tolerance is None
+
+
+def test_the_larger_tolerance_counts() -> None:
+    assert Row("x", "mm", [1.4], 1.0, absolute=0.1, relative=0.5).verdict == "agrees"
+    assert Row("x", "mm", [1.4], 1.0, absolute=0.5, relative=0.1).verdict == "agrees"
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(0.0, "0"), (1e-14, "0"), (3.68e-10, "3.68e-10"), (0.05, "0.0500"), (-1.5, "-1.50"), (674.8, "675")],
+)
+def test_numbers_have_three_digits(value: float, text: str) -> None:
+    assert number(value) == text
+
+
+def test_a_study_is_written_whole(tmp_path: Path) -> None:
+    files = small().save(tmp_path / "new")
+    assert [path.name for path in files] == ["report.html", "study.json"]
+    content = json.loads(files[1].read_text())
+    assert list(content) == [
+        "truearm",
+        "name",
+        "title",
+        "source",
+        "answer",
+        "seeds",
+        "tables",
+        "pictures",
+        "notes",
+    ]
+    assert content["truearm"] == "truearm-study/1"
+    assert content["tables"][0]["rows"][1] == {
+        "what": "far",
+        "unit": "mm",
+        "ours": [1.3],
+        "median": 1.3,
+        "lowest": 1.3,
+        "highest": 1.3,
+        "published": 1.0,
+        "source": "Table 1",
+        "tolerance": 0.1,
+        "verdict": "differs",
+        "explanation": HOSTILE,
+    }
+
+
+def test_the_report_is_one_page_that_trusts_no_text() -> None:
+    page = small().html()
+    assert HOSTILE not in page
+    assert "http-equiv" in page
+    assert "<link" not in page
+    assert '<div class="figure" id="line"' in page
+    assert "1 figure agrees with the published one, 1 differs; 3 seeds." in page
+
+
+def test_every_study_names_a_module_that_has_it() -> None:
+    from importlib import import_module
+
+    names = [entry.name for entry in STUDIES]
+    assert names == sorted(names)
+    for entry in STUDIES:
+        assert callable(import_module(entry.module).study)
+
+
+def test_an_unknown_study_is_refused_with_the_nearest_names() -> None:
+    with pytest.raises(InputError, match=r"there is no such study.*Did you mean irb120-simulation"):
+        run_study("irb120-simulations")
+
+
+def test_no_seed_is_refused() -> None:
+    with pytest.raises(InputError, match="at least one seed"):
+        run_study("irb120-axes", seeds=0)
+
+
+def test_data_for_a_simulation_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="simulates its data"):
+        run_study("irb120-axes", data=tmp_path)
+
+
+def test_missing_data_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"--data: this study needs measured data.*joints_commanded\.txt"):
+        run_study("irb120-faro")
+    (tmp_path / "joints_commanded.txt").write_text("0 0 0 0 0 0\n")
+    with pytest.raises(InputError, match=r"target_1\.txt: a file of the measured data is missing"):
+        run_study("irb120-faro", data=tmp_path)

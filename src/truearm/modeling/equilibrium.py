@@ -41,11 +41,9 @@ def settled(following: Callable[[NDArray[np.intp], Array], Array], start: Array)
         if not len(left):
             break
         before = found[:, left]
-        after = following(left, before)
-        if number >= _WHOLE_ROUNDS:
-            after = 0.5 * (before + after)
-        found[:, left] = after
-        left = left[np.abs(after - before).max(axis=0) > _SETTLED]
+        way = following(left, before) - before
+        found[:, left] = before + (way if number < _WHOLE_ROUNDS else 0.5 * way)
+        left = left[np.abs(way).max(axis=0) > _SETTLED]
     return found
 
 

@@ -81,9 +81,11 @@ def test_every_model_with_joint_effects(
     assert json.loads(truearm("show", tmp_path / "calibrated.yaml", "--json").out)["effects"] == EFFECTS[model]
     rows = {row["name"]: row for row in found["parameters"]}
     assert rows["compliance_3"]["unit"] == "mrad/(N m)"
-    assert rows["compliance_3"]["value"] == pytest.approx(0.130, abs=0.03)
+    if model == "elastic":
+        assert rows["compliance_3"]["value"] == pytest.approx(0.130, abs=0.01)
+    assert summary["validation"]["position_mm"]["mean"] < summary["nominal"]["position_mm"]["mean"] / 5
     codes = {warning["code"]: warning["message"] for warning in summary["warnings"]}
-    assert "compliance_2" in codes["urdf-partial"]
+    assert f"a URDF cannot hold: {', '.join(EFFECTS[model])} (" in codes["urdf-partial"]
     assert "compliance_1" in codes["effects-uninformed"]
     assert "compliance_2" not in codes["effects-uninformed"]
     again = json.loads(truearm("validate", tmp_path / "calibrated.yaml", data, "--json").out)["position_mm"]

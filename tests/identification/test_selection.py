@@ -53,6 +53,15 @@ def taken(selection: Selection) -> list[str]:
     return [attempt.effect for attempt in selection.attempts if attempt.taken]
 
 
+@pytest.fixture
+def few(monkeypatch: pytest.MonkeyPatch) -> tuple[str, ...]:
+    """Some effects to choose from, which is quicker."""
+    candidates = ("backlash", "hardening", "approach", "thermal-growth")
+    monkeypatch.setattr("truearm.identification.selection._CANDIDATES", candidates)
+    return candidates
+
+
+@pytest.mark.usefixtures("few")
 def test_backlash_is_found_where_there_is_some() -> None:
     chosen = select(arm(), seen(twin_of(backlash=math.radians(0.05)), 50, 2))
     assert taken(chosen)[0] == "backlash"
@@ -63,20 +72,21 @@ def test_backlash_is_found_where_there_is_some() -> None:
     assert first.gain > first.standard_error > 0.0
 
 
+@pytest.mark.usefixtures("few")
 def test_hysteresis_is_found_where_there_is_some() -> None:
     assert taken(select(arm(), seen(twin_of(hysteresis=math.radians(0.02)), 50, 3)))[0] == "approach"
 
 
+@pytest.mark.usefixtures("few")
 def test_growth_is_found_where_the_temperature_tells_it() -> None:
     chosen = select(arm(), seen(twin_of(growth=23e-6), 50, 4, warming=15.0))
     assert taken(chosen)[0] == "thermal-growth"
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_what_is_only_elastic_stays_as_good(seed: int) -> None:
+def test_what_is_only_elastic_stays_as_good() -> None:
     twin = twin_of()
-    data, unseen = seen(twin, 40, 10 + seed), seen(twin, 200, 20 + seed)
-    chosen = select(arm(), data, seed=seed)
+    data, unseen = seen(twin, 30, 10), seen(twin, 200, 20)
+    chosen = select(arm(), data)
     errors = []
     for model in (chosen.model, ELASTIC):
         spread = errors_of(identify(arm(), data, model).robot, unseen).position_spread
@@ -85,29 +95,31 @@ def test_what_is_only_elastic_stays_as_good(seed: int) -> None:
     assert errors[0] <= 1.05 * errors[1]
 
 
+@pytest.mark.usefixtures("few")
 def test_one_seed_gives_one_answer() -> None:
-    data = seen(twin_of(backlash=math.radians(0.05)), 25, 5)
+    data = seen(twin_of(), 15, 5)
     first = select(arm(), data, seed=1)
     assert first == select(arm(), data, seed=1)
     assert first.start != select(arm(), data, seed=2).start
 
 
-def test_what_the_data_do_not_tell_is_not_tried() -> None:
-    told = replace(seen(twin_of(), 20, 6), temperature=np.linspace(18.0, 25.0, 20))
+def test_what_the_data_do_not_tell_is_not_tried(few: tuple[str, ...]) -> None:
+    told = replace(seen(twin_of(), 12, 6), temperature=np.linspace(18.0, 25.0, 12))
     silent = replace(told, approach=None, number=None, temperature=None)
     tried = [{attempt.effect for attempt in select(arm(), data).attempts} for data in (told, silent)]
-    assert tried[0] - tried[1] == {"approach", "warm-up", "thermal-growth"}
-    assert {"bearing-compliance", "hardening", "backlash", "clearance", "fourier"} == tried[1]
+    assert tried == [set(few), {"backlash", "hardening"}]
 
 
-def test_nothing_is_added_to_an_arm_that_carries_nothing() -> None:
+def test_nothing_loads_an_arm_that_carries_nothing(few: tuple[str, ...]) -> None:
     weightless = replace(arm(), masses=(), payload=Payload())
-    chosen = select(weightless, seen(Twin(twin_of().robot), 30, 7))
-    loaded = {"bearing-compliance", "hardening", "backlash", "clearance"}
-    assert not loaded & set(taken(chosen))
-    assert all(attempt.gain == 0.0 for attempt in chosen.attempts if attempt.round == 1 and attempt.effect in loaded)
+    chosen = select(weightless, seen(Twin(twin_of().robot), 20, 7))
+    idle = [attempt for attempt in chosen.attempts if attempt.effect == few[0]]
+    assert idle
+    assert not any(attempt.taken for attempt in idle)
+    assert max(abs(attempt.gain) for attempt in idle) < 1e-9
 
 
+@pytest.mark.usefixtures("few")
 def test_a_target_seen_once_is_no_obstacle() -> None:
     data = seen(twin_of(), 20, 8)
     once = data.targets.index("3")
@@ -116,14 +128,15 @@ def test_a_target_seen_once_is_no_obstacle() -> None:
     assert math.isfinite(select(arm(), data).start)
 
 
+@pytest.mark.usefixtures("few")
 def test_bounds_may_name_effects_that_are_not_chosen() -> None:
     data = seen(twin_of(backlash=math.radians(0.05)), 40, 9)
     entries = {"truearm": "truearm-bounds/1", "units": {"length": "mm", "angle": "deg"}}
-    bounds = Bounds.model_validate({**entries, "within": {"backlash_2": 0.01, "fourier_sin1": 0.0}})
+    bounds = Bounds.model_validate({**entries, "within": {"backlash_2": 0.04, "approach": 0.1}})
     run = calibrate(arm(), data, model="auto", bounds=bounds)
     assert run.selection is not None
     assert "backlash" in run.fit.model.effects
-    assert math.degrees(run.robot.values["backlash_2"]) == pytest.approx(0.01)
+    assert math.degrees(run.robot.values["backlash_2"]) == pytest.approx(0.04)
     unknown = Bounds.model_validate({**entries, "within": {"gain": 0.1}})
     with pytest.raises(InputError, match=r"mine\.yaml, within: no free parameter of this model has this name"):
         select(arm(), data, bounds=unknown, bounds_file="mine.yaml")
@@ -136,6 +149,7 @@ def test_too_few_configurations_are_refused(count: int) -> None:
         select(arm(), data)
 
 
+@pytest.mark.usefixtures("few")
 def test_the_held_out_part_has_no_say() -> None:
     data = seen(twin_of(backlash=math.radians(0.05)), 40, 12)
     order = np.random.default_rng(3).permutation(40)
@@ -143,3 +157,21 @@ def test_the_held_out_part_has_no_say() -> None:
     spoiled[np.isin(data.configuration, order[28:])] += 1e-3 * np.random.default_rng(0).normal(size=3)
     chosen = [calibrate(arm(), d, model="auto", train=28, seed=3) for d in (data, replace(data, position=spoiled))]
     assert chosen[0].selection == chosen[1].selection
+
+
+def test_effects_with_more_unknowns_than_equations_are_passed_over() -> None:
+    # One target: 9 configurations of a fold give 27 equations, and 25 unknowns are elastic already.
+    data = seen(twin_of(), 12, 9)
+    first = data.target == 0
+    one = replace(
+        data,
+        targets=data.targets[:1],
+        configuration=data.configuration[first],
+        target=data.target[first],
+        position=data.position[first],
+        sigma=None if data.sigma is None else data.sigma[first],
+    )
+    selection = select(arm(), one, redundancy="drop")
+    tried = {attempt.effect for attempt in selection.attempts}
+    assert "compliance" in selection.model.effects
+    assert "fourier" not in tried

@@ -452,3 +452,108 @@ def test_it_is_fast(write: WriteFile) -> None:
         assert read_csv(path).configurations == 500
         taken.append(time.perf_counter() - start)
     assert min(taken) < 0.05
+
+
+# -- circumstances -----------------------------------------------------------------------------------------
+
+
+PULL = "force_x [N],force_y [N],force_z [N],moment_x [N m],moment_y [N m],moment_z [N m]"
+UNDER_LOAD = f"""{HEADER},temperature [degC],{PULL}
+3,10.0,-20.5,tcp,1000.0,2.0,3.0,21.5,10.0,-0.5,0.1,0.0,1.25,-3.0
+3,10.0,-20.5,side,1001.0,2.0,3.0,21.5,10.0,-0.5,0.1,0.0,1.25,-3.0
+1,0.0,90.0,tcp,1000.0,,3.0,-4.0,0.0,0.0,0.0,0.0,0.0,0.0
+2,5.0,90.0,tcp,1000.0,1.0,3.0,22.125,0.30000000000000004,0.0,0.0,0.0,0.0,0.0
+"""
+
+
+def test_circumstances_belong_to_configurations(write: WriteFile) -> None:
+    data = read_csv(write(UNDER_LOAD))
+    assert data.temperature is not None
+    assert data.wrench is not None
+    assert data.temperature.tolist() == [21.5, -4.0, 22.125]
+    assert data.wrench.tolist() == [[10, -0.5, 0.1, 0, 1.25, -3], [0] * 6, [0.30000000000000004, *[0] * 5]]
+    assert data.postures.wrench is data.wrench
+    part = data.of_configurations([2, 0])
+    assert part.temperature is not None
+    assert part.temperature.tolist() == [22.125, 21.5]
+
+
+def test_a_force_may_come_without_a_moment(write: WriteFile) -> None:
+    header = f"{HEADER},force_x [N],force_y [N],force_z [N]"
+    data = read_csv(write(f"{header}\nc,1,2,t,1,2,3,5,6,7\n"))
+    assert data.wrench is not None
+    assert data.wrench.tolist() == [[5, 6, 7, 0, 0, 0]]
+    assert read_csv(write(PLAIN)).wrench is None
+    assert read_csv(write(PLAIN)).temperature is None
+
+
+def test_circumstances_are_written_as_they_were_read(write: WriteFile) -> None:
+    first = csv_text(read_csv(write(UNDER_LOAD)))
+    assert first.replace(",tcp,1000.0,,3.0,", ",tcp,,,,") == UNDER_LOAD.replace(",tcp,1000.0,,3.0,", ",tcp,,,,")
+    again = read_csv(write(first))
+    assert csv_text(again) == first
+    assert same(again, read_csv(write(UNDER_LOAD)))
+    warm = first.replace(f",{PULL}", "")
+    warm = "\n".join(line if i == 0 else line.rsplit(",", 6)[0] for i, line in enumerate(warm.splitlines())) + "\n"
+    assert csv_text(read_csv(write(warm))) == warm
+
+
+def test_numbers_are_the_order_of_measurement(write: WriteFile) -> None:
+    data = read_csv(write(UNDER_LOAD))  # 1, 2, 3 were measured in this order: 0, 5, 10 deg
+    assert data.number is not None
+    assert data.approach is not None
+    assert data.number.tolist() == [2, 0, 1]
+    assert data.approach.tolist() == [[1, -1], [0, 0], [1, 0]]
+
+
+@pytest.mark.parametrize(
+    ("labels", "numbers"), [("1 2", [0, 1]), ("0 1", [0, 1]), ("301 305", [300, 304]), ("2 1", [1, 0])]
+)
+def test_numbers_count_from_the_first_of_the_campaign(write: WriteFile, labels: str, numbers: list[float]) -> None:
+    first, second = labels.split()
+    data = read_csv(write(f"{HEADER}\n{first},1,2,t,1,2,3\n{second},2,2,t,1,2,3\n"))
+    assert data.number is not None
+    assert data.number.tolist() == numbers
+
+
+@pytest.mark.parametrize("labels", ["P1 P2", "1 2b", "1 01", "1.0 2.0", "-1 2", "1 1234567890"])
+def test_other_labels_say_nothing_about_the_order(write: WriteFile, labels: str) -> None:
+    first, second = labels.split()
+    data = read_csv(write(f"{HEADER}\n{first},1,2,t,1,2,3\n{second},2,2,t,1,2,3\n"))
+    assert (data.number, data.approach) == (None, None)
+
+
+@pytest.mark.parametrize(
+    ("header", "row", "parts"),
+    [
+        ("temperature", "20", ["column 8, temperature", "no unit is given", "allowed: degC"]),
+        ("temperature [K]", "293", ["got 'K'; allowed: degC"]),
+        ("temperature [degC]", "", ["line 2, column temperature [degC]", "the cell is empty"]),
+        ("temperature [degC]", "warm", ["a number belongs here; got 'warm'"]),
+        ("force_x [kN],force_y [N],force_z [N]", "1,2,3", ["got 'kN'; allowed: N"]),
+        ("force_x [N],force_y [N]", "1,2", ["the column force_z is missing", "Add force_z [N]; it may be zero"]),
+        ("force_z [N]", "1", ["the column force_x is missing"]),
+        ("moment_x [N m],moment_y [N m],moment_z [N m]", "1,2,3", ["the column force_x is missing"]),
+        (PULL.rpartition(",")[0], "1,2,3,4,5", ["the column moment_z is missing", "moment_x [N m], moment_y [N m]"]),
+        ("weight [N]", "1", ["the column is not known", "temperature [degC], force_x [N]"]),
+    ],
+)
+def test_circumstances_that_are_refused(write: WriteFile, header: str, row: str, parts: list[str]) -> None:
+    with pytest.raises(InputError) as caught:
+        read_csv(write(f"{HEADER},{header}\nc,1,2,t,1,2,3,{row}\n"))
+    for part in parts:
+        assert part in str(caught.value)
+
+
+@pytest.mark.parametrize(("column", "place"), [("temperature [degC]", 7), ("force_y [N]", 9), ("moment_z [N m]", 13)])
+def test_a_circumstance_that_changes_within_a_configuration(write: WriteFile, column: str, place: int) -> None:
+    lines = UNDER_LOAD.splitlines()
+    cells = lines[2].split(",")
+    before, cells[place] = cells[place], "7"
+    with pytest.raises(InputError) as caught:
+        read_csv(write("\n".join([*lines[:2], ",".join(cells), *lines[3:]]) + "\n"))
+    message = str(caught.value)
+    assert (
+        f"data.csv, line 3, column {column}: {column} differs from line 2, which has the same configuration" in message
+    )
+    assert f"got '7'; allowed: {before}, as on line 2" in message

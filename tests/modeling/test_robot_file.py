@@ -11,12 +11,14 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from truearm.errors import InputError
+from truearm.modeling.effects import EFFECTS
 from truearm.modeling.formats.robot_file import RobotFile, read_robot, robot_from_file, robot_text
-from truearm.modeling.parts import Tool
+from truearm.modeling.parts import Payload, Tool
+from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 from truearm.robots import load_robot
-from truearm.units import to_si, written
+from truearm.units import SHOWN_AS, to_si, written
 
 PLAIN = """\
 truearm: truearm-robot/1
@@ -68,6 +70,11 @@ def changed(old: str, new: str) -> str:
     return PLAIN.replace(old, new)
 
 
+def with_effect(effect: str, name: str, unit: str, nominal: float = 0.0, value: float = 0.0) -> str:
+    entry = f"{{nominal: {nominal}, value: {value}, prior: 1, unit: {unit}}}"
+    return f"{PLAIN}effects: [{effect}]\nparameters: {{{name}: {entry}}}\n"
+
+
 # -- refusals --------------------------------------------------------------------------------------------
 
 
@@ -81,7 +88,7 @@ def changed(old: str, new: str) -> str:
                 "joints[2]",
                 "modified-hayati",
                 "got 'alpa'",
-                "allowed: name, type, limits, alpha, beta",
+                "allowed: name, type, limits, transmission_periods, alpha, beta",
                 "Did you mean alpha",
             ],
             id="unknown column",
@@ -180,6 +187,39 @@ def changed(old: str, new: str) -> str:
             changed("[-165, 165]", "[165, -165]"),
             ["joints[1].limits", "lower limit must be below", "got [165.0, -165.0]"],
             id="limits reversed",
+        ),
+        pytest.param(PLAIN + "payload: {mass: -1}\n", ["payload.mass", "greater than or equal to 0"], id="payload < 0"),
+        pytest.param(PLAIN + "payload: {mass: 2.7kg}\n", ["payload.mass", "valid number"], id="payload with a unit"),
+        pytest.param(PLAIN + "payload: {mass: 1e7}\n", ["payload.mass", "too large to be meant"], id="heavy payload"),
+        pytest.param(PLAIN + "payload: {cog: [1, 2, 3]}\n", ["payload.mass", "missing"], id="payload of no mass"),
+        pytest.param(PLAIN + "payload: {mass: 1, cog: [1, 2]}\n", ["payload.cog"], id="flat payload"),
+        pytest.param(PLAIN + "gravity: [0, 0, 0]\n", ["gravity", "this one has 0"], id="no gravity"),
+        pytest.param(PLAIN + "gravity: [0, -9.81]\n", ["gravity"], id="gravity of two numbers"),
+        pytest.param(PLAIN + "gravity: [0, 0, -9810]\n", ["gravity", "0.1 to 100 m/s^2"], id="gravity in mm"),
+        *(
+            pytest.param(
+                with_effect(effect, name, unit, **{key: -0.5}),
+                [f"parameters.{name}.{key}", "no joint has a negative one", f"got '-0.5 {unit}'", "allowed: 0 or more"],
+                id=f"{name} {key} < 0",
+            )
+            for effect, name, unit in (
+                ("compliance", "compliance_2", "mrad/(N m)"),
+                ("backlash", "backlash_1", "deg"),
+                ("clearance", "clearance_3", "deg"),
+                ("bearing-compliance", "bearing_compliance_2", "mrad/(N m)"),
+            )
+            for key in ("nominal", "value")
+        ),
+        pytest.param(
+            changed("compliance: {2: 0.03e-3}", "compliance: {2: -0.03e-3}"),
+            ["truths.printed.compliance.2", "greater than or equal to 0"],
+            id="truth of a negative compliance",
+        ),
+        pytest.param(
+            PLAIN
+            + "effects: [compliance]\nparameters: {compliance_2: {nominal: 0, value: 1, prior: 1, unit: rad/(N m)}}\n",
+            ["parameters.compliance_2", "the unit differs from the file's", "allowed: mrad/(N m)"],
+            id="compliance in another unit",
         ),
         pytest.param(PLAIN + "effects: [gian]\n", ["no joint effect 'gian'", "allowed: gain"], id="unknown effect"),
         pytest.param(
@@ -358,7 +398,7 @@ def ulps(a: float, b: float) -> float:
     return abs(a - b) / math.ulp(max(abs(a), abs(b)))
 
 
-@given(st.floats(-1e4, 1e4), st.sampled_from(["mm", "deg"]))
+@given(st.floats(-1e4, 1e4), st.sampled_from(sorted(SHOWN_AS.values())))
 def test_written_number_reads_back_to_2_ulp(value: float, unit: str) -> None:
     once = to_si(written(value, unit), unit)
     assert ulps(once, value) <= 2
@@ -446,6 +486,60 @@ def test_calibrated_robot_round_trips(tmp_path: Path) -> None:
     for target in (None, "tip", "1"):
         for actual, expected in zip(again.poses(q, target), robot.poses(q, target), strict=True):
             assert_allclose(actual, expected, rtol=0, atol=1e-14)
+
+
+def loaded() -> Robot:
+    """A robot with a payload, on a wall, with every joint effect, calibrated."""
+    rng = np.random.default_rng(2)
+    effects = [effect.name for effect in EFFECTS]
+    plain = load_robot("irb120").carrying(Payload(2.7, (0.05, 1 / 30, -0.1)), (-9.8, 0.1, 1 / 3)).with_effects(effects)
+    moved = [
+        replace(p, value=p.value + p.prior * float(rng.normal()), deviation=p.prior / 7, informed=float(rng.uniform()))
+        for p in plain.parameters.values()
+    ]
+    return replace(plain.with_parameters(moved), history=("calibrated",))
+
+
+def test_payload_gravity_and_effects_round_trip(tmp_path: Path) -> None:
+    robot = loaded()
+    text = robot_text(robot)
+    again = read(tmp_path, text)
+    assert robot_text(again) == text
+    assert again.gravity == robot.gravity
+    assert again.payload.mass == 2.7
+    assert all(ulps(*pair) <= 2 for pair in zip(again.payload.cog, robot.payload.cog, strict=True))
+    assert [type(effect) for effect in again.effects] == [type(effect) for effect in robot.effects]
+    assert {p.unit for p in robot.parameters.values()} == set(SHOWN_AS) - {"m/N"}
+    for name, parameter in robot.parameters.items():
+        other = again.parameters[name]
+        assert (other.unit, other.group, other.informed) == (parameter.unit, parameter.group, parameter.informed)
+        for key in ("nominal", "value", "prior", "deviation"):
+            assert ulps(getattr(other, key), getattr(parameter, key)) <= 2, (name, key)
+    q = robot.random_configurations(5, np.random.default_rng(1))
+    at = Postures(q, approach=np.sign(q), number=np.arange(5.0), temperature=np.linspace(15, 35, 5))
+    for actual, expected in zip(again.poses(at), robot.poses(at), strict=True):
+        assert_allclose(actual, expected, rtol=0, atol=1e-14)
+
+
+def test_a_sliding_joint_gives_way_in_um_per_newton(tmp_path: Path) -> None:
+    entry = "compliance_2: {nominal: 0, value: 2.5, prior: 1, unit: um/N}"
+    robot = read(tmp_path, f"{URDF_LIKE}effects: [compliance]\nparameters: {{{entry}}}\n")
+    assert robot.values["compliance_2"] == pytest.approx(2.5e-6, rel=1e-15)
+    assert "compliance_2: {unit: um/N, nominal: 0.0, value: 2.5, prior: 1.0}" in robot_text(robot)
+
+
+def test_payload_and_gravity_are_written_only_if_there_are_any(tmp_path: Path) -> None:
+    text = robot_text(read(tmp_path, PLAIN))
+    assert "payload" not in text
+    assert "gravity" not in text
+    robot = read(tmp_path, PLAIN + "payload: {mass: 3, cog: [10, 20, 30]}\ngravity: [0, 0, 9.81]\n")
+    assert robot.payload == Payload(3.0, (0.01, 0.02, 0.03))
+    assert "payload: {mass: 3.0, cog: [10.0, 20.0, 30.0]}\ngravity: [0.0, 0.0, 9.81]\n" in robot_text(robot)
+
+
+def test_what_was_identified_may_be_negative(tmp_path: Path) -> None:
+    text = with_effect("compliance", "compliance_2", "mrad/(N m)", nominal=-0.1, value=-0.2)
+    assert read(tmp_path, f"{text}history: [calibrated twice]\n").values["compliance_2"] == pytest.approx(-0.2e-3)
 
 
 def test_urdf_like_robot_round_trips(tmp_path: Path) -> None:

@@ -12,6 +12,9 @@ from truearm.notices import Notice
 _FAR: Final = 6.0
 #: Standard deviations below zero from which a stiffness or a play is doubted.
 _NEGATIVE: Final = 4.0
+#: Share of the prior variance that the data should remove, and of parameters of effects that may fall short of it.
+_HALF: Final = 0.5
+_CROWDED: Final = 0.05
 
 
 def check_fit(fit: Fit) -> list[Notice]:
@@ -119,6 +122,16 @@ def _check_effects(fit: Fit) -> list[Notice]:
                 f"The data say nothing about {', '.join(unknown)}: nothing loads these joints that way (gravity does "
                 "not turn a vertical axis), or there are too few configurations for so many effects. They stay near "
                 "nothing.",
+            )
+        )
+    vague = [name for name in own if name not in unknown and (robot.parameters[name].informed or 1.0) < _HALF]
+    if len(vague) > _CROWDED * len(own):
+        found.append(
+            Notice(
+                "too-many-effects",
+                f"Of {len(own)} parameters of joint effects the data know {len(vague)} less than half, "
+                f"{', '.join(vague[:8])}{' and others' if len(vague) > 8 else ''}: there are too few configurations "
+                f"for so many effects. Measure more{'' if fit.model.tried else ', or let --model auto choose'}.",
             )
         )
     soft = [

@@ -31,6 +31,9 @@ _UNINFORMED: Final = 0.05
 #: Noise assumed for readings that declare none, until their own residuals say better [m, rad].
 _FIRST_NOISE: Final = {"position": 1e-4, "orientation": 1e-4}
 _NOISE_FLOOR: Final = 1e-9
+#: Rounds until deviations and loads agree with the solution; each leaves a hundredth of the loads' error or less.
+_ROUNDS: Final = 6
+_LOADS_AGREE: Final = 1e-10  # of the joints' deflections [rad or m]
 # Spatial median in three dimensions against the mean, for normal noise (Brown 1983).
 _L1_EFFICIENCY: Final = 0.849
 
@@ -241,11 +244,6 @@ def _solve_with_noise(problem: Problem, loss: Loss, limits: tuple[Array, Array] 
         solution = solve(problem, loss, limits)
         steps += solution.steps
     return replace(solution, steps=steps), problem
-
-
-#: Rounds until deviations and loads agree with the solution; each leaves a hundredth of the loads' error or less.
-_ROUNDS: Final = 6
-_LOADS_AGREE: Final = 1e-10  # of the joints' deflections [rad or m]
 
 
 def _load_shift(before: Problem, after: Problem) -> float:

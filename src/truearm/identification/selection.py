@@ -147,7 +147,10 @@ def select(
         tried: list[tuple[Attempt, Array]] = []
         for name in _open(robot, effects, data):
             progress(f"choosing a model: {', '.join(effects)} and {name}?")
-            errors = judged((*effects, name))
+            try:
+                errors = judged((*effects, name))
+            except InputError:  # a fold has fewer equations than this model has unknowns
+                continue
             gains = (now - errors)[np.isfinite(errors)]
             standard_error = float(gains.std(ddof=1) / np.sqrt(len(gains)))
             tried.append(

@@ -40,7 +40,7 @@ class JointAxis:
 
 def joint_axes(robot: Robot) -> list[JointAxis]:
     """Return the joint axes of a robot as it is now, readings at zero."""
-    sweep = robot.trunk.sweep(np.zeros((len(robot.joints), 1)), robot.values)
+    sweep = robot.rigid.sweep(np.zeros((1, len(robot.joints))))
     places = {e.variable: i for i, e in enumerate(sweep.elements) if e.variable is not None}
     return [
         JointAxis(joint, sweep.axis(places[i])[:, 0], sweep.origin(places[i])[:, 0])
@@ -58,7 +58,7 @@ def at_zero(robot: Robot, elements: Iterable[Element]) -> Array:
 
 def base_and_flange(robot: Robot) -> tuple[Array, Array]:
     """Return the base and the flange frame in the world, joint variables at zero, each ``(4, 4)``."""
-    return at_zero(robot, robot.base_elements), at_zero(robot, robot.trunk.elements)
+    return at_zero(robot, robot.base_elements), at_zero(robot, robot.rigid.trunk.elements)
 
 
 def first_frame(base: Array, axis: JointAxis) -> Array:

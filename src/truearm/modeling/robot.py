@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Final
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from truearm.errors import InputError, nearest_names
 from truearm.modeling.chain import Array, Chain, Element, Sweep, across, turn_about
 from truearm.modeling.conventions import Convention, convention
 from truearm.modeling.effects import EFFECTS, Effect, Layout
+from truearm.modeling.equilibrium import postures_in_equilibrium, readings_in_equilibrium
 from truearm.modeling.loads import joint_loads
 from truearm.modeling.parameters import Group, Parameter, Unit, parameter
 from truearm.modeling.parts import GRAVITY, NO_PAYLOAD, SLIDES, TURNS, Joint, LinkMass, Payload, Target, Tool, Truth
@@ -21,10 +21,6 @@ from truearm.modeling.postures import Postures
 from truearm.modeling.transform import IDENTITY, Transform, fixed_rotation
 
 Values = Mapping[str, float | Array]
-
-#: Rounds until loads and deflections agree, and how well [rad, m]. Each round leaves a hundredth or less.
-_ROUNDS: Final = 12
-_SETTLED: Final = 1e-11
 
 
 @dataclass(frozen=True)
@@ -121,6 +117,11 @@ class Robot:
         """The chain from the world to the flange, with what joint effects tilt and stretch."""
         links = (element for link in self.moved_links for element in link)
         return Chain((*self.base_elements, *links, *self.flange_elements))
+
+    @cached_property
+    def rigid(self) -> Robot:
+        """The robot without its joint effects: every joint turns by its reading."""
+        return replace(self, effect_names=())
 
     @cached_property
     def moved_links(self) -> tuple[tuple[Element, ...], ...]:
@@ -296,19 +297,7 @@ class Robot:
             )
         if at.loads is not None or not any(effect.loaded for effect in self.effects):
             return at
-        rates = {
-            "velocity": None if at.velocity is None else at.velocity.T,
-            "acceleration": None if at.acceleration is None else at.acceleration.T,
-            "wrench": None if at.wrench is None else at.wrench.T,
-        }
-        variables = self._rows({}, np.ascontiguousarray(at.joints.T))
-        for _ in range(_ROUNDS):
-            loads = joint_loads(self, variables, **rates)
-            at = replace(at, loads=loads)
-            before, variables = variables, self.variables(at, self.values)
-            if np.abs(variables - before).max(initial=0.0) < _SETTLED:
-                break
-        return at
+        return postures_in_equilibrium(self, at)
 
     def variables(self, q: Array | Postures, values: Values) -> Array:
         """Return the variables ``(joints or more, ..., n)`` of the trunk behind the readings `q`.
@@ -321,17 +310,50 @@ class Robot:
         for effect in self.effects:
             for variable, part in effect.deflection(at, values).items():
                 moved[variable] = moved[variable] + part if variable in moved else part
-        if not moved:
-            return readings if len(self.moving) == len(readings) else self._rows({}, readings)
-        return self._rows(moved, readings)
-
-    def _rows(self, moved: Mapping[int, Array], readings: Array) -> Array:
+        if not moved and len(self.moving) == len(readings):
+            return readings
         shape = np.broadcast_shapes(readings.shape[1:], *(part.shape for part in moved.values()))
-        rows = np.zeros((len(self.moving), *shape))
-        rows[: len(readings)] = readings if len(shape) == 1 else readings[:, None, :]
+        variables = np.zeros((len(self.moving), *shape))
+        variables[: len(readings)] = readings if len(shape) == 1 else readings[:, None, :]
         for variable, part in moved.items():
-            rows[variable] += part
-        return rows
+            variables[variable] += part
+        return variables
+
+    def readings(self, variables: Array) -> Array:
+        """Return the readings ``(n, joints)`` behind variables ``(joints or more, n)``: the inverse of `variables`.
+
+        They are those of the arm at rest, where nothing but the readings is known, with its own parameter values. The
+        loads of an arm that has bent are known, so that there is one answer even where two ends of a joint's play are
+        in equilibrium.
+        """
+        if variables.ndim != 2 or len(variables) != len(self.moving):
+            raise InputError(
+                "wrong number of variables",
+                where=self.name,
+                came=f"an array of shape {variables.shape}",
+                allowed=f"({len(self.moving)}, n)",
+            )
+        return np.ascontiguousarray(readings_in_equilibrium(self, variables).T)
+
+    def straight(self, joints: Array) -> Array:
+        """Return the variables ``(joints or more, n)`` of an arm whose joints ``(joints, n)`` turn and do nothing else."""
+        return np.concatenate([joints, np.zeros((len(self.moving) - len(joints), *joints.shape[1:]))])
+
+    def tilted(self, variables: Array) -> Array:
+        """Return variables ``(joints or more, n)`` with the tilts that the loads of the arm make as it stands there.
+
+        What was tilted before counts for the loads alone; asked again for what came out, they are a thousandth nearer
+        to equilibrium.
+        """
+        tilting = [effect for effect in self.effects if effect.tilts]
+        if not tilting:
+            return variables
+        joints = variables[: len(self.joints)]
+        tilted, at = self.straight(joints), Postures(joints.T, loads=joint_loads(self, variables))
+        for effect in tilting:
+            for variable, part in effect.deflection(at, self.values).items():
+                tilted[variable] += part
+        return tilted
 
     def sweep(self, q: Array | Postures, target: str | None = None, values: Values | None = None) -> Sweep:
         """Run through the chain to the flange, or to a target.
@@ -346,7 +368,11 @@ class Robot:
             All parameter values, instead of the robot's own; each a number or ``(trials, 1)``.
         """
         values = self.values if values is None else values
-        variables = self.variables(q, values)
+        return self.sweep_of(self.variables(q, values), target, values)
+
+    def sweep_of(self, variables: Array, target: str | None = None, values: Values | None = None) -> Sweep:
+        """Run through the chain as :meth:`sweep`, with given variables ``(joints or more, ..., n)`` of the trunk."""
+        values = self.values if values is None else values
         trunk = self.trunk.sweep(variables, values)
         return trunk if target is None else self.target(target).chain.sweep(variables, values, trunk)
 

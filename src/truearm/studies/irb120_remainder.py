@@ -24,11 +24,10 @@ _ANGLE: Final = "angle of each joint, three harmonics"
 _WHOLE: Final = "steady drift of the whole robot"
 _EACH: Final = "steady drift of each joint"
 _CAUSES: Final = {
-    _ARRIVAL: "Nothing left: it is in the model.",
-    _ANGLE: "Next to nothing left: gears that run out are in the model, with two harmonics.",
-    _WHOLE: "The robot creeps against the reflectors on its table from the first configuration to the last, as it does"
-    " when it warms up. No effect of the model knows of time.",
-    _EACH: "The same, as turns of the joints: which of both it is these data hardly tell.",
+    _ARRIVAL: "What differs between a joint that comes from below and one that comes from above.",
+    _ANGLE: "Gears and encoders that run out of true.",
+    _WHOLE: "The robot creeps against the reflectors on its table, from the first configuration to the last.",
+    _EACH: "Joint zeros that creep.",
 }
 
 
@@ -240,7 +239,7 @@ def cause_table(remainders: Mapping[str, Sequence[Remainder]]) -> Table:
                     f"{name}: {cause}",
                     "mm",
                     [one.without[cause] for one in found],
-                    explanation=_CAUSES[cause] if found is list(remainders.values())[-1] else "",
+                    explanation=_CAUSES[cause] if len(rows) <= len(_CAUSES) else "",
                 )
             )
         rows.append(
@@ -254,6 +253,7 @@ def cause_table(remainders: Mapping[str, Sequence[Remainder]]) -> Table:
     return Table(
         "Error budget: what the rest goes along with",
         "Mean error if one more cause is taken out, too. It is fitted to what the training parts leave over, as small"
-        " turns of the joints or of the whole robot, and judged on the part that was left out.",
+        " turns of the joints or of the whole robot, and judged on the part that was left out. A cause that takes"
+        " nothing more is not there, or in the model already.",
         tuple(rows),
     )

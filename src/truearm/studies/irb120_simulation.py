@@ -227,14 +227,14 @@ def _run(seed: int, unseen: int) -> _Run:
     spread["d_3 held"], _ = _identified(without_beta(told), clean_parallel, truth_parallel, within={"d_3": 0.0})
 
     wrong = _wrong(nominal.carrying(published.robot.payload), rng)
-    noisy = measure(published, joints, _NOISE, rng)
+    noisy = _with_noise(clean, _NOISE, rng)
     fitted = identify(wrong, noisy, _ELASTIC).robot
     spread["noisy"], after = _judged(fitted, truth)
-    spread["noisy readings"], _ = _judged(fitted, measure(published, others, _NOISE, rng))
+    spread["noisy readings"], _ = _judged(fitted, _with_noise(truth, _NOISE, rng))
     spread["noisy, masses known"], _ = _identified(_told(nominal, published), noisy, truth)
     spread["masses wrong"], _ = _identified(wrong, clean, truth)
     spread["one reflector"], _ = _identified(wrong, _one_reflector(noisy, rng), truth)
-    spread["noise as length"], _ = _identified(wrong, measure(published, joints, _NOISE / math.sqrt(3), rng), truth)
+    spread["noise as length"], _ = _identified(wrong, _with_noise(clean, _NOISE / math.sqrt(3), rng), truth)
     return _Run(spread, before, after)
 
 
@@ -294,6 +294,11 @@ def _wrong(robot: Robot, rng: np.random.Generator) -> Robot:
     masses = tuple(replace(mass, mass=mass.mass * off(), cog=moved(mass.cog)) for mass in robot.masses)
     payload = Payload(robot.payload.mass * off(), moved(robot.payload.cog))
     return replace(robot, masses=masses, payload=payload)
+
+
+def _with_noise(data: Dataset, noise: float, rng: np.random.Generator) -> Dataset:
+    position = data.position + rng.normal(0.0, noise, data.position.shape)
+    return replace(data, position=position, sigma=np.full(len(position), noise))
 
 
 def _one_reflector(data: Dataset, rng: np.random.Generator) -> Dataset:

@@ -96,7 +96,7 @@ def converted(robot: Robot, convention_name: str) -> Robot:
     if moved and links.base is not None:
         x, y, z = (round(float(v), _DECIMALS) + 0.0 for v in links.base[:3, :3].T @ base[:3, :3] @ robot.gravity)
         made = replace(_based(made, links.base), gravity=(x, y, z))
-    behind = np.linalg.inv(at_zero(made, made.trunk.elements)) @ flange
+    behind = np.linalg.inv(at_zero(made, made.rigid.trunk.elements)) @ flange
     if np.abs(behind - np.eye(4)).max() > _SAME:
         made = replace(made, flange=_transform(behind))
     upright = float(made.base.rotation[:, 2] @ base[:3, 2]) > _UPRIGHT

@@ -44,18 +44,18 @@ class BranchSearch:
     ----------
     task
         The poses, with their whole orientation.
-    seed
-        Readings to stay near to [rad], ``(n, 6)``.
+    seed, turned
+        Readings to stay near to, and what they turn the joints by [rad], ``(n, 6)`` each.
     rule, form
         Names and closed form of the robot's branches.
     """
 
-    def __init__(self, task: PoseTask, seed: Array, rule: BranchRule, form: ClosedForm) -> None:
-        self._task, self._seed, self._rule, self._form = task, seed, rule, form
+    def __init__(self, task: PoseTask, seed: Array, turned: Array, rule: BranchRule, form: ClosedForm) -> None:
+        self._task, self._seed, self._turned, self._rule, self._form = task, seed, turned, rule, form
         self._joints, self._number, self._exact = self._nominal(task)
         # A pose without any solution starts at the seed.
         lone = (self._number < 0).all(axis=1)
-        self._joints[lone, 0], self._number[lone, 0] = seed[lone], 0
+        self._joints[lone, 0], self._number[lone, 0] = turned[lone], 0
         self._pool = Candidates(task, seed, rule)
 
     def one_branch(self, wanted: int | None) -> Candidates:
@@ -73,9 +73,8 @@ class BranchSearch:
         slot = np.argmin(cost, axis=1)
         self._pool.add(every, self._joints[every, slot])
         # A seed that is nearly there is a start of its own: at its end a branch of the nominal arm may be missing.
-        size = np.linalg.norm(self._task.error(self._task.robot.sweep(self._seed, self._task.target)), axis=1)
-        there = np.flatnonzero(size < _NEAR)
-        self._pool.add(there, self._seed[there])
+        there = np.flatnonzero(_missed(self._task, self._turned) < _NEAR)
+        self._pool.add(there, self._turned[there])
         missing = ~self._pool.satisfied(wanted)
         if missing.any():
             near = self._add_all(missing)
@@ -103,15 +102,14 @@ class BranchSearch:
         joints = starts.joints
         filled = ~np.isnan(joints[:, :, 0])
         number = np.full(filled.shape, -1)
-        number[filled] = self._rule.numbers(task.robot.trunk.sweep(joints[filled].T))
+        number[filled] = self._rule.numbers(task.robot.rigid.trunk.sweep(joints[filled].T))
         return joints, number, filled & ~starts.nearest
 
     def _add_all(self, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Start from every near nominal solution of some poses, or from the nearest one; return which are near."""
         pose, slot = np.nonzero((self._number >= 0) & chosen[:, None])
-        part, joints = self._task.of(pose), self._joints[pose, slot]
         size = np.full(self._number.shape, np.inf)
-        size[pose, slot] = np.linalg.norm(part.error(part.robot.sweep(joints, part.target)), axis=1)
+        size[pose, slot] = _missed(self._task.of(pose), self._joints[pose, slot])
         near = np.asarray(size < _NEAR)
         nearest = np.isfinite(size) & (size <= size.min(axis=1, keepdims=True))
         pose, slot = np.nonzero(near | nearest)
@@ -134,7 +132,8 @@ class BranchSearch:
     def _singular(self, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Return the chosen poses ``(n,)`` of which a nominal solution is all but singular."""
         pose, slot = np.nonzero((self._number >= 0) & chosen[:, None])
-        value, _ = weakest_motion(self._task.of(pose), self._joints[pose, slot])
+        part = self._task.of(pose)
+        value, _ = weakest_motion(part, part.variables(self._joints[pose, slot]))
         singular = np.zeros(len(chosen), dtype=bool)
         singular[pose[value < _SINGULAR]] = True
         return singular
@@ -152,9 +151,9 @@ class BranchSearch:
         unreached = ~np.asarray(pool.found().any(axis=1))
         origins = pool.reached | unreached[pool.pose] | thorough
         tried = np.flatnonzero(self._lost(expected)[pool.pose] & origins)
-        value, motion = weakest_motion(self._task.of(pool.pose[tried]), pool.joints[tried])
+        value, motion = weakest_motion(self._task.of(pool.pose[tried]), pool.variables[:, tried])
         weak = value < _WEAK
-        pose, origin, motion = pool.pose[tried][weak], pool.joints[tried][weak], motion[weak]
+        pose, origin, motion = pool.pose[tried][weak], pool.variables[:6, tried[weak]].T, motion[weak]
         for bold, amounts in _ACROSS:
             left = np.flatnonzero(self._lost(expected)[pose])
             way = np.tile([*amounts, *(-amount for amount in amounts)], len(left))[:, None]
@@ -167,7 +166,7 @@ class BranchSearch:
         The pose is shifted by what the calibrated arm misses it by, and the nominal arm solved again (the fake targets
         of Nubiola, section 1.5). The closed form knows a branch up to its very end, where Newton's steps leave it.
         """
-        part, joints = self._task.of(pose), self._seed[pose]
+        part, joints = self._task.of(pose), self._turned[pose]
         wanted = _matrices(np.stack(part.rotation).transpose(2, 1, 0), part.position.T)
         shifted, every = wanted, np.arange(len(pose))
         for _ in range(_FAKE_TARGETS):
@@ -178,9 +177,14 @@ class BranchSearch:
             slot = np.argmin(np.where(there < 0, 1e6, 1e2 * (there != number[:, None]) + 1e1 * ~exact), axis=1)
             none = there[every, slot] < 0
             joints = np.where(none[:, None], joints, found[every, slot])
-            sweep = part.robot.sweep(joints, part.target)
+            sweep = part.sweep(part.variables(joints))
             shifted = wanted @ np.linalg.inv(_matrices(sweep.matrix(), sweep.position.T)) @ shifted
         return joints
+
+
+def _missed(task: PoseTask, joints: Array) -> Array:
+    """Return by how much joints turned so miss the poses [reach lengths, rad], ``(n,)``."""
+    return np.asarray(np.linalg.norm(task.error(task.sweep(task.variables(joints))), axis=1))
 
 
 def _matrices(rotation: Array, position: Array) -> Array:

@@ -80,9 +80,9 @@ class Line:
 
 
 def joint_axes(sweep: Sweep) -> list[Line]:
-    """Return the axis of each joint as a sweep passed it."""
+    """Return the axes of the six joints as a sweep passed them."""
     places = {e.variable: i for i, e in enumerate(sweep.elements) if e.variable is not None}
-    return [Line(sweep.axis(places[i]), sweep.origin(places[i])) for i in range(len(places))]
+    return [Line(sweep.axis(places[i]), sweep.origin(places[i])) for i in range(6)]
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ def branch_rule(robot: Robot) -> BranchRule | None:
         return None
     readings = np.zeros((6, 2))
     readings[4, 1] = np.pi / 2
-    sweep = robot.trunk.sweep(readings)
+    sweep = robot.rigid.trunk.sweep(readings)
     lines = [
         Line(np.broadcast_to(line.along, (3, 2))[:, :1], np.broadcast_to(line.point, (3, 2))[:, :1])
         for line in joint_axes(sweep)

@@ -34,8 +34,10 @@ class Candidates:
         Index of the pose of each candidate, ``(candidates,)``; the other arrays have the same first axis.
     joints
         Readings [rad or m], in the turn nearest to the seed within the limits.
+    variables
+        What the readings turn the joints by, with tilts [rad or m], ``(joints or more, candidates)``.
     position_error, orientation_error
-        [m], [rad].
+        [m], [rad]; 0 where the orientation is free.
     reached
         Whether both are zero within 1e-9.
     beyond
@@ -49,6 +51,7 @@ class Candidates:
         joints = seed.shape[1]
         self.pose: NDArray[np.intp] = np.zeros(0, dtype=np.intp)
         self.joints: Array = np.zeros((0, joints))
+        self.variables: Array = task.robot.straight(np.zeros((joints, 0)))
         self.position_error: Array = np.zeros(0)
         self.orientation_error: Array = np.zeros(0)
         self.reached: NDArray[np.bool_] = np.zeros(0, dtype=bool)
@@ -56,31 +59,35 @@ class Candidates:
         self.number: NDArray[np.intp] = np.zeros(0, dtype=np.intp)
 
     def add(self, pose: NDArray[np.intp], starts: Array, *, bold: bool = False) -> None:
-        """Solve the poses with these indices from starts ``(candidates, joints)`` and keep what comes out.
+        """Solve the poses with these indices and keep what comes out.
 
-        `bold` steps need not come nearer.
+        Parameters
+        ----------
+        starts
+            What the joints have turned by [rad or m], ``(candidates, joints)``.
+        bold
+            Whether steps need not come nearer.
         """
         if not len(pose):
             return
         robot, part = self._task.robot, self._task.of(pose)
-        solved = solve(part, nearest_turns(robot, starts, self._seed[pose]), bold=bold)
-        joints, error = solved.joints, solved.error
-        turned = nearest_turns(robot, joints, self._seed[pose])
-        changed = np.flatnonzero((np.abs(turned - joints) > 1.0).any(axis=1))
-        if len(changed):
-            # A joint effect (a gain) need not be the same a turn further on.
-            again = solve(part.of(changed), turned[changed], bold=bold)
-            joints[changed], error[changed] = again.joints, again.error
-        position = np.linalg.norm(error[:, :3], axis=1) * part.length
-        angle = np.linalg.norm(error[:, 3:], axis=1)
+        solved = solve(part, starts, bold=bold)
+        variables, error = solved.variables, solved.error
+        joints = robot.readings(variables)
+        turns = nearest_turns(robot, joints, self._seed[pose]) - joints
+        changed = np.flatnonzero((np.abs(turns) > 1.0).any(axis=1))
+        # A whole turn on, the arm stands as it stood; a joint effect (a gain) need not be the same there.
+        variables[: joints.shape[1], changed] += turns[changed].T
+        joints[changed] = robot.readings(variables[:, changed])
+        position, angle = part.distances(error)
         number = np.full(len(pose), -1)
         if self._rule is not None:
-            number = self._rule.numbers(robot.sweep(joints, part.target))
-        free = part.orientation == "free"
+            number = self._rule.numbers(part.sweep(variables))
         self.pose = np.concatenate([self.pose, pose])
         self.joints = np.concatenate([self.joints, joints])
+        self.variables = np.concatenate([self.variables, variables], axis=1)
         self.position_error = np.concatenate([self.position_error, position])
-        self.orientation_error = np.concatenate([self.orientation_error, np.full(len(pose), np.nan) if free else angle])
+        self.orientation_error = np.concatenate([self.orientation_error, angle])
         self.reached = np.concatenate([self.reached, (position <= REACHED) & (angle <= REACHED)])
         self.beyond = np.concatenate([self.beyond, beyond_limits(robot, joints)])
         self.number = np.concatenate([self.number, number])
@@ -111,7 +118,7 @@ class Candidates:
     def _order(self, wanted: int | None) -> NDArray[np.intp]:
         """Return the candidates with the better ones first."""
         away = np.abs(self.joints - self._seed[self.pose]).max(axis=1)
-        missed = self.position_error / self._task.length + np.nan_to_num(self.orientation_error)
+        missed = self.position_error / self._task.length + self.orientation_error
         keys = (
             away,
             np.where(self.reached, 0.0, missed),

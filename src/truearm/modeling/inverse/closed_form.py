@@ -31,7 +31,7 @@ _THREADS: Final = 2
 
 @dataclass(frozen=True, eq=False)
 class Starts:
-    """Joint readings that reach poses on the nominal arm.
+    """What the joints of the nominal arm turn by to reach poses.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class ClosedForm:
         from eaik.pybindings.EAIK import Robot as Arm  # a tenth of the size of the package, and no mesh libraries
 
         zero = np.zeros((1, 6))
-        nominal, now = robot.trunk.sweep(zero.T), robot.sweep(zero, target)
+        nominal, now = robot.rigid.trunk.sweep(zero.T), robot.rigid.sweep(zero, target)
         base, wrist = _end_frames(nominal)
         axes = joint_axes(nominal)
         directions = np.column_stack([base[:3, :3].T @ line.along[:, 0] for line in axes]).round(12)

@@ -10,6 +10,7 @@ calibration left it: base and first joint can share an offset in many ways, and 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from typing import Final, Literal
 
@@ -20,7 +21,7 @@ from truearm.errors import InputError
 from truearm.modeling.chain import Array
 from truearm.modeling.inverse.branch_search import BranchSearch
 from truearm.modeling.inverse.branches import BRANCHES, branch_number, branch_rule
-from truearm.modeling.inverse.candidates import Candidates
+from truearm.modeling.inverse.candidates import REACHED, Candidates
 from truearm.modeling.inverse.closed_form import ClosedForm
 from truearm.modeling.inverse.pose_solver import Orientation, PoseTask, smallest_singular_value
 from truearm.modeling.inverse.solutions import JointSolutions, PoseStatus
@@ -83,12 +84,12 @@ def inverse(
             "inverse kinematics needs an arm of three joints or more", where=robot.name, came=len(robot.joints)
         )
     task = _task(robot, position, rotation, target, frame, orientation)
-    near = _seed(robot, seed, task.position.shape[1])
+    near, turned = _seed(task.robot, seed, task.position.shape[1])
     rule = branch_rule(robot) if orientation == "full" else None
     form = ClosedForm(robot, target) if rule is not None else None
     if rule is not None and form is not None and form.known:
         number = branch_number(branch) if branch not in (None, "all") else None
-        search = BranchSearch(task, near, rule, form)
+        search = BranchSearch(task, near, turned, rule, form)
         pool = search.every_branch() if branch == "all" else search.one_branch(number)
         return _answer(task, pool, pool.every_branch() if branch == "all" else pool.best(number), number)
     if branch is not None:
@@ -99,17 +100,17 @@ def inverse(
             allowed="no branch: the answer nearest to the seed is taken",
             cure="Named branches need six turning joints with a closed form, and the whole orientation.",
         )
-    return _by_starts(task, near)
+    return _by_starts(task, near, turned)
 
 
 # -- by starts --------------------------------------------------------------------------------------------
 
 
-def _by_starts(task: PoseTask, seed: Array) -> JointSolutions:
+def _by_starts(task: PoseTask, seed: Array, turned: Array) -> JointSolutions:
     robot, rng = task.robot, np.random.default_rng(0)
     pool = Candidates(task, seed, None)
     everyone = np.arange(len(seed))
-    pool.add(everyone, seed)
+    pool.add(everyone, turned)
     for number in range(_ROUNDS):
         missing = np.repeat(everyone[~pool.satisfied(None)], _STARTS_A_ROUND)
         if not len(missing):
@@ -117,7 +118,7 @@ def _by_starts(task: PoseTask, seed: Array) -> JointSolutions:
         if number:
             starts = robot.random_configurations(len(missing), rng)
         else:
-            starts = seed[missing] + _AROUND * rng.standard_normal((len(missing), len(robot.joints)))
+            starts = turned[missing] + _AROUND * rng.standard_normal((len(missing), len(robot.joints)))
         pool.add(missing, starts)
     return _answer(task, pool, pool.best(None), None)
 
@@ -128,7 +129,16 @@ def _by_starts(task: PoseTask, seed: Array) -> JointSolutions:
 def _answer(task: PoseTask, pool: Candidates, rows: NDArray[np.intp], wanted: int | None) -> JointSolutions:
     pose, joints = pool.pose[rows], pool.joints[rows]
     numbers, reached, beyond = pool.number[rows], pool.reached[rows], pool.beyond[rows]
-    singular_value = smallest_singular_value(task.of(pose), joints)
+    position_error, orientation_error = pool.position_error[rows], pool.orientation_error[rows]
+    if any(effect.loaded for effect in task.robot.effects):
+        # A joint that is all but balanced can come to rest on either side of its play, and the arm elsewhere.
+        comes_to_rest = task.robot.variables(joints, task.robot.values)
+        part = task.of(pose)
+        position_error, orientation_error = part.distances(part.error(part.sweep(comes_to_rest)))
+        reached = reached & (position_error <= REACHED) & (orientation_error <= REACHED)
+    if task.orientation == "free":
+        orientation_error = np.full(len(rows), np.nan)
+    singular_value = smallest_singular_value(task.of(pose), pool.variables[:, rows])
     status = np.full(len(rows), PoseStatus.REACHED, dtype=object)
     status[singular_value < NEAR_SINGULAR] = PoseStatus.NEAR_SINGULAR
     status[beyond.any(axis=1)] = PoseStatus.BEYOND_LIMIT
@@ -141,8 +151,8 @@ def _answer(task: PoseTask, pool: Candidates, rows: NDArray[np.intp], wanted: in
         joints=joints,
         status=tuple(status.tolist()),
         branch=tuple(BRANCHES[number] if number >= 0 else "" for number in numbers.tolist()),
-        position_error=pool.position_error[rows],
-        orientation_error=pool.orientation_error[rows],
+        position_error=position_error,
+        orientation_error=orientation_error,
         beyond=beyond,
         singular_value=singular_value,
         joint_names=tuple(joint.name for joint in task.robot.joints),
@@ -184,7 +194,9 @@ def _task(
         base = robot.base
         p, R = p @ base.rotation.T + np.array(base.translation), base.rotation @ R
     x, y, z = np.ascontiguousarray(R.transpose(2, 1, 0))
-    return PoseTask(robot, target, orientation, np.ascontiguousarray(p.T), (x, y, z), reach(robot, target))
+    # Without the temperature or the number of a configuration no length is known to have changed.
+    known = replace(robot, effect_names=tuple(effect.name for effect in robot.effects if not effect.stretches))
+    return PoseTask(known, target, orientation, np.ascontiguousarray(p.T), (x, y, z), reach(robot, target))
 
 
 def _array(name: str, given: ArrayLike, *shape: int) -> Array:
@@ -225,7 +237,8 @@ def _rotations(given: ArrayLike, count: int) -> Array:
     return rotation_from_quaternion(quaternion_from_rotation(R))
 
 
-def _seed(robot: Robot, seed: ArrayLike | None, count: int) -> Array:
+def _seed(robot: Robot, seed: ArrayLike | None, count: int) -> tuple[Array, Array]:
+    """Return readings, and what they turn the joints by [rad or m], ``(n, joints)`` each."""
     joints = len(robot.joints)
     values = np.zeros(joints) if seed is None else np.asarray(seed, float)
     if values.shape not in ((joints,), (count, joints)):
@@ -237,12 +250,13 @@ def _seed(robot: Robot, seed: ArrayLike | None, count: int) -> Array:
         )
     if not np.isfinite(values).all():
         raise InputError("NaN and infinity are no joint readings", where="seed")
-    return np.broadcast_to(values, (count, joints))
+    turned = robot.variables(np.atleast_2d(values), robot.values)[:joints].T
+    return np.broadcast_to(values, (count, joints)), np.broadcast_to(turned, (count, joints))
 
 
 def reach(robot: Robot, target: str | None) -> float:
     """Return the length of the stretched arm from its first joint [m]."""
-    sweep = robot.sweep(np.zeros((1, len(robot.joints))), target)
+    sweep = robot.rigid.sweep(np.zeros((1, len(robot.joints))), target)
     places = [i for i, element in enumerate(sweep.elements) if element.variable is not None]
     points = [*(sweep.origin(i)[:, 0] for i in places), sweep.position[:, 0]]
     return float(sum(np.linalg.norm(b - a) for a, b in pairwise(points)))

@@ -1,12 +1,14 @@
-"""Damped Newton for many poses at once: joint readings that bring the tip of a robot to given poses.
+"""Damped Newton for many poses at once: joint variables that bring the tip of a robot to given poses.
 
 The step is Levenberg's, with a damping that follows the squared error (Sugihara, "Solvability-unconcerned inverse
 kinematics by the Levenberg-Marquardt method", IEEE Trans. Robotics 27, 2011): far away or beyond the reach it is a
 careful descent that ends at the nearest pose, and near a solution it is Newton's own step. Every pose has a damping of
 its own, and those that are done leave the computation.
 
-A step is a change of the true joint variables. Joint effects are evaluated anew for every reading that is tried:
-the reading is what turns the joint to where the step wants it.
+The steps are in the true joint variables, by which the joints turn and not what they read. The loads follow from them,
+so that what turns a joint about its own axis need not be known here: the arm is rigid. Tilts across the axes are found
+anew where a step has led, from the loads of the arm as it was tilted before. How they change is foreseen only by late
+steps: near singular postures, where it matters, the others would not end.
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.modeling.chain import Array, Sweep
+from truearm.modeling.equilibrium import settled
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import cross, dot
 
@@ -33,6 +36,10 @@ _LONGEST_STEP: Final = 0.5
 #: Keeps the normal matrix of a singular arm invertible; what it takes from a step is far below a tenth.
 _FLOOR: Final = 1e-15
 _MOST_STEPS: Final = 60
+#: Steps before the change of tilts is foreseen; without tilts nearly all poses are met by then.
+_PATIENCE: Final = 8
+#: Of joints, to find how the tilts follow them [rad, m].
+_DIFFERENCE: Final = 1e-6
 _DAMPING: Final = (1e-6, 1e12)
 
 
@@ -82,14 +89,22 @@ class PoseTask:
         cosine = 0.5 * (sum((dot(now, wanted) for now, wanted in pairs), np.zeros(())) - 1.0)
         return np.concatenate([away, _turned(sine, cosine, x)]).T
 
-    def jacobian(self, sweep: Sweep) -> Array:
+    def distances(self, error: Array) -> tuple[Array, Array]:
+        """Return the size of errors in position [m] and in orientation [rad], which is 0 if it is free."""
+        position, angle = (np.linalg.norm(part, axis=1) for part in (error[:, :3], error[:, 3:]))
+        return np.asarray(position * self.length), np.asarray(angle)
+
+    def jacobian(self, sweep: Sweep, tilting: Array | None = None) -> Array:
         """Return how position and orientation follow the true joint variables, ``(n, 3, 5 or 6, joints)``.
 
-        A sliding joint is counted in reach lengths, a turning one in rad.
+        A sliding joint is counted in reach lengths, a turning one in rad. Tilts are held, or follow as `tilting` says.
         """
-        places = {e.variable: i for i, e in enumerate(sweep.elements) if e.variable is not None}
         joints = self.robot.joints
-        linear, angular = sweep.derivatives([places[i] for i in range(len(joints))])  # (joints, 3, n)
+        linear, angular = sweep.derivatives(self.robot.moving[: len(joints)])  # (joints, 3, n)
+        if tilting is not None:
+            across = self.robot.moving[len(joints) : 3 * len(joints)]
+            for by_joint, by_tilt in zip((linear, angular), sweep.derivatives(across), strict=True):
+                by_joint += np.einsum("tjn,tcn->jcn", tilting, by_tilt)
         rows = [linear / self.length]
         if self.orientation == "full":
             rows.append(angular)
@@ -101,16 +116,31 @@ class PoseTask:
         whole[sliding] *= self.length
         return np.ascontiguousarray(whole.transpose(2, 1, 0))
 
-    def advanced(self, q: Array, step: Array) -> Array:
-        """Return the readings ``(n, joints)`` whose true variables are those of `q` plus a step in them."""
-        scale = [self.length if joint.kind == "prismatic" else 1.0 for joint in self.robot.joints]
-        step = step * scale
-        moved: Array = q + step
-        if self.robot.effects:
-            wanted = self.robot.variables(q, self.robot.values) + step.T
-            for _ in range(2):  # an effect changes by a thousandth of the step: two rounds leave nothing
-                moved = moved + (wanted - self.robot.variables(moved, self.robot.values)).T
-        return moved
+    def variables(self, joints: Array) -> Array:
+        """Return the variables ``(joints or more, n)`` of the arm with its joints ``(n, joints)`` turned so."""
+        return settled(lambda _, variables: self.robot.tilted(variables), self.robot.straight(joints.T))
+
+    def tilting(self, variables: Array) -> Array | None:
+        """Return how the tilts follow the joints, ``(tilts, joints, n)``, by differences; None if nothing tilts."""
+        count = len(self.robot.joints)
+        if len(variables) == count:
+            return None
+        moved = np.repeat(variables[:, None, :], count + 1, axis=1)
+        for i in range(count):
+            moved[i, i] += _DIFFERENCE
+        tilts = self.robot.tilted(moved.reshape(len(variables), -1)).reshape(moved.shape)[count : 3 * count]
+        return np.asarray((tilts[:, :count] - tilts[:, count:]) / _DIFFERENCE)
+
+    def sweep(self, variables: Array) -> Sweep:
+        """Run through the chain to the tip."""
+        return self.robot.sweep_of(variables, self.target)
+
+    def advanced(self, variables: Array, step: Array) -> Array:
+        """Return the variables after a step ``(n, joints)`` of the joints, a sliding one's in reach lengths."""
+        moved = variables.copy()
+        for i, joint in enumerate(self.robot.joints):
+            moved[i] += step[:, i] * (self.length if joint.kind == "prismatic" else 1.0)
+        return self.robot.tilted(moved)
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,13 +149,13 @@ class Solved:
 
     Attributes
     ----------
-    joints
-        Readings [rad or m], ``(n, joints)``.
+    variables
+        [rad or m], ``(joints or more, n)``.
     error
         As :meth:`PoseTask.error` gives it.
     """
 
-    joints: Array
+    variables: Array
     error: Array
 
     @property
@@ -135,62 +165,57 @@ class Solved:
 
 
 def solve(task: PoseTask, starts: Array, *, bold: bool = False) -> Solved:
-    """Go from starting readings to the poses of a task, or as near to them as can be.
+    """Go from starts to the poses of a task, or as near to them as can be.
 
     Parameters
     ----------
     starts
-        One for each pose [rad or m], ``(n, joints)``.
+        What the joints have turned by, for each pose [rad or m], ``(n, joints)``.
     bold
         Whether a step is taken even if the error grows, undamped. Along a bent valley near a singular posture that is
         faster by far, and it ends anywhere if there is no solution.
     """
-    joints = np.array(starts, float)
-    error = np.empty((len(joints), 0))
-    if not len(joints):
-        return Solved(joints, error)
-    active = np.arange(len(joints))
-    part, q, damping = task, joints, np.ones(len(joints))
-    sweep = part.robot.sweep(q, part.target)
+    part, now = task, task.variables(starts)
+    found, damping = now.copy(), np.ones(len(starts))
+    sweep = part.sweep(now)
     e, jacobian = part.error(sweep), part.jacobian(sweep)
-    error = e.copy()
-    for _ in range(_MOST_STEPS):
+    error, active = e.copy(), np.arange(len(starts))
+    for number in range(_MOST_STEPS):
         size = np.linalg.norm(e, axis=1)
         gradient = np.linalg.norm((jacobian * e[:, :, None]).sum(1), axis=1)
         going = (size > CONVERGED) & (gradient > _LEVEL * size * np.minimum(size, 1.0)) & (damping < _DAMPING[1])
         if not going.all():
-            active, q, e, jacobian = active[going], q[going], e[going], jacobian[going]
+            active, now, e, jacobian = active[going], now[:, going], e[going], jacobian[going]
             damping, size, part = damping[going], size[going], part.of(np.flatnonzero(going))
         if not len(active):
             break
-        tried = part.advanced(q, _step(jacobian, e, _FLOOR + (0.0 if bold else damping) * size**2))
-        sweep = part.robot.sweep(tried, part.target)
+        tried = part.advanced(now, _step(jacobian, e, _FLOOR + (0.0 if bold else damping) * size**2))
+        sweep = part.sweep(tried)
         tried_error = part.error(sweep)
         better = (np.linalg.norm(tried_error, axis=1) < size) | bold
         damping = np.where(better, np.maximum(damping / 5, _DAMPING[0]), damping * 10)
-        q, e = np.where(better[:, None], tried, q), np.where(better[:, None], tried_error, e)
-        jacobian = np.where(better[:, None, None], part.jacobian(sweep), jacobian)
-        joints[active], error[active] = q, e
-    return Solved(joints, error)
+        now, e = np.where(better, tried, now), np.where(better[:, None], tried_error, e)
+        tilting = part.tilting(tried) if number >= _PATIENCE else None
+        jacobian = np.where(better[:, None, None], part.jacobian(sweep, tilting), jacobian)
+        found[:, active], error[active] = now, e
+    return Solved(found, error)
 
 
-def smallest_singular_value(task: PoseTask, joints: Array) -> Array:
+def smallest_singular_value(task: PoseTask, variables: Array) -> Array:
     """Return, for each pose, how little it moves with a joint motion of norm 1 [reach lengths or rad], ``(n,)``.
 
     The motion of a redundant arm that leaves the pose as it is does not count.
     """
-    if not len(joints):
+    if not variables.shape[1]:
         return np.zeros(0)
-    jacobian = task.jacobian(task.robot.sweep(joints, task.target))
-    return np.asarray(np.linalg.svd(jacobian, compute_uv=False)[:, -1])
+    return np.asarray(np.linalg.svd(task.jacobian(task.sweep(variables)), compute_uv=False)[:, -1])
 
 
-def weakest_motion(task: PoseTask, joints: Array) -> tuple[Array, Array]:
+def weakest_motion(task: PoseTask, variables: Array) -> tuple[Array, Array]:
     """Return the :func:`smallest_singular_value` of each pose and its joint motion ``(n, joints)``."""
-    if not len(joints):
-        return np.zeros(0), np.zeros(joints.shape)
-    jacobian = task.jacobian(task.robot.sweep(joints, task.target))
-    _, values, motions = np.linalg.svd(jacobian, full_matrices=False)
+    if not variables.shape[1]:
+        return np.zeros(0), np.zeros((0, len(task.robot.joints)))
+    _, values, motions = np.linalg.svd(task.jacobian(task.sweep(variables)), full_matrices=False)
     return values[:, -1], motions[:, -1]
 
 

@@ -1,0 +1,133 @@
+"""Joint effects found in simulated data, and what a fit says about those it cannot know."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.simulated import campaign
+
+from truearm.errors import InputError
+from truearm.identification.advice import check_fit
+from truearm.identification.bounds import Bounds
+from truearm.identification.fit import Fit, identify
+from truearm.identification.models import MODELS, Model
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.truths import truth_twin
+from truearm.measurement.twin import measure
+from truearm.measurement.twin_joint import JointTruth
+from truearm.modeling.parts import Payload
+from truearm.robots import load_robot
+
+MODEL = {model.name: model for model in MODELS}
+TOOL = Payload(2.7, (0.05, 0.025, 0.1))
+COMPLIANCE = {2: 0.032e-3, 3: 0.130e-3, 4: 0.605e-3, 5: 0.419e-3, 6: 0.647e-3}
+IRB120 = load_robot("irb120").carrying(TOOL)
+
+
+def bent(poses: int) -> Dataset:
+    """Return readings of an IRB 120 that gives way under its tool."""
+    return campaign("irb120", poses, 3e-5, 1, "tracker-triangular")[1]
+
+
+def told(fit: Fit) -> dict[str, str]:
+    return {notice.code: notice.message for notice in check_fit(fit)}
+
+
+def test_compliance_is_that_of_the_twin_and_the_vertical_axis_is_named() -> None:
+    fit = identify(IRB120, bent(50), MODEL["elastic"])
+    for number, true in COMPLIANCE.items():
+        found = fit.robot.parameters[f"compliance_{number}"]
+        assert found.deviation is not None
+        assert found.deviation < 0.2 * true
+        assert abs(found.value - true) < 4 * found.deviation
+    notices = told(fit)
+    assert notices["effects-uninformed"].startswith("The data say nothing about compliance_1: nothing loads")
+    assert not {"no-loads", "negative-effect", "too-many-effects"} & set(notices)
+    assert fit.standing("compliance_1") == "uninformed"
+    assert fit.robot.values["compliance_1"] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_dropped_effects_are_named_too() -> None:
+    fit = identify(IRB120, bent(50), MODEL["elastic"], redundancy="drop")
+    assert "compliance_1" in [r.dropped for r in fit.redundancies]
+    assert "compliance_1" in told(fit)["effects-uninformed"]
+    assert fit.robot.values["compliance_1"] == 0.0
+
+
+def test_a_robot_without_masses_is_told_so() -> None:
+    data = bent(15)
+    weightless = replace(load_robot("irb120"), masses=())
+    notices = told(identify(weightless, data, MODEL["elastic"]))
+    assert "no link masses and no payload" in notices["no-loads"]
+    assert "--payload" in notices["no-loads"]
+    assert "effects-uninformed" not in notices
+    assert "no-loads" not in told(identify(weightless.carrying(TOOL), data, MODEL["elastic"]))
+    assert "no-loads" not in told(identify(weightless, data, MODEL["joints"]))
+
+
+@pytest.mark.parametrize(("model", "few", "enough"), [("full", 12, 60), ("tilting", 6, 30)])
+def test_more_effects_than_the_data_can_carry(model: str, few: int, enough: int) -> None:
+    fit = identify(IRB120, bent(few), MODEL[model])
+    message = told(fit)["too-many-effects"]
+    effects = [p for effect in fit.robot.effects for p in effect.parameters]
+    assert message.startswith(f"Of {len(effects)} parameters of joint effects the data know ")
+    assert "too few configurations for so many effects" in message
+    assert "effects-uninformed" in told(fit)
+    assert "too-many-effects" not in told(identify(IRB120, bent(enough), MODEL[model]))
+
+
+def test_loads_of_the_wrong_sign_come_out_as_negative_springs() -> None:
+    data = bent(50)
+    message = told(identify(IRB120.carrying(gravity=(0.0, 0.0, 9.81)), data, MODEL["elastic"]))["negative-effect"]
+    assert "compliance_2, compliance_3" in message
+    assert "masses, payload or gravity may be wrong" in message
+    assert "negative-effect" not in told(identify(IRB120, data, MODEL["tilting"]))
+
+
+def test_growth_is_found_by_the_temperature() -> None:
+    rng = np.random.default_rng(3)
+    twin = truth_twin(load_robot("irb120"), "random", rng)
+    twin = replace(twin, joints={number: JointTruth(growth=23e-6) for number in range(1, 7)})
+    joints = IRB120.random_configurations(60, rng)
+    data = measure(twin, joints, 2e-5, rng, temperature=np.linspace(18.0, 34.0, 60))
+    model = Model("warm", "", MODEL["geometric"].groups, ("thermal-growth",))
+    fit = identify(IRB120, data, model)
+    for number in (3, 4):
+        growth = fit.robot.parameters[f"thermal_growth_{number}"]
+        assert growth.deviation is not None
+        assert growth.deviation < 6e-6
+        assert growth.value == pytest.approx(23e-6, abs=3 * growth.deviation)
+    plain = identify(IRB120, data, MODEL["geometric"])
+    assert fit.excess == 1.0
+    assert plain.excess > 1.2
+    with pytest.raises(InputError, match=r"thermal-growth needs the temperature of the arm.*temperature \[degC\]"):
+        identify(IRB120, replace(data, temperature=None), model)
+
+
+def test_a_pull_at_the_flange_turns_the_vertical_axis() -> None:
+    rng = np.random.default_rng(4)
+    twin = truth_twin(load_robot("irb120"), "tracker-triangular", rng)
+    twin = replace(twin, joints={**twin.joints, 1: JointTruth(0.1e-3)})
+    wrench = np.column_stack([rng.uniform(-30, 30, (60, 2)), np.zeros((60, 4))])
+    data = measure(twin, IRB120.random_configurations(60, rng), 3e-5, rng, wrench=wrench)
+    fit = identify(IRB120, data, MODEL["elastic"])
+    assert fit.robot.values["compliance_1"] == pytest.approx(0.1e-3, rel=0.1)
+    assert "effects-uninformed" not in told(fit)
+
+
+def test_bounds_on_effects_are_in_the_units_that_are_shown() -> None:
+    entries = {"truearm": "truearm-bounds/1", "units": {"length": "m", "angle": "rad"}}
+    bounds = Bounds.model_validate(
+        {
+            **entries,
+            "within": {"compliance_2": 0.01, "backlash": math.radians(0.02)},
+            "between": {"compliance_3": [0.0, 0.1]},
+        }
+    )
+    fit = identify(IRB120, bent(30), MODEL["tilting"], bounds=bounds)
+    assert fit.robot.values["compliance_2"] == pytest.approx(0.01e-3)
+    assert fit.robot.values["compliance_3"] == pytest.approx(0.1e-3)
+    assert all(abs(fit.robot.values[f"backlash_{i}"]) <= math.radians(0.02) + 1e-12 for i in range(1, 7))

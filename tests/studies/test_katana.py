@@ -136,6 +136,7 @@ def test_tilting() -> None:
     assert tilting < 0.15 * conventional
     contradictions = found.tables[-1].rows
     assert [row.median < 0 for row in contradictions[:3]] == [False, False, True]
+    assert contradictions[-1].verdict == "differs"
     assert {picture.name for picture in found.pictures} == {"poses", "errors"}
 
 

@@ -3,40 +3,37 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
-from truearm.identification.influence import Influence, influence
-from truearm.identification.pose_by_pose import Combination, influence_based, least_squares, minimum_norm
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.twin import measure
-from truearm.modeling.chain import Array
-from truearm.modeling.robot import Robot
-from truearm.planning.iso9283 import Cube
-from truearm.planning.pose_plan import POSES, plan_poses
+from truearm.identification.influence import influence
+from truearm.planning.pose_plan import POSES
 from truearm.reporting.drawing import AFTER, BEFORE, axis, figure
 from truearm.reporting.influence_figures import influence_figure
 from truearm.reporting.numbers import rounded
 from truearm.studies.katana import (
-    CHAPTER_5_CUBE,
     DOCUMENT_NAMES,
     NAMES,
     NOISE,
     PERTURBATIONS,
     QUANTITIES,
-    TILTING,
     TIP,
-    UNITS,
     katana,
-    pose_errors,
-    published,
-    tip_poses,
-    true_poses,
-    twin,
     workspace_cube,
+)
+from truearm.studies.katana_pose_by_pose import (
+    COMBINATIONS,
+    FULL,
+    GEOMETRY,
+    INFLUENCE,
+    JOINT,
+    NORM,
+    OTHER,
+    InfluenceRun,
+    run_influence,
 )
 from truearm.studies.study import Picture, Row, Study, Table
 
@@ -54,27 +51,6 @@ _THETA_2, _ALPHA_2 = 0.34, 0.59  # section 3.6 [mm, share]
 #: The document's robot is another one in other poses.
 _SIMILAR: Final = 0.25
 _UNSEEN: Final = 200
-_LENGTHS: Final = ("a_3", "a_4", "d_5", "target_tip_z")
-_ANGLES: Final = {"rad": 1.0, "deg": math.radians(1.0)}
-_COMBINATIONS: Final[tuple[Combination, ...]] = ("mean", "scaled-mean", "best-pose")
-
-#: The robots that are calibrated, and the methods.
-_FULL, _GEOMETRY, _OTHER = "Table 3.2 and tilting joints", "Table 3.2", "Table 3.3"
-_NORM, _INFLUENCE, _JOINT = "minimum norm, pose by pose", "influence-based, pose by pose", "joint least squares"
-
-_Errors = Mapping[str, Array]
-
-
-@dataclass(frozen=True)
-class _Run:
-    """What one seed gives: mean errors by robot, method and combination on the poses and on unseen ones."""
-
-    influence: Influence
-    chapter_5: Influence
-    poses: Mapping[tuple[str, str], _Errors]
-    unseen: Mapping[tuple[str, str], float]
-    apart: float
-    lengths: Mapping[str, float]
 
 
 def study(seeds: int, progress: Callable[[str], None], count: int = POSES, unseen: int = _UNSEEN) -> Study:
@@ -96,12 +72,12 @@ def study(seeds: int, progress: Callable[[str], None], count: int = POSES, unsee
     runs = []
     for seed in range(seeds):
         progress(f"seed {seed + 1} of {seeds}")
-        runs.append(_run(seed, cube, count, unseen))
+        runs.append(run_influence(seed, cube, count, unseen))
 
     def left(robot: str, method: str) -> float:
         return float(np.median([run.unseen[robot, method] for run in runs]))
 
-    beaten = all(left(robot, _INFLUENCE) > left(robot, _JOINT) for robot in (_FULL, _GEOMETRY, _OTHER))
+    beaten = all(left(robot, INFLUENCE) > left(robot, JOINT) for robot in (FULL, GEOMETRY, OTHER))
     verdict = (
         "Influence-based identification does not beat joint least squares on any of the robots tried"
         if beaten
@@ -112,17 +88,17 @@ def study(seeds: int, progress: Callable[[str], None], count: int = POSES, unsee
         title="Influence-based identification of a Katana 450",
         source="D. Patel, doctoral thesis on the Katana 450, sections 3.5 to 3.7, Figure 3.8, Tables 3.2 to 3.4",
         answer=f"{verdict}: on unseen poses of a geometric robot (Table 3.2) it leaves"
-        f" {left(_GEOMETRY, _INFLUENCE):.3f} mm, minimum norm {left(_GEOMETRY, _NORM):.3f} mm, joint least squares"
-        f" {left(_GEOMETRY, _JOINT):.4f} mm; where joints tilt as well {left(_FULL, _INFLUENCE):.3f},"
-        f" {left(_FULL, _NORM):.3f} and {left(_FULL, _JOINT):.3f} mm. One pose sees 3 combinations of the 17"
+        f" {left(GEOMETRY, INFLUENCE):.3f} mm, minimum norm {left(GEOMETRY, NORM):.3f} mm, joint least squares"
+        f" {left(GEOMETRY, JOINT):.4f} mm; where joints tilt as well {left(FULL, INFLUENCE):.3f},"
+        f" {left(FULL, NORM):.3f} and {left(FULL, JOINT):.3f} mm. One pose sees 3 combinations of the 17"
         " parameters, so the set that explains it holds a fraction of the errors, and so does the mean of the sets."
         " Weighting by influence changes which fraction. Several printed figures contradict each other.",
         seeds=seeds,
         tables=(
             _influences(runs),
             _printed(runs, "Before calibration", 0, "before"),
-            _printed(runs, "After simultaneous identification", 1, _JOINT),
-            _printed(runs, "After influence-based identification", 2, _INFLUENCE),
+            _printed(runs, "After simultaneous identification", 1, JOINT),
+            _printed(runs, "After influence-based identification", 2, INFLUENCE),
             _methods(runs),
             _combinations(runs),
             _contradictions(runs),
@@ -154,56 +130,10 @@ def study(seeds: int, progress: Callable[[str], None], count: int = POSES, unsee
     )
 
 
-def _run(seed: int, cube: Cube, count: int, unseen: int) -> _Run:
-    rng = np.random.default_rng(seed)
-    nominal = katana()
-    joints = plan_poses(nominal, cube, target=TIP, count=count, seed=seed).joints
-    others = nominal.random_configurations(unseen, rng)
-    central = plan_poses(nominal, CHAPTER_5_CUBE, target=TIP, count=count, seed=seed).joints
-    poses: dict[tuple[str, str], _Errors] = {}
-    left: dict[tuple[str, str], float] = {}
-    for name, truth in (
-        (_GEOMETRY, twin(published("standard"), {})),
-        (_OTHER, twin(published("influence"), {})),
-        (_FULL, twin(published("standard"), TILTING)),
-    ):
-        data = measure(truth, joints, NOISE, rng)
-        true, elsewhere = true_poses(truth, joints), true_poses(truth, others)
-        found: dict[str, Robot] = {"before": nominal, _JOINT: least_squares(nominal, data, NAMES, TIP)}
-        for combination in _COMBINATIONS:
-            suffix = "" if combination == "mean" else f", {combination}"
-            by_norm = minimum_norm(nominal, data, NAMES, TIP, combination=combination, units=UNITS)
-            by_influence = influence_based(
-                nominal, data, NAMES, TIP, combination=combination, units=UNITS, perturbations=PERTURBATIONS
-            )
-            found |= {_NORM + suffix: by_norm.robot, _INFLUENCE + suffix: by_influence.robot}
-        for method, robot in found.items():
-            poses[name, method] = {
-                quantity: errors.mean() for quantity, errors in pose_errors(tip_poses(robot, joints), true).items()
-            }
-            left[name, method] = float(pose_errors(tip_poses(robot, others), elsewhere)["dP"].mean())
-    standard, other = (published(table).poses(joints, TIP)[0] for table in ("standard", "influence"))
-    return _Run(
-        influence=influence(nominal, joints, NAMES, TIP, PERTURBATIONS),
-        chapter_5=influence(nominal, central, NAMES, TIP, PERTURBATIONS),
-        poses=poses,
-        unseen=left,
-        apart=float(np.linalg.norm(standard - other, axis=1).mean()) * 1e3,
-        lengths={unit: _length_change(nominal, data, size) for unit, size in _ANGLES.items()},
-    )
-
-
-def _length_change(nominal: Robot, data: Dataset, angle: float) -> float:
-    """Return the largest change of a length [mm] if angles are counted in `angle` [rad] and lengths in mm."""
-    units = {name: angle * UNITS.get(name, 1.0) for name in NAMES if name not in _LENGTHS}
-    found = minimum_norm(nominal, data, NAMES, TIP, units=units).robot
-    return 1e3 * max(abs(found.values[name] - nominal.values[name]) for name in _LENGTHS)
-
-
 # -- tables ------------------------------------------------------------------------------------------------
 
 
-def _influences(runs: list[_Run]) -> Table:
+def _influences(runs: list[InfluenceRun]) -> Table:
     def means(name: str) -> list[float]:
         return [1e3 * float(run.influence.mean[DOCUMENT_NAMES.index(name)]) for run in runs]
 
@@ -271,7 +201,7 @@ def _influences(runs: list[_Run]) -> Table:
     )
 
 
-def _printed(runs: list[_Run], title: str, column: int, method: str) -> Table:
+def _printed(runs: list[InfluenceRun], title: str, column: int, method: str) -> Table:
     why = {
         0: "Tables 3.2, 4.3 and 4.4 together do not make as large an error as was measured before calibration. What"
         " else was wrong (base frame, inverse kinematics of the controller) is not printed.",
@@ -283,7 +213,7 @@ def _printed(runs: list[_Run], title: str, column: int, method: str) -> Table:
         Row(
             f"|{quantity}|, mean",
             unit,
-            [float(run.poses[_FULL, method][quantity]) for run in runs],
+            [run.poses[FULL, method][quantity] for run in runs],
             _TABLE_34[quantity][column],
             "Table 3.4",
             relative=_SIMILAR,
@@ -296,7 +226,7 @@ def _printed(runs: list[_Run], title: str, column: int, method: str) -> Table:
             Row(
                 "|dP|, mean, by the document's own method",
                 "mm",
-                [float(run.poses[_FULL, _NORM]["dP"]) for run in runs],
+                [run.poses[FULL, NORM]["dP"] for run in runs],
                 _TABLE_34["dP"][1],
                 "Table 3.4",
                 relative=_SIMILAR,
@@ -309,12 +239,12 @@ def _printed(runs: list[_Run], title: str, column: int, method: str) -> Table:
             Row(
                 f"|dP|, mean, {name}, joints that do not tilt",
                 "mm",
-                [float(run.poses[name, method]["dP"]) for run in runs],
+                [run.poses[name, method]["dP"] for run in runs],
                 _TABLE_34["dP"][0],
                 "Table 3.4",
                 relative=_SIMILAR,
             )
-            for name in (_GEOMETRY, _OTHER)
+            for name in (GEOMETRY, OTHER)
         ]
     return Table(
         title,
@@ -326,23 +256,23 @@ def _printed(runs: list[_Run], title: str, column: int, method: str) -> Table:
     )
 
 
-def _methods(runs: list[_Run]) -> Table:
+def _methods(runs: list[InfluenceRun]) -> Table:
     rows = []
-    for robot in (_GEOMETRY, _OTHER, _FULL):
-        for method in ("before", _NORM, _INFLUENCE, _JOINT):
+    for robot in (GEOMETRY, OTHER, FULL):
+        for method in ("before", NORM, INFLUENCE, JOINT):
             rows.append(Row(f"{robot}: {method}", "mm", [run.unseen[robot, method] for run in runs]))
         rows.append(
             Row(
                 f"{robot}: influence-based over joint least squares",
                 "times",
-                [run.unseen[robot, _INFLUENCE] / run.unseen[robot, _JOINT] for run in runs],
+                [run.unseen[robot, INFLUENCE] / run.unseen[robot, JOINT] for run in runs],
             )
         )
     rows.append(
         Row(
-            f"{_GEOMETRY}: influence-based over minimum norm",
+            f"{GEOMETRY}: influence-based over minimum norm",
             "%",
-            [100 * run.unseen[_GEOMETRY, _INFLUENCE] / run.unseen[_GEOMETRY, _NORM] for run in runs],
+            [100 * run.unseen[GEOMETRY, INFLUENCE] / run.unseen[GEOMETRY, NORM] for run in runs],
             round(100 * 0.21 / 0.38),
             "Table 3.4",
             relative=_SIMILAR,
@@ -357,7 +287,7 @@ def _methods(runs: list[_Run]) -> Table:
     )
 
 
-def _combinations(runs: list[_Run]) -> Table:
+def _combinations(runs: list[InfluenceRun]) -> Table:
     words = {"mean": "mean of the sets", "scaled-mean": "mean, scaled to fit best", "best-pose": "best single set"}
     return Table(
         "Three ways to make one set of those of all poses",
@@ -366,15 +296,15 @@ def _combinations(runs: list[_Run]) -> Table:
             Row(
                 f"{method}: {words[combination]}",
                 "mm",
-                [run.unseen[_GEOMETRY, method + ("" if combination == "mean" else f", {combination}")] for run in runs],
+                [run.combined[method, combination] for run in runs],
             )
-            for method in (_NORM, _INFLUENCE)
-            for combination in _COMBINATIONS
+            for method in (NORM, INFLUENCE)
+            for combination in COMBINATIONS
         ),
     )
 
 
-def _contradictions(runs: list[_Run]) -> Table:
+def _contradictions(runs: list[InfluenceRun]) -> Table:
     floor = {
         column: math.sqrt(sum(_TABLE_34[quantity][column] ** 2 for quantity in ("dX", "dY", "dZ"))) for column in (1, 2)
     }
@@ -440,9 +370,9 @@ def _contradictions(runs: list[_Run]) -> Table:
     )
 
 
-def _picture(runs: list[_Run]) -> Picture:
-    robots = (_GEOMETRY, _OTHER, _FULL)
-    methods = ("before", _NORM, _INFLUENCE, _JOINT)
+def _picture(runs: list[InfluenceRun]) -> Picture:
+    robots = (GEOMETRY, OTHER, FULL)
+    methods = ("before", NORM, INFLUENCE, JOINT)
     colours = (BEFORE, "#8a6d1d", "#b3261e", AFTER)
     traces = [
         {

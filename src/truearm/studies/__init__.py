@@ -58,6 +58,21 @@ STUDIES: Final = (
         "calibration of a simulated IRB 120, without noise and with noise and wrong masses (Nubiola 2.6)",
         "truearm.studies.irb120_simulation",
     ),
+    Entry(
+        "katana-influence",
+        "influence of each parameter, and identification by it, on a simulated Katana 450 (Patel 3.5 to 3.7)",
+        "truearm.studies.katana_influence",
+    ),
+    Entry(
+        "katana-tilting",
+        "joints that tilt, found by inclinometers before the geometry, on a simulated Katana 450 (Patel 4)",
+        "truearm.studies.katana_tilting",
+    ),
+    Entry(
+        "katana-trajectory",
+        "a circle predicted, corrected and followed by a simulated Katana 450 (Patel 5)",
+        "truearm.studies.katana_trajectory",
+    ),
 )
 
 

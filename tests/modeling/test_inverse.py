@@ -10,13 +10,16 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 from tests.modeling.pinocchio_oracle import PinocchioChain
+from tests.modeling.test_effects import NAMES, loaded_arm
 
 from truearm.errors import InputError
+from truearm.measurement.truths import joint_truths
+from truearm.measurement.twin import Twin
 from truearm.modeling.chain import Array
 from truearm.modeling.inverse import inverse
 from truearm.modeling.inverse.branches import BRANCHES, branch_rule
 from truearm.modeling.inverse.solutions import PoseStatus
-from truearm.modeling.parts import Joint
+from truearm.modeling.parts import Joint, LinkMass, Payload
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform, rotation_vector
 from truearm.robots import load_robot
@@ -193,6 +196,105 @@ def test_branches_that_have_no_names() -> None:
         p, R = robot.poses(np.zeros((1, len(robot.joints))))
         with pytest.raises(InputError, match="no names here"):
             inverse(robot, p, R, branch="front-up-noflip")
+
+
+# -- joint effects under load -----------------------------------------------------------------------------
+
+ELASTIC = ("compliance",)
+FULL = ("compliance", "hardening", "fourier", "backlash", "approach")
+TILTING = ("compliance", "bearing-compliance", "clearance", "backlash")
+EFFECTS = pytest.mark.parametrize("effects", [ELASTIC, FULL, TILTING, (*NAMES, "warm-up")], ids="+".join)
+
+
+@EFFECTS
+def test_under_load_forward_of_inverse_is_the_pose_on_every_branch(effects: tuple[str, ...]) -> None:
+    robot = calibrated(loaded_arm(effects, 11), 5)
+    rule = branch_rule(robot)
+    assert rule is not None
+    assert np.abs(robot.poses(np.zeros((1, 6)))[0] - robot.rigid.poses(np.zeros((1, 6)))[0]).max() > 1e-5
+    q = robot.random_configurations(150, np.random.default_rng(12))
+    p, R = robot.poses(q, "tip")
+    number = rule.numbers(robot.sweep(q))
+    every = inverse(robot, p, R, frame="world", target="tip", branch="all")
+    position, rotation = robot.poses(every.joints, "tip")
+    assert np.abs(position - p[every.pose]).max() < 1e-9
+    assert np.abs(rotation - R[every.pose]).max() < 1e-9
+    assert len(every.pose) > 1000
+    found = {*zip(every.pose.tolist(), every.branch, strict=True)}
+    assert found >= {(pose, BRANCHES[k]) for pose, k in enumerate(number.tolist())}
+    for k in np.unique(number):
+        rows = np.flatnonzero(number == k)
+        one = inverse(robot, p[rows], R[rows], frame="world", target="tip", branch=BRANCHES[k])
+        assert set(one.branch) == {BRANCHES[k]}
+        assert one.position_error.max() < 1e-9
+        assert one.orientation_error.max() < 1e-9
+
+
+@EFFECTS
+def test_under_load_the_seed_gives_the_same_joints_back(effects: tuple[str, ...]) -> None:
+    robot = calibrated(loaded_arm(effects, 13), 1)
+    q = robot.random_configurations(200, np.random.default_rng(2))
+    p, R = robot.poses(q)
+    found = inverse(robot, p, R, frame="world", seed=q)
+    assert found.complete
+    regular = found.singular_value > 0.05
+    assert regular.sum() > 90
+    assert np.abs(found.joints - q)[regular].max() < 1e-9
+
+
+def test_readings_under_load_bring_the_twin_to_the_pose() -> None:
+    robot = loaded_arm(("compliance", "hardening", "fourier", "gain", "bearing-compliance", "clearance"), 3)
+    p, R = robot.rigid.poses(robot.random_configurations(8, np.random.default_rng(4)), "tip")
+    found = inverse(robot, p, R, frame="world", target="tip")
+    rows = found.rows(PoseStatus.REACHED, PoseStatus.NEAR_SINGULAR)
+    assert len(rows) >= 6
+    postures = Twin(robot, joint_truths(robot)).postures(found.joints[rows])
+    for row, posture in zip(rows, postures, strict=True):
+        assert np.abs(posture.targets["tip"][:3, 3] - p[found.pose[row]]).max() < 1e-9
+        assert np.abs(posture.targets["tip"][:3, :3] - R[found.pose[row]]).max() < 1e-9
+
+
+def test_the_pose_with_another_payload_takes_other_readings() -> None:
+    arm = loaded_arm(TILTING, 3)
+    p, R = arm.poses(arm.random_configurations(20, np.random.default_rng(4)))
+    light, heavy = (inverse(arm.carrying(Payload(mass, (0.0, 0.02, 0.1))), p, R, frame="world") for mass in (0.3, 5.0))
+    assert light.complete
+    assert heavy.complete
+    same = [one == other for one, other in zip(light.branch, heavy.branch, strict=True)]
+    assert np.abs(light.joints - heavy.joints)[same].max(axis=1).min() > 1e-6
+
+
+@pytest.mark.parametrize(
+    ("name", "orientation"), [("katana450", "axis"), ("katana450", "free"), ("irb120", "free"), ("ur5", "full")]
+)
+def test_under_load_other_arms_and_tasks(name: str, orientation: Any) -> None:
+    plain = calibrated(load_robot(name), 3)
+    masses = tuple(LinkMass(i, 2.0, (0.05, 0.02, -0.03)) for i in range(1, len(plain.joints) + 1))
+    robot = replace(plain, masses=masses, payload=Payload(2.0, (0.02, 0.03, 0.1))).with_effects([*FULL, *TILTING])
+    own = {p.name: 0.3 * p.prior for effect in robot.effects for p in effect.parameters}
+    robot = robot.with_values(own)
+    q = robot.random_configurations(60, np.random.default_rng(1))
+    p, R = robot.poses(q)
+    seed = q + 0.02 * np.random.default_rng(2).standard_normal(q.shape)
+    found = inverse(robot, p, R, frame="world", orientation=orientation, seed=seed)
+    assert found.complete
+    got_p, got_R = robot.poses(found.joints)
+    assert np.abs(got_p - p).max() < 1e-9
+    if orientation == "full":
+        assert np.abs(got_R - R).max() < 1e-9
+    if orientation == "axis":
+        assert np.abs(got_R[:, :, 2] - R[:, :, 2]).max() < 1e-9
+
+
+def test_a_shaft_that_would_have_to_stand_in_the_middle_of_its_clearance_is_told() -> None:
+    """The tool hangs straight down from the last axis: the load has no moment and no side to lay the shaft to."""
+    robot = replace(loaded_arm(("clearance",), 1), payload=Payload(2.7, (0.0, 0.0, 0.1)))
+    robot = replace(robot, masses=robot.masses[:-1])
+    found = inverse(robot, [[0.35, 0.05, 0.35]], np.diag([1.0, -1.0, -1.0])[None])
+    assert found.status == (PoseStatus.UNREACHABLE,)
+    assert 1e-6 < found.orientation_error[0] < 2 * robot.values["clearance_6"]
+    off = inverse(robot, [[0.35, 0.05, 0.35]], np.diag([1.0, -1.0, -1.0])[None], orientation="free")
+    assert off.complete
 
 
 # -- frames, tools, gauge ---------------------------------------------------------------------------------

@@ -336,7 +336,7 @@ class Robot:
         return np.ascontiguousarray(readings_in_equilibrium(self, variables).T)
 
     def straight(self, joints: Array) -> Array:
-        """Return the variables ``(joints or more, n)`` of an arm whose joints ``(joints, n)`` turn and do nothing else."""
+        """Return the variables ``(joints or more, n)`` of joints ``(joints, n)`` that turn and do nothing else."""
         return np.concatenate([joints, np.zeros((len(self.moving) - len(joints), *joints.shape[1:]))])
 
     def tilted(self, variables: Array) -> Array:

@@ -53,6 +53,8 @@ def inverse(
 ) -> JointSolutions:
     """Return joint readings that bring the flange, or a target, to poses.
 
+    The arm is at rest; what depends on the way it came, on temperature or on an external force is left out.
+
     Parameters
     ----------
     robot
@@ -132,9 +134,8 @@ def _answer(task: PoseTask, pool: Candidates, rows: NDArray[np.intp], wanted: in
     position_error, orientation_error = pool.position_error[rows], pool.orientation_error[rows]
     if any(effect.loaded for effect in task.robot.effects):
         # A joint that is all but balanced can come to rest on either side of its play, and the arm elsewhere.
-        comes_to_rest = task.robot.variables(joints, task.robot.values)
-        part = task.of(pose)
-        position_error, orientation_error = part.distances(part.error(part.sweep(comes_to_rest)))
+        part, at_rest = task.of(pose), task.robot.variables(joints, task.robot.values)
+        position_error, orientation_error = part.distances(part.error(part.sweep(at_rest)))
         reached = reached & (position_error <= REACHED) & (orientation_error <= REACHED)
     if task.orientation == "free":
         orientation_error = np.full(len(rows), np.nan)

@@ -114,7 +114,7 @@ def read_constraints(path: Path) -> Constraints:
 
 
 def allowed(
-    robot: Robot, postures: Postures, constraints: Constraints | None, where: str, *, own_targets: bool
+    robot: Robot, postures: Postures, constraints: Constraints | None, where: str, *, seen_from_the_origin: bool
 ) -> Mapping[str, Allowed]:
     """Return for each constraint at which postures it is kept, ``(n,)``; every one is asked about all postures.
 
@@ -126,8 +126,8 @@ def allowed(
         None leaves the robot's own limits alone.
     where
         The constraints file, for messages.
-    own_targets
-        Whether the robot came with its targets, seen from its world's origin.
+    seen_from_the_origin
+        Whether the instrument stands at the origin of the robot's world, unless the constraints say where.
 
     Raises
     ------
@@ -172,7 +172,7 @@ def allowed(
         joints = [sweep.origin(element).T for element in robot.moving[2 : len(robot.joints)]]
         kept["floor"] = np.all([points[:, 2] >= height for points in (*joints, sweep.position.T, *targets)], axis=0)
     if constraints.visibility is not None:
-        origin = -world.rotation.T @ np.array(world.translation) if own_targets else None
+        origin = -world.rotation.T @ np.array(world.translation) if seen_from_the_origin else None
         kept |= _visible(robot, postures, constraints.visibility, constraints.units, f"{where}, visibility", origin)
     if constraints.clearance is not None:
         least = sized_si(constraints.clearance, length, f"{where}, clearance")

@@ -140,13 +140,14 @@ def plan_measurements(
     labels: tuple[str, ...] | None = None,
     constraints: Constraints | None = None,
     where: str = "constraints",
+    seen_from_the_origin: bool = True,
 ) -> MeasurementPlan:
     """Choose configurations to measure.
 
     Parameters
     ----------
     robot
-        Nominal or calibrated; its parameter values are where the derivatives are taken. See :func:`with_targets`.
+        Nominal or calibrated, with targets, see :func:`with_targets`; derivatives are taken at its parameter values.
     candidates
         To choose from.
     model
@@ -163,6 +164,8 @@ def plan_measurements(
         Names of the candidates; numbers in the order of measurement if None.
     constraints, where
         What a configuration must keep besides the robot's limits, and the file that says so, for messages.
+    seen_from_the_origin
+        Whether the instrument stands at the origin of the robot's world, as after a calibration.
 
     Raises
     ------
@@ -181,8 +184,8 @@ def plan_measurements(
             came=f"auto with --objective {objective}",
             cure="Name a number of poses, or use --objective O1.",
         )
-    seen = model.prepared(with_targets(robot))
-    kept = allowed(seen, candidates, constraints, where, own_targets=bool(robot.targets))
+    seen = model.prepared(robot)
+    kept = allowed(seen, candidates, constraints, where, seen_from_the_origin=seen_from_the_origin)
     rejected = {name: int(np.sum(~keeps)) for name, keeps in kept.items()}
     usable = np.flatnonzero(np.all(list(kept.values()), axis=0))
     _refuse_too_few(FIRST if poses is None else poses, len(usable), len(candidates), rejected)
@@ -219,9 +222,7 @@ def plan_measurements(
         usable=len(usable),
         left_out=tuple(name for k, name in enumerate(told.free.names) if k not in among),
         seconds=seconds,
-        prediction=predict(
-            seen, told, order, sensitivity(seen, elsewhere, model, noise), elsewhere.joints, noise, rng
-        ),
+        prediction=predict(seen, told, order, sensitivity(seen, elsewhere, model, noise), elsewhere.joints, noise, rng),
     )
 
 
@@ -240,5 +241,7 @@ def _refuse_too_few(needed: int, usable: int, candidates: int, rejected: Mapping
             where="candidates",
             came=f"{usable} of {candidates} usable" + (f"; rejected by {cost}" if cost else ""),
             allowed=f"{needed} or more",
-            cure="Widen the constraint that costs most, or give more --candidates." if cost else "Give more candidates.",
+            cure="Widen the constraint that costs most, or give more --candidates."
+            if cost
+            else "Give more candidates.",
         )

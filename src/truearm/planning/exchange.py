@@ -10,6 +10,7 @@ objective never falls.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -22,7 +23,7 @@ from truearm.planning.observability import O1, Objective
 #: What the search for a number begins with (Nubiola, section 2.5.2).
 FIRST: Final = 11
 _ROUNDS: Final = 20
-_PROMISING: Final = 24
+_PROMISING: Final = 8
 _GAIN: Final = 1e-9  # of the logarithm of the objective
 
 
@@ -39,6 +40,8 @@ class Candidates:
     whitening
         What turns the parameters into ones that an average choice tells equally well, ``(parameters, parameters)``:
         the information then fits into single precision.
+    colouring
+        Its inverse.
     packed
         Distinct entries of the information of each candidate on those, ``(candidates, entries)``.
     """
@@ -46,6 +49,7 @@ class Candidates:
     rows: Array
     known: Array
     whitening: Array
+    colouring: Array
     packed: NDArray[np.float32]
 
     @classmethod
@@ -53,9 +57,15 @@ class Candidates:
         """Prepare a choice of about `count` candidates."""
         flat = rows.reshape(-1, rows.shape[2])
         average = known + flat.T @ flat * (max(count, 1) / max(len(rows), 1))
-        whitening = np.linalg.inv(np.linalg.cholesky(average)).T
+        colouring = np.linalg.cholesky(average).T
+        whitening = np.linalg.inv(colouring)
         turned = (flat @ whitening).astype(np.float32).reshape(rows.shape)
-        return cls(rows, known, whitening, _packed(turned.swapaxes(1, 2) @ turned))
+        return cls(rows, known, whitening, colouring, _packed(turned.swapaxes(1, 2) @ turned))
+
+    @cached_property
+    def twice(self) -> Array:
+        """How often each distinct entry stands in a matrix, ``(entries,)``."""
+        return _packed(2.0 - np.eye(len(self.known)))
 
     def information(self, chosen: NDArray[np.intp]) -> Array:
         """Return the information of single candidates, ``(chosen, parameters, parameters)``."""
@@ -69,11 +79,8 @@ class Candidates:
 
     def promise(self, slopes: Array) -> NDArray[np.float32]:
         """Return to first order what each candidate adds, ``(candidates, ...)``, for slopes ``(..., m, m)``."""
-        back = np.linalg.inv(self.whitening)
-        turned = back @ slopes @ back.T
-        doubled = turned + turned.swapaxes(-1, -2)
-        doubled[..., np.arange(len(back)), np.arange(len(back))] /= 2.0
-        return np.asarray(self.packed @ _packed(doubled).astype(np.float32).T)
+        turned = _packed(self.colouring @ slopes @ self.colouring.T) * self.twice
+        return np.asarray(self.packed @ turned.astype(np.float32).T)
 
 
 def most_telling(rows: Array, count: int, known: Array, objective: Objective) -> list[int]:
@@ -137,7 +144,7 @@ def most_telling_number(rows: Array, known: Array) -> list[int]:
             tried.append(chosen[:weakest] + chosen[weakest + 1 :])
         better = next((choice for choice in tried if index(choice) > best + _GAIN), None)
         if better is None:
-            better = _exchanged(candidates, chosen, objective)
+            better = exchanged(candidates, chosen, objective)
             if index(better) <= best + _GAIN:
                 return chosen
         chosen, best = better, index(better)
@@ -165,15 +172,15 @@ def _chosen(candidates: Candidates, count: int, objective: Objective) -> list[in
         best, information = _best(candidates, total, objective, promise, chosen)
         chosen.append(best)
         total = total + information
-    return _exchanged(candidates, chosen, objective)
+    return exchanged(candidates, chosen, objective)
 
 
-def _exchanged(candidates: Candidates, chosen: list[int], objective: Objective) -> list[int]:
+def exchanged(candidates: Candidates, chosen: list[int], objective: Objective) -> list[int]:
     """Exchange each of the chosen for a better one as long as there is one."""
     chosen = list(chosen)
     total = candidates.total(chosen)
     for _ in range(_ROUNDS):
-        exchanged = False
+        changed = False
         own = candidates.information(np.array(chosen, dtype=np.intp))
         promise = candidates.promise(objective.slope(total - own))
         for place, old in enumerate(chosen):
@@ -182,8 +189,8 @@ def _exchanged(candidates: Candidates, chosen: list[int], objective: Objective) 
             best, information = _best(candidates, without, objective, promise[:, place], others)
             gain = objective.value(without + information) - objective.value(total)
             if best != old and gain > _GAIN:
-                chosen[place], total, exchanged = best, without + information, True
-        if not exchanged:
+                chosen[place], total, changed = best, without + information, True
+        if not changed:
             break
     return chosen
 

@@ -55,7 +55,7 @@ class O1(Index):
 
     def value(self, information: Array) -> Array:
         """Return the logarithm of the geometric mean."""
-        return _log_determinant(information) / (2.0 * information.shape[-1])
+        return np.asarray(_log_determinant(information) / (2.0 * information.shape[-1]))
 
     def slope(self, information: Array) -> Array:
         """Return the derivative."""

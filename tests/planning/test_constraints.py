@@ -1,4 +1,4 @@
-"""Constraints against matrices of the twin and against Pinocchio-free closed forms; what they refuse."""
+"""Constraints against the twin and closed forms, and what they refuse."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def kept(arm: Robot, postures: Postures, **entries: object) -> dict[str, np.ndar
 
 
 def test_limits_of_the_robot_and_of_the_file(arm: Robot, postures: Postures) -> None:
-    beyond = replace(postures, joints=postures.joints + [np.deg2rad(100), 0, 0, 0, 0, 0])
+    beyond = replace(postures, joints=postures.joints + np.deg2rad([100.0, 0, 0, 0, 0, 0]))
     plain = allowed(arm, beyond, None, "", seen_from_the_origin=True)
     assert list(plain) == ["limits"]
     assert np.array_equal(plain["limits"], np.rad2deg(beyond.joints[:, 0]) <= 165)

@@ -95,9 +95,8 @@ def test_the_promise_is_the_first_order_of_what_is_added() -> None:
     candidates, total = Candidates.of(rows, known, 4), known + total_of(rows, range(6))
     for index in (*INDICES.values(), OfInterest(2)):
         step = 1e-6
-        added = [
-            index.value(total + step * one) - index.value(total - step * one) for one in rows.swapaxes(1, 2) @ rows
-        ]
+        each = step * rows.swapaxes(1, 2) @ rows
+        added = [index.value(total + one) - index.value(total - one) for one in each]
         promised = candidates.promise(index.slope(total))
         assert promised == pytest.approx(np.array(added) / (2 * step), rel=1e-3, abs=1e-6)
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 from truearm.errors import InputError
 from truearm.modeling.chain import Array
 from truearm.planning.observability import O1, Objective
+
+N = TypeVar("N", bound=np.floating[Any])
 
 #: What the search for a number begins with (Nubiola, section 2.5.2).
 FIRST: Final = 11
@@ -37,18 +39,15 @@ class Candidates:
         Derivatives of each by the parameters, per standard deviation, ``(candidates, rows, parameters)``.
     known
         Information that is there beforehand, ``(parameters, parameters)``, positive definite.
-    whitening
-        What turns the parameters into ones that an average choice tells equally well, ``(parameters, parameters)``:
-        the information then fits into single precision.
     colouring
-        Its inverse.
+        Factor of the information of an average choice, ``(parameters, parameters)``.
     packed
-        Distinct entries of the information of each candidate on those, ``(candidates, entries)``.
+        Distinct entries of the information of each candidate on parameters that an average choice tells equally well,
+        where single precision is enough, ``(candidates, entries)``.
     """
 
     rows: Array
     known: Array
-    whitening: Array
     colouring: Array
     packed: NDArray[np.float32]
 
@@ -58,14 +57,13 @@ class Candidates:
         flat = rows.reshape(-1, rows.shape[2])
         average = known + flat.T @ flat * (max(count, 1) / max(len(rows), 1))
         colouring = np.linalg.cholesky(average).T
-        whitening = np.linalg.inv(colouring)
-        turned = (flat @ whitening).astype(np.float32).reshape(rows.shape)
-        return cls(rows, known, whitening, colouring, _packed(turned.swapaxes(1, 2) @ turned))
+        turned = (flat @ np.linalg.inv(colouring)).astype(np.float32).reshape(rows.shape)
+        return cls(rows, known, colouring, _packed(turned.swapaxes(1, 2) @ turned))
 
     @cached_property
     def twice(self) -> Array:
         """How often each distinct entry stands in a matrix, ``(entries,)``."""
-        return _packed(2.0 - np.eye(len(self.known)))
+        return _packed(np.asarray(2.0 - np.eye(len(self.known)), dtype=np.float64))
 
     def information(self, chosen: NDArray[np.intp]) -> Array:
         """Return the information of single candidates, ``(chosen, parameters, parameters)``."""
@@ -208,7 +206,7 @@ def _best(
     return int(few[best]), information[best]
 
 
-def _packed(matrices: NDArray[np.floating]) -> NDArray[np.floating]:
+def _packed(matrices: NDArray[N]) -> NDArray[N]:
     """Return the entries on and above the diagonal of symmetric matrices, ``(..., entries)``."""
     rows, columns = np.triu_indices(matrices.shape[-1])
     return matrices[..., rows, columns]

@@ -56,7 +56,7 @@ class Candidates:
         """Prepare a choice of about `count` candidates."""
         flat = rows.reshape(-1, rows.shape[2])
         average = known + flat.T @ flat * (max(count, 1) / max(len(rows), 1))
-        colouring = np.linalg.cholesky(average).T
+        colouring = np.asarray(np.linalg.cholesky(average).T, dtype=np.float64)
         turned = (flat @ np.linalg.inv(colouring)).astype(np.float32).reshape(rows.shape)
         return cls(rows, known, colouring, _packed(turned.swapaxes(1, 2) @ turned))
 

@@ -42,7 +42,7 @@ def answer(plan: MeasurementPlan) -> tuple[str, ...]:
     count = len(plan.joints)
     first = (
         f"Measured at these {count} configurations, the {plan.model.name} model will miss readings elsewhere by"
-        f" {planned} mm on average; with any number of them it would be {floor} mm, which is the noise."
+        f" {planned} mm on average. No number of poses brings that below {floor} mm, the noise."
     )
     if told.enough is None:
         return first, "More poses than were looked at are needed to come within 10 % of that."

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,12 +14,13 @@ from truearm.calibration import Calibration, calibrate
 from truearm.identification.fit import identify
 from truearm.identification.losses import Loss
 from truearm.identification.models import MODELS
-from truearm.measurement.dataset import Dataset
+from truearm.measurement.dataset import Dataset, IntArray
 from truearm.measurement.readers.canonical import csv_text, read_csv
 from truearm.measurement.readers.matrices import read_matrices
 from truearm.measurement.statistics import errors_of
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
+from truearm.planning.measurement_plan import plan_measurements, with_targets
 from truearm.robots import load_robot
 
 SEEDS = range(10)
@@ -193,3 +195,34 @@ def test_a_measured_file_is_written_as_it_was_read(positioner: tuple[Robot, Path
     again = tmp_path / "again.csv"
     again.write_text(text)
     assert csv_text(read_csv(again)) == text
+
+
+@pytest.mark.parametrize("effects", [("compliance", "hardening"), ("compliance",)])
+def test_chosen_configurations_against_random_ones_on_the_irb120(irb120: Dataset, effects: tuple[str, ...]) -> None:
+    """38 of 300 by O1: with hardening stiffness at least as good in the mean and better in the maximum."""
+    model = replace(next(m for m in MODELS if m.name == "elastic"), effects=effects)
+    robot = load_robot("irb120").carrying(PAYLOAD)
+    chosen, drawn = [], []
+    for seed in SEEDS[:5]:
+        order = np.random.default_rng(seed).permutation(irb120.configurations)
+        training, held_out = irb120.of_configurations(order[:300]), irb120.of_configurations(order[300:])
+
+        def judged(
+            which: Sequence[int] | IntArray, training: Dataset = training, held_out: Dataset = held_out
+        ) -> tuple[float, float]:
+            fit = identify(robot, training.of_configurations(which), model)
+            norms = 1e3 * errors_of(fit.robot, held_out).position_norms
+            return float(norms.mean()), float(norms.max())
+
+        arm = with_targets(robot, training)
+        rng = np.random.default_rng(seed)
+        plan = plan_measurements(arm, training.postures, model, poses=38, rng=rng)
+        chosen.append(judged(plan.chosen))
+        drawn.append(np.median([judged(rng.permutation(300)[:38]) for _ in range(10)], axis=0))
+    by_o1, by_chance = np.median(chosen, axis=0), np.median(drawn, axis=0)
+    if "hardening" in effects:
+        assert by_o1[0] <= by_chance[0]
+        assert by_o1[1] <= 0.85 * by_chance[1]
+    else:
+        assert by_o1[0] <= 1.15 * by_chance[0]
+        assert by_o1[1] <= by_chance[1]

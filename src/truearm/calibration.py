@@ -496,6 +496,18 @@ def _train_count(train: Train, n: int, where: str) -> int:
     return count
 
 
+def named_model(name: str) -> Model:
+    """Return the model of this name.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    model: Model = _chosen(name, {m.name: m for m in MODELS}, "model")
+    return model
+
+
 def _chosen(name: str, known: Mapping[str, Any], option: str) -> Any:
     if name in known:
         return known[name]

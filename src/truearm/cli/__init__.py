@@ -15,6 +15,7 @@ from truearm.cli.convert import convert
 from truearm.cli.ik import ik
 from truearm.cli.importing import app as importing
 from truearm.cli.library import robots, show
+from truearm.cli.plan import plan
 from truearm.cli.simulate import simulate
 from truearm.cli.starting import demo, example, new_robot
 from truearm.cli.study import HELP, study
@@ -55,6 +56,7 @@ app.command()(check)
 app.command()(calibrate)
 app.command()(validate)
 app.command()(ik)
+app.command()(plan)
 app.command()(simulate)
 app.add_typer(importing, name="import")
 app.command()(robots)

@@ -62,11 +62,11 @@ def find_redundancies(problem: Problem, vector: Array, held: Sequence[str] = ())
     """
     A = problem.linearised(vector)[1] * problem.free.prior
     names = problem.free.names
-    kept = _independent(A, range(len(names)), problem.free)
+    kept = independent_columns(A, range(len(names)), problem.free)
     dropped = [i for i in _in_order(problem.free) if i not in kept]
     if held:
         rest = [i for i, name in enumerate(names) if name not in held]
-        if len(kept) == len(rest) == len(_independent(A, rest, problem.free)):
+        if len(kept) == len(rest) == len(independent_columns(A, rest, problem.free)):
             kept, dropped = rest, [names.index(name) for name in held]
     if not dropped:
         return ()
@@ -85,8 +85,11 @@ def _place(group: str) -> str:
     return group if group in _ORDER else ""
 
 
-def _independent(A: Array, among: Iterable[int], free: FreeParameters) -> list[int]:
-    """Return columns of A that span all of those `among`, the ones that stand well apart first."""
+def independent_columns(A: Array, among: Iterable[int], free: FreeParameters) -> list[int]:
+    """Return columns of a whitened Jacobian, per prior, that span all of those `among`.
+
+    The ones that stand well apart come first.
+    """
     norms = np.linalg.norm(A, axis=0)
     left = [i for i in _in_order(free) if i in set(among) and norms[i] > 1e-12 * norms.max()]
     rests = {i: A[:, i].copy() for i in left}

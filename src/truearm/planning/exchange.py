@@ -1,26 +1,88 @@
-"""Which of many possible measurements tell most: a D-optimal choice by exchange.
+"""Which of many possible measurements tell most: a choice by exchange.
 
-The measure is the determinant of the information on the parameters of interest, with what the others take away
-(the Schur complement, D_s-optimality: Atkinson, Donev and Tobias 2007, "Optimum experimental designs, with SAS",
-section 10.3). Measurements are added one at a time, then each is exchanged for a better one as long as there is one
-(Fedorov 1972, "Theory of optimal experiments").
+Measurements are added one at a time, then each is exchanged for a better one as long as there is one (Fedorov 1972,
+"Theory of optimal experiments"; Cook and Nachtsheim 1980). What each candidate would add is looked at to first order,
+for all of them at once: the inner product of its information with the slope of the objective, one matrix product in
+single precision over the distinct entries of the information. The most promising ones are then weighed exactly, so the
+objective never falls.
 """
 
 from __future__ import annotations
 
-from typing import Final
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Final, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truearm.errors import InputError
 from truearm.modeling.chain import Array
+from truearm.planning.observability import O1, Objective
 
-_ROUNDS: Final = 10
-_GAIN: Final = 1e-9  # of the logarithm of the determinant
+N = TypeVar("N", bound=np.floating[Any])
+
+#: What the search for a number begins with (Nubiola, section 2.5.2).
+FIRST: Final = 11
+_ROUNDS: Final = 20
+_PROMISING: Final = 8
+_GAIN: Final = 1e-9  # of the logarithm of the objective
 
 
-def most_telling(rows: Array, count: int, known: Array, interest: int) -> list[int]:
-    """Return the indices of `count` measurements that together tell most, in the order of their choice.
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """Measurements to choose from.
+
+    Attributes
+    ----------
+    rows
+        Derivatives of each by the parameters, per standard deviation, ``(candidates, rows, parameters)``.
+    known
+        Information that is there beforehand, ``(parameters, parameters)``, positive definite.
+    colouring
+        Factor of the information of an average choice, ``(parameters, parameters)``.
+    packed
+        Distinct entries of the information of each candidate on parameters that an average choice tells equally well,
+        where single precision is enough, ``(candidates, entries)``.
+    """
+
+    rows: Array
+    known: Array
+    colouring: Array
+    packed: NDArray[np.float32]
+
+    @classmethod
+    def of(cls, rows: Array, known: Array, count: int) -> Candidates:
+        """Prepare a choice of about `count` candidates."""
+        flat = rows.reshape(-1, rows.shape[2])
+        average = known + flat.T @ flat * (max(count, 1) / max(len(rows), 1))
+        colouring = np.asarray(np.linalg.cholesky(average).T, dtype=np.float64)
+        turned = (flat @ np.linalg.inv(colouring)).astype(np.float32).reshape(rows.shape)
+        return cls(rows, known, colouring, _packed(turned.swapaxes(1, 2) @ turned))
+
+    @cached_property
+    def twice(self) -> Array:
+        """How often each distinct entry stands in a matrix, ``(entries,)``."""
+        return _packed(np.asarray(2.0 - np.eye(len(self.known)), dtype=np.float64))
+
+    def information(self, chosen: NDArray[np.intp]) -> Array:
+        """Return the information of single candidates, ``(chosen, parameters, parameters)``."""
+        rows = self.rows[chosen]
+        return np.asarray(rows.swapaxes(1, 2) @ rows)
+
+    def total(self, chosen: list[int]) -> Array:
+        """Return what is known beforehand and from the chosen, ``(parameters, parameters)``."""
+        rows = self.rows[chosen].reshape(-1, self.rows.shape[2])
+        return np.asarray(self.known + rows.T @ rows)
+
+    def promise(self, slopes: Array) -> NDArray[np.float32]:
+        """Return to first order what each candidate adds, ``(candidates, ...)``, for slopes ``(..., m, m)``."""
+        turned = _packed(self.colouring @ slopes @ self.colouring.T) * self.twice
+        return np.asarray(self.packed @ turned.astype(np.float32).T)
+
+
+def most_telling(rows: Array, count: int, known: Array, objective: Objective) -> list[int]:
+    """Return the indices of `count` measurements that together tell most.
 
     Parameters
     ----------
@@ -31,54 +93,120 @@ def most_telling(rows: Array, count: int, known: Array, interest: int) -> list[i
         How many to choose.
     known
         Information that is there beforehand, ``(parameters, parameters)``, positive definite.
-    interest
-        How many of the parameters, the first ones, are of interest.
+    objective
+        What is made large.
 
     Raises
     ------
     InputError
         If there are fewer candidates.
     """
-    if not 0 <= count <= len(rows):
+    _refuse_too_many(count, len(rows))
+    return _chosen(Candidates.of(rows, known, count), count, objective)
+
+
+def most_telling_number(rows: Array, known: Array) -> list[int]:
+    """Return the indices of as many measurements as make O1 largest, beginning with 11.
+
+    One is added, taken away or exchanged as long as the index rises (Nubiola, section 2.5.2).
+
+    Parameters
+    ----------
+    rows, known
+        As for :func:`most_telling`.
+
+    Raises
+    ------
+    InputError
+        If there are fewer than 11 candidates.
+    """
+    _refuse_too_many(FIRST, len(rows))
+    objective = O1()
+    candidates = Candidates.of(rows, known, FIRST)
+    chosen = _chosen(candidates, FIRST, objective)
+
+    def index(choice: list[int]) -> float:
+        return float(objective.value(candidates.total(choice))) - 0.5 * float(np.log(len(choice)))
+
+    best = index(chosen)
+    while True:
+        tried = []
+        if len(chosen) < len(rows):
+            more = candidates.total(chosen)
+            promise = candidates.promise(objective.slope(more))
+            tried.append([*chosen, _best(candidates, more, objective, promise, chosen)[0]])
+        if len(chosen) > 1:
+            total = candidates.total(chosen)
+            left = objective.value(total - candidates.information(np.array(chosen)))
+            weakest = int(np.argmax(left))
+            tried.append(chosen[:weakest] + chosen[weakest + 1 :])
+        better = next((choice for choice in tried if index(choice) > best + _GAIN), None)
+        if better is None:
+            better = exchanged(candidates, chosen, objective)
+            if index(better) <= best + _GAIN:
+                return chosen
+        chosen, best = better, index(better)
+
+
+def _refuse_too_many(count: int, candidates: int) -> None:
+    if not 0 <= count <= candidates:
         raise InputError(
             "there are not so many measurements to choose from",
             where="number of measurements",
             came=count,
-            allowed=f"0 to {len(rows)}",
+            allowed=f"0 to {candidates}",
         )
-    information = rows.swapaxes(1, 2) @ rows
+
+
+def _chosen(candidates: Candidates, count: int, objective: Objective) -> list[int]:
+    """Choose one after the other, as if average ones stood for those to come, then exchange."""
+    flat = candidates.rows.reshape(-1, candidates.rows.shape[2])
+    average = flat.T @ flat / max(len(candidates.rows), 1)
     chosen: list[int] = []
-    total = np.array(known)
+    total = candidates.known + count * average
     for _ in range(count):
-        best, _ = _best(rows, total, interest, chosen)
+        total = total - average
+        promise = candidates.promise(objective.slope(total))
+        best, information = _best(candidates, total, objective, promise, chosen)
         chosen.append(best)
-        total = total + information[best]
+        total = total + information
+    return exchanged(candidates, chosen, objective)
+
+
+def exchanged(candidates: Candidates, chosen: list[int], objective: Objective) -> list[int]:
+    """Exchange each of the chosen for a better one as long as there is one."""
+    chosen = list(chosen)
+    total = candidates.total(chosen)
     for _ in range(_ROUNDS):
-        exchanged = False
+        changed = False
+        own = candidates.information(np.array(chosen, dtype=np.intp))
+        promise = candidates.promise(objective.slope(total - own))
         for place, old in enumerate(chosen):
-            without = total - information[old]
+            without = total - own[place]
             others = chosen[:place] + chosen[place + 1 :]
-            best, gains = _best(rows, without, interest, others)
-            if gains[best] > gains[old] + _GAIN:
-                chosen[place], total, exchanged = best, without + information[best], True
-        if not exchanged:
+            best, information = _best(candidates, without, objective, promise[:, place], others)
+            gain = objective.value(without + information) - objective.value(total)
+            if best != old and gain > _GAIN:
+                chosen[place], total, changed = best, without + information, True
+        if not changed:
             break
     return chosen
 
 
-def _best(rows: Array, total: Array, interest: int, taken: list[int]) -> tuple[int, Array]:
-    """Return the candidate that tells most beyond `total`, and what each would add."""
-    gains = _added(rows, total)
-    if interest < len(total):
-        gains = gains - _added(rows[..., interest:], total[interest:, interest:])
-    gains[taken] = -np.inf
-    return int(np.argmax(gains)), gains
+def _best(
+    candidates: Candidates, total: Array, objective: Objective, promise: NDArray[np.float32], taken: list[int]
+) -> tuple[int, Array]:
+    """Return the candidate that adds most to `total`, and its information."""
+    promise = promise.copy()
+    promise[taken] = -np.inf
+    several = min(_PROMISING, len(promise) - len(taken))
+    few = np.argpartition(promise, len(promise) - several)[len(promise) - several :]
+    information = candidates.information(few)
+    best = int(np.argmax(objective.value(total + information)))
+    return int(few[best]), information[best]
 
 
-def _added(rows: Array, total: Array) -> Array:
-    """Return what each candidate adds to the logarithm of the determinant (by the matrix determinant lemma)."""
-    scale = 1.0 / np.sqrt(np.diag(total))
-    scaled = rows * scale
-    inverse = np.linalg.inv(total * np.outer(scale, scale))
-    inner = np.eye(rows.shape[1]) + scaled @ inverse @ scaled.swapaxes(1, 2)
-    return np.asarray(np.linalg.slogdet(inner)[1], dtype=np.float64)
+def _packed(matrices: NDArray[N]) -> NDArray[N]:
+    """Return the entries on and above the diagonal of symmetric matrices, ``(..., entries)``."""
+    rows, columns = np.triu_indices(matrices.shape[-1])
+    return matrices[..., rows, columns]

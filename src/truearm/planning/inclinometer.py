@@ -24,6 +24,7 @@ from truearm.modeling.chain import Array
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
 from truearm.planning.exchange import most_telling
+from truearm.planning.observability import OfInterest
 
 _CANDIDATES: Final = 1500
 
@@ -129,7 +130,7 @@ def _chosen(candidates: Pairs, rows: Array, count: int, known: Array, interest: 
             allowed=f"{ENOUGH}, in {count} pairs",
             cure="Give a larger force, or a payload beside the last axis.",
         )
-    chosen = telling[most_telling(rows[telling], count, known, interest)]
+    chosen = telling[most_telling(rows[telling], count, known, OfInterest(interest))]
     told = rows[chosen].reshape(-1, rows.shape[2])
     return candidates.at(chosen), known + told.T @ told
 

@@ -1,4 +1,4 @@
-"""An order of configurations in which all joints move from one to the next, on a short way.
+"""An order of configurations on a short way, in which all joints move from one to the next if that is wanted.
 
 Nearest neighbour first, then 2-opt: a stretch of the order is reversed wherever that shortens the way (Croes, "A method
 for solving traveling-salesman problems", Operations Research 6, 1958). The way between two configurations is the
@@ -36,6 +36,11 @@ def all_moving_order(joints: Array, least_move: float) -> NDArray[np.intp]:
     """
     cost = _costs(joints, least_move)
     return _exchanged(_nearest_neighbours(cost), cost)
+
+
+def short_order(joints: Array) -> NDArray[np.intp]:
+    """Return an order of configurations ``(n, joints)`` on a short way; the first stays the first."""
+    return all_moving_order(joints, 0.0)
 
 
 def _costs(joints: Array, least_move: float) -> Array:

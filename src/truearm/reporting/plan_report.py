@@ -1,0 +1,111 @@
+"""What a plan of measurements is good for: one HTML file."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from truearm.planning.measurement_plan import MeasurementPlan
+from truearm.planning.prediction import Prediction
+from truearm.reporting.drawing import AFTER, BEFORE, CAMERA, Figure, axis, base_axes, figure, scene_axis
+from truearm.reporting.numbers import rounded, rounded_to, significant
+from truearm.reporting.page import page
+
+_INDEX_WORDS: Final = {
+    "O1": "geometric mean of the singular values, per square root of the poses",
+    "O2": "smallest by largest singular value",
+    "O3": "smallest singular value",
+    "O4": "noise amplification: smallest squared by largest",
+    "O5": "inverse of the sum of the inverse singular values",
+}
+
+
+def plan_html(plan: MeasurementPlan, command: str) -> str:
+    """Return the page of a plan; `command` is how to make it again."""
+    figures = {"number": number_figure(plan.prediction, len(plan.joints)), "workspace": workspace_figure(plan)}
+    return page(
+        "plan.html.jinja",
+        figures,
+        plan=plan,
+        command=command,
+        words=answer(plan),
+        indices=[(name, _INDEX_WORDS[name], f"{value:.4g}") for name, value in plan.indices.items()],
+    )
+
+
+def answer(plan: MeasurementPlan) -> tuple[str, ...]:
+    """Return how accurate the calibration will be and how many poses it needs, in words."""
+    told = plan.prediction
+    planned, floor = (significant(value * 1e3, 3) for value in (told.planned, told.floor))
+    count = len(plan.joints)
+    first = (
+        f"Measured at these {count} configurations, the {plan.model.name} model will miss readings elsewhere by"
+        f" {planned} mm on average. No number of poses brings that below {floor} mm, the noise."
+    )
+    if told.enough is None:
+        return first, "More poses than were looked at are needed to come within 10 % of that."
+    return first, f"{told.enough} well-chosen poses are enough to come within 10 % of that."
+
+
+def number_figure(told: Prediction, planned: int) -> Figure:
+    """Show how the predicted error falls with the number of poses."""
+    numbers = told.numbers.tolist()
+    traces: list[Figure] = [
+        {
+            "type": "scatter",
+            "mode": "lines+markers",
+            "name": name,
+            "x": numbers,
+            "y": rounded(1e3 * errors, 4),
+            "line": {"color": colour, "width": 2},
+        }
+        for name, errors, colour in (("drawn by chance", told.random, BEFORE), ("chosen", told.chosen, AFTER))
+    ]
+    traces.append(
+        {
+            "type": "scatter",
+            "mode": "markers",
+            "name": "this plan",
+            "x": [planned],
+            "y": rounded(np.array([1e3 * told.planned]), 4),
+            "marker": {"color": "#b3261e", "size": 10, "symbol": "diamond"},
+        }
+    )
+    line = {"type": "line", "x0": 0, "x1": 1, "xref": "paper", "line": {"dash": "dot", "color": "#646b72"}}
+    shapes = [line | {"y0": 1e3 * told.floor, "y1": 1e3 * told.floor}]
+    highest = 1e3 * max([2.0 * told.floor, told.planned * 1.05])
+    return figure(
+        traces,
+        420,
+        xaxis=axis("poses") | {"rangemode": "tozero"},
+        yaxis=axis("mean error of unseen readings [mm]") | {"range": [0.9e3 * told.floor, highest]},
+        shapes=shapes,
+    )
+
+
+def workspace_figure(plan: MeasurementPlan) -> Figure:
+    """Show where in the workspace the calibrated model will be good: its own error, without the noise of a reading."""
+    told = plan.prediction
+    base = plan.robot.base
+    points = 1e3 * (told.places - np.array(base.translation)) @ base.rotation
+    errors = rounded(1e3 * told.error, 3)
+    trace = {
+        "type": "scatter3d",
+        "mode": "markers",
+        **{letter: rounded_to(column, 1) for letter, column in zip("xyz", points.T, strict=True)},
+        "marker": {
+            "size": 4,
+            "color": errors,
+            "colorscale": "Viridis",
+            "reversescale": True,
+            "colorbar": {"title": {"text": "mm"}, "thickness": 14},
+        },
+        "customdata": errors,
+        "hovertemplate": "flange at %{x}, %{y}, %{z} mm: %{customdata} mm<extra></extra>",
+        "showlegend": False,
+    }
+    length = float(10.0 ** math.floor(math.log10(max(float(np.abs(points).max()), 1.0) / 2.0)))
+    axes = {f"{letter}axis": scene_axis(f"{letter} [mm]") for letter in "xyz"}
+    return figure([trace, *base_axes(length)], 620, scene={**axes, "aspectmode": "data", "camera": CAMERA})

@@ -1,0 +1,165 @@
+"""Constraints against the twin and closed forms, and what they refuse."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from truearm.errors import InputError
+from truearm.measurement.truths import STATION, truth_twin
+from truearm.modeling.postures import Postures
+from truearm.modeling.robot import Robot
+from truearm.planning.clearance import smallest_clearance
+from truearm.planning.constraints import Constraints, allowed, read_constraints
+from truearm.robots import load_robot
+
+HEAD = {"truearm": "truearm-constraints/1", "units": {"length": "mm", "angle": "deg"}}
+COUNT = 60
+
+
+@pytest.fixture(scope="module")
+def arm() -> Robot:
+    """An IRB 120 that an instrument at the origin sees from 2.6 m."""
+    return truth_twin(load_robot("irb120"), "nominal", np.random.default_rng(0)).robot
+
+
+@pytest.fixture(scope="module")
+def postures(arm: Robot) -> Postures:
+    return Postures(arm.random_configurations(COUNT, np.random.default_rng(1)))
+
+
+def kept(arm: Robot, postures: Postures, **entries: object) -> dict[str, np.ndarray]:
+    rules = Constraints.model_validate(HEAD | entries)
+    return dict(allowed(arm, postures, rules, "rules.yaml", seen_from_the_origin=True))
+
+
+def test_limits_of_the_robot_and_of_the_file(arm: Robot, postures: Postures) -> None:
+    beyond = replace(postures, joints=postures.joints + np.deg2rad([100.0, 0, 0, 0, 0, 0]))
+    plain = allowed(arm, beyond, None, "", seen_from_the_origin=True)
+    assert list(plain) == ["limits"]
+    assert np.array_equal(plain["limits"], np.rad2deg(beyond.joints[:, 0]) <= 165)
+    narrow = kept(arm, postures, limits={2: [-30, 200]})["limits"]
+    assert np.array_equal(narrow, np.rad2deg(postures.joints[:, 1]) >= -30)
+    assert narrow.any()
+    assert not narrow.all()
+
+
+def test_the_sign_of_the_moment_is_the_twins(arm: Robot, postures: Postures) -> None:
+    twin = truth_twin(load_robot("irb120"), "nominal", np.random.default_rng(0))
+    loads = np.array([posture.loads[:, 5] for posture in twin.postures(postures.joints)])
+    found = kept(arm, postures, moments={2: "positive", 3: "negative"})
+    assert np.array_equal(found["moment_2"], loads[:, 1] > 0)
+    assert np.array_equal(found["moment_3"], loads[:, 2] < 0)
+    assert 0 < found["moment_2"].sum() < COUNT
+
+
+def test_box_and_floor_in_the_base_frame(arm: Robot, postures: Postures) -> None:
+    twin = truth_twin(load_robot("irb120"), "nominal", np.random.default_rng(0))
+    world_base = np.eye(4)
+    world_base[:3, :3], world_base[:3, 3] = arm.base.rotation, arm.base.translation
+    from_world = np.linalg.inv(world_base)
+    places = np.array(
+        [
+            [(from_world @ frame)[:3, 3] for frame in posture.targets.values()]
+            for posture in twin.postures(postures.joints)
+        ]
+    )
+    inside = ((places[..., 0] >= 0) & (places[..., 2] <= 0.5)).all(axis=1)
+    assert np.array_equal(kept(arm, postures, box={"of": "targets", "x": [0, 9e3], "z": [-9e3, 500]})["box"], inside)
+    floor = kept(arm, postures, floor=200)["floor"]
+    assert not floor[(places[..., 2] < 0.2).any(axis=1)].any()
+    assert floor.any()
+    flange = kept(arm, postures, box={"of": "flange", "y": [0, 9e3]})["box"]
+    nominal = load_robot("irb120")
+    assert np.array_equal(flange, nominal.poses(postures)[0][:, 1] >= 0)
+
+
+def test_targets_look_at_the_instrument(arm: Robot, postures: Postures) -> None:
+    twin = truth_twin(load_robot("irb120"), "nominal", np.random.default_rng(0))
+    frames = [posture.targets["2"] for posture in twin.postures(postures.joints)]  # turned as the flange is
+    rule = {"within": 60, "targets": {"2": [0, 1, 1]}}
+    angle = [
+        np.degrees(np.arccos(frame[:3, :3] @ [0, 1, 1] / np.sqrt(2) @ -frame[:3, 3] / np.linalg.norm(frame[:3, 3])))
+        for frame in frames
+    ]
+    found = kept(arm, postures, visibility=rule)["visibility_2"]
+    assert np.array_equal(found, np.array(angle) <= 60)
+    assert 0 < found.sum() < COUNT
+    base = arm.base
+    place = 1e3 * -base.rotation.T @ np.array(base.translation)
+    again = kept(arm, postures, visibility=rule | {"instrument": place.tolist()})["visibility_2"]
+    assert np.array_equal(found, again)
+    assert np.linalg.norm(place) == pytest.approx(1e3 * np.linalg.norm(STATION.translation))
+
+
+def test_clearance_of_a_folded_arm() -> None:
+    """An UR5 whose forearm, 392.25 mm long, is folded back to within 5 deg of the upper arm."""
+    joints = np.zeros((2, 6))
+    joints[:, 1], joints[:, 2] = -np.pi / 2, np.deg2rad([0, 175])
+    straight, folded = smallest_clearance(load_robot("ur5"), joints, 0.12)
+    assert straight > 0.12
+    assert folded == pytest.approx(0.39225 * np.sin(np.deg2rad(5)))
+
+
+def test_distances_of_links_by_brute_force(arm: Robot) -> None:
+    from truearm.planning.clearance import _apart
+
+    rng = np.random.default_rng(2)
+    a, b, c, d = rng.normal(size=(4, 40, 3))
+    d[:10] = c[:10] + (b - a)[:10]  # parallel ones
+    s = np.linspace(0, 1, 201)
+    first = a[:, None] + s[:, None] * (b - a)[:, None]
+    second = c[:, None] + s[:, None] * (d - c)[:, None]
+    brute = np.linalg.norm(first[:, :, None] - second[:, None], axis=3).min(axis=(1, 2))
+    assert _apart(a, b, c, d) == pytest.approx(brute, abs=0.02)
+    assert (_apart(a, b, c, d) <= brute + 1e-12).all()
+
+
+@pytest.mark.parametrize(
+    ("entries", "words"),
+    [
+        ({"limits": {7: [0, 1]}}, "no such joint.*1 to 6"),
+        ({"limits": {2: [10, 0]}}, "leaves no value"),
+        ({"moments": {9: "positive"}}, "no such joint"),
+        ({"box": {"of": "flange", "x": [1, 0]}}, "leaves no value"),
+        ({"visibility": {"within": 30, "targets": {"4": [0, 0, 1]}}}, "no target of this name"),
+    ],
+)
+def test_what_does_not_fit_the_robot_is_refused(
+    arm: Robot, postures: Postures, entries: dict[str, object], words: str
+) -> None:
+    with pytest.raises(InputError, match=words):
+        kept(arm, postures, **entries)
+
+
+def test_an_instrument_must_stand_somewhere(arm: Robot, postures: Postures) -> None:
+    rules = Constraints.model_validate(HEAD | {"visibility": {"within": 30, "targets": {"1": [0, 0, 1]}}})
+    with pytest.raises(InputError, match="nobody knows where the instrument stands"):
+        allowed(arm, postures, rules, "rules.yaml", seen_from_the_origin=False)
+
+
+def test_moments_need_masses(postures: Postures) -> None:
+    with pytest.raises(InputError, match="no masses"):
+        kept(load_robot("kr5"), postures, moments={2: "positive"})
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("flor: 3", "not known.*floor"),
+        ("moments: {2: up}", "moments"),
+        ("box: {of: flange, w: [0, 1]}", "not known"),
+        ("visibility: {within: 30, targets: {}}", "targets"),
+        ("visibility: {within: 30, targets: {'1': [0, 0, 0]}}", "direction cannot be zero"),
+        ("clearance: -1", "clearance"),
+        ("limits: {2: [0, .nan]}", "limits"),
+    ],
+)
+def test_entries_that_are_not_known_are_refused(tmp_path: Path, text: str, words: str) -> None:
+    file = tmp_path / "rules.yaml"
+    file.write_text(f"truearm: truearm-constraints/1\nunits: {{length: mm, angle: deg}}\n{text}\n")
+    with pytest.raises(InputError, match=f"(?s){words}"):
+        read_constraints(file)

@@ -1,0 +1,185 @@
+"""Plans of measurements: what is chosen, what is refused, and whether the prediction comes true."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from truearm.errors import InputError
+from truearm.identification.fit import identify
+from truearm.identification.models import MODELS
+from truearm.measurement.truths import truth_twin
+from truearm.measurement.twin import measure
+from truearm.planning.constraints import Constraints
+from truearm.planning.measurement_plan import (
+    APPROACH,
+    MeasurementPlan,
+    plan_measurements,
+    random_candidates,
+    with_targets,
+)
+from truearm.planning.ordering import short_order
+from truearm.planning.prediction import predict
+from truearm.planning.sensitivity import sensitivity
+from truearm.robots import load_robot
+
+MODEL = {model.name: model for model in MODELS}
+
+
+def made(poses: int | None = 20, candidates: int = 300, **options: object) -> MeasurementPlan:
+    rng = np.random.default_rng(0)
+    arm = with_targets(load_robot("irb120"))
+    return plan_measurements(
+        arm,
+        random_candidates(arm, candidates, rng),
+        MODEL["geometric"],
+        poses=poses,
+        rng=rng,
+        **options,  # type: ignore[arg-type]
+    )
+
+
+@pytest.fixture(scope="module")
+def plan() -> MeasurementPlan:
+    return made()
+
+
+def test_a_plan_is_better_than_chance_and_within_limits(plan: MeasurementPlan) -> None:
+    arm = plan.robot
+    low, high = np.array([joint.limits for joint in arm.joints]).T
+    assert plan.joints.shape == (20, 6)
+    assert len(set(plan.chosen.tolist())) == 20
+    assert ((plan.joints >= low) & (plan.joints <= high)).all()
+    told = plan.prediction
+    assert (told.chosen < told.random).all()
+    assert (np.diff(told.chosen) < 0).all()
+    assert told.floor < told.planned < told.random[0]
+    assert told.enough is not None
+    assert told.chosen[told.numbers.tolist().index(told.enough)] <= 1.1 * told.floor
+
+
+def test_every_joint_comes_from_below(plan: MeasurementPlan) -> None:
+    low = np.array([joint.limits[0] for joint in plan.robot.joints if joint.limits])
+    step = plan.joints - plan.before
+    inside = plan.joints - APPROACH["revolute"] >= low
+    assert step[inside] == pytest.approx(APPROACH["revolute"])
+    assert (step >= 0).all()
+    assert (plan.before >= low).all()
+
+
+def test_the_order_is_shorter_than_by_chance(plan: MeasurementPlan) -> None:
+    def way(joints: np.ndarray) -> float:
+        return float(np.abs(np.diff(joints, axis=0)).max(axis=1).sum())
+
+    rng = np.random.default_rng(1)
+    assert way(plan.joints) < 0.9 * min(way(rng.permutation(plan.joints)) for _ in range(50))
+    points = np.array([[0.0], [3.0], [1.0], [2.0]])
+    assert short_order(points).tolist() == [0, 2, 3, 1]
+
+
+def test_what_cannot_be_told_apart_is_named(plan: MeasurementPlan) -> None:
+    assert {"d_3", "theta_offset_1", "theta_offset_6"} <= set(plan.left_out)  # against d_2, base and targets
+    assert "theta_offset_2" not in plan.left_out
+
+
+def test_each_objective_is_best_by_its_own_measure() -> None:
+    plans = {name: made(candidates=80, objective=name) for name in ("O1", "O3", "O5")}
+    for name, plan in plans.items():
+        assert plan.indices[name] == max(other.indices[name] for other in plans.values())
+
+
+def test_the_same_seed_gives_the_same_plan(plan: MeasurementPlan) -> None:
+    again = made()
+    assert np.array_equal(plan.joints, again.joints)
+    assert plan.summary() | {"seconds": 0} == again.summary() | {"seconds": 0}
+
+
+def test_constraints_are_counted_and_kept() -> None:
+    rules = Constraints.model_validate(
+        {
+            "truearm": "truearm-constraints/1",
+            "units": {"length": "mm", "angle": "deg"},
+            "moments": {2: "positive"},
+            "floor": 0,
+        }
+    )
+    plan = made(constraints=rules)
+    assert set(plan.rejected) == {"limits", "moment_2", "floor"}
+    assert plan.rejected["limits"] == 0
+    assert (
+        plan.candidates - sum(plan.rejected.values()) <= plan.usable < plan.candidates - plan.rejected["moment_2"] + 1
+    )
+    tight = rules.model_copy(update={"floor": 900.0})
+    with pytest.raises(InputError, match=r"(?s)too few.*rejected by moment_2 \d+, floor \d\d\d"):
+        made(constraints=tight)
+
+
+def test_auto_takes_eleven_or_more() -> None:
+    plan = made(poses=None, candidates=60)
+    assert 11 <= len(plan.joints) <= 60
+    assert plan.indices["O1"] >= made(poses=11, candidates=60).indices["O1"]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"poses": 0}, "at least one pose"),
+        ({"poses": 301}, "too few.*300 of 300.*301 or more"),
+        ({"poses": 2}, "fewer equations.*4 or more"),
+        ({"objective": "O6"}, "no objective of this name.*O1, O2"),
+        ({"objective": "O3", "poses": None}, "only O1 weighs"),
+    ],
+)
+def test_what_cannot_be_planned_is_refused(options: dict[str, object], words: str) -> None:
+    with pytest.raises(InputError, match=f"(?s){words}"):
+        made(**options)  # type: ignore[arg-type]
+
+
+def test_a_temperature_is_in_no_plan() -> None:
+    arm = with_targets(load_robot("irb120"))
+    model = replace(MODEL["geometric"], effects=("thermal-growth",))
+    rng = np.random.default_rng(0)
+    with pytest.raises(InputError, match="temperature"):
+        plan_measurements(arm, random_candidates(arm, 50, rng), model, poses=20, rng=rng)
+
+
+def test_a_robot_without_targets_tells_nothing() -> None:
+    rng, arm = np.random.default_rng(0), load_robot("irb120")
+    with pytest.raises(InputError, match="no targets"):
+        sensitivity(arm, random_candidates(arm, 5, rng), MODEL["geometric"], 1e-4)
+
+
+def test_where_the_robot_stands_does_not_matter() -> None:
+    arm = with_targets(load_robot("irb120"))
+    away = truth_twin(load_robot("irb120"), "nominal", np.random.default_rng(0)).robot
+    rng = np.random.default_rng(0)
+    q = random_candidates(arm, 200, rng)
+    plans = [
+        plan_measurements(one, q, MODEL["geometric"], poses=15, rng=np.random.default_rng(1)) for one in (arm, away)
+    ]
+    assert plans[0].indices["O1"] == pytest.approx(plans[1].indices["O1"], rel=0.01)
+
+
+def test_the_predicted_error_comes_true() -> None:
+    """Against calibrations of twins whose readings hang together as the prediction says."""
+    noise, errors = 1e-4, []
+    nominal = load_robot("irb120")
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        twin = truth_twin(nominal, "random", rng)
+        data = measure(twin, nominal.random_configurations(15, rng), 0.0, rng)
+        common = np.repeat(rng.normal(size=(15, 3)), 3, axis=0)
+        jitter = noise * (np.sqrt(0.75) * common + np.sqrt(0.25) * rng.normal(size=(45, 3)))
+        fit = identify(nominal, replace(data, position=data.position + jitter), MODEL["geometric"])
+        q = nominal.random_configurations(40, rng)
+        seen = [fit.robot.poses(q, name)[0] - twin.robot.poses(q, name)[0] for name in data.targets]
+        errors.append(np.linalg.norm(np.stack(seen) + noise * rng.normal(size=(3, 40, 3)), axis=2).mean())
+    arm = with_targets(nominal)
+    rng = np.random.default_rng(1)
+    where = random_candidates(arm, 15, rng), random_candidates(arm, 200, rng)
+    measured, elsewhere = (sensitivity(arm, one, MODEL["geometric"], noise) for one in where)
+    told = predict(arm, measured, np.arange(15), elsewhere, where[1].joints, noise, rng)
+    assert told.planned == pytest.approx(np.mean(errors), rel=0.1)
+    assert told.planned > 1.1 * told.floor

@@ -148,15 +148,14 @@ def triangle(sides: Sequence[float] | Array, fixture: str) -> Array:
     height = lengths[2] ** 2 - x**2
     flat = np.flatnonzero(~(height > (_THINNEST * lengths.max(axis=0)) ** 2))
     if len(flat):
-        longest = int(np.argmax(lengths[:, flat[0]]))
+        names, worst = side_names(fixture), lengths[:, flat[0]]
+        longest = names[int(np.argmax(worst))]
         raise InputError(
             f"the cups {', '.join(f'{fixture}{n + 1}' for n in range(3))} lie on one line, or cannot lie so at all",
-            where=side_names(fixture)[longest],
-            came=" ".join(
-                f"{name} {v * 1e3:.3f} mm" for name, v in zip(side_names(fixture), lengths[:, flat[0]], strict=True)
-            ),
+            where=longest,
+            came=", ".join(f"{name} {length * 1e3:.3f} mm" for name, length in zip(names, worst, strict=True)),
             allowed="three distances of a triangle, each well below the sum of the others",
-            cure=f"Measure {side_names(fixture)[longest]} again.",
+            cure=f"Measure {longest} again.",
         )
     zero = np.zeros_like(x)
     cups = np.array([[zero, zero, zero], [lengths[0], zero, zero], [x, np.sqrt(height), zero]])

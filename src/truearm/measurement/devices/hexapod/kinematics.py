@@ -51,15 +51,13 @@ def tripod(feet: Sequence[Array], legs: Sequence[Array], side: int, names: Seque
     xi2 = (l1 * l1 - l3 * l3 + dot(w, w)) / 2
     p = (xi1 * cross(w, n) + xi2 * cross(n, u)) / square
     height = l1 * l1 - dot(p, p)
-    if not (height >= 0).all():
-        first = tuple(np.argwhere(~(np.atleast_1d(height) >= 0))[0])
-        lengths = [
-            float(np.broadcast_to(leg, np.shape(height)).reshape(np.atleast_1d(height).shape)[first]) for leg in legs
-        ]
+    apart = np.flatnonzero(~(np.atleast_1d(height) >= 0))
+    if len(apart):
+        lengths = [float(np.broadcast_to(leg, np.shape(height)).flat[apart[0]]) for leg in legs]
         raise InputError(
             "legs of these lengths do not meet",
             where=", ".join(names),
-            came=" ".join(f"{name} {length * 1e3:.3f} mm" for name, length in zip(names, lengths, strict=True)),
+            came=", ".join(f"{name} {length * 1e3:.3f} mm" for name, length in zip(names, lengths, strict=True)),
             cure="Measure them again; check that the bar was between the cups that are named.",
         )
     return np.asarray(v1 + p + side * np.sqrt(height / square) * n)

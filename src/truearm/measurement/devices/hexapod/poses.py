@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from truearm.errors import InputError
-from truearm.measurement.devices.hexapod.geometry import DEVICE, Design, Device, Order, handedness, triangle
+from truearm.measurement.devices.hexapod.geometry import DEVICE, Design, Device, Order, triangle
 from truearm.measurement.devices.hexapod.kinematics import rigid_motion, tool_cups
 from truearm.modeling.chain import Array
 from truearm.modeling.transform import rotation_vector

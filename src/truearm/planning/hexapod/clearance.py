@@ -22,7 +22,9 @@ ARM_RADIUS: Final = 0.050
 def arm_links(robot: Robot, joints: Array) -> tuple[Array, Array]:
     """Return both ends of the arm's links in the world [m], each ``(links, 3, n)``, from the base to the flange."""
     sweep = robot.sweep(joints)
-    origins = [np.broadcast_to(sweep.origin(place), sweep.position.shape) for place in robot.moving[: len(robot.joints)]]
+    origins = [
+        np.broadcast_to(sweep.origin(place), sweep.position.shape) for place in robot.moving[: len(robot.joints)]
+    ]
     points = np.array([*origins, sweep.position])
     return points[:-1], points[1:]
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truearm.errors import InputError
 from truearm.measurement.devices.hexapod.geometry import DEVICE, SIDES, Device, triangle
@@ -16,6 +17,7 @@ from truearm.measurement.devices.hexapod.poses import HexapodPose
 from truearm.measurement.devices.hexapod.sheet import PlannedRow
 from truearm.modeling.chain import Array
 from truearm.modeling.inverse import PoseStatus, inverse
+from truearm.modeling.inverse.branches import BRANCHES
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 from truearm.planning.hexapod.clearance import ARM_RADIUS, clearance
@@ -25,6 +27,7 @@ from truearm.planning.ordering import all_moving_order
 OUT_OF_REACH: Final = "out of reach"
 BEYOND_LIMITS: Final = "beyond joint limits"
 TOO_NEAR: Final = "arm at the bars"
+NOT_WANTED: Final = "another branch"
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +65,7 @@ def reachable(
     device: Device = DEVICE,
     largest_turn: float = math.pi,
     arm_radius: float = ARM_RADIUS,
+    branches: Sequence[str] = (),
 ) -> Reachable:
     """Return the configurations in which a robot can be measured.
 
@@ -80,12 +84,17 @@ def reachable(
         cables.
     arm_radius
         Of the arm's links [m], see :mod:`truearm.planning.hexapod.clearance`.
+    branches
+        Only branches whose names begin so, such as ``front-up``; all of them if empty.
 
     Raises
     ------
     InputError
-        If the robot has no closed form, or nothing is left; with the reasons.
+        If the robot has no closed form, there is no such branch, or nothing is left; with the reasons.
     """
+    for begin in branches:
+        if not any(branch.startswith(begin) for branch in BRANCHES):
+            raise InputError("there is no such branch", where="branches", came=begin, allowed=", ".join(BRANCHES))
     turned = fixture.rotation
     position = np.array([turned @ pose.position for pose in wanted]) + np.array(fixture.translation)
     rotation = np.array([turned @ pose.rotation for pose in wanted])
@@ -99,8 +108,11 @@ def reachable(
     inside = (np.moveaxis(part, 1, -1) @ base.rotation.T + np.array(base.translation) for part in (starts, ends))
     starts, ends = (np.moveaxis(part, -1, 1) for part in inside)
     room = clearance(robot, found.joints, starts, ends, arm_radius)
-    kept = usable & ~wide & (room > 0)
-    reasons = np.where(usable | beyond, np.where(usable & ~wide, TOO_NEAR, BEYOND_LIMITS), OUT_OF_REACH)
+    meant = np.array([not branches or branch.startswith(tuple(branches)) for branch in found.branch])
+    kept = usable & ~wide & meant & (room > 0)
+    reasons = np.select(
+        [~(usable | beyond), ~(usable & ~wide), ~meant], [OUT_OF_REACH, BEYOND_LIMITS, NOT_WANTED], TOO_NEAR
+    )
     left_out = Counter(reasons[~kept].tolist())
     if not kept.any():
         raise InputError(
@@ -126,7 +138,7 @@ def reachable(
 
 
 def _bars(
-    fixture: Transform, wanted: Sequence[HexapodPose], of_row: Array, device: Device
+    fixture: Transform, wanted: Sequence[HexapodPose], of_row: NDArray[np.intp], device: Device
 ) -> tuple[Array, Array]:
     """Return both ends of the six bars of each row's pose and of the base fixture's edges, ``(9, 3, rows)``."""
     base = triangle([device.base] * 3, "B")
@@ -135,5 +147,5 @@ def _bars(
         [*([base[foot], pose.cups[cup]] for foot, cup in pose.design.legs), *edges] for pose in wanted
     ]  # (poses, bars, ends, 3)
     placed = np.array(bars) @ fixture.rotation.T + np.array(fixture.translation)
-    of_rows = np.moveaxis(placed[np.asarray(of_row, dtype=np.intp)], 0, -1)
+    of_rows = np.moveaxis(placed[of_row], 0, -1)
     return of_rows[:, 0], of_rows[:, 1]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Final
 
 import numpy as np
@@ -16,7 +16,7 @@ from truearm.modeling.transform import cross, dot
 SOLUTIONS: Final = {1: (1, 1), 2: (1, -1), 3: (-1, 1), 4: (-1, -1)}
 
 
-def tripod(feet: Sequence[Array], legs: Sequence[Array], side: int, names: Sequence[str]) -> Array:
+def tripod(feet: Iterable[Array], legs: Iterable[Array], side: int, names: Sequence[str]) -> Array:
     """Return the point at given distances from three others (Nubiola, 3.4 to 3.11; `Tri`).
 
     Parameters
@@ -53,7 +53,7 @@ def tripod(feet: Sequence[Array], legs: Sequence[Array], side: int, names: Seque
     height = l1 * l1 - dot(p, p)
     apart = np.flatnonzero(~(np.atleast_1d(height) >= 0))
     if len(apart):
-        lengths = [float(np.broadcast_to(leg, np.shape(height)).flat[apart[0]]) for leg in legs]
+        lengths = [float(np.broadcast_to(leg, np.shape(height)).flat[apart[0]]) for leg in (l1, l2, l3)]
         raise InputError(
             "legs of these lengths do not meet",
             where=", ".join(names),

@@ -20,7 +20,7 @@ import numpy as np
 
 from truearm.errors import InputError, nearest_names
 from truearm.files import read_text
-from truearm.measurement.dataset import Dataset
+from truearm.measurement.dataset import Dataset, IntArray
 from truearm.measurement.devices.hexapod.geometry import DEVICE, Design, Device, designs, side_names
 from truearm.measurement.devices.hexapod.kinematics import SOLUTIONS, tool_cups
 from truearm.measurement.readers.canonical import refuse_other_separators
@@ -69,7 +69,7 @@ class Sheet:
     legs: Array
 
     @property
-    def measured(self) -> Array:
+    def measured(self) -> IntArray:
         """Indices of the rows with all six legs."""
         return np.flatnonzero(np.isfinite(self.legs).all(axis=1))
 
@@ -77,7 +77,9 @@ class Sheet:
         """Return T1, T2 and T3 in the frame of the base fixture [m], ``(rows, 3, 3)``; NaN where a leg is missing."""
         found = np.full((len(self.labels), 3, 3), np.nan)
         for row in self.measured.tolist():
-            found[row] = tool_cups(self.designs[row], self.solutions[row], self.base[row], self.tool[row], self.legs[row])
+            found[row] = tool_cups(
+                self.designs[row], self.solutions[row], self.base[row], self.tool[row], self.legs[row]
+            )
         return found
 
     def dataset(self, targets: Sequence[str] = ("1", "2", "3")) -> Dataset:

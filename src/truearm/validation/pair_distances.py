@@ -104,7 +104,7 @@ def _blocks(of: NDArray[np.generic]) -> list[tuple[slice, slice, NDArray[np.bool
     start = 0
     while start < n:
         last = start + max(1, min(256, _BLOCK // max(n - start, 1)))
-        stop = int(ends[min(np.searchsorted(ends, last), len(ends) - 1)])
+        stop = int(ends[min(int(np.searchsorted(ends, last)), len(ends) - 1)])
         rows = slice(start, stop)
         label = of[rows]
         counted = np.triu(label[:, None] != label[None, :])
@@ -150,7 +150,7 @@ class _Tally:
             deviation=math.sqrt(max(self._squares / self._pairs - mean**2, 0.0)) * self._width,
             maximum=self._most * self._width,
             positive=self._positive / self._pairs,
-            edges=(np.arange(first, last + 1) - _BINS // 2) * self._width,
+            edges=np.asarray((np.arange(first, last + 1) - _BINS // 2) * self._width, float),
             counts=self._counts[first:last],
         )
 

@@ -13,8 +13,8 @@ def steps_text(plan: Reachable, robot: Robot, device: Device = DEVICE) -> str:
     base, tool, leg = (f"{length * 1e3:g} mm" for length in (device.base, device.tool, device.leg))
     lines = [
         f"Measuring {robot.name} with one ballbar: {len(plan.rows)} configurations, {plan.poses_reached} poses.",
-        f"The bar reads only within +/- {device.reach * 1e3:g} mm of the nominal length. If one of the six legs is beyond,",
-        "leave its cell empty and go on; after a preliminary calibration, plan again with the calibrated robot.",
+        f"The bar reads only within +/- {device.reach * 1e3:g} mm of the nominal length. If one of the six legs is",
+        "beyond, leave its cell empty and go on. Plan again with the robot that a first calibration gives.",
         "",
         f"1. Set the bar to {tool} on its calibrator. Measure {', '.join(side_names('T'))}.",
         "2. Loosen the base cups. Bring the setting ball in cup T1 to the three places of the base cups by programme,",

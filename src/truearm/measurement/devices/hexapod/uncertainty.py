@@ -18,7 +18,7 @@ from truearm.measurement.devices.hexapod.kinematics import SOLUTIONS, tool_cups
 from truearm.modeling.chain import Array
 
 #: The design of Table 3.1. The document takes its 35 permutations to be the same; the frame, which begins at B1 and B2,
-#: makes a difference: over all of them T3 has 2.83 to 3.52.
+#: makes a difference: over all of them the worst cup has 2.83 to 3.52.
 DESIGN: Final = Design((0, 1, 2), (0, 1, 2))
 #: Coordinates of the base cups that are not zero by the choice of the frame: x of B2, x and y of B3.
 _FREE_OF_BASE: Final = ((1, 0), (2, 0), (2, 1))

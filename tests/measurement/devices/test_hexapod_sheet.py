@@ -80,9 +80,7 @@ def test_a_row_without_all_its_legs_is_left_out(tmp_path: Path, filled: list[dic
         ("a number belongs here", 2, "leg", "about 300"),
     ],
 )
-def test_bad_cells(
-    tmp_path: Path, filled: list[dict[str, str]], words: str, row: int, column: str, text: str
-) -> None:
+def test_bad_cells(tmp_path: Path, filled: list[dict[str, str]], words: str, row: int, column: str, text: str) -> None:
     names = poses()[(5, 40, 66)[row] - 1].design.leg_names
     if column == "leg":
         column = f"{names[0]} [mm]"

@@ -54,4 +54,4 @@ def distances(
     sums = [int(found.counts[first : first + step].sum()) for first in starts]
     for first, count in zip(starts, sums, strict=True):
         last = min(first + step, len(found.counts))
-        typer.echo(f"  {edges[first]:8.3f} to {edges[last]:8.3f} mm  {'#' * round(50 * count / max(sums))}")
+        typer.echo(f"  {edges[first]:8.3f} to {edges[last]:8.3f} mm  {'#' * round(50 * count / max(sums))}".rstrip())

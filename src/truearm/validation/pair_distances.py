@@ -17,7 +17,7 @@ from truearm.errors import InputError
 from truearm.modeling.chain import Array
 
 #: Pairs that are worked on at once.
-_BLOCK: Final = 40_000
+_BLOCK: Final = 80_000
 #: Bins of the histogram at most, and the first digits of their width.
 _BINS: Final = 200
 _WIDTHS: Final = (1.0, 2.0, 5.0, 10.0)
@@ -122,6 +122,7 @@ class _Tally:
     def __init__(self, width: float, largest: int) -> None:
         self._width = width
         self._room = np.empty((3, largest))
+        self._bins = np.empty(largest, dtype=np.intp)
         self._pairs, self._sum, self._squares, self._most, self._positive = 0, 0.0, 0.0, 0.0, 0
         self._counts = np.zeros(_BINS, dtype=np.int64)
 
@@ -138,7 +139,9 @@ class _Tally:
         self._squares += float(size @ size)
         self._sum += float(size.sum())
         error += _BINS // 2
-        self._counts += np.bincount(error.astype(np.intp), minlength=_BINS)
+        bins = self._bins[: error.size]
+        np.copyto(bins, error, casting="unsafe")
+        self._counts += np.bincount(bins, minlength=_BINS)
 
     def result(self) -> PairDistances:
         mean = self._sum / self._pairs

@@ -12,6 +12,8 @@ import typer
 from truearm.cli.calibrate import calibrate
 from truearm.cli.check import check
 from truearm.cli.convert import convert
+from truearm.cli.distances import distances
+from truearm.cli.hexapod import app as hexapod
 from truearm.cli.ik import ik
 from truearm.cli.importing import app as importing
 from truearm.cli.library import robots, show
@@ -55,10 +57,12 @@ def _root(
 app.command()(check)
 app.command()(calibrate)
 app.command()(validate)
+app.command()(distances)
 app.command()(ik)
 app.command()(plan)
 app.command()(simulate)
 app.add_typer(importing, name="import")
+app.add_typer(hexapod, name="hexapod")
 app.command()(robots)
 app.command()(show)
 app.command()(convert)

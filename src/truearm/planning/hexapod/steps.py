@@ -1,0 +1,34 @@
+"""The plan in words, to print and to work through with the bar in hand (Nubiola, 3.5 and 4.4)."""
+
+from __future__ import annotations
+
+from truearm.measurement.devices.hexapod.geometry import DEVICE, Device, side_names
+from truearm.modeling.robot import Robot
+from truearm.planning.hexapod.reachable import Reachable
+from truearm.units import from_si
+
+
+def steps_text(plan: Reachable, robot: Robot, device: Device = DEVICE) -> str:
+    """Return the plan step by step; figures go into the sheet."""
+    base, tool, leg = (f"{length * 1e3:g} mm" for length in (device.base, device.tool, device.leg))
+    lines = [
+        f"Measuring {robot.name} with one ballbar: {len(plan.rows)} configurations, {plan.poses_reached} poses.",
+        f"The bar reads only within +/- {device.reach * 1e3:g} mm of the nominal length. If one of the six legs is",
+        "beyond, leave its cell empty and go on. Plan again with the robot that a first calibration gives.",
+        "",
+        f"1. Set the bar to {tool} on its calibrator. Measure {', '.join(side_names('T'))}.",
+        "2. Loosen the base cups. Bring the setting ball in cup T1 to the three places of the base cups by programme,",
+        f"   {base} apart. Let each cup snap on and lock it. Note the joint readings.",
+        f"3. Set the bar to {base} on its calibrator. Measure {', '.join(side_names('B'))}.",
+        f"4. For every configuration below: move, set the bar to {leg} on its calibrator, then measure six legs.",
+        "",
+    ]
+    for row, room in zip(plan.rows, plan.clearance.tolist(), strict=True):
+        readings = " ".join(
+            f"{from_si(value, 'deg' if joint.kind == 'revolute' else 'mm'):.3f}"
+            for joint, value in zip(robot.joints, row.joints.tolist(), strict=True)
+        )
+        lines.append(f"Configuration {row.configuration}  (pose {row.pose}, {row.branch}, {room * 1e3:.0f} mm of room)")
+        lines.append(f"   joints {readings}")
+        lines += [f"   [ ] Attach the bar between {' and '.join(name.split('-'))}." for name in row.design.leg_names]
+    return "\n".join(lines) + "\n"

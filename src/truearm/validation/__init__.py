@@ -1,0 +1,1 @@
+"""Proofs of accuracy beyond the errors of single readings."""

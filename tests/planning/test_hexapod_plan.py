@@ -1,0 +1,222 @@
+"""Measuring with the hexapod device: reach, room, the printed plan, and a calibration in two steps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from truearm.errors import InputError
+from truearm.identification.fit import identify
+from truearm.identification.models import MODELS
+from truearm.measurement.devices.hexapod.geometry import DEVICE, triangle
+from truearm.measurement.devices.hexapod.kinematics import leg_lengths
+from truearm.measurement.devices.hexapod.poses import HexapodPose, poses
+from truearm.measurement.devices.hexapod.simulated import ballbar
+from truearm.measurement.statistics import errors_of
+from truearm.measurement.twin import Twin, measure
+from truearm.measurement.twin_joint import JointTruth
+from truearm.modeling.chain import Array
+from truearm.modeling.robot import Robot
+from truearm.modeling.transform import Transform
+from truearm.planning.hexapod.campaign import Campaign, touching, two_steps
+from truearm.planning.hexapod.clearance import arm_links, clearance, segment_distance
+from truearm.planning.hexapod.reachable import Reachable, reachable
+from truearm.planning.hexapod.steps import steps_text
+from truearm.planning.hexapod.tool import with_cups
+from truearm.robots import load_robot
+
+HALF = np.radians(-15.0)
+#: B1 of a fixture that stands before the robot, turned by -30 deg.
+FIXTURE = Transform((0.2268, 0.0, 0.1), (float(np.cos(HALF)), 0.0, 0.0, float(np.sin(HALF))))
+
+
+@pytest.fixture(scope="module")
+def arm() -> tuple[Robot, tuple[HexapodPose, ...]]:
+    robot, cups = with_cups(load_robot("lrmate200ic"))
+    return robot, poses(cups)
+
+
+@pytest.fixture(scope="module")
+def plan(arm: tuple[Robot, tuple[HexapodPose, ...]]) -> Reachable:
+    return reachable(arm[0], FIXTURE, arm[1], branches=("front-up", "back-down"))
+
+
+# -- room -----------------------------------------------------------------------------------------------------
+
+
+def test_the_distance_of_segments_is_the_smallest_there_is() -> None:
+    rng = np.random.default_rng(0)
+    ends = rng.uniform(-1, 1, (4, 3, 40))
+    ends[1, :, :5] = ends[0, :, :5] + 2 * (ends[3, :, :5] - ends[2, :, :5])  # parallel
+    ends[1, :, 5] = ends[0, :, 5]  # a point
+    found = segment_distance(*ends)
+    for n in range(40):
+        p1, q1, p2, q2 = ends[:, :, n]
+
+        def apart(x: Array, p1: Array = p1, q1: Array = q1, p2: Array = p2, q2: Array = q2) -> float:
+            return float(np.sum((p1 + x[0] * (q1 - p1) - p2 - x[1] * (q2 - p2)) ** 2))
+
+        starts = [(0.5, 0.5), (0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)]
+        best = min(minimize(apart, start, bounds=[(0, 1), (0, 1)]).fun for start in starts)
+        assert found[n] == pytest.approx(np.sqrt(best), abs=2e-5)
+    crossing = np.array([[[-1], [0], [0]], [[1], [0], [0]], [[0], [-1], [0.25]], [[0], [1], [0.25]]], float)
+    assert segment_distance(*crossing) == pytest.approx([0.25], abs=1e-15)
+
+
+def test_a_bar_through_the_forearm_has_no_room(arm: tuple[Robot, tuple[HexapodPose, ...]]) -> None:
+    joints = np.radians([[10.0, 20.0, 10.0, 0.0, 40.0, 0.0]])
+    first, last = arm_links(arm[0], joints)
+    middle = (first[3] + last[3]) / 2  # between wrist and elbow
+    across = np.array([[0.0], [0.3], [0.0]])
+    through = (middle - across)[None], (middle + across)[None]
+    assert clearance(arm[0], joints, *through, arm_radius=0.05)[0] == pytest.approx(-0.06, abs=1e-3)
+    far = (through[0] + 5.0, through[1] + 5.0)
+    assert clearance(arm[0], joints, *far, arm_radius=0.05)[0] > 5
+
+
+# -- reach ----------------------------------------------------------------------------------------------------
+
+
+def test_every_planned_configuration_makes_all_legs_nominal(
+    arm: tuple[Robot, tuple[HexapodPose, ...]], plan: Reachable
+) -> None:
+    robot, _ = arm
+    twin = Twin(robot)
+    base = triangle([0.3] * 3, "B") @ FIXTURE.rotation.T + np.array(FIXTURE.translation)
+    low, high = np.array([joint.limits for joint in robot.joints]).T
+    assert plan.poses_reached > 40
+    assert len(plan.rows) > plan.poses_reached
+    assert len(plan.rows) + sum(plan.left_out.values()) >= 72
+    for row, room in zip(plan.rows, plan.clearance, strict=True):
+        frames = twin.target_frames(row.joints)
+        cups = np.array([frames[name][:3, 3] for name in ("1", "2", "3")])
+        assert leg_lengths(row.design, base, cups) == pytest.approx(np.full(6, 0.3), abs=2e-5)  # 93.7, not 93.675 mm
+        assert ((row.joints >= low) & (row.joints <= high) & (np.abs(row.joints) <= np.pi + 1e-9)).all()
+        assert row.branch.startswith(("front-up", "back-down"))
+        assert room > 0
+
+
+def test_the_plan_does_not_depend_on_where_the_robot_stands(
+    arm: tuple[Robot, tuple[HexapodPose, ...]], plan: Reachable
+) -> None:
+    robot, wanted = arm
+    cups = {target.name: [robot.values[target.parameter(a)] for a in "xyz"] for target in robot.targets}
+    moved = robot.with_frames(Transform((1.0, 2.0, 3.0), (0.8, 0.0, 0.6, 0.0)), cups)
+    again = reachable(moved, FIXTURE, wanted, branches=("front-up", "back-down"))
+    assert [row.pose for row in again.rows] == [row.pose for row in plan.rows]
+    assert again.clearance == pytest.approx(plan.clearance, abs=1e-9)
+
+
+def test_the_steps_name_every_leg(arm: tuple[Robot, tuple[HexapodPose, ...]], plan: Reachable) -> None:
+    text = steps_text(plan, arm[0])
+    assert text.count("[ ] Attach the bar between") == 6 * len(plan.rows)
+    assert "Attach the bar between B1 and T1." in text
+    assert max(len(line) for line in text.splitlines()) <= 120
+
+
+def test_refusals(arm: tuple[Robot, tuple[HexapodPose, ...]]) -> None:
+    robot, wanted = arm
+    with pytest.raises(InputError, match=r"can take none of the 72 poses.*out of reach"):
+        reachable(robot, Transform((5.0, 0.0, 0.0)), wanted)
+    with pytest.raises(InputError, match="there is no such branch"):
+        reachable(robot, FIXTURE, wanted, branches=("left",))
+    with pytest.raises(InputError, match="arm at the bars"):
+        reachable(robot, FIXTURE, wanted, arm_radius=1.0)
+    with pytest.raises(InputError, match="no such tool"):
+        with_cups(load_robot("lrmate200ic"), "gripper")
+    with pytest.raises(InputError, match="three cups"):
+        with_cups(load_robot("ur5"))
+    with pytest.raises(InputError, match="cannot bring its cup 1 to B1"):
+        touching(robot, "1", Transform((2.0, 0.0, 0.0)), 0.3, np.diag([1.0, -1.0, -1.0]))
+
+
+# -- two steps ------------------------------------------------------------------------------------------------
+
+ELASTIC = next(model for model in MODELS if model.name == "elastic")
+
+
+def wrong(robot: Robot, share: float, seed: int) -> Twin:
+    """Return an invented LR Mate: chapter 4 prints no parameters. Gears err by 0.1 mrad, which no model here has."""
+    rng = np.random.default_rng(seed)
+    true = {
+        p.name: p.value + share * p.prior * float(rng.standard_normal())
+        for p in robot.parameters.values()
+        if p.group in ("geometry", "joint zero")
+    }
+    compliances = {2: 0.04e-3, 3: 0.13e-3, 4: 0.6e-3, 5: 0.5e-3, 6: 0.6e-3}
+
+    def gear() -> tuple[tuple[int, float, float], ...]:
+        return tuple((k, 1e-4 * float(rng.normal()), float(rng.uniform(0, 6))) for k in (1, 2))
+
+    joints = {n: JointTruth(compliance=c, cubic=-1e-4 * c, gear=gear()) for n, c in compliances.items()}
+    return Twin(robot.with_values(true), joints)
+
+
+@pytest.fixture(scope="module")
+def campaign(arm: tuple[Robot, tuple[HexapodPose, ...]], plan: Reachable) -> tuple[Twin, Campaign]:
+    robot, wanted = arm
+    twin = wrong(robot, 0.3, 3)
+    touches = touching(robot, "1", FIXTURE, DEVICE.base, np.diag([1.0, -1.0, -1.0]))
+    bar = ballbar(np.random.default_rng(3))
+    return twin, two_steps(robot, twin, touches, wanted, plan.rows[::2], ELASTIC, bar)
+
+
+def test_what_is_beyond_the_range_is_skipped_until_the_first_calibration(
+    arm: tuple[Robot, tuple[HexapodPose, ...]], plan: Reachable, campaign: tuple[Twin, Campaign]
+) -> None:
+    twin, done = campaign
+    rows = plan.rows[::2]
+    assert sorted((*done.first, *done.second, *done.out_of_range)) == list(range(len(rows)))
+    assert 8 < len(done.first) < len(rows)
+    assert len(done.second) > 8
+    assert done.data.configurations == len(done.first) + len(done.second)
+    inside = 0
+    for row, planned in enumerate(rows):
+        frames = twin.target_frames(planned.joints)
+        cups = np.array([frames[name][:3, 3] for name in ("1", "2", "3")])
+        inside += bool(np.abs(leg_lengths(planned.design, done.base_cups, cups) - 0.3).max() < 1e-3) == (
+            row in done.first
+        )
+    assert inside >= len(rows) - 1  # the noise may decide for one at the very edge
+
+
+def test_the_final_calibration_sees_all_and_a_tracker_is_better_away_from_the_fixture(
+    arm: tuple[Robot, tuple[HexapodPose, ...]], campaign: tuple[Twin, Campaign]
+) -> None:
+    robot, _ = arm
+    twin, done = campaign
+    rng = np.random.default_rng(11)
+    seen = measure(twin, robot.random_configurations(150, rng), 0.0, rng)
+    frame = Transform.from_matrix(*_frame_of(done.base_cups))
+    from_fixture = replace(seen, position=(seen.position - np.array(frame.translation)) @ frame.rotation)
+    tracker = identify(robot, measure(twin, robot.random_configurations(50, rng), 2e-5, rng), ELASTIC)
+    away = np.linalg.norm(from_fixture.position - [0.15, 0.087, 0.245], axis=1) > 0.25
+    by_tracker = np.linalg.norm(errors_of(tracker.robot, seen).position[away], axis=1)
+    by_device = np.linalg.norm(errors_of(done.final.robot, from_fixture).position[away], axis=1)
+    nominal = np.linalg.norm(errors_of(robot, seen).position, axis=1)
+    assert by_tracker.mean() < by_device.mean() < nominal.mean() / 3
+    # the frame by the readings at the cups, as the document finds it
+    touched = done.frame_by(done.final.robot, "1").frame
+    assert touched.translation == pytest.approx([0, 0, 0], abs=5e-4)  # the fit's world is the fixture's frame
+
+
+def _frame_of(cups: Array) -> tuple[Array, Array]:
+    x = (cups[1] - cups[0]) / np.linalg.norm(cups[1] - cups[0])
+    z = np.cross(x, cups[2] - cups[0])
+    z /= np.linalg.norm(z)
+    return np.column_stack([x, np.cross(z, x), z]), cups[0]
+
+
+def test_a_robot_that_is_too_wrong_is_refused(arm: tuple[Robot, tuple[HexapodPose, ...]], plan: Reachable) -> None:
+    robot, wanted = arm
+    down = np.diag([1.0, -1.0, -1.0])
+    touches = touching(robot, "1", FIXTURE, DEVICE.base, down)
+    bar = ballbar(np.random.default_rng(0))
+    with pytest.raises(InputError, match=r"the distance B1-B2 is beyond"):
+        two_steps(robot, Twin(robot.with_values({"a_3": 0.33})), touches, wanted, plan.rows[:3], ELASTIC, bar)
+    twisted = Twin(robot.with_values({"theta_offset_6": np.radians(3.0)}))
+    with pytest.raises(InputError, match=r"not one pose is within the ballbar's range.*3 poses"):
+        two_steps(robot, twisted, touches, wanted, plan.rows[:3], ELASTIC, bar)

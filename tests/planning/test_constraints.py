@@ -105,7 +105,7 @@ def test_clearance_of_a_folded_arm() -> None:
 
 
 def test_distances_of_links_by_brute_force(arm: Robot) -> None:
-    from truearm.planning.clearance import _apart
+    from truearm.planning.segments import segment_distance
 
     rng = np.random.default_rng(2)
     a, b, c, d = rng.normal(size=(4, 40, 3))
@@ -114,8 +114,9 @@ def test_distances_of_links_by_brute_force(arm: Robot) -> None:
     first = a[:, None] + s[:, None] * (b - a)[:, None]
     second = c[:, None] + s[:, None] * (d - c)[:, None]
     brute = np.linalg.norm(first[:, :, None] - second[:, None], axis=3).min(axis=(1, 2))
-    assert _apart(a, b, c, d) == pytest.approx(brute, abs=0.02)
-    assert (_apart(a, b, c, d) <= brute + 1e-12).all()
+    apart = segment_distance(a.T, b.T, c.T, d.T)
+    assert apart == pytest.approx(brute, abs=0.02)
+    assert (apart <= brute + 1e-12).all()
 
 
 @pytest.mark.parametrize(

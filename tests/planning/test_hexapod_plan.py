@@ -22,10 +22,11 @@ from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 from truearm.planning.hexapod.campaign import Campaign, touching, two_steps
-from truearm.planning.hexapod.clearance import arm_links, clearance, segment_distance
+from truearm.planning.hexapod.clearance import arm_links, clearance
 from truearm.planning.hexapod.reachable import Reachable, reachable
 from truearm.planning.hexapod.steps import steps_text
 from truearm.planning.hexapod.tool import with_cups
+from truearm.planning.segments import segment_distance
 from truearm.robots import load_robot
 
 HALF = np.radians(-15.0)

@@ -10,6 +10,7 @@ import numpy as np
 from truearm.modeling.chain import Array
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
+from truearm.planning.segments import segment_distance
 
 _LENGTH: Final = 1e-3  # m: what is shorter is no link of its own
 
@@ -47,19 +48,5 @@ def smallest_clearance(robot: Robot, q: Array | Postures, near: float) -> Array:
     for i, j in combinations(range(len(segments)), 2):
         between = range(i + 1, min(j, flange))
         if i < flange and between and sum(lengths[k] for k in between) >= near:
-            np.minimum(smallest, _apart(*segments[i], *segments[j]), out=smallest)
+            np.minimum(smallest, segment_distance(*(end.T for end in (*segments[i], *segments[j]))), out=smallest)
     return smallest
-
-
-def _apart(a: Array, b: Array, c: Array, d: Array) -> Array:
-    """Return the distance between segments a-b and c-d, ``(n,)`` (Ericson 2004, section 5.1.9)."""
-    u, v, w = b - a, d - c, a - c
-    uu, vv, uv = (np.einsum("ni,ni->n", x, y) for x, y in ((u, u), (v, v), (u, v)))
-    uw, vw = (np.einsum("ni,ni->n", x, w) for x in (u, v))
-    cross = uu * vv - uv**2
-    uu, vv = (np.maximum(x, 1e-18) for x in (uu, vv))
-    along = np.where(cross > 1e-12 * uu * vv, (uv * vw - vv * uw) / np.maximum(cross, 1e-30), 0.0)
-    s = np.clip(along, 0.0, 1.0)
-    t = np.clip((uv * s + vw) / vv, 0.0, 1.0)
-    s = np.clip((uv * t - uw) / uu, 0.0, 1.0)
-    return np.asarray(np.linalg.norm(w + s[:, None] * u - t[:, None] * v, axis=1))

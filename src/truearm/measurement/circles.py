@@ -187,4 +187,3 @@ def _in_plane(points: Array) -> tuple[Array, float, Array]:
         if np.abs(step).max() <= 1e-14 * abs(found[2]):
             break
     return found[:2], float(found[2]), J
-

@@ -9,12 +9,15 @@ from typing import Final
 
 import numpy as np
 
+from truearm.errors import InputError
 from truearm.modeling.chain import Array, Chain, Element
 from truearm.modeling.parts import Joint
 from truearm.modeling.robot import Robot
 
 #: Below this angle [rad] two axes are parallel: they part by less than 1 nm over the reach of a robot.
 PARALLEL: Final = 1e-9
+#: Below this angle [rad] two axes fix no frame that is worth it: where it stands would be uncertain.
+_SQUARE_ENOUGH: Final = 0.1
 #: Below this distance [m] two parallel axes are one line.
 ONE_LINE: Final = 1e-12
 
@@ -64,6 +67,28 @@ def base_and_flange(robot: Robot) -> tuple[Array, Array]:
 def first_frame(base: Array, axis: JointAxis) -> Array:
     """Return the frame on an axis, z along it, that is nearest to the base frame, ``(4, 4)``."""
     return frame(across(base[:3, :3], axis.along), axis.along, axis.nearest(base[:3, 3]))
+
+
+def frame_between(axis: JointAxis, other: JointAxis) -> Array:
+    """Return the frame that two axes fix: z along `axis`, x along ``axis x other``, on their common normal ``(4, 4)``.
+
+    Raises
+    ------
+    InputError
+        If the axes are parallel: then nothing says where along them the frame stands.
+    """
+    normal = np.cross(axis.along, other.along)
+    sine = float(np.linalg.norm(normal))
+    if sine < _SQUARE_ENOUGH:
+        raise InputError(
+            "two axes that are parallel fix no frame",
+            where=f"{axis.joint.name} and {other.joint.name}",
+            came=f"{math.degrees(axis.angle(other)):.3g} deg apart",
+            allowed=f"{math.degrees(_SQUARE_ENOUGH):.3g} deg or more",
+        )
+    apart = other.point - axis.point
+    foot = axis.point + float(np.cross(apart, other.along) @ normal) / sine**2 * axis.along
+    return frame(normal / sine, axis.along, foot)
 
 
 def common_normal(axis: JointAxis, following: JointAxis, before: Array, here: Array) -> tuple[Array, Array, Array]:

@@ -1,9 +1,9 @@
 """Errors of the joints' assembly: what a link was designed to be, and five small errors where its joint is seated.
 
-Source: KR5 paper, equations 1, 5 and 7. A link is ``P E Rz(theta)`` with ``P = Trans(x, y, z) Rx Ry Rz`` as designed and
+Source: KR5 paper, equations 1, 5 and 7. A link is ``P E Rz(theta)``: ``P = Trans(x, y, z) Rx Ry Rz`` as designed and
 ``E = Trans(ex, ey, ez) Rx(egamma) Ry(ebeta)``. E has no turn about the joint axis, which mastering takes care of:
-that is the joint's zero. Only E and the zero are parameters. E of joint i and the design of joint i + 1 have
-neighbours that do the same, so not all of E can be told apart, whatever is measured.
+that is the joint's zero. Only E and the zero are parameters. What one E does its neighbour can partly do as well, so
+that not all of them can be told apart, whatever is measured.
 """
 
 from __future__ import annotations

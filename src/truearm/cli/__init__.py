@@ -9,6 +9,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
+from truearm.cli.axes import axes, lines, tolerance
 from truearm.cli.calibrate import calibrate
 from truearm.cli.check import check
 from truearm.cli.convert import convert
@@ -55,6 +56,9 @@ app.command()(check)
 app.command()(calibrate)
 app.command()(validate)
 app.command()(ik)
+app.command()(axes)
+app.command()(tolerance)
+app.command()(lines)
 app.command()(simulate)
 app.add_typer(importing, name="import")
 app.command()(robots)

@@ -84,6 +84,7 @@ def fit_axes(
     robot: Robot,
     circles: Sequence[AxisCircle],
     groups: Sequence[Group] = ("base", "joint zero", "geometry"),
+    known: Sequence[Redundancy] | None = None,
 ) -> AxisFit:
     """Identify a robot's parameters from circles.
 
@@ -95,6 +96,8 @@ def fit_axes(
         One or more of every joint.
     groups
         Which parameters are free; without ``base`` the robot stands where it is said to.
+    known
+        What an earlier fit of the same runs found redundant, to spare the search in repetitions.
 
     Raises
     ------
@@ -113,19 +116,20 @@ def fit_axes(
     chosen = (p.restarted(p.value) for p in robot.parameters.values() if p.group in groups)
     # Of what cannot be told apart the last is held. That shall be the slides along joint axes.
     free = FreeParameters(tuple(sorted(chosen, key=lambda p: p.name.startswith("ez_"))))
-    held: list[str] = []
+    held = [r.dropped for r in known or ()]
+    redundancies = tuple(known or ())
     start = robot.with_parameters(free.parameters)
     problem = AxisProblem(start, circles, free)
     for _ in range(6):
-        redundancies = find_redundancies(problem, problem.free.start, held)
-        if held and [r.dropped for r in redundancies] == held:
-            break
+        if known is None:
+            redundancies = find_redundancies(problem, problem.free.start, held)
+        settled = [r.dropped for r in redundancies] == held
         held = [r.dropped for r in redundancies]
-        solution = solve(replace(problem, free=free.without(held)))
-        found = dict(zip(free.without(held).names, solution.vector.tolist(), strict=True))
+        solution = solve(replace(problem, free=problem.free.without(held)))
+        found = dict(zip(problem.free.without(held).names, solution.vector.tolist(), strict=True))
         there = tuple(replace(p, value=found.get(p.name, p.nominal)) for p in free.parameters)
         problem = replace(problem, free=FreeParameters(there))
-        if not held:
+        if settled:
             break
     if not solution.converged:
         raise InputError(

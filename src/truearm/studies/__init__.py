@@ -58,6 +58,11 @@ STUDIES: Final = (
         "calibration of a simulated IRB 120, without noise and with noise and wrong masses (Nubiola 2.6)",
         "truearm.studies.irb120_simulation",
     ),
+    Entry(
+        "kr5-gdt",
+        "a KUKA KR 5: joint errors from circles, tolerances, seven lines before and after compensation (KR5 paper)",
+        "truearm.studies.kr5_gdt",
+    ),
 )
 
 

@@ -9,16 +9,18 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from truearm.cli.axes import axes, lines, tolerance
+from truearm.cli.axes import axes
 from truearm.cli.calibrate import calibrate
 from truearm.cli.check import check
 from truearm.cli.convert import convert
 from truearm.cli.ik import ik
 from truearm.cli.importing import app as importing
 from truearm.cli.library import robots, show
+from truearm.cli.lines import lines
 from truearm.cli.simulate import simulate
 from truearm.cli.starting import demo, example, new_robot
 from truearm.cli.study import HELP, study
+from truearm.cli.tolerance import tolerance
 from truearm.cli.validate import validate
 from truearm.errors import InputError
 from truearm.version import __version__

@@ -102,7 +102,7 @@ def _checked(robot: Robot) -> Robot:
             where=robot.name,
             came=robot.convention_name,
             allowed=CONVENTION,
-            cure="'truearm axes' writes joint-errors.yaml; 'truearm convert --convention joint-errors' converts a robot.",
+            cure="'truearm axes' writes joint-errors.yaml; 'truearm convert' converts a robot without errors.",
         )
     return robot
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from truearm.errors import InputError
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.twin import Twin
 from truearm.modeling.chain import Array
+from truearm.modeling.parts import Target
 from truearm.modeling.robot import Robot
 from truearm.planning.seven_lines import DIRECTIONS, SevenLines
 
@@ -56,18 +57,14 @@ def on_twin(
     base = twin.robot.base
     base_frame = np.eye(4)
     base_frame[:3, :3], base_frame[:3, 3] = base.rotation, base.translation
-    rest = twin_flange(twin, joints)
+    rest = _flange_of(twin, joints)
     true = np.array([(np.linalg.inv(base_frame) @ T)[:3, 3] for T in rest])
     seen = true + rng.normal(0.0, 1.0, (repeats, *true.shape)) * scatter
     return LineErrors(lines, np.asarray(np.linalg.norm(seen - lines.position, axis=2).mean(axis=0)))
 
 
-def twin_flange(twin: Twin, joints: Array) -> list[Array]:
+def _flange_of(twin: Twin, joints: Array) -> list[Array]:
     """Return ``T_world_flange`` ``(4, 4)`` of a twin at each of some readings ``(n, joints)``."""
-    from dataclasses import replace
-
-    from truearm.modeling.parts import Target
-
     flange = replace(twin, robot=replace(twin.robot, targets=(Target("flange", (1.0, 0.0, 0.0, 0.0)),)))
     return [posture.targets["flange"] for posture in flange.postures(joints)]
 

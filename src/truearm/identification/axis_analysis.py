@@ -69,7 +69,14 @@ class AxisAnalysis:
     @cached_property
     def robot(self) -> Robot:
         """The calibrated robot, with the targets where its own axes put them."""
-        robot = self.calibrated.robot
+        return self._with_targets(self.calibrated.robot)
+
+    @cached_property
+    def robot_with_errors(self) -> Robot:
+        """The robot as its design with the joint errors found, and the targets."""
+        return self._with_targets(self.errors.robot)
+
+    def _with_targets(self, robot: Robot) -> Robot:
         position, rotation = robot.poses(self.data.postures)
         there = self.data.has_position
         places = {}
@@ -81,7 +88,7 @@ class AxisAnalysis:
         made = robot.with_frames(robot.base, places)
         kept = {n: p for n, p in robot.parameters.items() if p.group in ("geometry", "joint zero")}
         said = f"calibrated axis by axis on {len(self.found.circles)} circles of {self.data.source}"
-        return replace(made.with_parameters(kept.values()), history=(*self.nominal.history, said))
+        return replace(made.with_parameters(kept.values()), history=(*robot.history, said))
 
     @cached_property
     def base(self) -> tuple[Transform, float, float]:
@@ -211,7 +218,7 @@ class AxisAnalysis:
         """Return the content of the result files by name; `summary` is the text of ``axes.json``."""
         return {
             "calibrated.yaml": robot_text(self.robot),
-            "joint-errors.yaml": robot_text(self.errors.robot),
+            "joint-errors.yaml": robot_text(self.robot_with_errors),
             "axes.json": summary,
         }
 
@@ -277,7 +284,7 @@ def analyse(robot: Robot, data: Dataset, *, in_robot_frame: bool = False) -> Axi
             allowed=f"{len(robot.joints)}",
         )
     found = axis_circles(data)
-    placed = robot if in_robot_frame else initial_frames(robot, data).with_frames(initial_frames(robot, data).base, {})
+    placed = robot if in_robot_frame else robot.with_frames(initial_frames(robot, data).base, {})
     groups: tuple[Group, ...] = ("geometry",) if in_robot_frame else ("base", "geometry")
     design = converted(placed, "joint-errors")
     return AxisAnalysis(

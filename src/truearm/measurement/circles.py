@@ -27,6 +27,8 @@ _LARGEST_TILT: Final = 0.05
 _LARGEST_SHARE: Final = 0.1
 #: Share of its length that an arc must be wide to be no straight line.
 _STRAIGHT: Final = 1e-9
+#: Points nearer together than this are one [m].
+_ONE_PLACE: Final = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,9 +139,11 @@ def fit_circle(points: Array, sigma: float | None = None, where: str = "circle")
     centroid = points.mean(axis=0)
     centred = points - centroid
     _, widths, (across, along, _) = np.linalg.svd(centred, full_matrices=False)
-    if widths[1] <= _STRAIGHT * widths[0] or widths[0] == 0.0:
+    if widths[1] <= max(_STRAIGHT * widths[0], _ONE_PLACE):
         raise InputError(
-            "the points lie on a straight line, which has no centre", where=where, cure="Turn the joint further."
+            "the points lie on a straight line or in one place, and make no circle",
+            where=where,
+            cure="Turn the joint further, or put the reflector further from its axis.",
         )
     normal = np.cross(across, along)
     x, y = centred @ across, centred @ along

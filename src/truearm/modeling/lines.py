@@ -18,6 +18,9 @@ from truearm.modeling.robot import Robot
 PARALLEL: Final = 1e-9
 #: Below this angle [rad] two axes fix no frame that is worth it: where it stands would be uncertain.
 _SQUARE_ENOUGH: Final = 0.1
+#: Two opposite normals are as near to a direction if they are this square to it [cosine]: 10 deg, so that the small
+#: errors of a real robot do not turn its frames round.
+_AS_NEAR: Final = math.sin(math.radians(10.0))
 #: Below this distance [m] two parallel axes are one line.
 ONE_LINE: Final = 1e-12
 
@@ -121,7 +124,7 @@ def common_normal(axis: JointAxis, following: JointAxis, before: Array, here: Ar
 def nearer_way(normal: Array, before: Array, gap: Array) -> Array:
     """Return `normal` or its opposite: the one nearer to `before`, where both are as near the one along `gap`."""
     leaning = float(normal @ before)
-    if abs(leaning) < 1e-9:
+    if abs(leaning) < _AS_NEAR:
         distance = float(gap @ normal)
         leaning = distance if abs(distance) > ONE_LINE else 1.0
     return normal if leaning > 0 else -normal

@@ -1,8 +1,8 @@
 """Tolerances of a joint's assembly from its errors, errors from tolerances, and what they do at the flange.
 
 Source: KR5 paper, sections 2.3 and 4.3. A hole of depth l whose far end may lie delta aside of its place lets the axis
-lean by ``atan(delta / l)`` (equation 8): perpendicularity if the axis is square to its datum, parallelism if it is along
-it. Towards mu, from x to y, the axis leans by ``egamma = -atan(delta sin(mu) / l)`` and ``ebeta = atan(delta cos(mu)
+lean by ``atan(delta / l)`` (equation 8): perpendicularity if the axis is square to its datum, parallelism if it goes
+along it. Towards mu, from x to y, it leans by ``egamma = -atan(delta sin(mu) / l)`` and ``ebeta = atan(delta cos(mu)
 cos(egamma) / l)`` (9 and 10, which print them for ``Ry Rx`` and without the sign; equation 5 has ``Rx Ry``).
 """
 
@@ -47,7 +47,7 @@ def tolerance_of(
 
 
 def errors_of_tolerance(delta: float, towards: float, depth: float) -> tuple[float, float]:
-    """Return ebeta and egamma [rad] of an axis that is `delta` [m] aside at a hole's depth [m] towards an angle [rad]."""
+    """Return ebeta and egamma [rad] of an axis that is `delta` aside at a hole's depth [m], towards an angle [rad]."""
     share = delta / checked_depth(depth)
     egamma = -math.atan(share * math.sin(towards))
     return math.atan(share * math.cos(towards) * math.cos(egamma)), egamma
@@ -101,7 +101,7 @@ def flange_error(robot: Robot, leans: Sequence[float], positions: Sequence[float
     robot
         With joint errors, at those values around which they vary.
     leans
-        Largest ``delta / l`` of each joint.
+        Largest angle of each joint's axis [rad].
     positions
         Radius of the sphere in which each joint's frame may lie [m].
     q

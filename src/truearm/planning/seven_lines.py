@@ -68,7 +68,7 @@ class SevenLines:
         """Return readings at the middle of the box, near which all others shall lie."""
         middle = self.position.mean(axis=0)
         found = inverse(robot, middle[None], self.rotation[None])
-        return readings(found, ("the middle of the box",), "line test")[0]
+        return np.asarray(readings(found, ("the middle of the box",), "line test")[0])
 
 
 def seven_lines(centre: ArrayLike, size: ArrayLike, poses_each: int = POSES_EACH, rotation: Array = DOWN) -> SevenLines:

@@ -127,15 +127,15 @@ def study(seeds: int, progress: Callable[[str], None], repetitions: int = 1000) 
             f" error is the mean distance over {_REPEATS} repetitions.",
             "Where the reflector was and where the box of lines stood is not printed, nor which way the tool pointed."
             " Ours are invented: the lines go through (850, 0, 600) mm, the tool points down.",
-            "Off-line compensation is equation 11 at the nominal joints: the fake target, from which the nominal robot's"
-            " readings follow. It uses the errors as found, never the twin's.",
+            "Off-line compensation is equation 11 at the nominal joints: the fake target, from which the nominal"
+            " robot's readings follow. It uses the errors as found, never the twin's.",
             "The held errors cannot be seen one by one, so that of joint 2, for example, ey_2 + ez_1 is found.",
         ),
     )
 
 
 def _truth() -> dict[str, float]:
-    values = {}
+    values: dict[str, float] = {}
     for number, (ebeta, egamma, *slides) in enumerate(_TABLE_3, 1):
         values |= {f"ebeta_{number}": math.radians(ebeta), f"egamma_{number}": math.radians(egamma)}
         values |= {f"{name}_{number}": v / 1e3 for name, v in zip(("ex", "ey", "ez"), slides, strict=True)}
@@ -149,7 +149,7 @@ def _configurations() -> Array:
         run = np.tile(posture, (2 * len(forward), 1)).astype(float)
         run[:, number - 1] = np.concatenate([forward, forward[::-1]])
         rows.append(run)
-    return np.radians(np.concatenate(rows))
+    return np.asarray(np.radians(np.concatenate(rows)))
 
 
 def _found(

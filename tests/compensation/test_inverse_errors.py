@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from tests.modeling.test_joint_errors import TABLE_1, TABLE_3, about, error, slid, with_table_3
+from tests.modeling.test_conventions import about, slid
+from tests.modeling.test_joint_errors import TABLE_1, TABLE_3, error, with_table_3
 
 from truearm.compensation.inverse_errors import design, fake_targets, inverted
 from truearm.compensation.line_test import LineErrors, from_data, on_twin, reduction, summary

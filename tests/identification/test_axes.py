@@ -27,11 +27,11 @@ from truearm.modeling.transform import IDENTITY
 from truearm.robots import load_robot
 
 
-def runs(step: float = 6.0, posture: tuple[float, ...] = (0, 0, 0, 0, 30, 0), joints: int = 6) -> Array:
+def runs(step: float = 6.0, posture: tuple[float, ...] = (0, 0, 0, 0, 30, 0)) -> Array:
     """Every joint alone from -60 to 60 deg and back, the others in a posture."""
     forward = np.arange(-60.0, 60.1, step)
     rows = []
-    for joint in range(joints):
+    for joint in range(6):
         run = np.tile(np.array(posture, float), (2 * len(forward), 1))
         run[:, joint] = np.concatenate([forward, forward[::-1]])
         rows.append(run)

@@ -9,6 +9,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
+from truearm.cli.axes import axes
 from truearm.cli.calibrate import calibrate
 from truearm.cli.check import check
 from truearm.cli.convert import convert
@@ -17,10 +18,12 @@ from truearm.cli.hexapod import app as hexapod
 from truearm.cli.ik import ik
 from truearm.cli.importing import app as importing
 from truearm.cli.library import robots, show
+from truearm.cli.lines import lines
 from truearm.cli.plan import plan
 from truearm.cli.simulate import simulate
 from truearm.cli.starting import demo, example, new_robot
 from truearm.cli.study import HELP, study
+from truearm.cli.tolerance import tolerance
 from truearm.cli.validate import validate
 from truearm.errors import InputError
 from truearm.version import __version__
@@ -60,6 +63,9 @@ app.command()(validate)
 app.command()(distances)
 app.command()(ik)
 app.command()(plan)
+app.command()(axes)
+app.command()(tolerance)
+app.command()(lines)
 app.command()(simulate)
 app.add_typer(importing, name="import")
 app.add_typer(hexapod, name="hexapod")

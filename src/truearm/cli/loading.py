@@ -1,4 +1,4 @@
-"""The options ``--payload`` and ``--gravity``: what a robot carries, and how it is mounted."""
+"""Options as texts: what a robot carries and how it is mounted (``--payload``, ``--gravity``), and lengths."""
 
 from __future__ import annotations
 
@@ -85,3 +85,16 @@ def read_gravity(text: str | None) -> tuple[float, float, float] | None:
         )
     x, y, z = (float(number) for number in numbers if number is not None)
     return x, y, z
+
+
+def read_lengths(text: str, where: str, count: int) -> list[float]:
+    """Return `count` lengths [m] of a text in mm; one number stands for all."""
+    from truearm.units import as_number, sized_si
+
+    numbers = [as_number(part.strip()) for part in text.split(",")]
+    if None in numbers or len(numbers) not in (1, count):
+        raise InputError(
+            "numbers separated by commas belong here", where=where, came=text, allowed=f"{count} numbers in mm"
+        )
+    found = [sized_si(number, "mm", where) for number in numbers if number is not None]
+    return found * count if len(found) == 1 else found

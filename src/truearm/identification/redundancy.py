@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 
@@ -52,7 +52,18 @@ class Redundancy:
     combination: str
 
 
-def find_redundancies(problem: Problem, vector: Array, held: Sequence[str] = ()) -> tuple[Redundancy, ...]:
+class Linearisable(Protocol):
+    """A whitened problem, such as :class:`truearm.identification.problem.Problem`."""
+
+    @property
+    def free(self) -> FreeParameters:
+        """What may change."""
+
+    def linearised(self, vector: Array) -> tuple[Array, Array]:
+        """Return the whitened residual ``(rows,)`` at a vector and its Jacobian ``(rows, parameters)``."""
+
+
+def find_redundancies(problem: Linearisable, vector: Array, held: Sequence[str] = ()) -> tuple[Redundancy, ...]:
     """Return the redundant parameters of a problem at `vector`, with their combinations.
 
     Parameters
@@ -120,10 +131,10 @@ def _redundancy(free: FreeParameters, dropped: int, here: Array, away: Array) ->
     involved = [dropped]
     involved += [i for i in range(len(here)) if i != dropped and max(abs(here[i]), abs(away[i])) > _MEMBER]
     members = {free.names[i]: float(here[i] * free.prior[i] / free.prior[dropped]) for i in involved}
-    return Redundancy(free.names[dropped], members, _in_words(members, free))
+    return Redundancy(free.names[dropped], members, in_words(members, free))
 
 
-def _in_words(members: dict[str, float], free: FreeParameters) -> str:
+def in_words(members: dict[str, float], free: FreeParameters) -> str:
     """Name the members that matter, a millimetre weighed against a tenth of a degree."""
     by_name: dict[str, Parameter] = dict(zip(free.names, free.parameters, strict=True))
     size = {n: abs(c) / (1e-3 if by_name[n].unit == "m" else 1.75e-3) for n, c in members.items()}

@@ -9,12 +9,18 @@ from typing import Final
 
 import numpy as np
 
+from truearm.errors import InputError
 from truearm.modeling.chain import Array, Chain, Element
 from truearm.modeling.parts import Joint
 from truearm.modeling.robot import Robot
 
 #: Below this angle [rad] two axes are parallel: they part by less than 1 nm over the reach of a robot.
 PARALLEL: Final = 1e-9
+#: Below this angle [rad] two axes fix no frame that is worth it: where it stands would be uncertain.
+_SQUARE_ENOUGH: Final = 0.1
+#: Two opposite normals are as near to a direction if they are this square to it [cosine]: 10 deg, so that the small
+#: errors of a real robot do not turn its frames round.
+_AS_NEAR: Final = math.sin(math.radians(10.0))
 #: Below this distance [m] two parallel axes are one line.
 ONE_LINE: Final = 1e-12
 
@@ -66,6 +72,28 @@ def first_frame(base: Array, axis: JointAxis) -> Array:
     return frame(across(base[:3, :3], axis.along), axis.along, axis.nearest(base[:3, 3]))
 
 
+def frame_between(axis: JointAxis, other: JointAxis) -> Array:
+    """Return the frame that two axes fix: z along `axis`, x along ``axis x other``, on their common normal ``(4, 4)``.
+
+    Raises
+    ------
+    InputError
+        If the axes are parallel: then nothing says where along them the frame stands.
+    """
+    normal = np.cross(axis.along, other.along)
+    sine = float(np.linalg.norm(normal))
+    if sine < _SQUARE_ENOUGH:
+        raise InputError(
+            "two axes that are parallel fix no frame",
+            where=f"{axis.joint.name} and {other.joint.name}",
+            came=f"{math.degrees(axis.angle(other)):.3g} deg apart",
+            allowed=f"{math.degrees(_SQUARE_ENOUGH):.3g} deg or more",
+        )
+    apart = other.point - axis.point
+    foot = axis.point + float(np.cross(apart, other.along) @ normal) / sine**2 * axis.along
+    return frame(normal / sine, axis.along, foot)
+
+
 def common_normal(axis: JointAxis, following: JointAxis, before: Array, here: Array) -> tuple[Array, Array, Array]:
     """Return direction, start and end of a common normal of two axes.
 
@@ -96,7 +124,7 @@ def common_normal(axis: JointAxis, following: JointAxis, before: Array, here: Ar
 def nearer_way(normal: Array, before: Array, gap: Array) -> Array:
     """Return `normal` or its opposite: the one nearer to `before`, where both are as near the one along `gap`."""
     leaning = float(normal @ before)
-    if abs(leaning) < 1e-9:
+    if abs(leaning) < _AS_NEAR:
         distance = float(gap @ normal)
         leaning = distance if abs(distance) > ONE_LINE else 1.0
     return normal if leaning > 0 else -normal

@@ -73,6 +73,11 @@ STUDIES: Final = (
         "a circle predicted, corrected and followed by a simulated Katana 450 (Patel 5)",
         "truearm.studies.katana_trajectory",
     ),
+    Entry(
+        "kr5-gdt",
+        "a KUKA KR 5: joint errors from circles, tolerances, seven lines before and after compensation (KR5 paper)",
+        "truearm.studies.kr5_gdt",
+    ),
 )
 
 

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from truearm.measurement import turns
+from truearm.measurement.circles import fit_circle
 from truearm.measurement.twin import Twin, measure
 from truearm.modeling.chain import Array
 
@@ -25,7 +27,7 @@ class AxisTest:
 
 @dataclass(frozen=True)
 class Turn:
-    """What circle fitting makes of one joint's run, forward and back.
+    """What circle fitting makes of one joint's run, forward and back, in the document's units.
 
     Attributes
     ----------
@@ -35,27 +37,18 @@ class Turn:
         Angle about the fitted axis beyond the commanded one, zero where the joint is at zero [deg], ``(n,)``.
     radius
         [mm].
+    angular, tangential
+        Range of the angular error [deg] and of the tangential one [mm].
+    backlash
+        How far the joint lags behind, backward minus forward [deg].
     """
 
     angle: Array
     error: Array
     radius: float
-
-    @property
-    def angular(self) -> float:
-        """Range of the angular error [deg]."""
-        return float(np.ptp(self.error))
-
-    @property
-    def tangential(self) -> float:
-        """Range of the tangential error [mm]."""
-        return math.radians(self.angular) * self.radius
-
-    @property
-    def backlash(self) -> float:
-        """How far the joint lags behind, backward minus forward [deg]."""
-        forward, backward = np.split(self.error, 2)
-        return float(np.mean(backward[::-1] - forward))
+    angular: float
+    tangential: float
+    backlash: float
 
 
 def _angles(test: AxisTest) -> Array:
@@ -76,15 +69,16 @@ def places_of(twin: Twin, number: int, test: AxisTest) -> Array:
 def turn_of(places: Array, test: AxisTest) -> Turn:
     """Fit a circle to the places of a reflector [m] and compare its angle with the commanded one."""
     angle = _angles(test)
-    centred = places - places.mean(axis=0)
-    across, along, _ = np.linalg.svd(centred, full_matrices=False)[2]
-    x, y = centred @ across, centred @ along
-    solved = np.linalg.lstsq(np.column_stack([2 * x, 2 * y, np.ones_like(x)]), x**2 + y**2)[0]
-    turned = np.degrees(np.unwrap(np.arctan2(y - solved[1], x - solved[0])))
-    turned *= np.sign(np.polyfit(angle, turned, 1)[0])
-    error = turned - angle
-    radius = math.sqrt(solved[2] + solved[0] ** 2 + solved[1] ** 2)
-    return Turn(angle, error - error[angle == 0.0].mean(), radius * 1e3)
+    turned = turns.turn_of(fit_circle(places), np.radians(angle), np.repeat([1.0, -1.0], len(angle) // 2))
+    error = np.degrees(turned.error)
+    return Turn(
+        angle=angle,
+        error=error - error[angle == 0.0].mean(),
+        radius=turned.circle.radius * 1e3,
+        angular=math.degrees(turned.angular),
+        tangential=turned.tangential * 1e3,
+        backlash=math.degrees(turned.backlash or 0.0),
+    )
 
 
 def run_out(turn: Turn, test: AxisTest) -> tuple[float, float]:

@@ -16,6 +16,8 @@ convention                   link i                                       source
 ``zero-reference``           Trans(p) small R, R(axis, theta) Trans(-p)   Mooring 1983; Gupta 1986
 ``product-of-exponentials``  exp(xi theta), the same with p = w x v       Brockett 1984; Okamura, Park 1996
 ``translations``             Tx(x) Ty(y) Tz(z) Rx(rx) Ry(ry) Rz(theta)    KR5 paper, equation 1
+``joint-errors``             Tx Ty Tz Rx Ry Rz as designed, errors Tx(ex)  KR5 paper, equations 5 and 7
+                             Ty(ey) Tz(ez) Rx(egamma) Ry(ebeta), Rz(theta)
 ``urdf``                     Tx Ty Tz Rz(yaw) Ry(pitch) Rx(roll), then     ROS, URDF specification
                              small Rx Ry Rz, then the joint's own axis
 ============================ ============================================ =================================
@@ -36,6 +38,7 @@ from truearm.modeling.chain import Motion
 from truearm.modeling.conventions.convention import JOINT, Convention, JointKind
 from truearm.modeling.conventions.cpc import CpcConvention
 from truearm.modeling.conventions.exponentials import ExponentialsConvention
+from truearm.modeling.conventions.joint_errors import JointErrorsConvention
 from truearm.modeling.conventions.origin import OriginConvention
 from truearm.modeling.conventions.parallel import parallel_joints_without_beta
 from truearm.modeling.conventions.zero_reference import ZeroReferenceConvention
@@ -68,6 +71,14 @@ CONVENTIONS: Final = (
     ZeroReferenceConvention("zero-reference", _POINT),
     ExponentialsConvention("product-of-exponentials", ()),
     Convention("translations", (*_POINT, ("rx", "Rx"), ("ry", "Ry"), (JOINT, "Rz"))),
+    JointErrorsConvention(
+        "joint-errors",
+        (
+            *(*_POINT, ("rx", "Rx"), ("ry", "Ry"), ("rz", "Rz")),
+            *(("ex", "Tx"), ("ey", "Ty"), ("ez", "Tz"), ("egamma", "Rx"), ("ebeta", "Ry")),
+            (JOINT, "Rz"),
+        ),
+    ),
     OriginConvention("urdf", (*_POINT, ("yaw", "Rz"), ("pitch", "Ry"), ("roll", "Rx"))),
 )
 

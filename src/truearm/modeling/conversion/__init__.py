@@ -19,7 +19,7 @@ from truearm.modeling.chain import Array
 from truearm.modeling.conventions import convention
 from truearm.modeling.conversion.base_frame import exponentials, zero_reference
 from truearm.modeling.conversion.common_normals import dh, hayati, s_model
-from truearm.modeling.conversion.directions import cpc, mcpc, translations
+from truearm.modeling.conversion.directions import cpc, joint_errors, mcpc, translations
 from truearm.modeling.conversion.links import Links
 from truearm.modeling.conversion.origins import origins
 from truearm.modeling.lines import at_zero, base_and_flange
@@ -38,6 +38,7 @@ CONVERSIONS: Final[Mapping[str, Callable[[Robot], Links]]] = {
     "zero-reference": zero_reference,
     "product-of-exponentials": exponentials,
     "translations": translations,
+    "joint-errors": joint_errors,
     "urdf": origins,
 }
 

@@ -53,6 +53,18 @@ def translations(robot: Robot) -> Links:
     return Links(tuple(rows))
 
 
+def joint_errors(robot: Robot) -> Links:
+    """Return the robot as it is as a design without errors; one given by translations keeps its frames."""
+    if robot.convention_name == "translations":
+        rows = [
+            {column: robot.values[f"{column}_{number}"] for column in robot.convention.row_units(joint.kind)}
+            for number, joint in enumerate(robot.joints, 1)
+        ]
+    else:
+        rows = [dict(row) for row in translations(robot).rows]
+    return Links(tuple({**row, "rz": row[JOINT], JOINT: 0.0} for row in rows))
+
+
 def _links(robot: Robot, tilt: Tilt, last: tuple[str, str, str, str]) -> Links:
     """Return links ``Rz(theta) tilt Rz Tx Ty Tz``, with the columns `last`; inner ones have no Rz and no Tz."""
     axes = joint_axes(robot)

@@ -176,6 +176,7 @@ class RobotFile(_Entry):
         "zero-reference",
         "product-of-exponentials",
         "translations",
+        "joint-errors",
         "urdf",
     ]
     joints: list[_Joint] = Field(min_length=1)

@@ -16,7 +16,7 @@ from truearm.identification.losses import MEDIAN_NORM, Loss
 from truearm.identification.models import FRAMES, Model
 from truearm.identification.problem import Problem, check_circumstances, check_solvable
 from truearm.identification.redundancy import Redundancy, find_redundancies, unseen_but_felt
-from truearm.identification.solver import Solution, solve
+from truearm.identification.solver import SMALL, Solution, solve
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
 from truearm.modeling.parameters import FreeParameters
@@ -33,7 +33,7 @@ _FIRST_NOISE: Final = {"position": 1e-4, "orientation": 1e-4}
 _NOISE_FLOOR: Final = 1e-9
 #: Rounds until deviations and loads agree with the solution; each leaves a hundredth of the loads' error or less.
 _ROUNDS: Final = 6
-_LOADS_AGREE: Final = 1e-10  # of the joints' deflections [rad or m]
+_LOADS_AGREE: Final = 1e-4  # of the last step, in the joints' deflections [rad or m]
 # Spatial median in three dimensions against the mean, for normal noise (Brown 1983).
 _L1_EFFICIENCY: Final = 0.849
 
@@ -139,6 +139,7 @@ def identify(
     redundancy: Redundant = "prior",
     bounds: Bounds | None = None,
     bounds_file: str = "bounds",
+    small: float = SMALL,
 ) -> Fit:
     """Identify a robot from training data.
 
@@ -158,6 +159,8 @@ def identify(
         do no harm. ``drop``: no priors; redundant parameters are held at nominal and named.
     bounds
         Limits of parameter values.
+    small
+        Step of the solver that is the last, in priors.
 
     Raises
     ------
@@ -184,7 +187,7 @@ def identify(
             _check_held(held, free, check_bounds, bounds_file)
         kept = problem.free.without(held)
         limits = None if check_bounds is None else _limits_of(check_bounds, free, kept)
-        solution, reduced = _solve_with_noise(replace(problem, free=kept), loss, limits)
+        solution, reduced = _solve_with_noise(replace(problem, free=kept), loss, limits, small)
         steps += solution.steps
         if redundancy == "prior":
             break
@@ -221,9 +224,11 @@ def _limits_of(limits: tuple[Array, Array], free: FreeParameters, kept: FreePara
     return limits[0][places], limits[1][places]
 
 
-def _solve_with_noise(problem: Problem, loss: Loss, limits: tuple[Array, Array] | None) -> tuple[Solution, Problem]:
+def _solve_with_noise(
+    problem: Problem, loss: Loss, limits: tuple[Array, Array] | None, small: float
+) -> tuple[Solution, Problem]:
     """Solve; then again with what the solution says of undeclared deviations and of the loads at every joint."""
-    solution = solve(problem, loss, limits)
+    solution = solve(problem, loss, limits, small)
     undeclared = {b.observation.name for b in problem.blocks if b.observation.declared_sigma(problem.data) is None}
     steps = solution.steps
     settled = False
@@ -237,11 +242,11 @@ def _solve_with_noise(problem: Problem, loss: Loss, limits: tuple[Array, Array] 
         started = FreeParameters(tuple(replace(p, value=found[p.name]) for p in problem.free.parameters))
         there = replace(problem, robot=problem.robot.with_values(found), noise=noise, free=started)
         shift = _load_shift(problem, there)
-        if (settled and shift < _LOADS_AGREE) or (not undeclared and shift == 0.0):
+        if (settled and shift < _LOADS_AGREE * small) or (not undeclared and shift == 0.0):
             break
         settled = change < 0.02
         problem = there
-        solution = solve(problem, loss, limits)
+        solution = solve(problem, loss, limits, small)
         steps += solution.steps
     return replace(solution, steps=steps), problem
 

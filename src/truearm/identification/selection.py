@@ -27,6 +27,7 @@ from truearm.modeling.robot import Robot
 
 AUTO: Final = "auto"
 FOLDS: Final = 5
+_ROUGH: Final = 1e-3  # priors; errors of folds are not compared more closely
 _START: Final = next(model for model in MODELS if model.name == "elastic")
 _CANDIDATES: Final = (
     "bearing-compliance",
@@ -132,7 +133,14 @@ def select(
         errors = []
         for training, held_out in folds:
             fit = identify(
-                robot, training, model, loss=loss, redundancy=redundancy, bounds=bounds, bounds_file=bounds_file
+                robot,
+                training,
+                model,
+                loss=loss,
+                redundancy=redundancy,
+                bounds=bounds,
+                bounds_file=bounds_file,
+                small=_ROUGH,
             )
             spread = errors_of(fit.robot, held_out).position_spread
             errors.append(np.nan if spread is None else spread.mean)

@@ -17,7 +17,7 @@ from truearm.modeling.chain import Array
 from truearm.modeling.parameters import FreeParameters
 
 #: A step this small is the last: the next one would be smaller by the share of the residual that bends, 1e-3 or less.
-_SMALL: Final = 1e-6
+SMALL: Final = 1e-6
 #: Size of a step that counts as one, where the prior is no scale (base and targets) [m or rad].
 _GEOMETRIC: Final = 1e-3
 _STEPS: Final = {"linear": 60, "huber": 100, "cauchy": 100, "l1": 300}
@@ -87,7 +87,9 @@ class Solution:
     weight: Array
 
 
-def solve(problem: Solvable, loss: Loss = "linear", bounds: tuple[Array, Array] | None = None) -> Solution:
+def solve(
+    problem: Solvable, loss: Loss = "linear", bounds: tuple[Array, Array] | None = None, small: float = SMALL
+) -> Solution:
     """Minimise the whitened residuals under a loss.
 
     Parameters
@@ -99,6 +101,8 @@ def solve(problem: Solvable, loss: Loss = "linear", bounds: tuple[Array, Array] 
         "|X - X'|" read as each point's distance).
     bounds
         Lowest and highest value of every parameter [SI], infinite where there is none.
+    small
+        Step that is the last, in priors.
     """
     start = problem.free.start
     here = problem.at(start if bounds is None else np.clip(start, *bounds))
@@ -126,8 +130,8 @@ def solve(problem: Solvable, loss: Loss = "linear", bounds: tuple[Array, Array] 
         if not accepted:
             break
         here = trial
-        small = float(np.abs(step / np.minimum(prior, _GEOMETRIC)).max()) < _SMALL
-        if small or predicted <= 1e-24 * max(cost, 1.0):
+        last = float(np.abs(step / np.minimum(prior, _GEOMETRIC)).max()) < small
+        if last or predicted <= 1e-24 * max(cost, 1.0):
             converged = loss != "l1" or scale <= _FLOOR * float(np.median(_norms(here.residual)) + 1e-300)
             if converged:
                 break

@@ -44,6 +44,7 @@ def circumstances(robot: Robot, count: int, seed: int) -> Postures:
     loads = replace(robot, effect_names=("compliance",), known={}).loaded(at).loads
     assert loads is not None
     seated = (np.abs(loads[:, 5]) > 20 * SEATED).all(axis=0)
+    seated &= (np.hypot(loads[:, 3], loads[:, 4]) > 20 * SEATED).all(axis=0)
     return at.at(np.flatnonzero(seated))
 
 

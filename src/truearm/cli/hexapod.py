@@ -147,7 +147,7 @@ def plan(
         str,
         typer.Option(
             metavar="X,Y,Z,TURN",
-            help="Base fixture in the robot's base frame: B1 [mm] and turn about z [deg], or X,Y,Z,QW,QX,QY,QZ.",
+            help="Base fixture in the robot's base frame: B1 \\[mm] and turn about z \\[deg], or X,Y,Z,QW,QX,QY,QZ.",
         ),
     ],
     out: Annotated[Path, typer.Option("--out", metavar="SHEET.csv", help="Sheet to fill in.")],
@@ -205,7 +205,9 @@ def plan(
 @app.command("world-frame")
 def world_frame(
     robot: RobotName,
-    touches: Annotated[Path, typer.Argument(metavar="TOUCHES.csv", help="Columns cup, joint_1 [deg] ..; B1, B2, B3.")],
+    touches: Annotated[
+        Path, typer.Argument(metavar="TOUCHES.csv", help="Columns cup, joint_1 \\[deg] ..; B1, B2, B3.")
+    ],
     base: Annotated[str, typer.Option(metavar=_THREE, help="Measured distances B1-B2, B2-B3, B3-B1.")],
     target: Annotated[str | None, typer.Option(metavar="NAME", help="Cup of the tool that touched.")] = None,
     tool: ToolName = None,

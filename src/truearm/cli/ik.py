@@ -23,7 +23,7 @@ _EXPLAINED = 10
 def ik(
     robot: Annotated[str, typer.Argument(metavar="ROBOT", help="A library id, a robot file or a URDF.")],
     poses: Annotated[
-        Path, typer.Argument(metavar="POSES.csv", help="Columns pose, x [mm], y [mm], z [mm], qw, qx, qy, qz.")
+        Path, typer.Argument(metavar="POSES.csv", help="Columns pose, x \\[mm], y \\[mm], z \\[mm], qw, qx, qy, qz.")
     ],
     out: Annotated[Path, typer.Option("--out", metavar="JOINTS.csv", help="File to write.")],
     branch: Annotated[

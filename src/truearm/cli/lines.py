@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 def lines(
     robot: Annotated[str, typer.Argument(metavar="ROBOT", help="The nominal robot, as the controller knows it.")],
-    centre: Annotated[str, typer.Option(metavar="X,Y,Z", help="Middle of the box in the base frame [mm].")],
-    size: Annotated[str, typer.Option(metavar="X,Y,Z", help="Of the box [mm].")] = "600,800,400",
+    centre: Annotated[str, typer.Option(metavar="X,Y,Z", help="Middle of the box in the base frame \\[mm].")],
+    size: Annotated[str, typer.Option(metavar="X,Y,Z", help="Of the box \\[mm].")] = "600,800,400",
     model: Annotated[
         str | None,
         typer.Option(metavar="FILE", help="joint-errors.yaml to compensate with.", show_default=False),

@@ -26,7 +26,7 @@ GravityText = Annotated[
     typer.Option(
         "--gravity",
         metavar="X,Y,Z",
-        help="Free fall in the robot's base frame [m/s^2], 0,0,9.81 for a robot that hangs.",
+        help="Free fall in the robot's base frame \\[m/s^2], 0,0,9.81 for a robot that hangs.",
         show_default="as the robot file says",
     ),
 ]

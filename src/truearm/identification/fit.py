@@ -52,8 +52,8 @@ class Status(Enum):
         return {
             Status.CONVERGED: "Judge the fit by its held-out error.",
             Status.AT_BOUND: "A parameter stopped at a bound: widen the bound if it was a guess.",
-            Status.RANK_LOSS: "The data are too alike to determine everything that predictions depend on: "
-            "measure configurations that move every joint.",
+            Status.RANK_LOSS: "The data are too few or too alike to determine everything that predictions "
+            "depend on: measure more configurations that move every joint, or free fewer parameters.",
             Status.NOT_CONVERGED: "The steps did not settle: check units, joint order and targets.",
         }[self]
 

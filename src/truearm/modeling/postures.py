@@ -49,6 +49,13 @@ class Postures:
         """Return plain readings ``(n, joints)`` as postures at rest."""
         return q if isinstance(q, Postures) else cls(np.asarray(q, float))
 
+    @property
+    def joint_loads(self) -> Array:
+        """The loads, of postures that have them."""
+        if self.loads is None:
+            raise ValueError("the postures have no loads; ask Robot.loaded for them")
+        return self.loads
+
     def __len__(self) -> int:
         return len(self.joints)
 

@@ -178,6 +178,13 @@ class Robot:
                 add(name, _unit(element), "base" if name.startswith("base_") else group, element.value)
         for effect in self.effects:
             for plain in effect.parameters:
+                if plain.name in found:
+                    raise InputError(
+                        "two joint effects of the robot have the same parameter",
+                        where=f"{self.name}, {plain.name}",
+                        came=", ".join(e.name for e in self.effects if plain.name in [p.name for p in e.parameters]),
+                        cure="They are forms of one effect: take one of them.",
+                    )
                 found[plain.name] = self.known.get(plain.name, plain)
         for target in self.targets:
             for element in target.chain.elements:

@@ -1,7 +1,7 @@
 """Backlash: the load pushes a joint to one end of its play (Patel, 4.10 and 5.19).
 
 ``backlash_i`` is the whole play, what a dial shows when the load is reversed; the joint lies half of it from the
-middle. (Equation 5.19 adds the whole; see there what that would give on the document's own circle.)
+middle. (Equation 5.19 adds the whole, on either side.)
 """
 
 from __future__ import annotations

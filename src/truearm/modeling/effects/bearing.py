@@ -32,9 +32,7 @@ class BearingCompliance(LinearEffect):
 
     def shapes(self, at: Postures) -> Rates:
         """Return the moments across the axes."""
-        if at.loads is None:
-            raise ValueError("the postures have no loads; ask Robot.loaded for them")
         return {
-            f"bearing_compliance_{i + 1}": dict(zip(self.layout.tilt(i), at.loads[i, 3:5], strict=True))
+            f"bearing_compliance_{i + 1}": dict(zip(self.layout.tilt(i), at.joint_loads[i, 3:5], strict=True))
             for i in self.layout.turning
         }

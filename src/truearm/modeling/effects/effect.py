@@ -135,6 +135,4 @@ class LinearEffect(Effect):
 
 def effort(at: Postures, layout: Layout, joint: int) -> Array:
     """Return the load that turns a revolute joint forward [N m], or pushes a prismatic one [N], ``(n,)``."""
-    if at.loads is None:
-        raise ValueError("the postures have no loads; ask Robot.loaded for them")
-    return np.asarray(at.loads[joint, 5 if layout.kinds[joint] == "revolute" else 2])
+    return np.asarray(at.joint_loads[joint, 5 if layout.kinds[joint] == "revolute" else 2])

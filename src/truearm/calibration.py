@@ -30,6 +30,7 @@ from truearm.measurement.dataset import Dataset
 from truearm.measurement.readers.canonical import read_csv
 from truearm.measurement.statistics import Errors, Spread, errors_of
 from truearm.measurement.table_motion import without_table_motion
+from truearm.modeling.effects import EFFECTS
 from truearm.modeling.formats.robot_file import robot_text
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
@@ -197,6 +198,7 @@ def calibrate(
     bounds: Bounds | str | Path | None = None,
     payload: Payload | None = None,
     gravity: tuple[float, float, float] | None = None,
+    effects: Sequence[str] = (),
     progress: Callable[[str], None] = lambda _: None,
 ) -> Calibration:
     """Calibrate a robot and judge it on configurations the fit has not seen.
@@ -223,6 +225,8 @@ def calibrate(
         Limits of parameter values, or a bounds file.
     payload, gravity
         What the robot carried and how it was mounted, see :meth:`truearm.modeling.robot.Robot.carrying`.
+    effects
+        Joint effects to add to the model, of :data:`truearm.modeling.effects.EFFECTS` by name.
     progress
         Called with a few words at each step.
 
@@ -233,6 +237,12 @@ def calibrate(
     """
     urdf = None
     named = _chosen(model, {m.name: m for m in MODELS} | {AUTO: None}, "model")
+    for name in effects:
+        _chosen(name, {effect.name: effect for effect in EFFECTS}, "effect")
+    if effects and named is None:
+        raise InputError(
+            "the model auto chooses its effects itself", where="--effect", came=effects[0], cure="Name another model."
+        )
     _chosen(loss, {name: name for name in LOSSES}, "loss")
     _chosen(redundancy, {name: name for name in get_args(Redundant)}, "redundancy")
     words = ["truearm", "calibrate", str(robot) if isinstance(robot, str | Path) else "ROBOT"]
@@ -278,7 +288,7 @@ def calibrate(
             seed=seed,
             progress=progress,
         )
-    chosen: Model = named if selection is None else selection.model
+    chosen: Model = named.also(effects) if selection is None else selection.model
     progress("placing the nominal robot")
     nominal = place(robot, first, loss)
     progress(f"identifying the {chosen.name} model on {count} configurations")
@@ -289,6 +299,7 @@ def calibrate(
     before = errors_of(nominal.robot, judged)
     words += [data.source, "--model", chosen.name, "--train", "all" if second is None else str(count)]
     words += ["--seed", str(seed)]
+    words += [word for name in effects for word in ("--effect", name)]
     words += ["--loss", loss] if loss != "linear" else []
     words += ["--redundancy", redundancy] if redundancy != "prior" else []
     words += ["--bounds", bounds_file] if bounds is not None else []
@@ -296,8 +307,8 @@ def calibrate(
         words += ["--payload", ",".join([f"{payload.mass:.15g}kg", *(f"{v * 1e3:.15g}mm" for v in payload.cog)])]
     words += ["--gravity", ",".join(f"{v:.15g}" for v in gravity)] if gravity is not None else []
     history = (
-        f"calibrated by truearm {__version__}: model {chosen.name}, {count} of {n} configurations of"
-        f" {Path(data.source).name}{digest}, seed {seed}, loss {loss}, redundancy {redundancy}"
+        f"calibrated by truearm {__version__}: model {' + '.join([chosen.name, *effects])},"
+        f" {count} of {n} configurations of {Path(data.source).name}{digest}, seed {seed}, loss {loss}, redundancy {redundancy}"
     )
     return Calibration(
         fit=fit,

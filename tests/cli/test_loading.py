@@ -262,3 +262,26 @@ def test_a_robot_calibrated_with_its_temperature_asks_for_it(truearm: Truearm, d
     assert "the robot was calibrated with its temperature, and the data do not say theirs" in message
     assert "Add the column temperature [degC]" in message
     assert truearm("validate", tmp_path / "out" / "calibrated.yaml", tmp_path / "warm.csv").code == 0
+
+
+def test_an_effect_can_be_added_to_any_model(truearm: Truearm, data: Path, tmp_path: Path) -> None:
+    arguments = ("calibrate", "irb120", data, "--payload", PAYLOAD, "--out", tmp_path / "out")
+    run = truearm(*arguments, "--model", "elastic", "--effect", "bearing-compliance", "--effect", "compliance")
+    assert run.code == 0
+    result = json.loads((tmp_path / "out" / "result.json").read_text())
+    assert result["model"]["effects"] == ["compliance", "bearing-compliance"]
+    assert "--effect bearing-compliance" in result["command"]
+    misspelt = truearm(*arguments, "--effect", "bearing-complience")
+    assert misspelt.code == 2
+    assert "Did you mean bearing-compliance" in misspelt.err
+    both = truearm(*arguments, "--model", "auto", "--effect", "fourier")
+    assert both.code == 2
+    assert "chooses its effects itself" in both.err
+
+
+def test_two_forms_of_one_effect_are_refused(truearm: Truearm, data: Path, tmp_path: Path) -> None:
+    arguments = ("calibrate", "irb120", data, "--payload", PAYLOAD, "--out", tmp_path / "out")
+    run = truearm(*arguments, "--model", "tilting", "--effect", "clearance-linear-contact")
+    assert run.code == 2
+    assert "two joint effects of the robot have the same parameter" in run.err
+    assert "clearance, clearance-linear-contact" in run.err

@@ -14,6 +14,7 @@ from truearm.identification.advice import check_fit
 from truearm.identification.bounds import Bounds
 from truearm.identification.fit import Fit, identify
 from truearm.identification.models import MODELS, Model
+from truearm.measurement.checks import check_data
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.truths import truth_twin
 from truearm.measurement.twin import measure
@@ -131,3 +132,20 @@ def test_bounds_on_effects_are_in_the_units_that_are_shown() -> None:
     assert fit.robot.values["compliance_2"] == pytest.approx(0.01e-3)
     assert fit.robot.values["compliance_3"] == pytest.approx(0.1e-3)
     assert all(abs(fit.robot.values[f"backlash_{i}"]) <= math.radians(0.02) + 1e-12 for i in range(1, 7))
+
+
+def test_effects_that_no_model_frees_are_told() -> None:
+    geared = IRB120.with_effects(["bearing-compliance"])
+    message = told(identify(geared, bent(30), MODEL["elastic"]))["effects-idle"]
+    assert "bearing-compliance at nothing" in message
+    assert "--effect bearing-compliance" in message
+    assert "effects-idle" not in told(identify(geared, bent(30), MODEL["elastic"].also(["bearing-compliance"])))
+    known = geared.with_values({"bearing_compliance_2": 1e-5})
+    assert "effects-idle" not in told(identify(known, bent(30), MODEL["elastic"]))
+
+
+@pytest.mark.parametrize(("warmth", "told_of"), [((18.0, 31.0), False), ((291.0, 304.0), True)])
+def test_temperatures_of_no_arm_are_told(warmth: tuple[float, float], told_of: bool) -> None:
+    data = replace(bent(20), temperature=np.linspace(*warmth, 20))
+    codes = [notice.code for notice in check_data(data)]
+    assert ("temperature-unlikely" in codes) == told_of

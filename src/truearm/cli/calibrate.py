@@ -38,6 +38,10 @@ def calibrate(
     bounds: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Limits of parameter values.", show_default=False)
     ] = None,
+    effect: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="A joint effect to add to the model; repeat for each.", show_default=False),
+    ] = None,
     payload: PayloadText = None,
     gravity: GravityText = None,
     json: Json = False,
@@ -66,6 +70,7 @@ def calibrate(
             loss=loss,  # type: ignore[arg-type]
             redundancy=redundancy,  # type: ignore[arg-type]
             bounds=bounds,
+            effects=effect or (),
             payload=read_payload(payload),
             gravity=read_gravity(gravity),
             progress=say,

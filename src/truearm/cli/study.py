@@ -48,5 +48,8 @@ def study(
             typer.echo(f"{table.title}:")
         for row in table.rows:
             if row.published is not None:
-                typer.echo(f"  {row.verdict:8}{row.what}: {row.median:.3g}, published {row.published:g} {row.unit}")
+                allowed = "" if row.tolerance is None else f", may differ by {row.tolerance:.2g}"
+                typer.echo(
+                    f"  {row.verdict:8}{row.what}: {row.median:.3g}, published {row.published:g} {row.unit}{allowed}"
+                )
     typer.echo(f"Written to {out}: {', '.join(STUDY_FILES)}")

@@ -102,6 +102,21 @@ def check_fit(fit: Fit) -> list[Notice]:
 def _check_effects(fit: Fit) -> list[Notice]:
     """Say which joint effects the data know nothing about, and which came out as no spring can be."""
     robot, found = fit.robot, []
+    idle = [
+        effect.name
+        for effect in robot.effects
+        if effect.parameters
+        and not any(p.name in fit.free.names for p in effect.parameters)
+        and all(robot.values[p.name] == p.value for p in effect.parameters)
+    ]
+    if idle:
+        found.append(
+            Notice(
+                "effects-idle",
+                f"The robot file has the joint effects {', '.join(idle)} at nothing, and the model "
+                f"{fit.model.name} does not free them. Add --effect {idle[0]}, or take them out of the file.",
+            )
+        )
     effects = {p.name for effect in robot.effects for p in effect.parameters}
     own = [name for name in fit.free.names if name in effects]
     unknown = [name for name in own if fit.standing(name) == "uninformed"]

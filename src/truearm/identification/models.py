@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Final
 
 from truearm.modeling.parameters import FreeParameters, Group
@@ -32,6 +33,13 @@ class Model:
     groups: tuple[Group, ...]
     effects: tuple[str, ...] = ()
     tried: tuple[str, ...] = ()
+
+    def also(self, effects: Sequence[str]) -> Model:
+        """Return the model with some joint effects added."""
+        added = [name for name in dict.fromkeys(effects) if name not in self.effects]
+        if not added:
+            return self
+        return replace(self, summary=f"{self.summary}; also {', '.join(added)}", effects=(*self.effects, *added))
 
     def prepared(self, robot: Robot) -> Robot:
         """Return the robot with the model's effects, every parameter starting anew from its current value."""

@@ -21,6 +21,9 @@ from truearm.notices import Notice
 Suspicion = Literal["outliers", "targets-swapped", "target-mistaken"]
 
 #: A distance, or a place, that holds better than this is never doubted [m].
+#: Temperatures of working arms [degC].
+_COLDEST: Final = -30.0
+_WARMEST: Final = 80.0
 _HOLDS: Final = 1e-4
 #: How many robust deviations a distance or a place may be off.
 _DEVIATIONS: Final = 10.0
@@ -61,7 +64,23 @@ def check_data(data: Dataset, suspects: Iterable[Suspect] | None = None) -> list
     """
     found = [*_missing(data), *_duplicates(data)]
     found += suspect_notices([*rigid_suspects(data), *reference_suspects(data), *(suspects or ())])
-    return found + _moved(data)
+    return found + _moved(data) + _temperatures(data)
+
+
+def _temperatures(data: Dataset) -> list[Notice]:
+    """Say if an arm would be colder or warmer than arms are."""
+    if data.temperature is None:
+        return []
+    low, high = float(data.temperature.min()), float(data.temperature.max())
+    if low >= _COLDEST and high <= _WARMEST:
+        return []
+    return [
+        Notice(
+            "temperature-unlikely",
+            f"The temperature goes from {low:g} to {high:g} degC; arms work between {_COLDEST:g} and {_WARMEST:g}. "
+            "Is it in kelvin or degrees Fahrenheit?",
+        )
+    ]
 
 
 def suspect_notices(suspects: Sequence[Suspect]) -> list[Notice]:

@@ -198,7 +198,9 @@ class RobotFile(_Entry):
         known = [effect.name for effect in EFFECTS]
         for name in self.effects:
             if name not in known:
-                raise ValueError(f"there is no joint effect {name!r}; allowed: {', '.join(known)}")
+                near = nearest_names(name, known)
+                cure = f"; did you mean {' or '.join(near)}?" if near else ""
+                raise ValueError(f"there is no joint effect {name!r}; allowed: {', '.join(known)}{cure}")
         return self
 
 
@@ -288,6 +290,9 @@ def robot_from_file(content: RobotFile, where: str) -> Robot:
             return robot.parameters[name]
         near = nearest_names(name, robot.parameters)
         cure = f"Did you mean {' or '.join(near)}?" if near else None
+        for effect in EFFECTS:
+            if name in [p.name for p in effect(robot.layout).parameters]:
+                cure = f"It belongs to the joint effect {effect.name}: add that to the entry effects."
         raise InputError("the robot has no such parameter", where=f"{where}, {entry}", came=name, cure=cure)
 
     truths = {

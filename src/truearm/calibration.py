@@ -308,7 +308,8 @@ def calibrate(
     words += ["--gravity", ",".join(f"{v:.15g}" for v in gravity)] if gravity is not None else []
     history = (
         f"calibrated by truearm {__version__}: model {' + '.join([chosen.name, *effects])},"
-        f" {count} of {n} configurations of {Path(data.source).name}{digest}, seed {seed}, loss {loss}, redundancy {redundancy}"
+        f" {count} of {n} configurations of {Path(data.source).name}{digest}, seed {seed}, loss {loss},"
+        f" redundancy {redundancy}"
     )
     return Calibration(
         fit=fit,

@@ -12,22 +12,8 @@ from truearm.measurement.twin import Twin, measure
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.robots import load_robot
+from truearm.studies.katana import NAMES
 
-#: The document's alpha_0 to alpha_4 are alpha_1 to alpha_5 here. Its tool link is the flange here, so d_6 is z of the
-#: tip, and alpha_6, a turn with an arm of 200 mm, is y of the tip.
-NAMES: Final = (
-    *(f"theta_offset_{i}" for i in range(1, 6)),
-    *(f"alpha_{i}" for i in range(1, 6)),
-    "target_tip_y",
-    "beta_3",
-    "beta_4",
-    "a_3",
-    "a_4",
-    "d_5",
-    "target_tip_z",
-)
-UNITS: Final = {"target_tip_y": 0.2}
-PERTURBATIONS: Final = {"target_tip_y": 0.2 * math.radians(0.05)}
 #: One step of a parameter as the document counts them: rad and mm.
 UNIT: Final = np.array([0.2 if n == "target_tip_y" else 1e-3 if n in NAMES[-4:] else 1.0 for n in NAMES])
 

@@ -28,13 +28,14 @@ from truearm.identification.transmission import check_transmission
 from truearm.measurement.checks import check_data
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.readers.canonical import read_csv
-from truearm.measurement.statistics import Errors, Spread, errors_of
+from truearm.measurement.statistics import Errors, errors_of
 from truearm.measurement.table_motion import without_table_motion
 from truearm.modeling.effects import EFFECTS
 from truearm.modeling.formats.robot_file import robot_text
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
+from truearm.reporting.summaries import errors_summary, selection_summary
 from truearm.robots import load_robot, urdf_source
 from truearm.units import SHOWN_AS, from_si
 from truearm.version import __version__
@@ -427,45 +428,6 @@ def check_joints(robot: Robot, data: Dataset) -> None:
                 where=f"{data.source}, column joint_{number}",
                 allowed=units[joint.kind],
             )
-
-
-def selection_summary(selection: Selection) -> dict[str, Any]:
-    """Return how a model was chosen, as JSON holds it: errors in mm."""
-    return {
-        "elastic_mm": selection.start * 1e3,
-        "attempts": [
-            {
-                "round": attempt.round,
-                "effect": attempt.effect,
-                "error_mm": attempt.error * 1e3,
-                "gain_mm": attempt.gain * 1e3,
-                "standard_error_mm": attempt.standard_error * 1e3,
-                "taken": attempt.taken,
-            }
-            for attempt in selection.attempts
-        ],
-    }
-
-
-def errors_summary(errors: Errors) -> dict[str, Any]:
-    """Return error statistics in mm and mrad, as JSON holds them."""
-    made: dict[str, Any] = {"configurations": errors.configurations}
-    for key, spread, scale in (
-        ("position_mm", errors.position_spread, 1e3),
-        ("orientation_mrad", errors.orientation_spread, 1e3),
-    ):
-        if spread is not None:
-            made[key] = _scaled(spread, scale)
-    return made
-
-
-def _scaled(spread: Spread, scale: float) -> dict[str, float]:
-    return {
-        "mean": spread.mean * scale,
-        "rms": spread.rms * scale,
-        "p95": spread.p95 * scale,
-        "max": spread.max * scale,
-    }
 
 
 def _check_split(training: Dataset, held_out: Dataset) -> None:

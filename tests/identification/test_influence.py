@@ -5,7 +5,7 @@ from collections.abc import Mapping
 
 import numpy as np
 import pytest
-from tests.katana import NAMES, PERTURBATIONS, katana
+from tests.katana import katana
 
 from truearm.errors import InputError
 from truearm.identification.influence import Influence, influence
@@ -13,6 +13,7 @@ from truearm.measurement.truths import truth_twin
 from truearm.measurement.twin import Twin
 from truearm.modeling.chain import Array
 from truearm.robots import load_robot
+from truearm.studies.katana import NAMES, PERTURBATIONS
 
 HALF = math.radians(0.025)
 EIGHTY = math.radians(80)

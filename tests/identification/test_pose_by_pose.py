@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.katana import NAMES, PERTURBATIONS, UNIT, UNITS, drawn, katana, readings, values
+from tests.katana import UNIT, drawn, katana, readings, values
 
 from truearm.errors import InputError
 from truearm.identification.influence import influence
@@ -23,6 +23,7 @@ from truearm.measurement.statistics import errors_of
 from truearm.measurement.twin import Twin
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
+from truearm.studies.katana import NAMES, PERTURBATIONS, UNITS
 
 NOISE = 1e-5
 Method = Callable[..., PoseByPose]

@@ -3,10 +3,11 @@ from __future__ import annotations
 import json
 
 import numpy as np
-from tests.katana import NAMES, PERTURBATIONS, katana
+from tests.katana import katana
 
 from truearm.identification.influence import Influence, influence
 from truearm.reporting.influence_figures import influence_figure
+from truearm.studies.katana import NAMES, PERTURBATIONS
 
 
 def test_the_picture_shows_average_and_range_in_mm() -> None:

@@ -18,8 +18,8 @@ def validate(
     json: Json = False,
 ) -> None:
     """Judge a calibrated robot on new measurements taken in the same frames."""
-    from truearm.calibration import errors_summary
     from truearm.calibration import validate as run
+    from truearm.reporting.summaries import errors_summary
 
     summary = errors_summary(run(robot_file, data, payload=read_payload(payload), gravity=read_gravity(gravity)))
     if json:

@@ -92,11 +92,10 @@ def decided(robot: Robot, posture: Postures, *, upright: bool) -> NDArray[np.boo
         Whether a joint may turn to either side about an axis along gravity, which inclinometers do not see.
     """
     at = robot.loaded(posture)
-    assert at.loads is not None
     sweep, up = robot.sweep(at), upwards(robot)
     clear = np.ones((len(at), len(robot.joints)), dtype=bool)
     for joint in robot.layout.turning:
-        x, y, z = at.loads[joint, 3:]
+        x, y, z = at.joint_loads[joint, 3:]
         stands = np.linalg.norm(np.cross(sweep.axis(robot.moving[joint]).T, up), axis=1) < _UPRIGHT
         clear[:, joint] = (np.abs(z) > UNDECIDED[0]) | (upright & stands)
         clear[:, joint] &= np.hypot(x, y) > UNDECIDED[1]

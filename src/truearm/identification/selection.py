@@ -158,7 +158,7 @@ def select(
             progress(f"choosing a model: {', '.join(effects)} and {name}?")
             try:
                 errors = judged((*effects, name))
-            except InputError:  # a fold has fewer equations than this model has unknowns
+            except InputError:  # too few equations in a fold, or a bound that a redundant one cannot keep
                 continue
             gains = (now - errors)[np.isfinite(errors)]
             standard_error = float(gains.std(ddof=1) / np.sqrt(len(gains)))

@@ -78,9 +78,14 @@ class Pairs:
     @property
     def in_turn(self) -> Postures:
         """All postures, first and second of each pair in turn, as they are measured."""
+        joints, wrench = self._in_turn()
+        return Postures(joints, wrench=wrench)
+
+    def _in_turn(self) -> tuple[Array, Array]:
+        """Return readings ``(2n, joints)`` and wrenches ``(2n, 6)``."""
         wrenches = [np.zeros((len(p), 6)) if p.wrench is None else p.wrench for p in (self.first, self.second)]
         joints = np.stack([self.first.joints, self.second.joints], axis=1)
-        return Postures(joints.reshape(2 * len(self), -1), wrench=np.stack(wrenches, axis=1).reshape(2 * len(self), 6))
+        return joints.reshape(2 * len(self), -1), np.stack(wrenches, axis=1).reshape(2 * len(self), 6)
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,14 +143,12 @@ def compare(
     resolution, noise
         Of each reading [rad]; see :func:`inclinations`.
     """
-    at = pairs.in_turn
-    assert at.wrench is not None
-    read = inclinations(twin, at.joints, noise, rng, resolution, wrench=at.wrench)
+    joints, wrench = pairs._in_turn()
+    read = inclinations(twin, joints, noise, rng, resolution, wrench=wrench)
     return InclinometerReadings(pairs, read[1::2] - read[::2], deviation_of_change(resolution, noise))
 
 
 def measure_pairs(twin: Twin, pairs: Pairs, noise: float, rng: np.random.Generator) -> Dataset:
     """Return what an instrument reads of a twin's targets at the postures of pairs, in turn; noise in metres."""
-    at = pairs.in_turn
-    assert at.wrench is not None
-    return measure(twin, at.joints, noise, rng, wrench=at.wrench)
+    joints, wrench = pairs._in_turn()
+    return measure(twin, joints, noise, rng, wrench=wrench)

@@ -145,9 +145,7 @@ def run_circle(seed: int, step: float, poses: int) -> CircleRun:
         commanded = corrected(told, motion, circle.position, TIP).joints
         followed[what, ""] = _follow(real, commanded, motion, circle)
 
-    loads, loads_still = (causes["tilting"].loaded(at.postures()).loads for at in (motion, _at_rest(motion)))
-    assert loads is not None
-    assert loads_still is not None
+    loads, loads_still = (causes["tilting"].loaded(at.postures()).joint_loads for at in (motion, _at_rest(motion)))
     return CircleRun(
         motion=motion,
         distance=circle.distance * 1e3,

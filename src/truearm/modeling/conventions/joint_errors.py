@@ -10,13 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Final
 
 from truearm.modeling.chain import Element
 from truearm.modeling.conventions.convention import Convention, JointKind
-
-#: The errors of one joint, in the order of the transforms.
-ERRORS: Final = ("ex", "ey", "ez", "egamma", "ebeta")
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truearm.errors import InputError
 from truearm.measurement.circles import Circle, fit_circle
@@ -177,6 +178,11 @@ class AxisProblem:
     free: FreeParameters
     priors: bool = False
 
+    @property
+    def components(self) -> NDArray[np.intp]:
+        """Number of rows of each reading: two for the place of an axis and two for its direction."""
+        return np.full(2 * len(self.circles), 2)
+
     def at(self, vector: Array) -> AxisEvaluation:
         """Compare axes and circles at a vector ``(parameters,)``."""
         return AxisEvaluation(self, vector)
@@ -195,8 +201,8 @@ class AxisProblem:
 class AxisEvaluation:
     """Axes against circles at one vector of the free parameters.
 
-    A circle has six rows: where the axis crosses its plane, along x and y and zero, and how it leans towards x and y,
-    and zero, each whitened. (The zeros keep to the solver's three rows a reading.)
+    A circle has four rows: where the axis crosses its plane, along x and y, and how it leans towards x and y, each
+    whitened.
     """
 
     problem: AxisProblem
@@ -247,7 +253,5 @@ def _rows(
     axes = np.stack([circle.x, circle.y])
     by_offset = np.linalg.inv(np.linalg.cholesky(circle.shares[:2, :2])) / circle.sigma
     by_tilt = np.diag(1.0 / np.sqrt(circle.tilts)) / circle.sigma
-    residual, J = np.zeros(6), np.zeros((6, len(names)))
-    residual[:2], J[:2] = by_offset @ axes @ (crossing - circle.centre), by_offset @ axes @ moved.T
-    residual[3:5], J[3:5] = by_tilt @ axes @ along / facing, by_tilt @ axes @ leaning.T
-    return residual, J
+    residual = np.concatenate([by_offset @ axes @ (crossing - circle.centre), by_tilt @ axes @ along / facing])
+    return residual, np.concatenate([by_offset @ axes @ moved.T, by_tilt @ axes @ leaning.T])

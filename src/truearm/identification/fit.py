@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 
 from truearm.errors import InputError
 from truearm.identification.bounds import Bounds, bound_vectors
-from truearm.identification.frames import initial_frames
-from truearm.identification.losses import MEDIAN_NORM, Loss
+from truearm.identification.losses import MEDIAN_NORM, Loss, norms_of
 from truearm.identification.models import FRAMES, Model
-from truearm.identification.problem import Problem, check_circumstances, check_solvable
+from truearm.identification.problem import SETUP, Problem, check_circumstances, check_solvable
 from truearm.identification.redundancy import Redundancy, find_redundancies, unseen_but_felt
 from truearm.identification.solver import SMALL, Solution, solve
+from truearm.identification.standing import initial_standing, unanchored
 from truearm.measurement.dataset import Dataset
+from truearm.measurement.observations import OBSERVATIONS
 from truearm.modeling.chain import Array
 from truearm.modeling.parameters import FreeParameters
 from truearm.modeling.robot import Robot
@@ -29,7 +30,7 @@ Standing = Literal["identified", "uninformed", "at-bound", "not-determined", "dr
 _UNINFORMED: Final = 0.05
 
 #: Noise assumed for readings that declare none, until their own residuals say better [m, rad].
-_FIRST_NOISE: Final = {"position": 1e-4, "orientation": 1e-4}
+_FIRST_NOISE: Final = {observation.name: 1e-4 for observation in OBSERVATIONS}
 _NOISE_FLOOR: Final = 1e-9
 #: Rounds until deviations and loads agree with the solution; each leaves a hundredth of the loads' error or less.
 _ROUNDS: Final = 6
@@ -168,9 +169,9 @@ def identify(
         For data without positions, bounds on unknown parameters, bounds that a redundant parameter cannot keep, or
         too few equations without priors.
     """
-    start = initial_frames(model.prepared(robot), data)
+    start = initial_standing(model.prepared(robot), data)
     check_circumstances(start, data)
-    free = model.free(start)
+    free = unanchored(model.free(start), data)
     check_bounds = None
     if bounds is not None:
         tried = start.with_effects(model.tried).parameters.values()
@@ -229,7 +230,7 @@ def _solve_with_noise(
 ) -> tuple[Solution, Problem]:
     """Solve; then again with what the solution says of undeclared deviations and of the loads at every joint."""
     solution = solve(problem, loss, limits, small)
-    undeclared = {b.observation.name for b in problem.blocks if b.observation.declared_sigma(problem.data) is None}
+    undeclared = {problem.kind(b) for b in problem.blocks if not b.declared}
     steps = solution.steps
     settled = False
     for _ in range(_ROUNDS):
@@ -262,17 +263,20 @@ def _load_shift(before: Problem, after: Problem) -> float:
 
 def _noise(problem: Problem, solution: Solution, loss: Loss) -> dict[str, tuple[float, float]]:
     """Return for each observation the deviation of its whitened residuals, and the degrees of freedom behind it."""
-    norms = np.linalg.norm(solution.residual.reshape(-1, 3), axis=1)
-    kinds = np.concatenate([[b.observation.name] * len(b.readings) for b in problem.blocks])
+    kinds = np.concatenate([[problem.kind(b)] * b.rows for b in problem.blocks])
+    of_readings = np.concatenate([[problem.kind(b)] * len(b.readings) for b in problem.blocks])
+    norms = norms_of(solution.residual, problem.components)
     spent = _informed_rows(problem, solution)
     found = {}
     for name in dict.fromkeys(kinds.tolist()):
-        mine = norms[kinds == name]
-        freedom = 3 * len(mine) * max(1.0 - spent / problem.rows, 1e-3)
+        if name == SETUP:
+            continue
+        mine = solution.residual[kinds == name]
+        freedom = len(mine) * max(1.0 - spent / problem.rows, 1e-3)
         if loss == "linear":
             found[name] = (float(np.sqrt(np.sum(mine**2) / freedom)), freedom)
         else:
-            found[name] = (float(np.median(mine)) / MEDIAN_NORM, freedom)
+            found[name] = (float(np.median(norms[of_readings == name])) / MEDIAN_NORM, freedom)
     return found
 
 
@@ -301,9 +305,9 @@ def _fit(
         near = 1e-9 * free.prior
         at_bound = (x <= limits[0] + near) | (x >= limits[1] - near)
     weighted = np.ones_like(solution.weight) if loss == "l1" else solution.weight
-    A = solution.jacobian * free.prior * np.repeat(np.sqrt(weighted), 3)[:, None]
+    A = solution.jacobian * free.prior * np.repeat(np.sqrt(weighted), problem.components)[:, None]
     noise = _noise(problem, solution, loss)
-    declared = {b.observation.name for b in problem.blocks if b.observation.declared_sigma(problem.data) is not None}
+    declared = {problem.kind(b) for b in problem.blocks if b.declared} - {SETUP}
     excess = _excess({name: noise[name] for name in noise if name in declared}) if declared else 1.0
     spread = excess / np.sqrt(_L1_EFFICIENCY) if loss == "l1" else excess
     covariance = _covariance(A / spread, ~at_bound, problem.priors) * np.outer(free.prior, free.prior)
@@ -324,7 +328,8 @@ def _fit(
     first = 0
     for block in problem.blocks:
         part = used[first : first + len(block.readings)]
-        weight[block.readings] = np.fmin(weight[block.readings], part)
+        if block.data is problem.data:
+            weight[block.readings] = np.fmin(weight[block.readings], part)
         first += len(block.readings)
     if not solution.converged:
         status = Status.NOT_CONVERGED
@@ -336,7 +341,7 @@ def _fit(
         status = Status.CONVERGED
     sigma = {}
     for name in noise:
-        values = np.concatenate([b.sigma for b in problem.blocks if b.observation.name == name])
+        values = np.concatenate([b.sigma for b in problem.blocks if problem.kind(b) == name])
         sigma[name] = float(np.sqrt(np.mean(values**2)))
     return Fit(
         robot=robot,

@@ -178,6 +178,11 @@ class _Problem:
             raise InputError("no pair of poses can be used", where=poses.source, allowed=ENOUGH)
         return found
 
+    @property
+    def components(self) -> NDArray[np.intp]:
+        points = sum(len(pair) for pair in self.pairs.values())
+        return np.full(self.used.size // 3 + points, 3)
+
     def at(self, vector: Array) -> _Evaluation:
         return _Evaluation(self, vector)
 

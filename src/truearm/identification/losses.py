@@ -1,6 +1,6 @@
 """How much a reading counts, by how far off it is.
 
-A loss acts on whole readings (the norm of the three whitened residuals), not on single coordinates: a target caught
+A loss acts on whole readings (the norm of their whitened residuals), not on single coordinates: a target caught
 by mistake is wrong in all of them. Each is solved by iterated reweighting (Holland and Welsch 1977).
 """
 
@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Final, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truearm.modeling.chain import Array
 
@@ -17,10 +18,30 @@ LOSSES: Final[tuple[Loss, ...]] = ("linear", "huber", "cauchy", "l1")
 
 #: Median norm of three independent standard normal components.
 MEDIAN_NORM: Final = 1.5382
+_MEDIAN_OF_ONE: Final = 0.6745
 # Where a loss starts to doubt a reading, in robust deviations of one coordinate: beyond the 95th percentile of the
 # norm of three normal components for Huber, at its root mean square and a bit for Cauchy.
 _HUBER: Final = 2.80
 _CAUCHY: Final = 3.0
+
+
+def norms_of(residual: Array, components: NDArray[np.intp]) -> Array:
+    """Return the norm of each whitened reading, ``(readings,)``.
+
+    A reading of one number is worth as many times more as makes its median that of three: the thresholds below hold for
+    both.
+
+    Parameters
+    ----------
+    residual
+        Whitened, ``(rows,)``.
+    components
+        Number of consecutive rows of each reading, one to three.
+    """
+    first = np.concatenate([[0], np.cumsum(components)[:-1]])
+    norms: Array = np.sqrt(np.add.reduceat(residual**2, first))
+    norms[components == 1] *= MEDIAN_NORM / _MEDIAN_OF_ONE
+    return norms
 
 
 def robust_scale(norms: Array) -> float:

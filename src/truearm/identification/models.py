@@ -1,4 +1,4 @@
-"""Which parameters a model frees. Base and targets are always free."""
+"""Which parameters a model frees. Base, targets and fixtures are always free."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Model:
     summary
         What it frees, in words.
     groups
-        Parameter groups that are free besides base, targets and the effects' own.
+        Parameter groups that are free besides base, targets, fixtures and the effects' own.
     effects
         Joint effects that are added and free.
     tried
@@ -47,8 +47,8 @@ class Model:
         return known.with_parameters(p.restarted(p.value) for p in known.known.values())
 
     def free(self, robot: Robot) -> FreeParameters:
-        """Return the free parameters of a robot, base first, targets last."""
-        groups = ("base", "target", *self.groups, *self.effects)
+        """Return the free parameters of a robot, base first, targets and fixtures last."""
+        groups = ("base", "target", "fixture", *self.groups, *self.effects)
         return FreeParameters(tuple(p for p in robot.parameters.values() if p.group in groups))
 
 

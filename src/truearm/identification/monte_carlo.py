@@ -102,7 +102,7 @@ def monte_carlo(
     readings = rng.standard_normal((trials, problem.rows))
     estimate, deviation = np.empty_like(truth), np.empty_like(truth)
     converged = np.empty(trials, dtype=bool)
-    size = max(1, _BLOCK // problem.readings)
+    size = max(1, _BLOCK // len(problem.components))
     for block in (slice(first, first + size) for first in range(0, trials, size)):
         readings[block] += problem.at(truth[block]).residual
         estimate[block], deviation[block], converged[block] = _calibrated(problem, readings[block])

@@ -54,8 +54,11 @@ def check_against(robot: Robot, data: Dataset) -> tuple[list[Notice], list[Suspe
         The nominal robot, with as many joints as the data; its base and targets are left out of account.
     """
     found = _beyond_limits(robot, data)
+    data = data.in_instrument_frame()
+    if not data.has_position.any():
+        return found, []
     slips = _slips(robot, data)
-    if slips or not data.has_position.any():
+    if slips:
         return [*slips, *found], []
     return found, _far_off(robot, data)
 
@@ -174,19 +177,8 @@ def _some(data: Dataset) -> Dataset:
 def _only(data: Dataset, target: int) -> Dataset:
     kept = (data.target == target) & data.has_position
 
-    def part(values: Array | None) -> Array | None:
-        return None if values is None else values[kept]
-
-    return replace(
-        data,
-        configuration=data.configuration[kept],
-        target=np.zeros(int(kept.sum()), dtype=np.intp),
-        targets=(data.targets[target],),
-        position=data.position[kept],
-        quaternion=part(data.quaternion),
-        sigma=part(data.sigma),
-        sigma_rot=part(data.sigma_rot),
-    )
+    some = data.of_readings(kept)
+    return replace(some, target=np.zeros(len(some.target), dtype=np.intp), targets=(data.targets[target],))
 
 
 def _seen(data: Dataset, target: int) -> bool:

@@ -9,31 +9,40 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truearm.errors import InputError
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.observations import OBSERVATIONS, Observation
+from truearm.measurement.observations import Observation, compared
+from truearm.measurement.sighting import Sighting
 from truearm.modeling.chain import Array, Sweep
 from truearm.modeling.parameters import FreeParameters
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
 
+#: What the residuals of readings of the fixtures themselves are called.
+SETUP: Final = "setup"
+
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """The readings of one observation kind of one target: consecutive rows of the problem.
+    """The readings of one observation kind of one target from one fixture: consecutive rows of the problem.
 
     Attributes
     ----------
     observation
         What is compared.
+    data
+        Where the readings are: the problem's data, or what is known of its fixtures.
     target
-        Name of the target.
+        Name of the target; of a fixture in what is known of fixtures.
+    fixture
+        Name of the fixture it is measured against; None for the instrument's frame.
     readings
-        Indices into the dataset, ``(k,)``.
+        Indices into `data`, ``(k,)``.
     configurations
         Index of the configuration of each reading; all of them at once, which costs no copy, where the target was
         read at every one in order.
@@ -42,10 +51,22 @@ class Block:
     """
 
     observation: Observation
+    data: Dataset
     target: str
+    fixture: str | None
     readings: NDArray[np.intp]
     configurations: NDArray[np.intp] | slice
     sigma: Array
+
+    @property
+    def declared(self) -> bool:
+        """Whether the file declares the deviations."""
+        return self.observation.declared_sigma(self.data) is not None
+
+    @property
+    def rows(self) -> int:
+        """Number of equations."""
+        return len(self.readings) * self.observation.components
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,35 +95,36 @@ class Problem:
 
     @cached_property
     def blocks(self) -> tuple[Block, ...]:
-        """The readings, by target and observation."""
-        made = []
-        for index, name in enumerate(self.data.targets):
-            for observation in OBSERVATIONS:
-                readings = np.flatnonzero((self.data.target == index) & observation.present(self.data))
-                if len(readings):
-                    declared = observation.declared_sigma(self.data)
-                    sigma = (
-                        np.full(len(readings), self.noise[observation.name]) if declared is None else declared[readings]
-                    )
-                    seen = self.data.configuration[readings]
-                    everywhere = np.array_equal(seen, np.arange(self.data.configurations))
-                    made.append(Block(observation, name, readings, slice(None) if everywhere else seen, sigma))
-        return tuple(made)
+        """The readings, by target, fixture and observation; then what is known of the fixtures."""
+        parts = [self.data] if self.data.setup is None else [self.data, self.data.setup]
+        return tuple(block for part in parts for block in self._blocks_of(part))
+
+    def _blocks_of(self, data: Dataset) -> Iterator[Block]:
+        for target, fixture, observation, readings in compared(data):
+            sigma = observation.declared_sigma(data)
+            known = np.full(len(readings), self.noise[observation.name]) if sigma is None else sigma[readings]
+            seen = data.configuration[readings]
+            everywhere = np.array_equal(seen, np.arange(data.configurations))
+            yield Block(observation, data, target, fixture, readings, slice(None) if everywhere else seen, known)
+
+    def kind(self, block: Block) -> str:
+        """Return the name under which the deviations of a block are counted."""
+        return block.observation.name if block.data is self.data else SETUP
 
     @cached_property
     def postures(self) -> Postures:
         """The configurations, with the loads of `robot` at its own parameter values."""
         return self.robot.loaded(self.data.postures)
 
-    @property
-    def readings(self) -> int:
-        """Number of readings of three rows each."""
-        return sum(len(block.readings) for block in self.blocks)
+    @cached_property
+    def components(self) -> NDArray[np.intp]:
+        """Number of equations of each reading, ``(readings,)``."""
+        return np.concatenate([np.full(len(b.readings), b.observation.components) for b in self.blocks])
 
-    @property
+    @cached_property
     def rows(self) -> int:
         """Number of equations from readings."""
-        return 3 * self.readings
+        return sum(block.rows for block in self.blocks)
 
     def at(self, vector: Array) -> Evaluation:
         """Compare the robot with the readings at a vector ``(parameters,)``, or at one for each of many trials."""
@@ -143,38 +165,56 @@ class Evaluation:
     @cached_property
     def residual(self) -> Array:
         """Whitened residual of the readings, ``(rows,)``."""
-        r = np.empty((*self.vector.shape[:-1], self.problem.readings, 3))
+        r = np.empty((*self.vector.shape[:-1], self.problem.rows))
         for block, rows in self._rows():
-            raw = block.observation.residual(self._sweeps[block.target], self.problem.data, block.readings)
-            np.divide(raw, block.sigma[:, None], out=r[..., rows, :])
-        return r.reshape(*r.shape[:-2], -1)
+            raw = block.observation.residual(self._sightings[rows.start], block.data, block.readings)
+            np.divide(raw, block.sigma[:, None], out=self._by_reading(r[..., rows], block))
+        return r
 
     @cached_property
     def jacobian(self) -> Array:
         """Derivative of the residual, ``(rows, parameters)``."""
-        problem, names = self.problem, self.problem.free.names
-        r = self.residual.reshape(*self.vector.shape[:-1], -1, 3)
+        names = self.problem.free.names
         # Parameter by parameter in memory: as sweeps give it, and as QR decompositions take it.
-        J = np.empty((*self.vector.shape[:-1], len(names), problem.readings, 3))
-        by_parameter = np.moveaxis(J, -3, 0)
+        J = np.empty((*self.vector.shape[:-1], len(names), self.problem.rows))
+        by_parameter = np.moveaxis(J, -2, 0)
         for block, rows in self._rows():
             observation, sigma = block.observation, block.sigma[:, None]
-            derivative = problem.robot.linear if observation.velocity == "linear" else problem.robot.angular
-            velocity = derivative(self._sweeps[block.target], problem.postures, names, self._values)
-            moved = observation.jacobian(r[..., rows, :] * sigma, velocity[..., block.configurations])
-            np.divide(moved, sigma, out=by_parameter[..., rows, :])
-        return np.swapaxes(J.reshape(*J.shape[:-2], -1), -1, -2)
+            seen = self._sightings[rows.start]
+            velocity = self._velocity(block)
+            raw = self._by_reading(self.residual[..., rows], block) * sigma
+            turned = seen.linear if observation.velocity == "linear" else seen.angular
+            moved = observation.jacobian(seen, raw, turned(velocity, names))
+            np.divide(moved, sigma, out=self._by_reading(by_parameter[..., rows], block))
+        return np.swapaxes(J, -1, -2)
 
     def _rows(self) -> Iterator[tuple[Block, slice]]:
-        """Go through the blocks, with the readings of the problem that each of them is."""
+        """Go through the blocks, with the equations of the problem that each of them is."""
         first = 0
         for block in self.problem.blocks:
-            yield block, slice(first, first + len(block.readings))
-            first += len(block.readings)
+            yield block, slice(first, first + block.rows)
+            first += block.rows
+
+    @staticmethod
+    def _by_reading(rows: Array, block: Block) -> Array:
+        """Return a view of some equations ``(..., rows)`` as ``(..., readings, components)``."""
+        return rows.reshape(*rows.shape[:-1], len(block.readings), block.observation.components)
 
     @cached_property
     def _values(self) -> dict[str, float | Array]:
         return {**self.problem.robot.values, **self.problem.free.values(self.vector)}
+
+    @cached_property
+    def _sightings(self) -> dict[int, Sighting]:
+        """What each block is about, by its first equation."""
+        return {
+            rows.start: Sighting(
+                self._sweeps[block.target] if block.data is self.problem.data else self._fixtures[block.target],
+                block.configurations,
+                None if block.fixture is None else self._fixtures[block.fixture],
+            )
+            for block, rows in self._rows()
+        }
 
     @cached_property
     def _sweeps(self) -> dict[str, Sweep]:
@@ -182,8 +222,33 @@ class Evaluation:
         robot = self.problem.robot
         variables = robot.variables(self.problem.postures, self._values)
         trunk = robot.trunk.sweep(variables, self._values)
-        names = dict.fromkeys(block.target for block in self.problem.blocks)
+        names = dict.fromkeys(block.target for block in self.problem.blocks if block.data is self.problem.data)
         return {name: robot.target(name).chain.sweep(variables, self._values, trunk) for name in names}
+
+    @cached_property
+    def _fixtures(self) -> dict[str, Sweep]:
+        """The sweep to each fixture."""
+        data = self.problem.data
+        names = dict.fromkeys((*data.fixtures, *(() if data.setup is None else data.setup.targets)))
+        return {name: self.problem.robot.fixture_sweep(name, self._values) for name in names}
+
+    def _velocity(self, block: Block) -> Array:
+        """Return how a block's target moves in the world with each parameter; blocks of one target share it."""
+        problem, names, moves = self.problem, self.problem.free.names, block.observation.velocity
+        if block.data is not problem.data:
+            sweep = self._fixtures[block.target]
+            places = [sweep.places.get(name) for name in names]
+            return sweep.linear(places) if moves == "linear" else sweep.angular(places)
+        known = self._velocities
+        if (block.target, moves) not in known:
+            known.clear()  # blocks come target by target: more would only fill memory
+            derivative = problem.robot.linear if moves == "linear" else problem.robot.angular
+            known[block.target, moves] = derivative(self._sweeps[block.target], problem.postures, names, self._values)
+        return known[block.target, moves]
+
+    @cached_property
+    def _velocities(self) -> dict[tuple[str, str], Array]:
+        return {}
 
 
 def check_circumstances(robot: Robot, data: Dataset) -> None:

@@ -19,11 +19,12 @@ import numpy as np
 
 from truearm.identification.problem import Problem
 from truearm.measurement.dataset import Dataset
+from truearm.measurement.observations import OBSERVATIONS
 from truearm.modeling.chain import Array
 from truearm.modeling.parameters import FreeParameters, Parameter
 from truearm.modeling.robot import Robot
 
-_ORDER: Final = ("base", "target", "", "joint zero", "geometry")  # "" is every joint effect
+_ORDER: Final = ("base", "fixture", "target", "", "joint zero", "geometry")  # "" is every joint effect
 _APART: Final = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)  # share of a column outside the span of the others
 _MEMBER: Final = 1e-9  # priors per prior below which a parameter takes no part in a combination
 _SHOWN: Final = 0.02
@@ -170,7 +171,7 @@ def unseen_but_felt(robot: Robot, data: Dataset, free: FreeParameters, seed: int
     free
         The parameters to look at; all others are held.
     """
-    noise = {"position": 1.0, "orientation": 1.0}
+    noise = {observation.name: 1.0 for observation in OBSERVATIONS}
     plain = Problem(robot, _unit_noise(data), free, noise, priors=False)
     A = plain.linearised(free.start)[1] * free.prior
     _, s, Vt = np.linalg.svd(np.linalg.qr(A, mode="r"), full_matrices=True)

@@ -7,7 +7,7 @@ identified model leaves over, after removing what its own parameters could still
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -15,6 +15,8 @@ import numpy as np
 from truearm.identification.fit import Fit
 from truearm.identification.problem import Block, Problem
 from truearm.measurement.dataset import Dataset
+from truearm.measurement.observations import OBSERVATIONS
+from truearm.measurement.sighting import Sighting
 from truearm.modeling.chain import Array
 from truearm.notices import Notice
 
@@ -53,12 +55,11 @@ def settling(fit: Fit, data: Dataset) -> Settling | None:
     data
         All readings, with the configurations in the order in which they were measured.
     """
-    noise = {name: fit.sigma.get(name, 1.0) for name in ("position", "orientation")}
-    problem = Problem(fit.robot, data, fit.free, noise)
+    noise = {observation.name: fit.sigma.get(observation.name, 1.0) for observation in OBSERVATIONS}
+    problem = Problem(fit.robot, replace(data, setup=None), fit.free, noise)
     r, J = problem.linearised(np.array([fit.robot.values[name] for name in fit.free.names]))
     arrived = np.sign(np.diff(data.joints, axis=0, prepend=data.joints[:1])).T[:, None, :]
-    H = np.concatenate([_by_arrival(fit, data, block, arrived) for block in problem.blocks], axis=1)
-    H = H.reshape(len(H), -1).T
+    H = np.concatenate([_by_arrival(fit, block, arrived) for block in problem.blocks], axis=1).T
     U, s, _ = np.linalg.svd(J * fit.free.prior, full_matrices=False)
     basis = U[:, s > 1e-8 * s[0]]
     free = len(r) - basis.shape[1]
@@ -71,13 +72,18 @@ def settling(fit: Fit, data: Dataset) -> Settling | None:
     return Settling(1.0 - float(np.sqrt(after / before)) if before > 0 else 0.0, -angles)
 
 
-def _by_arrival(fit: Fit, data: Dataset, block: Block, arrived: Array) -> Array:
-    """Return how the whitened readings of a block move with the lag of each joint, ``(joints, k, 3)``."""
-    sweep = fit.robot.sweep(data.postures, block.target)
-    by_joint = sweep.linear if block.observation.velocity == "linear" else sweep.angular
-    velocity = (by_joint(fit.robot.moving[: len(fit.robot.joints)]) * arrived)[..., block.configurations]
-    residual = block.observation.residual(sweep, data, block.readings)
-    return np.asarray(block.observation.jacobian(residual, velocity) / block.sigma[:, None])
+def _by_arrival(fit: Fit, block: Block, arrived: Array) -> Array:
+    """Return how the whitened readings of a block move with the lag of each joint, ``(joints, rows)``."""
+    robot = fit.robot
+    sweep = robot.sweep(block.data.postures, block.target)
+    seen = Sighting(sweep, block.configurations, None if block.fixture is None else robot.fixture_sweep(block.fixture))
+    by_joint, turned = (
+        (sweep.linear, seen.linear) if block.observation.velocity == "linear" else (sweep.angular, seen.angular)
+    )
+    velocity = turned(by_joint(robot.moving[: len(robot.joints)]) * arrived, ())
+    residual = block.observation.residual(seen, block.data, block.readings)
+    moved = block.observation.jacobian(seen, residual, velocity) / block.sigma[:, None]
+    return np.asarray(moved.reshape(len(moved), -1))
 
 
 def check_settling(fit: Fit, data: Dataset) -> list[Notice]:

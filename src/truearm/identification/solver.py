@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from typing import Final, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
-from truearm.identification.losses import Loss, robust_scale, weights
+from truearm.identification.losses import Loss, norms_of, robust_scale, weights
 from truearm.modeling.chain import Array
 from truearm.modeling.parameters import FreeParameters
 
@@ -34,6 +35,10 @@ class Solvable(Protocol):
     def priors(self) -> bool:
         """Whether the parameters' priors are rows of the problem."""
 
+    @property
+    def components(self) -> NDArray[np.intp]:
+        """Number of consecutive rows of each reading, ``(readings,)``."""
+
     def at(self, vector: Array) -> Evaluated:
         """Evaluate it at a vector ``(parameters,)``."""
 
@@ -54,7 +59,7 @@ class Evaluated(Protocol):
 
     @property
     def residual(self) -> Array:
-        """Whitened residual ``(rows,)``, three rows for each reading."""
+        """Whitened residual of the readings, ``(rows,)``."""
 
     @property
     def jacobian(self) -> Array:
@@ -111,7 +116,7 @@ def solve(
     scale: float | None = None
     steps, converged = 0, False
     for steps in range(1, _STEPS[loss] + 1):
-        norms = _norms(here.residual)
+        norms = _norms(here)
         scale = _next_scale(loss, norms, scale, steps)
         w = weights(loss, norms, scale)
         R, c = _triangle(here, w)
@@ -132,10 +137,10 @@ def solve(
         here = trial
         last = float(np.abs(step / np.minimum(prior, _GEOMETRIC)).max()) < small
         if last or predicted <= 1e-24 * max(cost, 1.0):
-            converged = loss != "l1" or scale <= _FLOOR * float(np.median(_norms(here.residual)) + 1e-300)
+            converged = loss != "l1" or scale <= _FLOOR * float(np.median(_norms(here)) + 1e-300)
             if converged:
                 break
-    norms = _norms(here.residual)
+    norms = _norms(here)
     final = np.ones_like(norms) if loss == "linear" else weights(loss, norms, scale or 1.0)
     return Solution(here.vector, converged, steps, here.residual, here.jacobian, final)
 
@@ -154,18 +159,18 @@ def _next_scale(loss: Loss, norms: Array, scale: float | None, step: int) -> flo
     return scale
 
 
-def _norms(r: Array) -> Array:
-    return np.asarray(np.linalg.norm(r.reshape(-1, 3), axis=1))
+def _norms(here: Evaluated) -> Array:
+    return norms_of(here.residual, here.problem.components)
 
 
 def _cost(here: Evaluated, w: Array) -> float:
     prior, _ = here.problem.prior_rows(here.vector)
-    return float(np.sum(w * np.sum(here.residual.reshape(-1, 3) ** 2, axis=1))) + float(prior @ prior)
+    return float(np.sum(np.repeat(w, here.problem.components) * here.residual**2)) + float(prior @ prior)
 
 
 def _triangle(here: Evaluated, w: Array) -> tuple[Array, Array]:
     """Return R and c with |R s + c|^2 equal to the linearised cost of a step s, up to a constant."""
-    root = np.repeat(np.sqrt(w), 3)
+    root = np.repeat(np.sqrt(w), here.problem.components)
     stacked = np.column_stack([here.jacobian, here.residual]) * root[:, None]
     if here.problem.priors:
         prior, weight = here.problem.prior_rows(here.vector)

@@ -61,7 +61,7 @@ def periodic_errors(fit: Fit, data: Dataset) -> tuple[PeriodicError, ...]:
         The readings it is held against; fewer than 60 configurations say nothing.
     """
     robot = fit.robot
-    if data.configurations < _FEWEST:
+    if data.configurations < _FEWEST or not data.has_position.any():
         return ()
     at = robot.loaded(data.postures)
     count = len(robot.joints)

@@ -288,7 +288,7 @@ def _moved(data: Dataset) -> list[Notice]:
 def _missing(data: Dataset) -> list[Notice]:
     counts = {}
     for part in [data] if data.references is None else [data, data.references]:
-        empty = ~(part.has_position | part.has_orientation)
+        empty = ~part.has_reading
         read = {(c, t) for c, t in zip(part.configuration.tolist(), part.target.tolist(), strict=True)}
         for t, name in enumerate(part.targets):
             absent = part.configurations - sum((c, t) in read for c in range(part.configurations))

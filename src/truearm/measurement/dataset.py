@@ -33,11 +33,26 @@ class Dataset:
     configuration, target
         Index of the configuration and of the target of each reading, ``(readings,)``.
     position
-        Measured position in the instrument's frame [m], ``(readings, 3)``; NaN where it is missing.
+        Measured position in the instrument's frame, or counted from the reading's fixture [m], ``(readings, 3)``; NaN
+        where it is missing.
     quaternion
         Measured orientation (w, x, y, z), ``(readings, 4)``, NaN where it is missing; None if nothing has one.
+    distance
+        Measured distance from the origin of the reading's fixture [m], ``(readings,)``, NaN where none was measured;
+        None if nothing has one.
+    height
+        Measured height over the plane of the reading's fixture [m], ``(readings,)``, likewise.
+    fixtures
+        Names of the fixtures, in order of first appearance.
+    fixture
+        Index of the fixture that each reading is measured against, ``(readings,)``, -1 for the instrument's own frame;
+        None if that is all of them.
+    setup
+        What is known of the fixtures themselves: readings whose targets are fixtures, all at one configuration that
+        says nothing, with their deviations; None if nothing is.
     sigma
-        Declared standard deviation per coordinate [m], ``(readings,)``; None if the file declares none.
+        Declared standard deviation per coordinate, or of a distance or height [m], ``(readings,)``; None if the file
+        declares none.
     sigma_rot
         Declared standard deviation per rotation axis [rad], ``(readings,)``; None if the file declares none.
     approach
@@ -65,6 +80,11 @@ class Dataset:
     target: IntArray
     position: Array
     quaternion: Array | None = None
+    distance: Array | None = None
+    height: Array | None = None
+    fixtures: tuple[str, ...] = ()
+    fixture: IntArray | None = None
+    setup: Dataset | None = None
     sigma: Array | None = None
     sigma_rot: Array | None = None
     approach: Array | None = None
@@ -90,16 +110,58 @@ class Dataset:
         return len(self.labels)
 
     @property
+    def against(self) -> IntArray:
+        """Index of the fixture of each reading, -1 for the instrument's own frame, ``(readings,)``."""
+        return np.full(len(self.target), -1, dtype=np.intp) if self.fixture is None else self.fixture
+
+    @property
     def has_position(self) -> NDArray[np.bool_]:
-        """Which readings hold a position."""
-        return np.asarray(np.isfinite(self.position).all(axis=1))
+        """Which readings hold a position in the instrument's own frame."""
+        return np.asarray(np.isfinite(self.position).all(axis=1) & (self.against < 0))
 
     @property
     def has_orientation(self) -> NDArray[np.bool_]:
-        """Which readings hold an orientation."""
+        """Which readings hold an orientation in the instrument's own frame."""
         if self.quaternion is None:
             return np.zeros(len(self.target), dtype=bool)
-        return np.asarray(np.isfinite(self.quaternion).all(axis=1))
+        return np.asarray(np.isfinite(self.quaternion).all(axis=1) & (self.against < 0))
+
+    @property
+    def has_reading(self) -> NDArray[np.bool_]:
+        """Which readings hold anything."""
+        parts = [self.position, *(v for v in (self.quaternion, self.distance, self.height) if v is not None)]
+        return np.any([np.isfinite(v.reshape(len(v), -1)).all(axis=1) for v in parts], axis=0)
+
+    @property
+    def anchored(self) -> bool:
+        """Whether anything says where the robot stands: the instrument's own frame, or a fixture's place in it."""
+        in_frame = bool((self.has_position | self.has_orientation).any())
+        return in_frame or (self.setup is not None and bool(self.setup.has_position.any()))
+
+    def of_readings(self, kept: NDArray[np.bool_]) -> Dataset:
+        """Return some of the readings ``(readings,)``, with all configurations."""
+
+        def part(values: Array | None) -> Array | None:
+            return None if values is None else values[kept]
+
+        return replace(
+            self,
+            configuration=self.configuration[kept],
+            target=self.target[kept],
+            position=self.position[kept],
+            quaternion=part(self.quaternion),
+            distance=part(self.distance),
+            height=part(self.height),
+            fixture=None if self.fixture is None else self.fixture[kept],
+            sigma=part(self.sigma),
+            sigma_rot=part(self.sigma_rot),
+        )
+
+    def in_instrument_frame(self) -> Dataset:
+        """Return the readings that are not measured against a fixture."""
+        if self.fixture is None:
+            return self
+        return replace(self.of_readings(self.fixture < 0), fixture=None, fixtures=(), setup=None)
 
     def of_configurations(self, indices: Sequence[int] | IntArray) -> Dataset:
         """Return the readings at some configurations, with these in the given order."""
@@ -108,22 +170,15 @@ class Dataset:
         place[indices] = np.arange(len(indices))
         kept = place[self.configuration] >= 0
 
-        def part(values: Array | None) -> Array | None:
-            return None if values is None else values[kept]
-
         def of_each(values: Array | None) -> Array | None:
             return None if values is None else values[indices]
 
+        some = self.of_readings(kept)
         return replace(
-            self,
+            some,
             labels=tuple(self.labels[i] for i in indices),
             joints=self.joints[indices],
-            configuration=place[self.configuration[kept]],
-            target=self.target[kept],
-            position=self.position[kept],
-            quaternion=part(self.quaternion),
-            sigma=part(self.sigma),
-            sigma_rot=part(self.sigma_rot),
+            configuration=place[some.configuration],
             approach=of_each(self.approach),
             number=of_each(self.number),
             temperature=of_each(self.temperature),

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.observations import Orientation, Position
-from truearm.modeling.chain import Array
+from truearm.measurement.observations import compared
+from truearm.measurement.sighting import Sighting
+from truearm.modeling.chain import Array, Sweep
 from truearm.modeling.robot import Robot
 
 
@@ -45,11 +46,15 @@ class Errors:
     orientation
         Rotation vector from the measured to the predicted orientation [rad], likewise; None without any. A target
         that the robot knows only as a point has no orientation to be judged.
+    length
+        Predicted minus measured distance from a fixture, or height over one [m], ``(readings,)``, NaN where none was
+        read; None without any.
     """
 
     configurations: int
     position: Array
     orientation: Array | None
+    length: Array | None = None
 
     @property
     def position_norms(self) -> Array:
@@ -60,6 +65,11 @@ class Errors:
     def orientation_norms(self) -> Array:
         """Error of each orientation that was read [rad]."""
         return _norms(self.orientation) if self.orientation is not None else np.zeros(0)
+
+    @property
+    def length_norms(self) -> Array:
+        """Error of each distance or height that was read, without sign [m]."""
+        return np.zeros(0) if self.length is None else np.abs(self.length[np.isfinite(self.length)])
 
     @property
     def position_spread(self) -> Spread | None:
@@ -73,6 +83,12 @@ class Errors:
         norms = self.orientation_norms
         return Spread.of(norms) if len(norms) else None
 
+    @property
+    def length_spread(self) -> Spread | None:
+        """Statistics over single distances and heights [m], None without any."""
+        norms = self.length_norms
+        return Spread.of(norms) if len(norms) else None
+
 
 def _norms(errors: Array) -> Array:
     return np.asarray(np.linalg.norm(errors[np.isfinite(errors).all(axis=1)], axis=1))
@@ -84,24 +100,24 @@ def errors_of(robot: Robot, data: Dataset) -> Errors:
     Parameters
     ----------
     robot
-        With base and targets.
+        With base, targets and fixtures.
     data
-        Readings of those targets.
+        Readings of those.
     """
-    position = np.full((len(data.target), 3), np.nan)
-    orientation = np.full((len(data.target), 3), np.nan) if data.has_orientation.any() else None
-    kinds = ((Position(), position), (Orientation(), orientation))
+    count = len(data.target)
+    position = np.full((count, 3), np.nan)
+    orientation = np.full((count, 3), np.nan) if data.quaternion is not None else None
+    length = np.full((count, 1), np.nan) if data.distance is not None or data.height is not None else None
+    errors = {"position": position, "orientation": orientation, "distance": length, "height": length}
     at = robot.loaded(data.postures)
-    for index, name in enumerate(data.targets):
-        mine = (data.target == index) & (data.has_position | data.has_orientation)
-        if not mine.any():
+    sweeps: dict[str, Sweep] = {}
+    for target, fixture, observation, readings in compared(data):
+        into = errors[observation.name]
+        if into is None or (observation.name == "orientation" and robot.target(target).quaternion is None):
             continue
-        sweep = robot.sweep(at, name)
-        is_point = robot.target(name).quaternion is None
-        for kind, errors in kinds:
-            if is_point and isinstance(kind, Orientation):
-                continue
-            readings = np.flatnonzero(mine & kind.present(data))
-            if errors is not None and len(readings):
-                errors[readings] = kind.residual(sweep, data, readings)
-    return Errors(data.configurations, position, orientation)
+        if target not in sweeps:
+            sweeps[target] = robot.sweep(at, target)
+        beside = None if fixture is None else robot.fixture_sweep(fixture)
+        seen = Sighting(sweeps[target], data.configuration[readings], beside)
+        into[readings] = observation.residual(seen, data, readings)
+    return Errors(data.configurations, position, orientation, None if length is None else length[:, 0])

@@ -19,6 +19,7 @@ Group = Literal[
     "joint zero",
     "geometry",
     "target",
+    "fixture",
     # of joint effects, by their names
     "gain",
     "fourier",
@@ -42,6 +43,8 @@ PRIOR: Final[Mapping[tuple[str, str], float]] = {
     ("base", "rad"): 1.0,
     ("target", "m"): 1.0,
     ("target", "rad"): 1.0,
+    ("fixture", "m"): 1.0,
+    ("fixture", "rad"): 1.0,
     ("joint zero", "m"): 1e-3,
     ("joint zero", "rad"): math.radians(0.1),
     ("geometry", "m"): 1e-3,

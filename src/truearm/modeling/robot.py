@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from truearm.modeling.chain import Array, Chain, Element, Sweep, across, turn_ab
 from truearm.modeling.conventions import Convention, convention
 from truearm.modeling.effects import EFFECTS, Effect, Layout
 from truearm.modeling.equilibrium import postures_in_equilibrium, readings_in_equilibrium
+from truearm.modeling.fixtures import Fixture, FixtureKind
 from truearm.modeling.loads import joint_loads
 from truearm.modeling.parameters import Group, Parameter, Unit, parameter
 from truearm.modeling.parts import GRAVITY, NO_PAYLOAD, SLIDES, TURNS, Joint, LinkMass, Payload, Target, Tool, Truth
@@ -21,6 +23,7 @@ from truearm.modeling.postures import Postures
 from truearm.modeling.transform import IDENTITY, Transform, fixed_rotation
 
 Values = Mapping[str, float | Array]
+Part = TypeVar("Part", Target, Fixture)
 
 
 @dataclass(frozen=True)
@@ -52,6 +55,8 @@ class Robot:
         Reference orientation of the base in the world.
     targets
         What the instrument sees.
+    fixtures
+        What stands beside the robot and targets are measured against.
     effect_names
         Joint effects that are part of the model.
     known
@@ -75,6 +80,7 @@ class Robot:
     gravity: tuple[float, float, float] = GRAVITY
     base_quaternion: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
     targets: tuple[Target, ...] = ()
+    fixtures: tuple[Fixture, ...] = ()
     effect_names: tuple[str, ...] = ()
     known: Mapping[str, Parameter] = field(default_factory=dict)
     priors: Mapping[str, float] = field(default_factory=dict)
@@ -160,14 +166,16 @@ class Robot:
 
     @cached_property
     def parameters(self) -> Mapping[str, Parameter]:
-        """All parameters by name: base, joints, effects, targets."""
+        """All parameters by name: base, joints, effects, targets, fixtures."""
         zeros = {f"{self.convention.zero(j.kind)}_{i}" for i, j in enumerate(self.joints, 1)}
         found: dict[str, Parameter] = {}
 
         def add(name: str, unit: Unit, group: Group, nominal: float) -> None:
             if name in found:
                 raise InputError(
-                    "two parameters of the robot would have the same name", where=name, cure="Rename the target."
+                    "two parameters of the robot would have the same name",
+                    where=name,
+                    cure="Rename the target or fixture.",
                 )
             found[name] = self.known.get(name) or parameter(name, unit, group, nominal, self.priors)
 
@@ -186,10 +194,14 @@ class Robot:
                         cure="They are forms of one effect: take one of them.",
                     )
                 found[plain.name] = self.known.get(plain.name, plain)
-        for target in self.targets:
-            for element in target.chain.elements:
+        beside: tuple[tuple[Group, Sequence[Target | Fixture]], ...] = (
+            ("target", self.targets),
+            ("fixture", self.fixtures),
+        )
+        for group_of, parts in beside:
+            for element in (element for part in parts for element in part.chain.elements):
                 if element.parameter is not None:
-                    add(element.parameter, _unit(element), "target", element.value)
+                    add(element.parameter, _unit(element), group_of, element.value)
         return found
 
     @cached_property
@@ -205,16 +217,23 @@ class Robot:
 
     def target(self, name: str) -> Target:
         """Return the target called `name`."""
-        for target in self.targets:
-            if target.name == name:
-                return target
-        known = [target.name for target in self.targets]
+        return self._named(name, "target", self.targets)
+
+    def fixture(self, name: str) -> Fixture:
+        """Return the fixture called `name`."""
+        return self._named(name, "fixture", self.fixtures)
+
+    def _named(self, name: str, kind: str, parts: Sequence[Part]) -> Part:
+        for part in parts:
+            if part.name == name:
+                return part
+        known = [part.name for part in parts]
         near = nearest_names(name, known)
         raise InputError(
-            "the robot has no target of this name",
+            f"the robot has no {kind} of this name",
             where=self.name,
             came=name,
-            allowed=", ".join(known) or "none: the robot has no targets",
+            allowed=", ".join(known) or f"none: the robot has no {kind}s",
             cure=f"Did you mean {' or '.join(near)}?" if near else None,
         )
 
@@ -285,6 +304,22 @@ class Robot:
             made.append(target)
         moved = replace(self, base_quaternion=base.quaternion, targets=tuple(made), known=kept)
         return moved.with_parameters(moved.parameters[n].restarted(v) for n, v in places.items())
+
+    def with_fixtures(self, places: Mapping[str, tuple[FixtureKind, Transform]]) -> Robot:
+        """Return the robot with other fixtures beside it, as nominal values.
+
+        Parameters
+        ----------
+        places
+            What each fixture is and where it stands in the world, see :meth:`Fixture.standing`.
+        """
+        kept = {n: p for n, p in self.known.items() if p.group != "fixture"}
+        made = tuple(Fixture(name, kind, place.quaternion) for name, (kind, place) in places.items())
+        beside = replace(self, fixtures=made, known=kept)
+        values = {
+            n: v for f, (_, place) in zip(made, places.values(), strict=True) for n, v in f.standing(place).items()
+        }
+        return beside.with_parameters(beside.parameters[n].restarted(v) for n, v in values.items())
 
     # -- kinematics ----------------------------------------------------------------------------------------
 
@@ -382,6 +417,10 @@ class Robot:
         values = self.values if values is None else values
         trunk = self.trunk.sweep(variables, values)
         return trunk if target is None else self.target(target).chain.sweep(variables, values, trunk)
+
+    def fixture_sweep(self, name: str, values: Values | None = None) -> Sweep:
+        """Run through the chain to a fixture: one configuration, whatever the joints do; `values` as for `sweep`."""
+        return self.fixture(name).chain.sweep(np.zeros((0, 1)), self.values if values is None else values)
 
     def poses(self, q: Array | Postures, target: str | None = None) -> tuple[Array, Array]:
         """Return positions ``(n, 3)`` [m] and rotations ``(n, 3, 3)`` of the flange or a target in the world."""

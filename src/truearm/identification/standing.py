@@ -1,0 +1,398 @@
+"""Where robot, targets and fixtures stand before anything is identified, from readings of any kind.
+
+Positions in the instrument's frame give base and targets at once (:mod:`truearm.identification.frames`). Where the only
+anchor is a few fixtures whose places are known, distances to them give such positions. Without an anchor the world is
+the robot's base. Fixtures follow from the places of the targets in closed form; a target that only touches or is held
+at a distance is looked for around the flange.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from truearm.errors import InputError
+from truearm.identification.frames import initial_frames
+from truearm.identification.problem import Problem
+from truearm.identification.solver import solve
+from truearm.measurement.dataset import Dataset, IntArray
+from truearm.measurement.observations import OBSERVATIONS
+from truearm.modeling.chain import Array
+from truearm.modeling.fixtures import FixtureKind
+from truearm.modeling.parameters import FreeParameters
+from truearm.modeling.robot import Robot
+from truearm.modeling.transform import Transform
+
+Place = tuple[FixtureKind, Transform]
+
+#: How far from the flange a target is looked for, and in what steps [m].
+_REACH: Final = 0.45
+_STEP: Final = 0.09
+#: How many of the places tried are gone on from.
+_TRIED: Final = 6
+#: Deviation that readings are weighed with while targets are looked for [m or rad].
+_ROUGH: Final = 1e-3
+_FLAT: Final = 1e-6
+_TELLS: Final = 1e-5
+
+
+def initial_standing(robot: Robot, data: Dataset) -> Robot:
+    """Return the robot placed where the data say it stands, with the data's targets and fixtures.
+
+    Parameters
+    ----------
+    robot
+        Its kinematic parameters are used as they are. Its own base and targets are left out of account where the data
+        place them.
+
+    Raises
+    ------
+    InputError
+        If readings contradict each other about what a fixture is, or are too few or too much alike to place target
+        and fixture.
+    """
+    if data.fixture is None:
+        return initial_frames(robot, data)
+    kinds = _kinds(data)
+    placed = _placed(robot, data, kinds)
+    missing = [t for t in range(len(data.targets)) if data.targets[t] not in {t.name for t in placed.targets}]
+    for target in missing:
+        placed = _with_target(placed, data, target, kinds)
+    places = _fixture_places(placed, data, kinds)
+    placed = placed.with_fixtures(places)
+    _refuse_alike(placed, data)
+    return placed
+
+
+def unanchored(free: FreeParameters, data: Dataset) -> FreeParameters:
+    """Return the parameters without those of the base, where nothing says how it stands: the world is the base."""
+    if data.anchored:
+        return free
+    return free.without(p.name for p in free.parameters if p.group == "base")
+
+
+def _kinds(data: Dataset) -> dict[str, FixtureKind]:
+    """Return what each fixture is, from what is measured against it."""
+    found: dict[str, FixtureKind] = {}
+    for index, name in enumerate(data.fixtures):
+        mine = data.against == index
+        seen: list[FixtureKind] = []
+        if data.height is not None and np.isfinite(data.height[mine]).any():
+            seen.append("plane")
+        if data.distance is not None and np.isfinite(data.distance[mine]).any():
+            seen.append("point")
+        counted = data.position[mine][np.isfinite(data.position[mine]).all(axis=1)]
+        turned = data.quaternion is not None and bool(np.isfinite(data.quaternion[mine]).any())
+        if len(counted) or turned:
+            seen.append("frame" if turned or np.ptp(counted, axis=0).any() else "point")
+        if len(set(seen)) > 1:
+            raise InputError(
+                "the readings disagree about what a fixture is",
+                where=f"{data.source}, fixture {name}",
+                came=" and ".join(dict.fromkeys(seen)),
+                allowed="heights over a plane, distances from a point, or positions counted from a point or in a frame",
+                cure="Give them fixtures of different names.",
+            )
+        found[name] = seen[0] if seen else "point"
+    for name in () if data.setup is None else data.setup.targets:
+        found.setdefault(name, "point")
+    return found
+
+
+def _placed(robot: Robot, data: Dataset, kinds: Mapping[str, FixtureKind]) -> Robot:
+    """Return the robot with its base and with those targets that positions give."""
+    if data.has_position.any():
+        return initial_frames(robot, data)
+    if data.setup is not None and data.setup.has_position.any():
+        return min(
+            (initial_frames(robot, seen) for seen in _triangulated(data, data.setup)),
+            key=lambda found: _misfit(found, data, data.setup),  # type: ignore[arg-type]
+        )
+    base, targets = robot.base, dict[str, Transform | Array]()
+    for index, name in enumerate(data.fixtures):
+        if kinds[name] == "frame":
+            there = initial_frames(robot, _as_instrument(data, index))
+            for target in there.targets:
+                if target.name not in targets:
+                    values = [there.values[target.parameter(axis)] for axis in "xyz"]
+                    if target.quaternion is None:
+                        targets[target.name] = np.array(values)
+                    else:
+                        targets[target.name] = Transform((values[0], values[1], values[2]), target.quaternion)
+    placed = robot.with_frames(base, targets)  # type: ignore[arg-type]
+    return _at_points(placed, data, kinds)
+
+
+def _as_instrument(data: Dataset, fixture: int) -> Dataset:
+    """Return the readings in a fixture's frame as if that were the instrument's."""
+    return replace(data.of_readings(data.against == fixture), fixture=None, fixtures=(), setup=None)
+
+
+def _triangulated(data: Dataset, setup: Dataset) -> Iterator[Dataset]:
+    """Return positions from distances to known points; two sets where these lie in a plane, one on either side."""
+    known = {setup.targets[setup.target[r]]: setup.position[r] for r in np.flatnonzero(setup.has_position).tolist()}
+    places = [known.get(name, np.full(3, np.nan)) for name in data.fixtures]
+    anchors = np.array(places)
+    useful = np.isfinite(anchors).all(axis=1)
+    lengths = np.full((data.configurations, len(data.targets), len(anchors)), np.nan)
+    if data.distance is not None:
+        read = np.flatnonzero(np.isfinite(data.distance) & (data.against >= 0))
+        lengths[data.configuration[read], data.target[read], data.against[read]] = data.distance[read]
+    for side in (1.0, -1.0):
+        where, what, found = [], [], []
+        for c, t in np.argwhere((np.isfinite(lengths) & useful).sum(axis=2) >= 3).tolist():
+            seen = np.isfinite(lengths[c, t]) & useful
+            where.append(c)
+            what.append(t)
+            found.append(_from_distances(anchors[seen], lengths[c, t, seen], side))
+        if not found:
+            raise InputError(
+                "no target was measured from enough known points",
+                where=data.source,
+                allowed="distances from three known fixtures or more at a configuration",
+                cure="Say where the fixtures stand, or measure the robot's targets with another device first.",
+            )
+        yield replace(
+            data,
+            configuration=np.array(where, dtype=np.intp),
+            target=np.array(what, dtype=np.intp),
+            position=np.array(found),
+            quaternion=None,
+            distance=None,
+            height=None,
+            fixture=None,
+            fixtures=(),
+            setup=None,
+            sigma=None,
+            sigma_rot=None,
+        )
+
+
+def _from_distances(anchors: Array, lengths: Array, side: float) -> Array:
+    """Return the point at these distances from known points, on one side of them if they lie in a plane."""
+    centre = anchors.mean(axis=0)
+    a = anchors - centre
+    _, s, Vt = np.linalg.svd(a)
+    flat = len(anchors) < 4 or s[2] < 1e-3 * s[0]
+    axes = Vt[:2] if flat else Vt
+    rows = np.column_stack([2.0 * a @ axes.T, -np.ones(len(a))])
+    solved = np.linalg.lstsq(rows, np.sum(a * a, axis=1) - lengths**2, rcond=None)[0]
+    inside = solved[:-1] @ axes
+    if not flat:
+        return np.asarray(centre + inside)
+    above = np.sqrt(max(float(solved[-1] - inside @ inside), 0.0))
+    return np.asarray(centre + inside + side * above * np.cross(Vt[0], Vt[1]))
+
+
+def _at_points(robot: Robot, data: Dataset, kinds: Mapping[str, FixtureKind]) -> Robot:
+    """Return the robot with the targets that are held at points: ``R_i t + p_i = c + y_i`` is linear in t and c."""
+    points = [f for f, name in enumerate(data.fixtures) if kinds[name] == "point"]
+    read = np.flatnonzero(np.isin(data.against, points) & np.isfinite(data.position).all(axis=1))
+    have = {t.name for t in robot.targets}
+    targets = [t for t in dict.fromkeys(data.target[read].tolist()) if data.targets[t] not in have]
+    read = read[np.isin(data.target[read], targets)]
+    if len(read) == 0:
+        return robot
+    p, R = robot.poses(data.postures)
+    rows = np.zeros((len(read), 3, 3 * (len(targets) + len(points))))
+    for k, reading in enumerate(read.tolist()):
+        t, f = targets.index(int(data.target[reading])), points.index(int(data.against[reading]))
+        rows[k, :, 3 * t : 3 * t + 3] = R[data.configuration[reading]]
+        rows[k, :, 3 * (len(targets) + f) :][:, :3] = -np.eye(3)
+    right = data.position[read] - p[data.configuration[read]]
+    solved = np.linalg.lstsq(rows.reshape(-1, rows.shape[2]), right.reshape(-1), rcond=1e-6)[0]
+    found = {data.targets[t]: solved[3 * k : 3 * k + 3] for k, t in enumerate(targets)}
+    return _also(robot, found)
+
+
+def _also(robot: Robot, found: Mapping[str, Array]) -> Robot:
+    """Return the robot with some targets more."""
+    places: dict[str, Transform | Array] = {}
+    for target in robot.targets:
+        x, y, z = (robot.values[target.parameter(axis)] for axis in "xyz")
+        places[target.name] = (
+            np.array([x, y, z]) if target.quaternion is None else Transform((x, y, z), target.quaternion)
+        )
+    return robot.with_frames(robot.base, {**places, **found})  # type: ignore[dict-item]
+
+
+def _with_target(robot: Robot, data: Dataset, target: int, kinds: Mapping[str, FixtureKind]) -> Robot:
+    """Return the robot with a target whose place only distances and heights tell."""
+    mine = replace(data.of_readings(data.target == target), setup=None, sigma=None, sigma_rot=None)
+    name = data.targets[target]
+    p, R = robot.poses(mine.postures)
+    p, R = p[mine.configuration], R[mine.configuration]
+    steps = np.arange(-_REACH, _REACH + 1e-9, _STEP)
+    grid = np.stack(np.meshgrid(steps, steps, steps), axis=-1).reshape(-1, 3)
+    tips = p + np.einsum("nij,gj->gni", R, grid)
+    cost = np.zeros(len(grid))
+    for index in np.unique(mine.against).tolist():
+        of = mine.against == index
+        points = tips[:, of]
+        if mine.distance is not None and np.isfinite(mine.distance[of]).all():
+            centre = _centres(points, mine.distance[of])
+            off = np.linalg.norm(points - centre[:, None], axis=2) - mine.distance[of]
+        elif mine.height is not None and np.isfinite(mine.height[of]).all():
+            spread = points - points.mean(axis=1, keepdims=True)
+            h = mine.height[of] - mine.height[of].mean()
+            normal = _normals(spread, h)
+            off = np.einsum("gni,gi->gn", spread, normal) - h
+        else:
+            continue
+        cost += np.sum(off**2, axis=1)
+    best: tuple[float, Robot] | None = None
+    for start in np.argsort(cost)[:_TRIED].tolist():
+        tried = _also(robot, {name: grid[start]})
+        tried = tried.with_fixtures(_fixture_places(tried, mine, kinds))
+        groups = ("target", "fixture")
+        free = FreeParameters(
+            tuple(
+                q
+                for q in tried.parameters.values()
+                if q.group in groups and (q.group == "fixture" or q.name in tried.target(name).chain.parameters)
+            )
+        )
+        noise = {observation.name: _ROUGH for observation in OBSERVATIONS}
+        problem = Problem(tried, replace(mine, targets=mine.targets), free, noise)
+        solution = solve(problem)
+        found = tried.with_values(dict(zip(free.names, map(float, solution.vector), strict=True)))
+        worth = float(solution.residual @ solution.residual)
+        if best is None or worth < best[0]:
+            best = worth, found
+    assert best is not None
+    values = best[1].values
+    there = np.array([values[best[1].target(name).parameter(axis)] for axis in "xyz"])
+    return _also(robot, {name: there})
+
+
+def _fixture_places(robot: Robot, data: Dataset, kinds: Mapping[str, FixtureKind]) -> dict[str, Place]:
+    """Return where the fixtures stand, from the places of the targets; known places as they are known."""
+    tips = {t.name: robot.poses(data.postures, t.name)[0] for t in robot.targets if t.name in data.targets}
+    flange = robot.poses(data.postures)[0]
+    known = {} if data.setup is None else _known(data.setup)
+    places: dict[str, Place] = {}
+    for index, name in enumerate(data.fixtures):
+        read = np.flatnonzero((data.against == index) & data.has_reading)
+        points = np.array([tips[data.targets[data.target[r]]][data.configuration[r]] for r in read.tolist()])
+        if name in known:
+            place = Transform(known[name])
+        elif kinds[name] == "frame":
+            place = _frame(robot, data, index)
+        elif data.height is not None and kinds[name] == "plane":
+            place = _plane(points, data.height[read], flange[data.configuration[read]])
+        else:
+            place = Transform(_point(points, data, read, f"{data.source}, fixture {name}"))
+        places[name] = kinds[name], place
+    for name in known:
+        places.setdefault(name, (kinds[name], Transform(known[name])))
+    return places
+
+
+def _known(setup: Dataset) -> dict[str, tuple[float, float, float]]:
+    found = {}
+    for reading in np.flatnonzero(setup.has_position).tolist():
+        x, y, z = setup.position[reading].tolist()
+        found[setup.targets[setup.target[reading]]] = (x, y, z)
+    return found
+
+
+def _frame(robot: Robot, data: Dataset, index: int) -> Transform:
+    """Return where a frame stands: the robot's base, seen from it, the other way round."""
+    from_it = initial_frames(robot, _as_instrument(data, index)).base
+    turned = robot.base.rotation @ from_it.rotation.T
+    return Transform.from_matrix(turned, np.array(robot.base.translation) - turned @ np.array(from_it.translation))
+
+
+def _plane(points: Array, heights: Array, flange: Array) -> Transform:
+    """Return a frame in the plane over which points ``(n, 3)`` have these heights; the flange is on its upper side."""
+    middle = points.mean(axis=0)
+    h = heights - heights.mean()
+    normal = _normals((points - middle)[None], h)[0]
+    if not h.any() and float(normal @ (flange - points).mean(axis=0)) < 0.0:
+        normal = -normal
+    x = np.cross(np.eye(3)[np.argmin(np.abs(normal))], normal)
+    x /= np.linalg.norm(x)
+    return Transform.from_matrix(np.column_stack([x, np.cross(normal, x), normal]), middle - heights.mean() * normal)
+
+
+def _normals(points: Array, heights: Array) -> Array:
+    """Return for sets of points about their middle ``(g, n, 3)`` the normals ``(g, 3)`` along which they rise so."""
+    _, _, Vt = np.linalg.svd(points, full_matrices=False)
+    flat = Vt[:, -1]
+    if not heights.any():
+        return flat
+    gram = np.swapaxes(points, 1, 2) @ points
+    lift = np.swapaxes(points, 1, 2) @ heights
+    steep = np.linalg.solve(gram + 1e-12 * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(3), lift[..., None])
+    steep = steep[..., 0] / np.linalg.norm(steep[..., 0], axis=1, keepdims=True)
+    choices = np.stack([flat, -flat, steep], axis=1)
+    off = np.einsum("gni,gci->gcn", points, choices) - heights
+    chosen = np.argmin(np.sum(off**2, axis=2), axis=1)
+    return np.asarray(choices[np.arange(len(choices)), chosen])
+
+
+def _point(points: Array, data: Dataset, read: IntArray, where: str) -> tuple[float, float, float]:
+    counted = np.isfinite(data.position[read]).all(axis=1)
+    if counted.any():
+        x, y, z = (points[counted] - data.position[read][counted]).mean(axis=0).tolist()
+        return x, y, z
+    if data.distance is None or len(points) < 4:
+        raise InputError(
+            "a fixture was measured too few times to know where it stands",
+            where=where,
+            came=f"{len(points)} readings",
+            allowed="4 or more",
+        )
+    x, y, z = _centres(points[None], data.distance[read])[0].tolist()
+    return x, y, z
+
+
+def _centres(points: Array, distances: Array) -> Array:
+    """Return for sets of points ``(g, n, 3)`` the centres ``(g, 3)`` from which they lie at these distances.
+
+    ``|x|^2 - d^2 = 2 c x - |c|^2`` is linear in the centre and in its square, which is left free.
+    """
+    middle = points.mean(axis=1, keepdims=True)
+    x = points - middle
+    rows = np.concatenate([2.0 * x, -np.ones((*x.shape[:2], 1))], axis=2)
+    right = np.sum(x * x, axis=2) - distances**2
+    gram = np.swapaxes(rows, 1, 2) @ rows
+    gram = gram + 1e-9 * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.diag([1.0, 1.0, 1.0, 0.0])
+    solved = np.linalg.solve(gram, np.swapaxes(rows, 1, 2) @ right[..., None])[..., 0]
+    return np.asarray(middle[:, 0] + solved[:, :3])
+
+
+def _standing_parameters(robot: Robot, data: Dataset, groups: Iterable[str]) -> FreeParameters:
+    return unanchored(FreeParameters(tuple(p for p in robot.parameters.values() if p.group in groups)), data)
+
+
+def _misfit(robot: Robot, data: Dataset, setup: Dataset) -> float:
+    """Return how badly a placed robot fits the distances."""
+    places = _fixture_places(robot, data, dict.fromkeys((*data.fixtures, *setup.targets), "point"))
+    there = robot.with_fixtures(places)
+    free = _standing_parameters(there, data, ("base",))
+    residual = Problem(there, replace(data, setup=None), free, dict.fromkeys(_names(), _ROUGH)).residual(free.start)
+    return float(residual @ residual)
+
+
+def _names() -> tuple[str, ...]:
+    return tuple(observation.name for observation in OBSERVATIONS)
+
+
+def _refuse_alike(robot: Robot, data: Dataset) -> None:
+    """Refuse readings that do not even tell where base, targets and fixtures are."""
+    free = _standing_parameters(robot, data, ("base", "target", "fixture"))
+    noise = dict.fromkeys(_names(), _ROUGH)
+    J = Problem(robot, data, free, noise, priors=False).linearised(free.start)[1]
+    s = np.linalg.svd(np.linalg.qr(J, mode="r"), compute_uv=False)
+    told = int((s > _TELLS * s[0]).sum())
+    if told < len(free.names):
+        raise InputError(
+            "the readings do not tell where targets and fixtures are: the postures are too few or too much alike",
+            where=data.source,
+            came=f"{data.configurations} postures that determine {told} of {len(free.names)} unknowns",
+            cure="Measure more postures, with the tool turned to different sides.",
+        )

@@ -1,0 +1,81 @@
+"""A target as something else sees it: the instrument, or a fixture beside the robot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.modeling.chain import Array, Sweep
+from truearm.modeling.transform import cross
+
+
+@dataclass(frozen=True, eq=False)
+class Sighting:
+    """A target at k configurations, in the axes of the fixture that it is measured against.
+
+    Attributes
+    ----------
+    target
+        The chain to the target, at all configurations.
+    configurations
+        Which of them, in order; a slice costs no copy.
+    fixture
+        The chain to the fixture, at one configuration; None for the instrument, whose frame is the world.
+    """
+
+    target: Sweep
+    configurations: NDArray[np.intp] | slice
+    fixture: Sweep | None = None
+
+    @cached_property
+    def position(self) -> Array:
+        """Where the target is [m], ``(3, ..., k)``."""
+        at = self.target.position[..., self.configurations]
+        return at if self.fixture is None else self._turned(at - self.fixture.position)
+
+    @cached_property
+    def rotation(self) -> Array:
+        """How the target is turned, ``(..., k, 3, 3)``."""
+        turned = self.target.matrix()[..., self.configurations, :, :]
+        return turned if self.fixture is None else np.swapaxes(self.fixture.matrix(), -1, -2) @ turned
+
+    def linear(self, velocity: Array, names: tuple[str, ...]) -> Array:
+        """Return how the position moves with parameters [m per unit], ``(parameters, 3, ..., k)``.
+
+        Parameters
+        ----------
+        velocity
+            Of the target in the world by each parameter, at all configurations, ``(parameters, 3, ..., n)``.
+        names
+            Of the parameters.
+        """
+        moved = velocity[..., self.configurations]
+        if self.fixture is None:
+            return moved
+        arm = self.target.position[..., self.configurations] - self.fixture.position
+        mine = [k for k, name in enumerate(names) if name in self.fixture.places]
+        places = [self.fixture.places[names[k]] for k in mine]
+        moved = moved.copy()
+        for k, slide, turn in zip(mine, self.fixture.linear(places), self.fixture.angular(places), strict=True):
+            moved[k] -= slide + cross(*np.broadcast_arrays(turn, arm))
+        return np.stack([self._turned(one) for one in moved])
+
+    def angular(self, velocity: Array, names: tuple[str, ...]) -> Array:
+        """Return how the target turns with parameters [rad per unit], as :meth:`linear`."""
+        moved = velocity[..., self.configurations]
+        if self.fixture is None:
+            return moved
+        mine = [k for k, name in enumerate(names) if name in self.fixture.places]
+        moved = moved.copy()
+        for k, turn in zip(mine, self.fixture.angular([self.fixture.places[names[k]] for k in mine]), strict=True):
+            moved[k] -= turn
+        return np.stack([self._turned(one) for one in moved])
+
+    def _turned(self, vector: Array) -> Array:
+        """Return vectors ``(3, ..., k)`` of the world in the axes of the fixture."""
+        if self.fixture is None or not any(element.turns for element in self.fixture.elements):
+            return vector
+        return np.stack([np.sum(axis * vector, axis=0) for axis in self.fixture.rotation])

@@ -268,7 +268,9 @@ def calibrate(
     count = _train_count(train, n, data.source)
     order = np.random.default_rng(seed).permutation(n)
     training, held_out = order[:count], order[count:]
-    if not data.has_position.any():
+    if not data.has_reading.any():
+        raise InputError("there is no reading at all", where=data.source, cure="Fill in x, y and z, or distance.")
+    if data.fixture is None and not data.has_position.any():
         raise InputError("there is no position reading at all", where=data.source, cure="Fill in x, y and z.")
     _check_split(data.of_configurations(training), data.of_configurations(held_out))
 
@@ -399,8 +401,10 @@ def validate(
         )
     for name in data.targets:
         robot.target(name)
-    if not (data.has_position | data.has_orientation).any():
-        raise InputError("there is no reading at all", where=data.source, cure="Fill in x, y and z.")
+    for name in data.fixtures:
+        robot.fixture(name)
+    if not data.has_reading.any():
+        raise InputError("there is no reading at all", where=data.source, cure="Fill in x, y and z, or distance.")
     return errors_of(robot, data)
 
 
@@ -432,15 +436,25 @@ def check_joints(robot: Robot, data: Dataset) -> None:
 
 def _check_split(training: Dataset, held_out: Dataset) -> None:
     """Refuse a held-out part that holds nothing, or readings of targets that the training part does not place."""
-    if held_out.configurations and not (held_out.has_position | held_out.has_orientation).any():
+    if held_out.configurations and not held_out.has_reading.any():
         raise InputError(
             "the held-out part has no reading at all",
             where=held_out.source,
             cure="Lower --train, change --seed, or measure again where readings are missing.",
         )
-    placed = set(training.target[training.has_position].tolist())
+    places = training.has_position if training.fixture is None else training.has_reading
+    placed = set(training.target[places].tolist())
+    fixtures = set(training.against[training.has_reading].tolist())
     for part, name in ((training, "training"), (held_out, "held-out")):
-        for index in dict.fromkeys(part.target[part.has_position | part.has_orientation].tolist()):
+        for index in dict.fromkeys(part.against[part.has_reading].tolist()):
+            if index not in fixtures:
+                raise InputError(
+                    f"a fixture of the {name} part was not measured in the training part",
+                    where=training.source,
+                    came=training.fixtures[index] if index >= 0 else "the instrument's own frame",
+                    cure="Raise --train, change --seed, or leave the fixture out.",
+                )
+        for index in dict.fromkeys(part.target[part.has_reading].tolist()):
             if index not in placed:
                 raise InputError(
                     f"a target of the {name} part has no position in the training part",
@@ -505,7 +519,7 @@ def _check_proof(before: Errors, after: Errors | None) -> list[Notice]:
                 "Leave --train out to see the error on configurations the fit has not seen.",
             )
         ]
-    old, new = before.position_spread, after.position_spread
+    old, new = before.position_spread or before.length_spread, after.position_spread or after.length_spread
     if old is None or new is None or new.mean <= old.mean:
         return []
     return [

@@ -33,7 +33,8 @@ def progress() -> Iterator[Callable[[str], None]]:
 def error_line(summary: dict[str, Any]) -> str:
     """Return the statistics of one set of errors as a line."""
     parts = []
-    for key, unit in (("position_mm", "mm"), ("orientation_mrad", "mrad")):
+    kinds = (("position_mm", "mm"), ("orientation_mrad", "mrad"), ("length_mm", "mm of length"))
+    for key, unit in kinds:
         if key in summary:
             s = summary[key]
             parts.append(f"mean {s['mean']:.3f}  rms {s['rms']:.3f}  95 % {s['p95']:.3f}  max {s['max']:.3f} {unit}")

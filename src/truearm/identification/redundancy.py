@@ -20,7 +20,7 @@ import numpy as np
 from truearm.identification.problem import Problem
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.observations import OBSERVATIONS
-from truearm.modeling.chain import Array
+from truearm.modeling.chain import Array, Sweep
 from truearm.modeling.parameters import FreeParameters, Parameter
 from truearm.modeling.robot import Robot
 
@@ -31,6 +31,7 @@ _SHOWN: Final = 0.02
 _KNOWS_NOTHING: Final = 0.3  # readings that tell a parameter no better than to three priors do not tell it
 _UNSEEN: Final = 1e-8  # share of the best seen direction
 _FELT: Final = 1e-6  # share of the largest effect of a parameter
+_FELT_TRUSTED: Final = 1e-3  # the same but for a size of all, which readings with noise all but do not see
 _INVOLVED: Final = 0.1  # share of a parameter in the lost directions
 
 
@@ -166,6 +167,9 @@ def unseen_but_felt(robot: Robot, data: Dataset, free: FreeParameters, seed: int
     that changes nothing there either is a matter of convention (d_2 against d_3) and harmless; one that does is
     a loss of rank: the data are too alike.
 
+    Where nothing says how the robot stands, the world is its base, and predictions count but for a rigid motion of all;
+    where no length was measured either, but for one scale of all: see :func:`taken_on_trust`.
+
     Parameters
     ----------
     free
@@ -178,6 +182,7 @@ def unseen_but_felt(robot: Robot, data: Dataset, free: FreeParameters, seed: int
     unseen = Vt[int((s > _UNSEEN * s[0]).sum()) :]
     if len(unseen) == 0:
         return ()
+    trusted = taken_on_trust(data)
     q = robot.loaded(robot.random_configurations(40, np.random.default_rng(seed)))
     felt = np.zeros((0, len(free.names)))
     for target in robot.targets:
@@ -185,12 +190,47 @@ def unseen_but_felt(robot: Robot, data: Dataset, free: FreeParameters, seed: int
         parts = [robot.linear(sweep, q, free.names)]
         if target.quaternion is not None:
             parts.append(robot.angular(sweep, q, free.names))
-        felt = np.concatenate([felt, *(part.reshape(len(free.names), -1).T * free.prior for part in parts)])
+        moved = [part.reshape(len(free.names), -1).T * free.prior for part in parts]
+        if trusted:
+            moved = _but_for(trusted, robot, sweep, moved)
+        felt = np.concatenate([felt, *moved])
     _, strength, turned = np.linalg.svd(felt @ unseen.T, full_matrices=False)
-    lost = turned[: len(strength)][strength > _FELT * np.linalg.norm(felt, axis=0).max()] @ unseen
+    lost = (
+        turned[: len(strength)][strength > (_FELT_TRUSTED if trusted else _FELT) * np.linalg.norm(felt, axis=0).max()]
+        @ unseen
+    )
     involved = np.linalg.norm(lost, axis=0) > _INVOLVED
     return tuple(name for name, is_in in zip(free.names, involved.tolist(), strict=True) if is_in)
 
 
+def taken_on_trust(data: Dataset) -> tuple[str, ...]:
+    """Return what nobody measured and every prediction depends on: where the ``base`` is, and the ``size`` of all."""
+    if data.anchored:
+        return ()
+    if data.distance is not None or (data.setup is not None and data.setup.distance is not None):
+        return ("base",)
+    for fixture in range(len(data.fixtures)):
+        lengths = data.position if data.height is None else np.column_stack([data.position, data.height])
+        mine = lengths[data.against == fixture]
+        if any(len(np.unique(column[np.isfinite(column)])) > 1 for column in mine.T):
+            return ("base",)
+    return "base", "size"
+
+
+def _but_for(trusted: Sequence[str], robot: Robot, sweep: Sweep, moved: Sequence[Array]) -> list[Array]:
+    """Take out of moves of a target what a motion of the whole robot does, and a change of its size."""
+    base = [f"base_{axis}" for axis in ("x", "y", "z", "rx", "ry", "rz")]
+    places = [sweep.places[name] for name in base]
+    columns = [part.reshape(6, -1).T for part in (sweep.linear(places), sweep.angular(places))[: len(moved)]]
+    if "size" in trusted:
+        grown = (sweep.position - np.array(robot.base.translation)[:, None]).reshape(-1, 1)
+        columns = [np.column_stack([c, g]) for c, g in zip(columns, (grown, np.zeros_like(grown)), strict=False)]
+    together = np.concatenate(columns)
+    Q = np.linalg.qr(together)[0]
+    every = np.concatenate(moved)
+    return [every - Q @ (Q.T @ every)]
+
+
 def _unit_noise(data: Dataset) -> Dataset:
-    return replace(data, sigma=None, sigma_rot=None)
+    setup = None if data.setup is None else replace(data.setup, sigma=np.ones(len(data.setup.target)))
+    return replace(data, sigma=None, sigma_rot=None, setup=setup)

@@ -204,7 +204,7 @@ def _at_points(robot: Robot, data: Dataset, kinds: Mapping[str, FixtureKind]) ->
         rows[k, :, 3 * (len(targets) + f) :][:, :3] = -np.eye(3)
     right = data.position[read] - p[data.configuration[read]]
     solved = np.linalg.lstsq(rows.reshape(-1, rows.shape[2]), right.reshape(-1), rcond=1e-6)[0]
-    found = {data.targets[t]: solved[3 * k : 3 * k + 3] for k, t in enumerate(targets)}
+    found = {data.targets[t]: np.asarray(solved[3 * k : 3 * k + 3], float) for k, t in enumerate(targets)}
     return _also(robot, found)
 
 

@@ -130,7 +130,7 @@ class Dataset:
     def has_reading(self) -> NDArray[np.bool_]:
         """Which readings hold anything."""
         parts = [self.position, *(v for v in (self.quaternion, self.distance, self.height) if v is not None)]
-        return np.any([np.isfinite(v.reshape(len(v), -1)).all(axis=1) for v in parts], axis=0)
+        return np.asarray(np.any([np.isfinite(v.reshape(len(v), -1)).all(axis=1) for v in parts], axis=0))
 
     @property
     def anchored(self) -> bool:

@@ -114,6 +114,11 @@ class Twin:
         """Return ``T_world_target`` ``(4, 4)`` of every target for one joint reading ``(joints,)``, at rest."""
         return self.postures(np.asarray(reading)[None])[0].targets
 
+    def frames(self, joints: Array, **conditions: Unpack[Conditions]) -> Mapping[str, Array]:
+        """Return ``T_world_target`` ``(n, 4, 4)`` of every target at joint readings ``(n, joints)``."""
+        found = [posture.targets for posture in self.postures(joints, **conditions)]
+        return {target.name: np.array([at[target.name] for at in found]) for target in self.robot.targets}
+
     def postures(self, joints: Array, **conditions: Unpack[Conditions]) -> tuple[Posture, ...]:
         """Return where the twin stands at joint readings ``(n, joints)``.
 
@@ -262,8 +267,8 @@ def measure(
     """
     robot = twin.robot
     names = tuple(target.name for target in robot.targets)
-    frames = [posture.targets for posture in twin.postures(joints, **conditions)]
-    position = np.array([[at[name][:3, 3] for name in names] for at in frames]).reshape(-1, 3)
+    frames = twin.frames(joints, **conditions)
+    position = np.stack([frames[name][:, :3, 3] for name in names], axis=1).reshape(-1, 3)
     position = position + rng.normal(0.0, 1.0, position.shape) * noise
     n = len(joints)
     return Dataset(

@@ -32,6 +32,7 @@ def errors_summary(errors: Errors) -> dict[str, Any]:
     for key, spread, scale in (
         ("position_mm", errors.position_spread, 1e3),
         ("orientation_mrad", errors.orientation_spread, 1e3),
+        ("length_mm", errors.length_spread, 1e3),
     ):
         if spread is not None:
             made[key] = _scaled(spread, scale)

@@ -1,1 +1,55 @@
 """Instruments: what each sees of a robot, how well, and which readings are its own."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from truearm.errors import InputError, nearest_names
+from truearm.measurement.devices.artefacts import MARKERS, PLANAR_ARTEFACT, SPATIAL_ARTEFACT
+from truearm.measurement.devices.device import Arm, Device
+from truearm.measurement.devices.lengths import BALLBAR, STRINGS
+from truearm.measurement.devices.printed_circle import TOUCH_UP
+from truearm.measurement.devices.small_volumes import FIVE_LASERS, GAUGES, STEREO
+from truearm.measurement.devices.touching import PLANE, POINT, SPHERE, TWO_SPHERES
+from truearm.measurement.devices.tracker import MEASUREMENT_ARM, TRACKER
+
+__all__ = ["DEVICES", "Arm", "Device", "named_device"]
+
+DEVICES: Final[tuple[Device, ...]] = (
+    TRACKER,
+    MEASUREMENT_ARM,
+    PLANAR_ARTEFACT,
+    SPATIAL_ARTEFACT,
+    MARKERS,
+    BALLBAR,
+    STRINGS,
+    STEREO,
+    FIVE_LASERS,
+    GAUGES,
+    PLANE,
+    SPHERE,
+    TWO_SPHERES,
+    POINT,
+    TOUCH_UP,
+)
+
+
+def named_device(name: str) -> Device:
+    """Return the device of this name.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    known = {device.name: device for device in DEVICES}
+    if name in known:
+        return known[name]
+    near = nearest_names(name, known)
+    raise InputError(
+        "there is no device of this name",
+        where="--device",
+        came=name,
+        allowed=", ".join(known),
+        cure=f"Did you mean {' or '.join(near)}?" if near else None,
+    )

@@ -1,4 +1,7 @@
-"""The canonical CSV: one row a reading, with its configuration, joints, target and units in the header."""
+"""The canonical CSV: one row a reading, with its configuration, joints, target and units in the header.
+
+Rows of the role ``fixture`` are of no configuration: they say what is known of what stands beside the robot.
+"""
 
 from __future__ import annotations
 
@@ -16,25 +19,28 @@ from truearm.errors import InputError, nearest_names
 from truearm.files import read_text
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.readers.cells import Cells, Layout, read_cells
+from truearm.measurement.readers.fixtures import check_lengths, read_setup
 from truearm.measurement.readers.rows import Readings, dataset_of, found_configurations, same_everywhere
 from truearm.modeling.chain import Array
 from truearm.units import ANGLE_UNITS, LENGTH_UNITS, SMALL_ANGLE_UNITS, checked_unit, written
 
 _POSITION: Final = ("x", "y", "z")
 _QUATERNION: Final = ("qw", "qx", "qy", "qz")
-_ROLES: Final = ("target", "reference")
+_LENGTHS: Final = ("distance", "height")
+_ROLES: Final = ("target", "reference", "fixture")
 _FORCE: Final = ("force_x", "force_y", "force_z")
 _MOMENT: Final = ("moment_x", "moment_y", "moment_z")
 _UNITS: Final[dict[str, tuple[str, ...]]] = (
-    dict.fromkeys((*_POSITION, "sigma"), LENGTH_UNITS)
+    dict.fromkeys((*_POSITION, *_LENGTHS, "sigma"), LENGTH_UNITS)
     | {"sigma_rot": SMALL_ANGLE_UNITS, "temperature": ("degC",)}
     | dict.fromkeys(_FORCE, ("N",))
     | dict.fromkeys(_MOMENT, ("N m",))
 )
-_PLAIN: Final = ("configuration", "target", "role", *_QUATERNION)
+_PLAIN: Final = ("configuration", "target", "role", "fixture", *_QUATERNION)
 #: Every column as one writes it, for messages.
 _SHOWN: Final = (
     {"configuration": "configuration", "joint_1": "joint_1 [deg]", "target": "target", "role": "role"}
+    | {"fixture": "fixture", "distance": "distance [mm]", "height": "height [mm]"}
     | {axis: f"{axis} [mm]" for axis in _POSITION}
     | {part: part for part in _QUATERNION}
     | {"sigma": "sigma [mm]", "sigma_rot": "sigma_rot [mrad]", "temperature": "temperature [degC]"}
@@ -69,6 +75,16 @@ def read_csv(path: Path) -> Dataset:
     refuse_other_separators(text, f"{path}, line {header}")
     cells = read_cells(text, str(path), Layout(header=header))
     columns = _columns(cells)
+    setup = None
+    if "role" in columns and "fixture" in (roles := _roles(cells, columns)):
+        beside = [role == "fixture" for role in roles]
+        setup, cells = cells.some(beside), cells.some([not is_beside for is_beside in beside])
+        if not cells.lines:
+            raise InputError(
+                "all rows are fixtures, there is no target",
+                where=str(path),
+                cure="Give the points on the robot the role `target`.",
+            )
     joints = [columns[f"joint_{number}"] for number in _joint_numbers(columns)]
     labels = cells.texts(columns["configuration"].place)
     configurations = found_configurations(cells, labels, [j.place for j in joints], [j.unit for j in joints])
@@ -85,11 +101,15 @@ def read_csv(path: Path) -> Dataset:
         configuration=configurations.of_row,
         targets=cells.texts(columns["target"].place),
         reference=np.array(_roles(cells, columns)) == "reference",
-        position=numbers(*_POSITION),
+        position=numbers(*_POSITION) if "x" in columns else np.full((len(cells.lines), 3), np.nan),
         quaternion=numbers(*_QUATERNION) if "qw" in columns else None,
         sigma=numbers("sigma", deviation=True)[:, 0] if "sigma" in columns else None,
         sigma_rot=numbers("sigma_rot", deviation=True)[:, 0] if "sigma_rot" in columns else None,
+        fixture=cells.columns[columns["fixture"].place] if "fixture" in columns else None,
+        distance=numbers("distance")[:, 0] if "distance" in columns else None,
+        height=numbers("height")[:, 0] if "height" in columns else None,
     )
+    check_lengths(cells, readings, {name: column.place for name, column in columns.items()})
 
     def circumstance(name: str) -> Array:
         column = columns[name]
@@ -99,8 +119,11 @@ def read_csv(path: Path) -> Dataset:
     if "force_x" in columns:
         still = np.zeros(len(configurations.labels))
         wrench = np.column_stack([circumstance(n) if n in columns else still for n in (*_FORCE, *_MOMENT)])
+    dataset = dataset_of(readings, configurations)
+    places = {name: (column.place, column.unit) for name, column in columns.items()}
     return replace(
-        dataset_of(readings, configurations),
+        dataset,
+        setup=None if setup is None else read_setup(setup, places, dataset),
         temperature=circumstance("temperature") if "temperature" in columns else None,
         wrench=wrench,
     )
@@ -172,7 +195,9 @@ def _refuse_missing(cells: Cells, columns: dict[str, _Column]) -> None:
                 allowed="joint_1, joint_2, .. without a gap",
                 cure=f"Add joint_{number} [deg], or with the unit it has, or renumber.",
             )
-    for name in ("configuration", "target", *_POSITION):
+    lengths = [name for name in _LENGTHS if name in columns]
+    positions = () if lengths and not any(axis in columns for axis in _POSITION) else _POSITION
+    for name in ("configuration", "target", *positions, *(["fixture"] if lengths else [])):
         if name not in columns:
             raise InputError(
                 f"the column {name} is missing", where=where, allowed=_ALLOWED, cure=f"Add {_SHOWN[name]}."
@@ -216,8 +241,9 @@ def _roles(cells: Cells, columns: dict[str, _Column]) -> tuple[str, ...]:
                 "the role is not known" if role else "the cell is empty",
                 where=cells.place(roles.index(role), place),
                 came=role or None,
-                allowed=" or ".join(_ROLES),
-                cure="A target is fixed to the robot's tool, a reference stands beside the robot.",
+                allowed=f"{', '.join(_ROLES[:-1])} or {_ROLES[-1]}",
+                cure="A target is fixed to the robot's tool, a reference stands beside the robot and is measured too, "
+                "a fixture is what targets are measured against.",
             )
     return roles
 
@@ -232,7 +258,8 @@ def _joint_numbers(columns: Iterable[str]) -> list[int]:
 def csv_text(dataset: Dataset, length_unit: str = "mm", angle_unit: str = "deg") -> str:
     """Return a dataset as the text of a canonical CSV.
 
-    Rows come configuration by configuration, in each one the targets first and then the reference points.
+    Rows come configuration by configuration, in each one the targets first and then the reference points; what is
+    known of fixtures comes last.
     What was read from such a text is written as the same text again. ``sigma_rot`` is always in mrad.
     """
     checked_unit(length_unit, LENGTH_UNITS, "length unit")
@@ -246,31 +273,48 @@ def csv_text(dataset: Dataset, length_unit: str = "mm", angle_unit: str = "deg")
     if dataset.wrench is not None:
         circumstances |= dict(zip((*_FORCE, *_MOMENT), dataset.wrench.T, strict=True))
     units = [angle_unit if kind == "revolute" else length_unit for kind in dataset.joint_kinds]
+    setup = dataset.setup
+    with_roles = references is not None or setup is not None
+    every = [part for part in (*parts, setup) if part is not None]
+    lengths = [name for name in _LENGTHS if any(getattr(part, name) is not None for part in every)]
+    positions = not lengths or any(np.isfinite(part.position).any() for part in every)
+    with_sigma = with_sigma or setup is not None
     heading = [
         "configuration",
         *(f"joint_{number} [{unit}]" for number, unit in enumerate(units, 1)),
         "target",
-        *(["role"] if references is not None else []),
-        *(f"{axis} [{length_unit}]" for axis in _POSITION),
+        *(["role"] if with_roles else []),
+        *(["fixture"] if any(part.fixtures for part in every) else []),
+        *(f"{axis} [{length_unit}]" for axis in (_POSITION if positions else ())),
         *(_QUATERNION if oriented else ()),
+        *(f"{name} [{length_unit}]" for name in lengths),
         *([f"sigma [{length_unit}]"] if with_sigma else []),
         *(["sigma_rot [mrad]"] if with_sigma_rot else []),
         *(_SHOWN[name] for name in circumstances),
     ]
     joints = [[_shown(v, unit) for v, unit in zip(row, units, strict=True)] for row in dataset.joints.tolist()]
     rows: list[list[list[str]]] = [[] for _ in dataset.labels]
+
+    def reading_cells(part: Dataset, role: str, reading: int) -> list[str]:
+        row = [part.targets[part.target[reading]], *([role] if with_roles else [])]
+        if "fixture" in heading:
+            other = int(part.against[reading])
+            row.append(part.fixtures[other] if other >= 0 else "")
+        if positions:
+            row += [_shown(v, length_unit) for v in part.position[reading].tolist()]
+        if oriented:
+            row += _cells(part.quaternion, reading, "1", 4)
+        for name in lengths:
+            row += _cells(getattr(part, name), reading, length_unit, 1)
+        if with_sigma:
+            row += _cells(part.sigma, reading, length_unit, 1)
+        if with_sigma_rot:
+            row += _cells(part.sigma_rot, reading, "mrad", 1)
+        return row
+
     for part, role in zip(parts, _ROLES, strict=False):
         for reading, configuration in enumerate(part.configuration.tolist()):
-            row = [dataset.labels[configuration], *joints[configuration], part.targets[part.target[reading]]]
-            if references is not None:
-                row.append(role)
-            row += [_shown(v, length_unit) for v in part.position[reading].tolist()]
-            if oriented:
-                row += _cells(part.quaternion, reading, "1", 4)
-            if with_sigma:
-                row += _cells(part.sigma, reading, length_unit, 1)
-            if with_sigma_rot:
-                row += _cells(part.sigma_rot, reading, "mrad", 1)
+            row = [dataset.labels[configuration], *joints[configuration], *reading_cells(part, role, reading)]
             row += [_shown(float(values[configuration]), "1") for values in circumstances.values()]
             rows[configuration].append(row)
     unseen = next((label for label, found in zip(dataset.labels, rows, strict=True) if not found), None)
@@ -284,6 +328,9 @@ def csv_text(dataset: Dataset, length_unit: str = "mm", angle_unit: str = "deg")
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(heading)
     writer.writerows(row for found in rows for row in found)
+    for reading in range(0 if setup is None else len(setup.target)):
+        row = ["", *("" for _ in units), *reading_cells(setup, "fixture", reading), *("" for _ in circumstances)]  # type: ignore[arg-type]
+        writer.writerow(row)
     return stream.getvalue()
 
 

@@ -10,8 +10,9 @@ import csv
 import io
 import math
 import re
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import compress
 from typing import Final
 
 import numpy as np
@@ -78,6 +79,14 @@ class Cells:
     lines: tuple[int, ...]
     columns: tuple[tuple[str, ...], ...]
     decimal: str = "."
+
+    def some(self, kept: Sequence[bool]) -> Cells:
+        """Return some of the rows."""
+        return replace(
+            self,
+            lines=tuple(compress(self.lines, kept)),
+            columns=tuple(tuple(compress(column, kept)) for column in self.columns),
+        )
 
     def place(self, row: int, column: int) -> str:
         """Return the file, line and column of a cell, for messages."""

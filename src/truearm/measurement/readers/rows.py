@@ -116,6 +116,10 @@ class Readings:
         (w, x, y, z), ``(readings, 4)``, NaN where it is missing; None if the file has none.
     sigma, sigma_rot
         Declared standard deviations [m], [rad], ``(readings,)``, NaN where missing; None if there are none.
+    fixture
+        Name of the fixture that each is measured against, empty for none; None if the file names none.
+    distance, height
+        From, or over, the fixture [m], ``(readings,)``, NaN where missing; None if the file has none.
     """
 
     source: str
@@ -127,6 +131,9 @@ class Readings:
     quaternion: Array | None = None
     sigma: Array | None = None
     sigma_rot: Array | None = None
+    fixture: Sequence[str] | None = None
+    distance: Array | None = None
+    height: Array | None = None
 
 
 def dataset_of(readings: Readings, configurations: Configurations) -> Dataset:
@@ -169,11 +176,19 @@ def _part(
     rows: IntArray = np.flatnonzero(chosen)
     names = [readings.targets[row] for row in rows.tolist()]
     target = np.array([place.setdefault(name, len(place)) for name in names], dtype=np.intp)
-    has_position = _whole(position)
+    has_length = _whole(position)
+    for lengths in (readings.distance, readings.height):
+        has_length = has_length if lengths is None else has_length | np.isfinite(lengths)
     has_orientation: NDArray[np.bool_] = np.zeros(len(position), dtype=bool)
     if quaternion is not None:
         has_orientation = _whole(quaternion)
         quaternion = quaternion[rows] if has_orientation[rows].any() else None
+    beside = [""] * len(rows) if readings.fixture is None else [readings.fixture[row] for row in rows.tolist()]
+    fixtures = tuple(dict.fromkeys(name for name in beside if name))
+
+    def lengths_of(values: Array | None) -> Array | None:
+        return None if values is None or np.isnan(values[rows]).all() else values[rows]
+
     return Dataset(
         source=readings.source,
         labels=configurations.labels,
@@ -184,7 +199,11 @@ def _part(
         target=target,
         position=position[rows],
         quaternion=quaternion,
-        sigma=_declared(readings, rows, readings.sigma, has_position, "sigma"),
+        distance=lengths_of(readings.distance),
+        height=lengths_of(readings.height),
+        fixtures=fixtures,
+        fixture=np.array([fixtures.index(n) if n else -1 for n in beside], dtype=np.intp) if fixtures else None,
+        sigma=_declared(readings, rows, readings.sigma, has_length, "sigma"),
         sigma_rot=_declared(readings, rows, readings.sigma_rot, has_orientation, "sigma_rot"),
     )
 

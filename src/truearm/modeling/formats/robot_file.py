@@ -21,6 +21,7 @@ from truearm.errors import InputError, nearest_names
 from truearm.files import is_one_line, read_yaml
 from truearm.modeling.conventions import convention
 from truearm.modeling.effects import EFFECTS
+from truearm.modeling.fixtures import Fixture, FixtureKind
 from truearm.modeling.parameters import Parameter
 from truearm.modeling.parts import (
     GRAVITY,
@@ -143,6 +144,12 @@ class _Target(_Entry):
     quaternion: Quaternion | None = None
 
 
+class _Fixture(_Entry):
+    name: TargetName
+    kind: FixtureKind
+    quaternion: Quaternion | None = None
+
+
 class _Parameter(_Entry):
     nominal: Number
     value: Number
@@ -190,6 +197,7 @@ class RobotFile(_Entry):
     effects: list[str] = []
     base_quaternion: Quaternion = (1.0, 0.0, 0.0, 0.0)
     targets: list[_Target] = []
+    fixtures: list[_Fixture] = []
     parameters: dict[str, _Parameter] = {}
     history: list[str] = []
 
@@ -264,6 +272,7 @@ def robot_from_file(content: RobotFile, where: str) -> Robot:
         gravity=content.gravity,
         base_quaternion=content.base_quaternion,
         targets=tuple(Target(t.name, t.quaternion) for t in content.targets),
+        fixtures=tuple(Fixture(f.name, f.kind, f.quaternion or (1.0, 0.0, 0.0, 0.0)) for f in content.fixtures),
         effect_names=tuple(content.effects),
         priors={
             unit: si(value, file_unit, f"priors.{entry}", deviation=True)
@@ -498,6 +507,14 @@ def robot_text(robot: Robot) -> str:
         content["targets"] = [
             flow({"name": text(t.name)} | ({"quaternion": listed(list(t.quaternion))} if t.quaternion else {}))
             for t in robot.targets
+        ]
+    if robot.fixtures:
+        content["fixtures"] = [
+            flow(
+                {"name": text(f.name), "kind": f.kind}
+                | ({} if f.kind == "point" else {"quaternion": listed(list(f.quaternion))})
+            )
+            for f in robot.fixtures
         ]
     if robot.known:
         content["parameters"] = {

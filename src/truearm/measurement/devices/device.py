@@ -1,0 +1,175 @@
+"""An instrument: what it sees of an arm, how well, and what stands beside the robot for it."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.errors import InputError
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.twin import directions
+from truearm.modeling.chain import Array
+from truearm.modeling.parts import Tool
+from truearm.modeling.robot import Robot
+
+IntArray = NDArray[np.intp]
+_DRAWS: Final = 200
+
+
+class Arm(Protocol):
+    """What is measured: a twin, or a robot taken at its word."""
+
+    @property
+    def robot(self) -> Robot:
+        """Its targets by name."""
+
+    def frames(self, joints: Array) -> Mapping[str, Array]:
+        """Return ``T_world_target`` ``(n, 4, 4)`` of every target at joint readings ``(n, joints)``."""
+
+
+@dataclass(frozen=True)
+class Device(ABC):
+    """An instrument.
+
+    Attributes
+    ----------
+    name
+        As the command line spells it.
+    summary
+        What it is and reads, in words.
+    source
+        Where its figures come from.
+    sigma
+        Standard deviation of a coordinate, distance or height that it reads [m].
+    tool
+        What it needs on the flange; None for whatever targets the robot has.
+    """
+
+    name: str
+    summary: str
+    source: str
+    sigma: float
+    tool: Tool | None = None
+
+    @abstractmethod
+    def campaign(self, nominal: Robot, arm: Arm, count: int, sigma: float, rng: np.random.Generator) -> Dataset:
+        """Return what it reads of an arm.
+
+        Parameters
+        ----------
+        nominal
+            What is known of the arm: the nominal robot where it stands, with the targets of its tool. Postures are
+            chosen by it.
+        arm
+            What is read.
+        count
+            Number of configurations.
+        sigma
+            Standard deviation of a reading [m]; zero reads without noise and declares nothing.
+
+        Raises
+        ------
+        InputError
+            If the arm does not reach, or never shows, what is read.
+        """
+
+
+def recorded(
+    nominal: Robot,
+    source: str,
+    joints: Array,
+    configuration: Sequence[int] | IntArray,
+    target: Sequence[str],
+    *,
+    position: Array | None = None,
+    quaternion: Array | None = None,
+    distance: Array | None = None,
+    height: Array | None = None,
+    fixtures: tuple[str, ...] = (),
+    fixture: IntArray | None = None,
+    setup: Dataset | None = None,
+    sigma: float = 0.0,
+    sigma_rot: float = 0.0,
+) -> Dataset:
+    """Return readings as a dataset, the configurations numbered in the order of measurement.
+
+    Parameters
+    ----------
+    joints
+        Readings ``(n, joints)``.
+    configuration, target
+        Of each reading.
+    position, quaternion, distance, height, fixtures, fixture, setup
+        As in :class:`truearm.measurement.dataset.Dataset`.
+    sigma, sigma_rot
+        Standard deviations [m], [rad]; nothing is declared where they are zero.
+    """
+    names = tuple(dict.fromkeys(target))
+    n = len(joints)
+    return Dataset(
+        source=source,
+        labels=tuple(str(k + 1) for k in range(n)),
+        joints=joints,
+        joint_kinds=tuple(joint.kind for joint in nominal.joints),
+        targets=names,
+        configuration=np.asarray(configuration, dtype=np.intp),
+        target=np.array([names.index(name) for name in target], dtype=np.intp),
+        position=np.full((len(target), 3), np.nan) if position is None else position,
+        quaternion=quaternion,
+        distance=distance,
+        height=height,
+        fixtures=fixtures,
+        fixture=fixture,
+        setup=setup,
+        sigma=np.full(len(target), sigma) if sigma > 0 else None,
+        sigma_rot=np.full(len(target), sigma_rot) if sigma_rot > 0 else None,
+        approach=directions(joints),
+        number=np.arange(float(n)),
+    )
+
+
+def shown(
+    nominal: Robot, count: int, rng: np.random.Generator, visible: Visible, what: str
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Return random configurations that show enough of the tool.
+
+    Parameters
+    ----------
+    visible
+        Tells which targets of a robot are seen at joint readings ``(n, joints)``, ``(n, targets)``; a configuration
+        that shows none of them is passed over.
+    what
+        Who looks, for messages.
+
+    Returns
+    -------
+    Joint readings ``(count, joints)``, and which targets are seen ``(count, targets)``.
+    """
+    found, seen = [], []
+    for _ in range(_DRAWS):
+        drawn = nominal.random_configurations(500, rng)
+        sees = visible(nominal, drawn)
+        some = sees.any(axis=1)
+        found.append(drawn[some])
+        seen.append(sees[some])
+        if sum(map(len, found)) >= count:
+            return np.concatenate(found)[:count], np.concatenate(seen)[:count]
+    raise InputError(
+        f"{what} sees too few configurations of {nominal.name}",
+        where="--device",
+        came=f"{sum(map(len, found))} among {500 * _DRAWS} within the limits",
+        allowed=f"{count} or more",
+        cure="Take fewer poses, or another device.",
+    )
+
+
+class Visible(Protocol):
+    """Tells which targets of a robot are seen."""
+
+    def __call__(self, robot: Robot, joints: Array) -> NDArray[np.bool_]:
+        """Return ``(n, targets)`` for joint readings ``(n, joints)``."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Protocol
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from truearm.errors import InputError
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.twin import directions
+from truearm.measurement.twin import Twin, directions
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import Tool
 from truearm.modeling.robot import Robot
@@ -77,6 +77,31 @@ class Device(ABC):
         InputError
             If the arm does not reach, or never shows, what is read.
         """
+
+
+def measured_with(
+    device: Device, nominal: Robot, twin: Twin, count: int, rng: np.random.Generator, sigma: float | None = None
+) -> Dataset:
+    """Return what a device reads of a twin.
+
+    Parameters
+    ----------
+    nominal
+        The robot as it is known; where it stands and what it carries is taken from the twin.
+    twin
+        The true robot, given the device's tool if it needs one.
+    count
+        Number of configurations.
+    sigma
+        Standard deviation of a reading [m]; the device's own if None, no noise if zero.
+    """
+    if device.tool is not None:
+        carrying = twin.robot.with_frames(twin.robot.base, device.tool.targets)
+        twin = replace(twin, robot=carrying)
+    values = twin.robot.values
+    places = {t.name: [values[t.parameter(axis)] for axis in "xyz"] for t in twin.robot.targets}
+    standing = nominal.with_frames(twin.robot.base, places)
+    return device.campaign(standing, twin, count, device.sigma if sigma is None else sigma, rng)
 
 
 def recorded(

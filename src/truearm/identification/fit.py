@@ -14,7 +14,7 @@ from truearm.identification.bounds import Bounds, bound_vectors
 from truearm.identification.losses import MEDIAN_NORM, Loss, norms_of
 from truearm.identification.models import FRAMES, Model
 from truearm.identification.problem import SETUP, Problem, check_circumstances, check_solvable
-from truearm.identification.redundancy import Redundancy, find_redundancies, taken_on_trust, unseen_but_felt
+from truearm.identification.redundancy import Redundancy, find_redundancies, in_words, taken_on_trust, unseen_but_felt
 from truearm.identification.solver import SMALL, Solution, solve
 from truearm.identification.standing import initial_standing, unanchored
 from truearm.measurement.dataset import Dataset
@@ -85,7 +85,8 @@ class Fit:
         What nobody measured and every prediction depends on: ``base`` where nothing says how the robot stands, ``size``
         where no length was measured either.
     blind
-        Directions that readings without an anchor do not see, with a parameter that keeps its nominal value for each.
+        What readings without an anchor do not see: combinations of the robot's parameters in words, such as
+        ``d_3 - d_2``, of which the first keeps its nominal value.
     sigma
         Standard deviation of a reading [m or rad] by observation, declared (root mean square) or estimated.
     declared
@@ -110,7 +111,7 @@ class Fit:
     at_bound: tuple[str, ...]
     unseen: tuple[str, ...]
     trusted: tuple[str, ...]
-    blind: tuple[Redundancy, ...]
+    blind: tuple[str, ...]
     sigma: dict[str, float]
     declared: bool
     excess: float
@@ -362,13 +363,23 @@ def _fit(
         at_bound=tuple(n for n, bound in zip(free.names, at_bound, strict=True) if bound),
         unseen=unseen,
         trusted=trusted,
-        blind=find_redundancies(problem, x) if trusted else (),
+        blind=_blind(problem, x) if trusted else (),
         sigma=sigma,
         declared=declared == set(noise),
         excess=excess,
         weight=weight,
         steps=steps,
     )
+
+
+def _blind(problem: Problem, vector: Array) -> tuple[str, ...]:
+    """Return the combinations of the robot's own parameters that the readings do not see."""
+    beside = {p.name for p in problem.free.parameters if p.group in ("target", "fixture")}
+    own = [
+        {n: c for n, c in redundancy.members.items() if n not in beside}
+        for redundancy in find_redundancies(problem, vector)
+    ]
+    return tuple(in_words(members, problem.free) for members in own if members)
 
 
 def _covariance(A: Array, uncertain: NDArray[np.bool_], priors: bool) -> Array:

@@ -6,14 +6,14 @@ from typing import Final
 
 from truearm.errors import InputError, nearest_names
 from truearm.measurement.devices.artefacts import MARKERS, PLANAR_ARTEFACT, SPATIAL_ARTEFACT
-from truearm.measurement.devices.device import Arm, Device, measured_with
+from truearm.measurement.devices.device import Arm, Device, measured_with, standing_for
 from truearm.measurement.devices.lengths import BALLBAR, STRINGS
 from truearm.measurement.devices.printed_circle import TOUCH_UP
 from truearm.measurement.devices.small_volumes import FIVE_LASERS, GAUGES, STEREO
 from truearm.measurement.devices.touching import PLANE, POINT, SPHERE, TWO_SPHERES
 from truearm.measurement.devices.tracker import MEASUREMENT_ARM, TRACKER
 
-__all__ = ["DEVICES", "Arm", "Device", "measured_with", "named_device"]
+__all__ = ["DEVICES", "Arm", "Device", "measured_with", "named_device", "standing_for"]
 
 DEVICES: Final[tuple[Device, ...]] = (
     TRACKER,

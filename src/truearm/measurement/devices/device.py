@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from truearm.errors import InputError
 from truearm.measurement.dataset import Dataset
+from truearm.measurement.truths import DEFAULT_TOOL, stationed
 from truearm.measurement.twin import Twin, directions
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import Tool
@@ -19,6 +20,7 @@ from truearm.modeling.robot import Robot
 
 IntArray = NDArray[np.intp]
 _DRAWS: Final = 200
+_DRAWN: Final = 2000
 
 
 class Arm(Protocol):
@@ -104,6 +106,12 @@ def measured_with(
     return device.campaign(standing, twin, count, device.sigma if sigma is None else sigma, rng)
 
 
+def standing_for(device: Device, robot: Robot) -> Robot:
+    """Return a robot where a simulated instrument sees it, with the device's tool or, if that needs none, its own."""
+    tool = device.tool or next(iter(robot.tools.values()), DEFAULT_TOOL)
+    return stationed(robot, tool)
+
+
 def recorded(
     nominal: Robot,
     source: str,
@@ -177,7 +185,7 @@ def shown(
     """
     found, seen = [], []
     for _ in range(_DRAWS):
-        drawn = nominal.random_configurations(500, rng)
+        drawn = nominal.random_configurations(_DRAWN, rng)
         sees = visible(nominal, drawn)
         some = sees.any(axis=1)
         found.append(drawn[some])
@@ -187,7 +195,7 @@ def shown(
     raise InputError(
         f"{what} sees too few configurations of {nominal.name}",
         where="--device",
-        came=f"{sum(map(len, found))} among {500 * _DRAWS} within the limits",
+        came=f"{sum(map(len, found))} among {_DRAWN * _DRAWS} within the limits",
         allowed=f"{count} or more",
         cure="Take fewer poses, or another device.",
     )

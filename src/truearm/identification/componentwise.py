@@ -68,6 +68,6 @@ def _linear_program(A: Array, r: Array, room: Array) -> tuple[Array, float]:
         bounds=[*limits, *[(0.0, np.inf)] * rows],
         method="highs",
     )
-    if found.x is None:
+    if found.x is None or found.fun is None:
         return np.zeros(count), float(np.abs(r).sum())
     return np.asarray(found.x[:count]), float(found.fun)

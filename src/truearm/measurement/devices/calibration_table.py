@@ -172,19 +172,26 @@ def rectangular_grid(columns: int, rows: int, spacing: float) -> Array:
 def _jogged(twin: Twin, wanted: Array, start: Array, conditions: Conditions) -> Array:
     """Return readings ``(n, joints)`` with the tip where it is wanted ``(n, 3)`` [m], by least-norm Newton steps.
 
-    The Jacobian is that of the arm without its joints' imperfections: steps need not be exact, their end is.
+    The Jacobian is that of the arm without its joints' imperfections: steps need not be exact, their end is. Most of
+    the way that arm is followed too, since all its configurations are computed at once.
     """
     name, q = twin.robot.targets[0].name, start
-    for _ in range(_STEPS):
-        tip = np.array([posture.targets[name][:3, 3] for posture in twin.postures(q, **conditions)])
-        missing = wanted - tip
-        apart = np.linalg.norm(missing, axis=1)
-        if (apart < _TOUCHES).all():
-            return q
-        jacobian = twin.robot.joint_jacobian(q, name)[:, :3]
-        step = (np.linalg.pinv(jacobian, rcond=_SINGULAR) @ missing[:, :, None])[:, :, 0]
-        longest = np.abs(step).max(axis=1, keepdims=True)
-        q = q + step * np.minimum(1.0, _LONGEST / np.maximum(longest, _LONGEST))
+    for imperfect in (False, True):
+        for _ in range(_STEPS):
+            if imperfect:
+                tip = np.array([posture.targets[name][:3, 3] for posture in twin.postures(q, **conditions)])
+            else:
+                tip = twin.robot.poses(q, name)[0]
+            missing = wanted - tip
+            apart = np.linalg.norm(missing, axis=1)
+            if (apart < _TOUCHES).all():
+                if imperfect:
+                    return q
+                break
+            jacobian = twin.robot.joint_jacobian(q, name)[:, :3]
+            step = (np.linalg.pinv(jacobian, rcond=_SINGULAR) @ missing[:, :, None])[:, :, 0]
+            longest = np.abs(step).max(axis=1, keepdims=True)
+            q = q + step * np.minimum(1.0, _LONGEST / np.maximum(longest, _LONGEST))
     worst = int(np.argmax(apart >= _TOUCHES))
     raise InputError(
         "the tip does not come to rest on a point of the table",

@@ -32,6 +32,11 @@ def least_absolute(problem: Solvable, bounds: tuple[Array, Array] | None = None)
     Returns
     -------
     Parameter values ``(parameters,)``, in the order of the problem.
+
+    Raises
+    ------
+    ArithmeticError
+        If the solver of linear programs fails: residuals or Jacobian are not finite.
     """
     low, high = bounds if bounds is not None else (np.full(len(problem.free.names), side) for side in (-np.inf, np.inf))
     x, longest = np.clip(problem.free.start, low, high), np.inf
@@ -69,5 +74,5 @@ def _linear_program(A: Array, r: Array, room: Array) -> tuple[Array, float]:
         method="highs",
     )
     if found.x is None or found.fun is None:
-        return np.zeros(count), float(np.abs(r).sum())
+        raise ArithmeticError(f"the linear program of a step was not solved: {found.message}")
     return np.asarray(found.x[:count]), float(found.fun)

@@ -23,7 +23,6 @@ from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY, Transform
 from truearm.planning.paths import Hermite
 from truearm.robots import load_robot
-from truearm.studies.parallel_axes import without_beta
 
 TIP: Final = "tip"
 #: The document's bounds on every deviation of a DH parameter.
@@ -61,7 +60,10 @@ Objective = Literal["distances", "components", "squares"]
 
 def arm() -> Robot:
     """Return the nominal arm without beta, as the document models it, with its tip at the end of link 3."""
-    return without_beta(load_robot("li3")).with_frames(IDENTITY, {TIP: (0.0, 0.0, 0.0)})
+    robot = load_robot("li3")
+    rows = [{column: value for column, value in joint.row.items() if column != "beta"} for joint in robot.joints]
+    joints = tuple(replace(joint, row=row) for joint, row in zip(robot.joints, rows, strict=True))
+    return replace(robot, joints=joints).with_frames(IDENTITY, {TIP: (0.0, 0.0, 0.0)})
 
 
 def truth(

@@ -78,6 +78,11 @@ STUDIES: Final = (
         "a KUKA KR 5: joint errors from circles, tolerances, seven lines before and after compensation (KR5 paper)",
         "truearm.studies.kr5_gdt",
     ),
+    Entry(
+        "li-table",
+        "an arm of three joints that touches a tilted table of known points, fitted in bounds (Li et al.)",
+        "truearm.studies.li_table",
+    ),
 )
 
 

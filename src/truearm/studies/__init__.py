@@ -78,6 +78,11 @@ STUDIES: Final = (
         "a KUKA KR 5: joint errors from circles, tolerances, seven lines before and after compensation (KR5 paper)",
         "truearm.studies.kr5_gdt",
     ),
+    Entry(
+        "lrmate-hexapod",
+        "an LR Mate calibrated with one ballbar in two steps, and with a tracker; its truth is invented (Nubiola 4)",
+        "truearm.studies.lrmate_hexapod",
+    ),
 )
 
 

@@ -21,7 +21,7 @@ from truearm.modeling.inverse.branches import BRANCHES, branch_rule
 from truearm.modeling.parameters import FreeParameters
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform, rotation_vector
+from truearm.modeling.transform import Transform, rotation_from_quaternion, rotation_vector
 from truearm.planning.constraints import Constraints, allowed
 from truearm.planning.hexapod.campaign import touching
 from truearm.planning.hexapod.tool import with_cups
@@ -33,7 +33,9 @@ TARGETS: Final = ("1", "2", "3")
 TOUCHING: Final = TARGETS[0]
 #: The base fixture beside the robot, leaning 17 deg on its pivot; the document does not print where it stood. Of a
 #: thousand places this one has as many poses and configurations as the document's.
-FIXTURE: Final = Transform((0.059, 0.233, 0.246), (0.757633, -0.113205, 0.095004, 0.635729))
+FIXTURE: Final = Transform.from_matrix(
+    rotation_from_quaternion(np.array([0.757633, -0.113205, 0.095004, 0.635729])), np.array([0.059, 0.233, 0.246])
+)
 #: What the document calls front/up and back/down. Its elbow is up or down as seen from the wrist's side; in both of
 #: these it is above the line from shoulder to wrist, and below it the arm would meet the table.
 FRONT_UP: Final = "front-up"
@@ -265,9 +267,9 @@ class Judgement:
 
 def judged(model: Robot, truth: Unseen) -> Judgement:
     """Compare a model with what a twin does, both in the same frame."""
-    predicted = np.array([model.poses(truth.joints, name)[0] for name in TARGETS])
-    predicted = predicted[truth.cup, np.arange(len(truth.joints))]
-    turned = model.poses(truth.joints)[1] @ np.swapaxes(truth.rotation, 1, 2)
+    at = model.loaded(truth.joints)
+    predicted = _predicted(model, at, truth)
+    turned = model.poses(at)[1] @ np.swapaxes(truth.rotation, 1, 2)
     front = truth.front_up
     return Judgement(
         position=np.linalg.norm(predicted - truth.position, axis=1),
@@ -275,3 +277,15 @@ def judged(model: Robot, truth: Unseen) -> Judgement:
         pairs=pair_distances(predicted, truth.position),
         pairs_front_up=pair_distances(predicted[front], truth.position[front]),
     )
+
+
+def mean_position_error(model: Robot, truth: Unseen) -> float:
+    """Return the mean position error alone [m]."""
+    predicted = _predicted(model, model.loaded(truth.joints), truth)
+    return float(np.linalg.norm(predicted - truth.position, axis=1).mean())
+
+
+def _predicted(model: Robot, at: Postures, truth: Unseen) -> Array:
+    """Return where a model says the cup that is looked at is [m], ``(n, 3)``."""
+    places = np.array([model.poses(at, name)[0] for name in TARGETS])
+    return np.asarray(places[truth.cup, np.arange(len(truth.cup))])

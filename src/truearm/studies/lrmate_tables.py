@@ -169,9 +169,9 @@ def _frames(outcomes: Sequence[Outcome]) -> Table:
                 15.0,
                 "section 4.2",
                 absolute=5.0,
-                explanation="Three distances do not see what shifts or tilts all three points together, and that is most"
-                " of what the model has wrong there. The gain is that of one robot, the document's or ours; with the"
-                " other robots below it is as often a loss.",
+                explanation="Three distances do not see what shifts or tilts all three points together, and that is"
+                " most of what the model has wrong there. The gain is that of one robot, the document's or ours; with"
+                " the other robots below it is as often a loss.",
             ),
             *(
                 Row(f"frame by the {words}, {what}", unit, [scale * getattr(o, of)[name] for o in outcomes])
@@ -348,8 +348,8 @@ def _other_robots(drawn: Sequence[Outcome]) -> Table:
                 1.54,
                 "Table 4.3",
                 relative=0.3,
-                explanation="That the final calibration is the worse one is no rule. Where base and cups are found it is"
-                " mostly the better one.",
+                explanation="That the final calibration is the worse one is no rule. Where base and cups are found it"
+                " is mostly the better one.",
             ),
             Row("final over preliminary, base and cups found", "", ratio("final found", "preliminary found")),
             Row(

@@ -65,7 +65,7 @@ def study(
         answer=f"Done as printed, with the base held where the three cups are, the final calibration leaves"
         f" {mean('final'):.2f} mm on average and the preliminary one {mean('preliminary'):.2f} mm (document: 0.80 and"
         f" 0.52 mm); with {seeds} other robots the final one leaves {min(printed):.1f} to {max(printed):.1f} mm and is"
-        f" the worse of both for {worse}. It is the base that costs so much: found together with the robot from the"
+        f" the worse of the two for {worse}. It is the base that costs so much: found together with the robot from the"
         f" very same readings, {mean('final found'):.2f} mm are left. A tracker"
         f" leaves {mean('tracker'):.2f} mm (document: 0.16 mm), and away from the fixture it is better than the device"
         f" for {better} of {seeds} other robots. Chapter 4 prints no identified parameters, so this robot is"

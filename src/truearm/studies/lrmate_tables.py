@@ -259,7 +259,7 @@ def _signs(outcomes: Sequence[Outcome]) -> Table:
                 (
                     "preliminary",
                     60.0,
-                    "The document does not say what it subtracts from what; the other way round ours is 100 less it."
+                    "The document does not say what it subtracts from what; the other way round it is 100 % minus ours."
                     " With other robots the share is anything, see below.",
                 ),
                 (

@@ -83,6 +83,11 @@ STUDIES: Final = (
         "an arm of three joints that touches a tilted table of known points, fitted in bounds (Li et al.)",
         "truearm.studies.li_table",
     ),
+    Entry(
+        "lrmate-hexapod",
+        "an LR Mate calibrated with one ballbar in two steps, and with a tracker; its truth is invented (Nubiola 4)",
+        "truearm.studies.lrmate_hexapod",
+    ),
 )
 
 

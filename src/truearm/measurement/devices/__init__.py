@@ -7,8 +7,8 @@ from typing import Final
 from truearm.errors import InputError, nearest_names
 from truearm.measurement.devices.artefacts import MARKERS, PLANAR_ARTEFACT, SPATIAL_ARTEFACT
 from truearm.measurement.devices.device import Arm, Device, measured_with, standing_for
+from truearm.measurement.devices.known_points import CALIBRATION_TABLE, TOUCH_UP
 from truearm.measurement.devices.lengths import BALLBAR, STRINGS
-from truearm.measurement.devices.printed_circle import TOUCH_UP
 from truearm.measurement.devices.small_volumes import FIVE_LASERS, GAUGES, STEREO
 from truearm.measurement.devices.touching import PLANE, POINT, SPHERE, TWO_SPHERES
 from truearm.measurement.devices.tracker import MEASUREMENT_ARM, TRACKER
@@ -30,6 +30,7 @@ DEVICES: Final[tuple[Device, ...]] = (
     SPHERE,
     TWO_SPHERES,
     POINT,
+    CALIBRATION_TABLE,
     TOUCH_UP,
 )
 

@@ -144,6 +144,11 @@ def recorded(
     """
     names = tuple(dict.fromkeys(target))
     n = len(joints)
+    if fixture is not None:
+        used = np.unique(fixture[fixture >= 0])
+        place = np.full(len(fixtures), -1)
+        place[used] = np.arange(len(used))
+        fixtures, fixture = tuple(fixtures[k] for k in used), place[fixture]
     return Dataset(
         source=source,
         labels=tuple(str(k + 1) for k in range(n)),

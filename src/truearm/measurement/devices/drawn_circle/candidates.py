@@ -62,7 +62,7 @@ def lines(darkness: Array, pitch: tuple[float, float], threshold: float) -> NDAr
     for number, (rows, columns) in enumerate(find_objects(pieces), 1):
         extent = max((rows.stop - rows.start) * pitch[1], (columns.stop - columns.start) * pitch[0])
         large[number] = extent >= _SPECK
-    return np.asarray(skeletonize(large[pieces]), dtype=bool)
+    return np.asarray(skeletonize(large[pieces]), dtype=np.bool_)
 
 
 def candidates(thinned: NDArray[np.bool_], ink: Ink) -> Iterator[Candidate]:

@@ -111,4 +111,4 @@ def _between(profile: Array, angle: Array) -> Array:
     share = np.maximum(place - below, 0.0)
     low, high = (profile[(below + more).astype(int) % sectors] for more in (0, 1))
     on_one = share < 1e-6
-    return np.where(on_one, low, (1 - share) * low + share * np.where(on_one, 0.0, high))
+    return np.asarray(np.where(on_one, low, (1 - share) * low + share * np.where(on_one, 0.0, high)))

@@ -18,6 +18,8 @@ from truearm.modeling.chain import Array
 #: Edge of a block of paper, and of the dots in which lines are looked for [m].
 _BLOCK: Final = 5e-3
 _COARSE: Final = 0.2e-3
+#: What is darker than this share of the page's usual paper is a filled area and no paper.
+_DARKEST_PAPER: Final = 0.6
 #: Darkness that is no ink, nor noise larger than usual.
 _FAINTEST: Final = 0.08
 _NOISE: Final = 5.0
@@ -48,17 +50,18 @@ class Ink:
     block: tuple[float, float]
 
     def at(self, x: Array, y: Array) -> Array:
-        """Return the darkness at points [m] between dots, 0 beyond the page."""
+        """Return the darkness at points [m] between dots, 0 beyond the page; ``(rays, points)``, short rays."""
         from scipy.ndimage import map_coordinates
 
         columns, rows = x / self.pitch[0] - 0.5, (self.size[1] - y) / self.pitch[1] - 0.5
         bright = map_coordinates(self.brightness, [rows, columns], output=np.float64, order=1, mode="nearest")
         inside = (x >= 0) & (x <= self.size[0]) & (y >= 0) & (y <= self.size[1])
-        return np.where(inside, 1 - bright / self._paper_at(rows, columns), 0.0)
+        middle = slice(x.shape[1] // 2, x.shape[1] // 2 + 1)
+        return np.where(inside, 1 - bright / self._paper_at(rows[:, middle], columns[:, middle]), 0.0)
 
     def everywhere(self) -> Array:
         """Return the darkness of all dots, ``(rows, columns)``."""
-        rows, columns = np.indices(self.brightness.shape, dtype=np.float64)
+        rows, columns = (np.asarray(places, dtype=np.float64) for places in np.indices(self.brightness.shape))
         return np.asarray(1 - self.brightness / self._paper_at(rows, columns))
 
     def _paper_at(self, rows: Array, columns: Array) -> Array:
@@ -77,7 +80,7 @@ def ink_of(page: Page) -> tuple[Ink, Ink]:
     pitch = (x * page.pitch[0], y * page.pitch[1])
     across, along = (max(1, round(_BLOCK / edge)) for edge in pitch)
     paper = median_filter(np.median(_blocks(coarse, across, along), axis=(1, 3)), size=3, mode="nearest")
-    paper = np.maximum(paper, 1.0)
+    paper = np.maximum(paper, max(_DARKEST_PAPER * float(np.median(paper)), 1.0))
     block = (float(across), float(along))
     return (
         Ink(page.brightness, page.pitch, page.size, paper, (block[0] * x, block[1] * y)),

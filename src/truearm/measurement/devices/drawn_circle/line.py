@@ -1,8 +1,9 @@
 """A drawn line followed around a centre: its radius in every sector, at the middle of the ink across its width.
 
-A sector is the mean of rays that lie a dot apart. Across the line the ink's middle is the centroid of what is darker
-than half its darkest: a faint grid and uneven paper stay below that, and the weight vanishes where the line ends, so
-the dots' spacing does not show. A sector in which the line is absent, covered, crossed or far from its neighbours is
+A sector is the mean of rays that lie a dot apart. The ink's middle is a centroid across the line. Its weight grows from
+a third of the line's usual darkness and stays the same above half of it: a faint grid and uneven paper do not count,
+nor does the pencil's grain within the line, and the weight vanishes where the line ends, so that the dots' spacing does
+not show. A sector in which the line is absent, covered, crossed or far from its neighbours is
 missing.
 """
 
@@ -23,6 +24,8 @@ from truearm.modeling.chain import Array
 _REACH: Final = 1e-3
 #: Share of a turn, on either side, that counts as neighbourhood when following and when judging.
 _AROUND: Final = (1 / 16, 1 / 90)
+#: Shares of a line's usual darkness between which the weight grows.
+_LEVELS: Final = (1 / 3, 1 / 2)
 #: A line that jumps by more from one sector to the next is none [m]; nor one further from a circle than this share.
 _ROUGH: Final = 0.15e-3
 _NO_CIRCLE: Final = 0.04
@@ -45,7 +48,7 @@ class Line:
     profile
         Distance of the line from the centre in each sector [m], NaN where missing, ``(sectors,)``.
     beside
-        Share of the sectors with another line nearby.
+        Share of the sectors in which something else is drawn nearby.
     """
 
     centre: Array
@@ -82,12 +85,12 @@ def follow(ink: Ink, start: Candidate, sectors: int, threshold: float) -> Line |
     if math.sqrt(float(circle.radial @ circle.radial) / len(angle)) > _NO_CIRCLE * radius:
         return None
     own = np.abs(radii - np.where(seen, profile, np.inf)[:, None]) <= width
-    other, _ = _middle(radii, np.where(own, 0.0, rays), threshold)
+    beside = (np.where(own, 0.0, rays) > threshold).any(axis=1)
     return Line(
         centre=centre,
         radius=radius,
         profile=profile,
-        beside=float(np.isfinite(other).mean()),
+        beside=float(beside.mean()),
     )
 
 
@@ -106,23 +109,30 @@ def _rays(ink: Ink, centre: Array, radius: float, reach: float, sectors: int) ->
 
 
 def _middle(radii: Array, rays: Array, threshold: float) -> tuple[Array, float]:
-    """Return the radius of the line's middle in each sector, NaN where missing, and the line's width [m]."""
+    """Return the radius of the line's middle in each sector, NaN where missing, and the line's width [m].
+
+    All is missing where less than half of the sectors have a line, or it jumps.
+    """
     sectors = len(rays)
+    nothing = np.full(sectors, np.nan), 0.0
     first = np.where(rays.max(axis=1) > threshold, radii[rays.argmax(axis=1)], np.nan)
     if np.isfinite(first).sum() < _SEEN * sectors:
-        return np.full(sectors, np.nan), 0.0
+        return nothing
     near = np.abs(radii - _smooth(first, _AROUND[0])[:, None]) <= _REACH
     at = np.where(near, rays, -1.0).argmax(axis=1)
     darkest = rays[np.arange(sectors), at]
+    if not (darkest > threshold).any():
+        return nothing
     place = np.arange(len(radii))
-    light = rays < darkest[:, None] / 2
+    usual = _smooth(np.where(darkest > threshold, darkest, np.nan), _AROUND[0])[:, None]
+    light = rays < _LEVELS[0] * usual
     left = np.where(light & (place < at[:, None]), place, -1).max(axis=1)
     right = np.where(light & (place > at[:, None]), place, len(radii)).min(axis=1)
     run = (place > left[:, None]) & (place < right[:, None])
-    weights = np.where(run, rays - darkest[:, None] / 2, 0.0)
-    found = (darkest > threshold) & (left >= 0) & (right < len(radii))
+    weights = np.where(run, np.minimum(rays, _LEVELS[1] * usual) - _LEVELS[0] * usual, 0.0)
+    found = (darkest > np.maximum(threshold, _LEVELS[0] * usual[:, 0])) & (left >= 0) & (right < len(radii))
     if found.sum() < _SEEN * sectors:
-        return np.full(sectors, np.nan), 0.0
+        return nothing
     profile = np.where(found, weights @ radii / np.where(found, weights.sum(axis=1), 1.0), np.nan)
     step = radii[1] - radii[0]
     widths = (right - left - 1) * step
@@ -131,7 +141,7 @@ def _middle(radii: Array, rays: Array, threshold: float) -> tuple[Array, float]:
     off = np.abs(profile - _smooth(profile, _AROUND[1]))
     spread = 1.4826 * float(np.nanmedian(off))
     if spread > _ROUGH:
-        return np.full(sectors, np.nan), 0.0
+        return nothing
     profile[off > max(width / 2, 4 * spread)] = np.nan
     return profile, width
 

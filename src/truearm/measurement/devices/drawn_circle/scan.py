@@ -20,8 +20,8 @@ from truearm.modeling.chain import Array
 _SECTORS: Final = (90, 3600)
 #: Lines whose circles are nearer together than this are one [m].
 _SAME: Final = 1e-3
-#: Share of a turn over which a second line beside the first makes another circle of it.
-_BESIDE: Final = 0.5
+#: Share of the turn over which something else may be drawn within 3.5 mm.
+_BESIDE: Final = 0.1
 #: How far from the circle its line is looked for in the end, at most [m]; and as a share of the radius.
 _REACH: Final = (4e-3, 0.25)
 #: How near the edge of the page a line is cut [m].
@@ -85,7 +85,7 @@ def read_circle(path: Path, dpi: float | tuple[float, float] | None = None, sect
     ------
     InputError
         If the file is no such page or does not say its resolution; if nothing is drawn on it, or no circle, one that
-        the page's edge cuts, or several.
+        the page's edge cuts, several, or one with something else along it.
     """
     if not _SECTORS[0] <= sectors <= _SECTORS[1]:
         raise InputError(
@@ -101,15 +101,22 @@ def read_circle(path: Path, dpi: float | tuple[float, float] | None = None, sect
             "the page is dark", where=str(path), cure="Draw on white paper, and scan without turning it to a negative."
         )
     found, threshold = _found(coarse, str(path))
-    if len(found) > 1 or found[0].beside > _BESIDE:
+    if len(found) > 1:
         raise InputError(
             "several circles are drawn on the page",
             where=str(path),
-            came=", ".join(_words(line) for line in found) if len(found) > 1 else f"two lines near {_words(found[0])}",
+            came=", ".join(_words(line) for line in found[:2]),
             allowed="one",
             cure="Scan a page with one of them, or paint the others over with white.",
         )
     (line,) = found
+    if line.beside > _BESIDE:
+        raise InputError(
+            "another line, or writing, runs along the circle, or its line is not clear",
+            where=str(path),
+            came=f"{_words(line)}, with something beside it over {line.beside:.0%} of the turn",
+            cure="Draw one circle, once, on clean paper.",
+        )
     room = min(*line.centre, *(np.array(page.size) - line.centre))
     if room < line.radius + _MARGIN:
         raise InputError(
@@ -149,7 +156,7 @@ def _found(coarse: Ink, where: str) -> tuple[list[Line], float]:
             return found, threshold
     if not drawn:
         raise InputError(
-            "nothing is drawn on the page",
+            "nothing is drawn on the page but specks or letters",
             where=where,
             cure="Check that the drawn side was scanned, and use a soft pencil or a pen.",
         )

@@ -31,8 +31,9 @@ _ROUGH: Final = 0.15e-3
 _NO_CIRCLE: Final = 0.04
 #: Share of the sectors that must be seen.
 _SEEN: Final = 0.5
-#: The centre is found when it moves by less [m].
-_STILL: Final = 1e-6
+#: The centre is found when it moves by a smaller share of a dot; it does so at the second or third look.
+_STILL: Final = 0.02
+_LOOKS: Final = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +71,7 @@ def follow(ink: Ink, start: Candidate, sectors: int, threshold: float) -> Line |
         Darkness of what is inked.
     """
     centre, radius, reach = np.array([start.x, start.y]), start.radius, start.tolerance
-    for _ in range(8):
+    for _ in range(_LOOKS):
         radii, rays = _rays(ink, centre, radius, reach, sectors)
         profile, width = _middle(radii, rays, threshold)
         seen = np.isfinite(profile)
@@ -80,7 +81,7 @@ def follow(ink: Ink, start: Candidate, sectors: int, threshold: float) -> Line |
         points = np.stack([profile[seen] * np.cos(angle), profile[seen] * np.sin(angle), np.zeros(len(angle))], axis=1)
         circle = fit_circle(points)
         centre, radius = centre + circle.centre[:2], circle.radius
-        if np.hypot(*circle.centre[:2]) < _STILL:
+        if np.hypot(*circle.centre[:2]) < _STILL * min(ink.pitch):
             break
     if math.sqrt(float(circle.radial @ circle.radial) / len(angle)) > _NO_CIRCLE * radius:
         return None

@@ -7,6 +7,7 @@ from typing import Final
 from truearm.errors import InputError, nearest_names
 from truearm.measurement.devices.artefacts import MARKERS, PLANAR_ARTEFACT, SPATIAL_ARTEFACT
 from truearm.measurement.devices.device import Arm, Device, measured_with, standing_for
+from truearm.measurement.devices.hexapod_poses import HEXAPOD
 from truearm.measurement.devices.known_points import CALIBRATION_TABLE, TOUCH_UP
 from truearm.measurement.devices.lengths import BALLBAR, STRINGS
 from truearm.measurement.devices.small_volumes import FIVE_LASERS, GAUGES, STEREO
@@ -22,6 +23,7 @@ DEVICES: Final[tuple[Device, ...]] = (
     SPATIAL_ARTEFACT,
     MARKERS,
     BALLBAR,
+    HEXAPOD,
     STRINGS,
     STEREO,
     FIVE_LASERS,

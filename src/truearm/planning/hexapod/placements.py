@@ -70,8 +70,7 @@ def in_one_frame(robot: Robot, places: Sequence[Dataset]) -> tuple[Dataset, ...]
     """Return the readings of all places in the frame of the first, by what a robot's model predicts of them."""
     (R0, p0), *_ = frames = [_place(robot, data) for data in places]
     return tuple(
-        replace(data, position=(data.position @ R.T + p - p0) @ R0)
-        for data, (R, p) in zip(places, frames, strict=True)
+        replace(data, position=(data.position @ R.T + p - p0) @ R0) for data, (R, p) in zip(places, frames, strict=True)
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from truearm.measurement.devices.hexapod.geometry import DEVICE, triangle
 from truearm.measurement.devices.hexapod.poses import HexapodPose, distance, distinct, near_equal
+from truearm.measurement.devices.hexapod.sheet import PlannedRow
 from truearm.modeling.chain import Array
 from truearm.reporting.drawing import AFTER, BEFORE, CAMERA, Figure, axis, figure, scene_axis
 from truearm.reporting.numbers import rounded, rounded_to
@@ -99,3 +100,10 @@ def _triangles(name: str, colour: str, triangles: Sequence[Array], width: int) -
         "line": {"color": colour, "width": width},
         "hoverinfo": "skip",
     }
+
+
+def reached_poses(found: Sequence[HexapodPose], rows: Sequence[PlannedRow]) -> Picture:
+    """Draw the poses that a plan takes."""
+    taken = {row.pose for row in rows}
+    drawn = poses_figure([("reached", AFTER, [pose for pose in found if pose.number in taken])])
+    return Picture("reached", "The poses that the robot takes (Figure 3.10)", "In the fixture's frame.", drawn)

@@ -36,7 +36,7 @@ class SetUp:
     tool: Array
 
 
-def set_up(twin: Twin, touches: Array, bar: Ballbar) -> SetUp:
+def set_up(twin: Twin, touches: Array, bar: Ballbar, approach: Array | None = None) -> SetUp:
     """Lock the base cups where the robot brings its first cup, and measure both fixtures.
 
     Parameters
@@ -47,13 +47,16 @@ def set_up(twin: Twin, touches: Array, bar: Ballbar) -> SetUp:
         Joint readings at the base cups [rad or m], ``(3, joints)``.
     bar
         The ballbar; it is initialised for each fixture.
+    approach
+        Direction of the last move of each joint, ``(3, joints)``; unknown if None.
 
     Raises
     ------
     InputError
         If a distance is beyond the ballbar's range.
     """
-    at_cups = [_cups(twin, joints) for joints in touches]
+    directions = np.zeros(touches.shape) if approach is None else approach
+    at_cups = [_cups(twin, joints, direction) for joints, direction in zip(touches, directions, strict=True)]
     base_cups = np.array([cups[0] for cups in at_cups])
     bar.initialise()
     base = _sides(measured_sides(bar, base_cups, "B"), "B")
@@ -138,9 +141,8 @@ def joined(a: Dataset, b: Dataset) -> Dataset:
     )
 
 
-def _cups(twin: Twin, reading: Array, direction: Array | None = None) -> Array:
-    at = np.zeros(reading.shape) if direction is None else direction
-    frames = twin.postures(reading[None], approach=at[None])[0].targets
+def _cups(twin: Twin, reading: Array, direction: Array) -> Array:
+    frames = twin.postures(reading[None], approach=direction[None])[0].targets
     return np.array([frames[target.name][:3, 3] for target in twin.robot.targets])
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -69,6 +70,20 @@ def test_without_noise_the_cups_are_where_they_are(arm: Robot, plan: tuple[list[
     assert twice.configurations == 2 * len(rows)
     assert twice.position[3 * len(rows) :] == pytest.approx(data.position)
     assert (twice.configuration == np.repeat(np.arange(2 * len(rows)), 3)).all()
+
+
+def test_sessions_that_do_not_fit_are_refused(arm: Robot) -> None:
+    data = cups_dataset(arm, ["a"], np.zeros((1, 6)), np.zeros((1, 3, 3)))
+    told = replace(data, sigma=np.full(3, 1e-5), temperature=np.array([20.0]))
+    both = joined(told, told)
+    assert both.sigma == pytest.approx(np.full(6, 1e-5))
+    assert both.temperature == pytest.approx([20.0, 20.0])
+    with pytest.raises(InputError, match="only one of the sessions has sigma"):
+        joined(data, told)
+    with pytest.raises(InputError, match="not of one robot with one tool"):
+        joined(data, replace(data, targets=("a", "b", "c")))
+    with pytest.raises(InputError, match="sessions with quaternion cannot be joined"):
+        joined(data, replace(data, quaternion=np.zeros((3, 4))))
 
 
 def test_a_bar_that_is_not_initialised_errs_more_and_more(arm: Robot, plan: tuple[list[PlannedRow], Array]) -> None:

@@ -49,7 +49,7 @@ def identify_placements(robot: Robot, places: Sequence[Dataset], model: Model) -
     Raises
     ------
     InputError
-        If there is no place, or the first one alone does not determine the robot.
+        If there is no place, or the places cannot be put together.
     """
     if not places:
         raise InputError("a calibration needs at least one place of the base fixture", where="places")
@@ -60,7 +60,7 @@ def identify_placements(robot: Robot, places: Sequence[Dataset], model: Model) -
     for _ in range(_TURNS):
         together = reduce(joined, in_one_frame(fit.robot, places))
         fit = identify(robot, together, model)
-        if np.abs(together.position - before).max() < _STILL:
+        if np.nanmax(np.abs(together.position - before)) < _STILL:
             break
         before = together.position
     return fit
@@ -76,4 +76,5 @@ def in_one_frame(robot: Robot, places: Sequence[Dataset]) -> tuple[Dataset, ...]
 
 def _place(robot: Robot, data: Dataset) -> tuple[Array, Array]:
     """Return rotation and origin of the frame in the robot's world in which the readings are nearest to the model."""
-    return rigid_motion(data.position, data.position + errors_of(robot, data).position)
+    seen = data.has_position
+    return rigid_motion(data.position[seen], (data.position + errors_of(robot, data).position)[seen])

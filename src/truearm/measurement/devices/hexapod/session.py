@@ -130,7 +130,29 @@ def cups_dataset(robot: Robot, labels: Sequence[str], joints: Array, cups: Array
 
 
 def joined(a: Dataset, b: Dataset) -> Dataset:
-    """Return the positions of two sessions as one, in the frame that both have."""
+    """Return the positions of two sessions as one, in the frame that both have.
+
+    Raises
+    ------
+    InputError
+        If their targets or joints are others, or only one of them declares deviations or the like, or one holds more
+        than positions.
+    """
+    where = f"{a.source} and {b.source}"
+    if (a.targets, a.joint_kinds) != (b.targets, b.joint_kinds):
+        raise InputError("the sessions are not of one robot with one tool", where=where, cure="Name the cups alike.")
+    for name in ("quaternion", "sigma_rot", "references"):
+        if getattr(a, name) is not None or getattr(b, name) is not None:
+            raise InputError(f"sessions with {name} cannot be joined", where=where, allowed="positions")
+
+    def part(name: str) -> Array | None:
+        one, other = getattr(a, name), getattr(b, name)
+        if (one is None) != (other is None):
+            raise InputError(
+                f"only one of the sessions has {name}", where=where, cure="Leave it out of both, or give it in both."
+            )
+        return None if one is None else np.concatenate([one, other])
+
     return replace(
         a,
         labels=a.labels + b.labels,
@@ -138,6 +160,11 @@ def joined(a: Dataset, b: Dataset) -> Dataset:
         configuration=np.concatenate([a.configuration, b.configuration + a.configurations]),
         target=np.concatenate([a.target, b.target]),
         position=np.vstack([a.position, b.position]),
+        sigma=part("sigma"),
+        approach=part("approach"),
+        number=part("number"),
+        temperature=part("temperature"),
+        wrench=part("wrench"),
     )
 
 

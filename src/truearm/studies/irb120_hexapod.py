@@ -378,9 +378,9 @@ def _repeatability_table(runs: list[_Run]) -> Table:
                 printed,
                 "section 3.5",
                 relative=0.35,
-                explanation="With the whole backlash of Table 2.3, by chance at each joint. That backlash was seen on"
-                " circles of 0.12 to 0.23 m by a tracker, and on the way to the poses of section 3.5 most joints may"
-                " have come from one side."
+                explanation="Every joint comes from either side by chance and lags by the backlash of Table 2.3, which"
+                " is the document's own, measured on circles of 0.12 to 0.23 m. A quarter of it would do. How the"
+                " document came to its four poses is not said; most joints may have come from one side."
                 if n == 0
                 else "",
             )

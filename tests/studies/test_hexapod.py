@@ -57,4 +57,4 @@ def test_the_irb120() -> None:
     assert everywhere["four cups"] < everywhere["one place, joints come from either side"]
     in_turn, once = "three places, frames by touches, in turn", "three places, frames by touches"
     assert everywhere[in_turn] > everywhere[once] > everywhere["three places"]
-    assert len(study.pictures) == 2
+    assert len(study.pictures) == 3

@@ -27,7 +27,7 @@ from truearm.robots import load_robot
 from truearm.studies.hexapod_figures import reached_poses
 from truearm.studies.hexapod_place import PLACE, touched
 from truearm.studies.irb120_placements import Ways, ways, ways_tables
-from truearm.studies.irb120_sphere import TRACKER, Spheres, sphere_picture, sphere_tables, spheres
+from truearm.studies.irb120_sphere import TRACKER, Spheres, sphere_pictures, sphere_tables, spheres
 from truearm.studies.irb120_worn import calibrated, in_base, in_region, tracked, worn_twin
 from truearm.studies.parallel_axes import without_beta
 from truearm.studies.study import Row, Study, Table
@@ -145,7 +145,7 @@ def study(seeds: int, progress: Callable[[str], None], unseen: int = _UNSEEN, co
             *sphere_tables([run.spheres for run in runs]),
             *ways_tables([run.ways for run in runs]),
         ),
-        pictures=(reached_poses(poses(cups), plan.rows), sphere_picture(runs[0].spheres)),
+        pictures=(reached_poses(poses(cups), plan.rows), *sphere_pictures(runs[0].spheres)),
         notes=(
             "The twin has the errors of Tables 2.6 and 2.7. Its gears also run out by sines once and twice a turn, axis"
             " 3 leans to the side, and joints lag behind by the backlash of Table 2.3. Size of the first two is chosen"
@@ -250,7 +250,7 @@ def _reach(plan: Reachable) -> Table:
     return Table(
         "What the robot reaches (Figure 3.10)",
         "The nominal robot, its elbow up. The place is invented and was chosen to give these counts: the document's is"
-        ' not printed, "almost arbitrarily" chosen. At a flat fixture before the robot it is 50 poses and more.',
+        ' not printed, "almost arbitrarily" chosen. With a flat fixture before the robot it is 40 to 60 poses.',
         (
             Row("poses", "", [plan.poses_reached], 22, "section 3.5"),
             Row("poses with two wrist configurations", "", [twice], 17, "section 3.5"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
@@ -17,7 +17,7 @@ from truearm.modeling.inverse import inverse
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY
-from truearm.reporting.drawing import AFTER, BEFORE, axis, figure
+from truearm.reporting.drawing import AFTER, BEFORE, Figure, axis, figure
 from truearm.reporting.numbers import rounded_to
 from truearm.robots import load_robot
 from truearm.studies.irb120_worn import calibrated, in_base, in_region, tracked, worn_twin
@@ -215,11 +215,29 @@ def sphere_tables(runs: list[Spheres]) -> tuple[Table, Table]:
     )
 
 
-def sphere_picture(run: Spheres) -> Picture:
-    """Draw the errors with the triangular artefact, reading after reading."""
+def sphere_pictures(run: Spheres) -> tuple[Picture, Picture]:
+    """Draw the errors, reading after reading: with the triangular artefact, and with the spatial one."""
+    words = "First seed; one nest after the other. The document's paths are not printed, so only the spread compares."
+    return (
+        Picture(
+            "sphere",
+            "Distance errors on the sphere, nests 1 and 2 of the triangular artefact (Figures 2.13 and 2.14)",
+            words,
+            _errors_figure(run, ("1", "2"), (("laser tracker", AFTER), ("C-Track", BEFORE))),
+        ),
+        Picture(
+            "spatial",
+            "Distance errors on the sphere, nests 1 and 3 of the spatial artefact (Figures 2.15 and 2.16)",
+            words,
+            _errors_figure(run, ("1", "3"), (("C-Track, spatial", BEFORE),)),
+        ),
+    )
+
+
+def _errors_figure(run: Spheres, nests: Sequence[str], models: Sequence[tuple[str, str]]) -> Figure:
     traces: list[dict[str, Any]] = []
-    for name, colour in (("laser tracker", AFTER), ("C-Track", BEFORE)):
-        errors = np.concatenate([run.taught[nest, name].errors for nest in ("1", "2")])
+    for name, colour in models:
+        errors = np.concatenate([run.taught[nest, name].errors for nest in nests])
         traces.append(
             {
                 "type": "scatter",
@@ -231,6 +249,4 @@ def sphere_picture(run: Spheres) -> Picture:
                 "hovertemplate": f"{name}, reading %{{x}}: %{{y:.3f}} mm<extra></extra>",
             }
         )
-    drawn = figure(traces, 340, xaxis=axis("reading"), yaxis=axis("error [mm]"))
-    words = "First seed; nest 1 first, then nest 2. The document's paths are not printed, so only the spread compares."
-    return Picture("sphere", "Distance errors on the sphere (Figures 2.13 and 2.14)", words, drawn)
+    return figure(traces, 340, xaxis=axis("reading"), yaxis=axis("error [mm]"))

@@ -43,6 +43,11 @@ class Entry:
 
 STUDIES: Final = (
     Entry(
+        "hexapod-device",
+        "what one ballbar between six cups can measure, and how well (Nubiola 3)",
+        "truearm.studies.hexapod_device",
+    ),
+    Entry(
         "irb120-axes",
         "one joint of an IRB 120 turned at a time: compliance, run-out and backlash (Nubiola 2.4)",
         "truearm.studies.irb120_axes",
@@ -52,6 +57,11 @@ STUDIES: Final = (
         "a measured IRB 120: what every model leaves, and where it comes from (with --data)",
         "truearm.studies.irb120_faro",
         ("joints_commanded.txt", *(f"{kind}_{number}.txt" for kind in ("target", "base") for number in (1, 2, 3))),
+    ),
+    Entry(
+        "irb120-hexapod",
+        "a simulated IRB 120 judged and calibrated with one ballbar (Nubiola 2.6.3 and 3.5)",
+        "truearm.studies.irb120_hexapod",
     ),
     Entry(
         "irb120-simulation",

@@ -162,7 +162,9 @@ def _one_setup(
     pooled[setup.name].append(1e3 * errors)
     by_chance = calibrate(setup, twin, candidates, rng, chosen=False)
     _mm(found, (setup.name, "by chance"), by_chance.errors(truth))
-    _mm(found, (setup.name, "geometric"), calibrate(setup, twin, candidates, rng, _MODELS["geometric"]).errors(truth))
+    if setup.name in tables.RIGID:
+        rigid = calibrate(setup, twin, candidates, rng, _MODELS["geometric"])
+        _mm(found, (setup.name, "geometric"), rigid.errors(truth))
     if setup is SETUPS[0]:
         # Cones that are open all round: every reflector at every configuration.
         everywhere = replace(setup, device=replace(setup.device, within=np.pi))

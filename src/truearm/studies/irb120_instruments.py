@@ -19,7 +19,7 @@ from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.studies.irb120_twin import ELASTIC, Truth
 
-#: What no reading tells apart: base against joint 1, tool against joint 6, slides along parallel axes, a vertical joint.
+#: What no reading tells: base against joint 1, tool against joint 6, slides along parallel axes, sag of joint 1.
 _CONVENTIONS = frozenset(
     {"alpha_1", "a_1", "d_1", "theta_offset_1", "theta_offset_6", "d_6", "d_2", "d_3", "compliance_1"}
 )
@@ -74,7 +74,7 @@ def accuracy(
     """
     data = measured_with(device, nominal, twin, count, rng)
     fit = identify(nominal, data, ELASTIC)
-    points = dict(device.tool.targets) if device.tool is not None else _points(twin.robot)
+    points = _targets(device, twin)
     truly = np.concatenate([truth.places(points[name]) for name in data.targets])
     before = _predicted(place(nominal, data).robot, data, truth)
     after = _predicted(fit.robot, data, truth)
@@ -106,7 +106,7 @@ def tool_alone(
     with_tracker = measured_with(named_device("tracker"), nominal, twin, max(touches), rng)
     point = named_device("point")
     data = measured_with(point, nominal, twin, max(touches), rng)
-    (tip,) = point.tool.targets.values() if point.tool is not None else ()
+    tip = _targets(point, twin)["tip"]
     compliance = {f"compliance_{number}": joint.compliance for number, joint in twin.joints.items()}
     robots = {
         "nominal": place(nominal, with_tracker).robot,
@@ -122,6 +122,10 @@ def tool_alone(
             found = identify(robot, data.of_configurations(range(count)), FRAMES).robot
             error[name][count] = float(np.linalg.norm(_points(found)["tip"] - right))
     return error
+
+
+def _targets(device: Device, twin: Twin) -> dict[str, tuple[float, ...]]:
+    return _points(twin.robot) if device.tool is None else dict(device.tool.targets)
 
 
 def _points(robot: Robot) -> dict[str, tuple[float, ...]]:

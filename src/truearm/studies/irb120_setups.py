@@ -196,7 +196,7 @@ def number_by_o1(setup: Setup, candidates: int, rng: np.random.Generator, *, too
 
 
 def sphere_test(robot: Calibrated, twin: Twin, nest: str, points: int, rng: np.random.Generator) -> Array:
-    """Return by how much a ballbar misses its length on a sphere that the calibrated robot is sent to [m], ``(points,)``.
+    """Return by how much a ballbar misses its length on a sphere that a calibrated robot is sent to [m], ``(points,)``.
 
     Nest 1 touches the centre, by hand, and the robot's model says where that is. The ball in a nest is then sent to
     places on the upper half of a sphere about it, without the way back into range.

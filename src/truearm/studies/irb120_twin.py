@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Final
 
 import numpy as np
@@ -49,6 +50,7 @@ class Truth:
         return np.asarray(self.flange[:, :3, 3] + self.flange[:, :3, :3] @ np.array(point))
 
 
+@cache
 def driven() -> Robot:
     """Return the nominal IRB 120 with the limits within which the document drives it."""
     robot = load_robot("irb120")

@@ -112,7 +112,7 @@ def test_what_cannot_be_cut_is_refused() -> None:
         identify_zones(nominal, data, GEOMETRIC, (1, 1, 1), 0.0)
     with pytest.raises(InputError, match="these divisions make no zones"):
         identify_zones(nominal, data, GEOMETRIC, (0, 2, 1), 0.0)
-    with pytest.raises(InputError, match="zones overlap by a length.*-10 mm"):
+    with pytest.raises(InputError, match=r"zones overlap by a length.*-10 mm"):
         identify_zones(nominal, data, GEOMETRIC, (2, 1, 1), -0.01)
     rng = np.random.default_rng(5)
     held = measured_with(named_device("point"), nominal, twin, 5, rng)

@@ -17,8 +17,8 @@ from truearm.studies.study import Study
 
 @pytest.fixture(scope="module")
 def small() -> Study:
-    devices = [named_device(name) for name in ("tracker", "optical-cmm-spatial", "ballbar", "point")]
-    return study(1, lambda _: None, unseen=15, candidates=120, devices=devices, training=(40, 80))
+    devices = [named_device(name) for name in ("tracker", "ballbar", "point")]
+    return study(1, lambda _: None, unseen=15, candidates=120, devices=devices, training=(30, 60))
 
 
 def medians(found: Study, title: str) -> dict[str, float]:
@@ -51,14 +51,14 @@ def test_every_instrument_and_what_closed_loops_miss(small: Study) -> None:
     assert lost["ballbar: directions not seen"] == 6.0  # where the base stands
     assert lost["point: directions not seen"] == 7.0  # and the size
     assert lost["point: mean but for a change of size"] < few["point: mean"]
-    assert not any(what.startswith(("tracker", "optical")) for what in lost)
+    assert not any(what.startswith("tracker") for what in lost)
 
 
 def test_zones_and_tool(small: Study) -> None:
     zones = medians(small, "A model for each zone")
-    one, four = (zones[f"geometric, 80 configurations, {cut}: mean"] for cut in ("one model", "2 x 1 x 2 zones"))
+    one, four = (zones[f"geometric, 60 configurations, {cut}: mean"] for cut in ("one model", "2 x 1 x 2 zones"))
     assert four < one
-    assert zones["elastic, 80 configurations, one model: mean"] < four
+    assert zones["elastic, 60 configurations, one model: mean"] < four
     tool = medians(small, "A tool")
     assert tool["nominal robot, 36 touches"] > 3.0 * tool["true robot, 36 touches"]
     # n touches turned evenly to all sides tell the tool to sigma sqrt(3 / n) in length, the point being unknown.
@@ -67,7 +67,7 @@ def test_zones_and_tool(small: Study) -> None:
 
 
 def test_visibility_by_spherical_caps() -> None:
-    """Directions spread evenly over the sphere would be seen by the share of the caps; the region is not far from it."""
+    """Directions spread evenly over the sphere would be seen by the share of the caps: the region is near to that."""
     rng = np.random.default_rng(0)
     tracker, planar, spatial = (shares(setup, 4000, rng)["of all configurations"] for setup in SETUPS)
     assert tracker == pytest.approx(100.0 * 3.0 * 0.5 * (1.0 - np.cos(np.radians(30.0))), rel=0.25)

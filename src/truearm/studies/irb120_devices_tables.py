@@ -96,9 +96,9 @@ def after(found: Found) -> Table:
                 setup.after,
                 "section 2.6.2",
                 relative=0.25,
-                explanation="Too much: one reflector a configuration makes 114 numbers for 45 parameters, since base"
-                " and nests are found with the robot. The document measured the nests on the tool beforehand and fits 30."
-                " With all three read at every configuration, below, it comes nearer."
+                explanation="Too much: one reflector a configuration makes 114 numbers, and 37 parameters can be told"
+                " apart, since base and nests are found with the robot. The document measured the nests on the tool"
+                " beforehand and fits 30. With all three read at every configuration, below, it comes nearer."
                 if first
                 else "",
             )
@@ -186,6 +186,7 @@ def spheres(found: Found) -> Table:
         key = ("sphere", sphere.setup, sphere.nest)
         first = sphere is SPHERES[0]
         what = f"{sphere.setup}, nest {sphere.nest}, {sphere.points} points"
+        tracked = sphere.setup == "tracker"
         source = f"Table {sphere.table}"
         rows += [
             Row(
@@ -204,8 +205,8 @@ def spheres(found: Found) -> Table:
                 sphere.std,
                 source,
                 relative=0.4,
-                explanation="The document drives these paths without taking up backlash, the twin has none."
-                if first
+                explanation="The twin's tracker calibration is weaker than the document's, see above."
+                if tracked
                 else "",
             ),
             Row(f"{what}: maximum", "mm", found[(*key, "max")], sphere.max, source, relative=0.5),
@@ -213,7 +214,8 @@ def spheres(found: Found) -> Table:
     return Table(
         "Ballbar on a sphere of 300 mm (Figures 2.13 to 2.16)",
         "True distance from the true centre minus 300 mm, where the calibrated robot is sent to 300 mm from where it"
-        " believes the centre. Tracker and plate on the twin of Tables 2.6 and 2.7, spatial artefact on its own.",
+        " believes the centre. Tracker and plate on the twin of Tables 2.6 and 2.7, spatial artefact on its own. The"
+        " document drives these paths without taking up backlash; the twin has none.",
         tuple(rows),
     )
 
@@ -363,13 +365,13 @@ def zones(found: Found, training: tuple[int, int]) -> Table:
             for title in ("whole", *DIVISIONS):
                 key = ("zones", name, str(count), title)
                 cut = "one model" if title == "whole" else f"{title} zones"
-                rows.append(Row(f"{name}, {count} configurations, {cut}: mean", "mm", found[key], explanation=""))
+                rows.append(Row(f"{name}, {count} configurations, {cut}: mean", "mm", found[key]))
                 rows.append(Row(f"{name}, {count} configurations, {cut}: maximum", "mm", found[(*key, "max")]))
     return Table(
         "A model for each zone of the workspace",
         "Twin of Tables 2.6 and 2.7 with run-out, all reflectors read to 0.01 mm. Zones are boxes by where the nominal"
         " flange is, along x, y and z of the base, 50 mm of overlap; each starts from the model of the whole. Zones"
-        " make up for an effect that the model lacks, such as compliance. A model that has it gains little from many"
+        " make up for an effect that the model lacks, such as compliance. A model that has it gains next to nothing from many"
         " configurations and loses from few, which its zones must share.",
         tuple(rows),
     )

@@ -9,6 +9,7 @@ import pytest
 
 from truearm.measurement.devices import named_device
 from truearm.measurement.truths import truth_twin
+from truearm.studies import irb120_instruments_tables
 from truearm.studies.irb120_devices import study
 from truearm.studies.irb120_setups import SETUPS, shares, twin_of, visible_configurations
 from truearm.studies.irb120_twin import Truth, driven, running_out
@@ -18,7 +19,10 @@ from truearm.studies.study import Study
 @pytest.fixture(scope="module")
 def small() -> Study:
     devices = [named_device(name) for name in ("tracker", "ballbar", "point")]
-    return study(1, lambda _: None, unseen=15, candidates=120, devices=devices, training=(30, 60))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(irb120_instruments_tables, "ZONED", ("geometric", "elastic"))
+        patch.setattr(irb120_instruments_tables, "DIVISIONS", {"2 x 1 x 2": (2, 1, 2)})
+        return study(1, lambda _: None, unseen=12, candidates=100, devices=devices, training=(30, 60))
 
 
 def medians(found: Study, title: str) -> dict[str, float]:

@@ -15,8 +15,8 @@ from truearm.measurement.devices import DEVICES, Device
 from truearm.measurement.truths import truth_twin
 from truearm.measurement.twin import Twin, measure
 from truearm.modeling.chain import Array
-from truearm.studies import irb120_devices_tables as tables
-from truearm.studies.irb120_devices_tables import COUNT, DIVISIONS, ONE_NUMBER, SPHERES, TOUCHES, ZONED, Found
+from truearm.studies import irb120_instruments_tables as listed
+from truearm.studies import irb120_setups_tables as compared
 from truearm.studies.irb120_instruments import Accuracy, accuracy, tool_alone
 from truearm.studies.irb120_setups import (
     SETUPS,
@@ -30,6 +30,7 @@ from truearm.studies.irb120_setups import (
     uncalibrated,
     visible_configurations,
 )
+from truearm.studies.irb120_setups_tables import Found
 from truearm.studies.irb120_twin import Truth, driven, running_out
 from truearm.studies.study import Study
 
@@ -63,7 +64,7 @@ def study(
     few
         At how many seeds at most ballbar, instruments, tool and zones are looked at: they take long.
     devices
-        The instruments that are compared.
+        The instruments that are compared, a closed loop among them that reads one number at a time.
     training
         Configurations that zones share, few and many.
     """
@@ -77,12 +78,12 @@ def study(
         for setup in SETUPS:
             robot, twin = _one_setup(setup, found, pooled, unseen, candidates, rng)
             shown.setdefault(setup.name, robot.places(robot.joints, "1"))
-            if seed < few and setup.name == "spatial artefact":
-                _spheres(found, {setup.name: (robot, twin)}, unseen, rng)
+            if seed < few:
+                _spheres("2.13", found, {setup.name: (robot, twin)}, unseen, rng)
         same = _crossed(found, unseen, candidates, rng)
         if seed < few:
             progress(f"seed {seed + 1} of {min(seeds, few)}: ballbar")
-            _spheres(found, same, unseen, rng)
+            _spheres("2.12", found, same, unseen, rng)
             progress(f"seed {seed + 1} of {min(seeds, few)}: every instrument")
             _instruments(found, results, devices, unseen, rng)
             progress(f"seed {seed + 1} of {min(seeds, few)}: zones")
@@ -91,8 +92,10 @@ def study(
     def of(*key: str) -> float:
         return float(np.median(found[key]))
 
-    few_numbers = [float(np.median([1e3 * a.after.mean() for a in results[key]])) for key in results if key[1] == COUNT]
-    whole, cut = (of("zones", "geometric", str(training[1]), name) for name in ("whole", "3 x 1 x 3"))
+    alike = [made for (_, count), made in results.items() if count == listed.COUNT]
+    left = [float(np.median([1e3 * a.after.mean() for a in made])) for made in alike]
+    finest = list(listed.DIVISIONS)[-1]
+    whole, cut = (of("zones", "geometric", str(training[1]), name) for name in ("whole", finest))
     return Study(
         name="irb120-devices",
         title="An ABB IRB 120 calibrated with many instruments",
@@ -102,24 +105,24 @@ def study(
         f" {of('tracker', 'after'):.3f}, {of('planar artefact', 'after'):.3f} and"
         f" {of('spatial artefact', 'after'):.3f} mm in the three set-ups, where the document has 0.146, 0.176 and"
         " 0.149 mm: the gears decide, not the instrument. On a robot that the model can follow, the instruments leave"
-        f" {min(few_numbers):.3f} to {max(few_numbers):.2f} mm from {COUNT} configurations. Zones are no better than a"
-        f" good model: they bring the geometric model from {whole:.2f} to {cut:.2f} mm, compliances bring it to"
+        f" {min(left):.3f} to {max(left):.2f} mm from {listed.COUNT} configurations. Zones are no better than a good"
+        f" model: they bring the geometric model from {whole:.2f} to {cut:.2f} mm, compliances bring it to"
         f" {of('zones', 'elastic', str(training[1]), 'whole'):.2f} mm.",
         seeds=seeds,
         tables=(
-            tables.before(found),
-            tables.after(found),
-            tables.crossed(found),
-            tables.spheres(found),
-            tables.visible(found),
-            tables.numbers(found),
-            tables.instruments(results, COUNT),
-            *([tables.instruments(results, 3 * COUNT)] if any(key[1] == 3 * COUNT for key in results) else []),
-            *([tables.closed_loops(results)] if any(not a.anchored for one in results.values() for a in one) else []),
-            tables.tool(found),
-            tables.zones(found, training),
+            compared.before(found),
+            compared.after(found),
+            compared.crossed(found),
+            compared.spheres(found),
+            compared.visible(found),
+            compared.numbers(found),
+            listed.instruments(results, listed.COUNT),
+            listed.instruments(results, 3 * listed.COUNT),
+            listed.closed_loops(results),
+            listed.tool(found),
+            listed.zones(found, training),
         ),
-        pictures=(tables.places_picture(shown), tables.errors_picture(pooled), tables.instruments_picture(results)),
+        pictures=(compared.places_picture(shown), compared.errors_picture(pooled), listed.instruments_picture(results)),
         notes=(
             "All errors are against the true positions of the twin, without noise, at configurations that no"
             " calibration has seen, drawn evenly from the region of section 2.5.",
@@ -162,7 +165,7 @@ def _one_setup(
     pooled[setup.name].append(1e3 * errors)
     by_chance = calibrate(setup, twin, candidates, rng, chosen=False)
     _mm(found, (setup.name, "by chance"), by_chance.errors(truth))
-    if setup.name in tables.RIGID:
+    if setup.name in compared.RIGID:
         rigid = calibrate(setup, twin, candidates, rng, _MODELS["geometric"])
         _mm(found, (setup.name, "geometric"), rigid.errors(truth))
     if setup is SETUPS[0]:
@@ -193,10 +196,11 @@ def _crossed(
     return made
 
 
-def _spheres(found: Found, made: dict[str, tuple[Calibrated, Twin]], unseen: int, rng: np.random.Generator) -> None:
-    for sphere in SPHERES:
-        own_truth = sphere.setup == "spatial artefact"
-        if sphere.setup in made and own_truth == (len(made) == 1):
+def _spheres(
+    table: str, found: Found, made: dict[str, tuple[Calibrated, Twin]], unseen: int, rng: np.random.Generator
+) -> None:
+    for sphere in compared.SPHERES:
+        if sphere.table == table and sphere.setup in made:
             robot, twin = made[sphere.setup]
             missed = 1e3 * sphere_test(robot, twin, sphere.nest, min(sphere.points, unseen), rng)
             for what, value in (("mean", missed.mean()), ("std", missed.std()), ("max", np.abs(missed).max())):
@@ -215,10 +219,10 @@ def _instruments(
     nominal = nominal.carrying(twin.robot.payload)
     truth = Truth.of(twin, nominal.random_configurations(unseen, rng))
     for device in devices:
-        counts = (COUNT, 3 * COUNT) if device.name in ONE_NUMBER else (COUNT,)
+        counts = (listed.COUNT, 3 * listed.COUNT) if device.name in listed.ONE_NUMBER else (listed.COUNT,)
         for count in counts:
             results[device.name, count].append(accuracy(device, nominal, twin, truth, count, rng))
-    for robot, by_count in tool_alone(nominal, twin, truth, TOUCHES, rng).items():
+    for robot, by_count in tool_alone(nominal, twin, truth, listed.TOUCHES, rng).items():
         for count, error in by_count.items():
             found["tool", robot, str(count)].append(1e3 * error)
 
@@ -232,11 +236,11 @@ def _zones(found: Found, unseen: int, training: tuple[int, int], rng: np.random.
     nests = {t.name: tuple(twin.robot.values[t.parameter(axis)] for axis in "xyz") for t in twin.robot.targets}
     for count in training:
         data = read.of_configurations(range(count))
-        for name in ZONED:
-            for title, divisions in DIVISIONS.items():
+        for name in listed.ZONED:
+            for title, divisions in listed.DIVISIONS.items():
                 cut = identify_zones(nominal, data, _MODELS[name], divisions, _OVERLAP)
                 apart = [cut.positions(truth.joints, nest) - truth.places(point) for nest, point in nests.items()]
                 _mm(found, ("zones", name, str(count), title), np.linalg.norm(np.concatenate(apart), axis=1))
-                if title == next(iter(DIVISIONS)):
+                if title == next(iter(listed.DIVISIONS)):
                     apart = [cut.whole.robot.poses(truth.joints, n)[0] - truth.places(p) for n, p in nests.items()]
                     _mm(found, ("zones", name, str(count), "whole"), np.linalg.norm(np.concatenate(apart), axis=1))

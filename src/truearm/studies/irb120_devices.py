@@ -100,7 +100,7 @@ def study(
         name="irb120-devices",
         title="An ABB IRB 120 calibrated with many instruments",
         source="A. Nubiola, doctoral thesis, ETS Montreal, sections 1.7 and 2.2 to 2.7, Figures 2.7 and 2.9 to 2.16,"
-        " Tables 2.5 to 2.13; truth from Tables 2.3, 2.4 and 2.6 to 2.11",
+        " Tables 2.6 to 2.13; truth from Tables 2.3, 2.4 and 2.6 to 2.11",
         answer="With gears that run out as the document's own test of single joints says, the elastic model leaves"
         f" {of('tracker', 'after'):.3f}, {of('planar artefact', 'after'):.3f} and"
         f" {of('spatial artefact', 'after'):.3f} mm in the three set-ups, where the document has 0.146, 0.176 and"

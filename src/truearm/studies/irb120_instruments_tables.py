@@ -84,7 +84,7 @@ def closed_loops(results: Results) -> Table:
 def tool(found: Found) -> Table:
     """Return tool centre points that were found alone."""
     why = {
-        "nominal": "The robot's own errors go into the tool: no number of touches helps.",
+        "nominal": "The robot's own errors go into the tool. Many touches average them, and do not remove them.",
         "calibrated": "Calibrated by tracker before.",
         "true": "Errors of the hand alone, 0.05 mm a coordinate: what touching can do at best.",
     }

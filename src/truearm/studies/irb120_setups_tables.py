@@ -189,7 +189,11 @@ def spheres(found: Found) -> Table:
                 sphere.mean,
                 source,
                 absolute=0.15,
-                explanation="It hangs on how the centre was touched, once, so 0.15 mm are allowed." if first else "",
+                explanation="It hangs on how the centre was touched, once, so 0.15 mm are allowed."
+                if first
+                else "Again one touch of the centre, and the document's nests are not ours."
+                if sphere.nest == "3"
+                else "",
             ),
             Row(
                 f"{what}: standard deviation",

@@ -135,7 +135,7 @@ def test_training_must_leave_something(truearm: Truearm, small: Path, tmp_path: 
     ("option", "text", "part"),
     [
         ("--train", "half", "--train: a number of configurations belongs here; got 'half'"),
-        ("--model", "geometry", "there is no model of this name; got 'geometry'; allowed: frames, offsets, joints, geometric"),
+        ("--model", "geometry", "there is no model of this name; got 'geometry'; allowed: frames, offsets, joints"),
         ("--loss", "hubert", "Did you mean huber?"),
         ("--redundancy", "keep", "allowed: prior, drop"),
         ("--bounds", "nowhere.yaml", "nowhere.yaml: there is no such file"),

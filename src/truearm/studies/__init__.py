@@ -53,6 +53,11 @@ STUDIES: Final = (
         "truearm.studies.irb120_axes",
     ),
     Entry(
+        "irb120-devices",
+        "a simulated IRB 120 calibrated with tracker, cameras and every other instrument (Nubiola 1.7, 2.2 to 2.7)",
+        "truearm.studies.irb120_devices",
+    ),
+    Entry(
         "irb120-faro",
         "a measured IRB 120: what every model leaves, and where it comes from (with --data)",
         "truearm.studies.irb120_faro",

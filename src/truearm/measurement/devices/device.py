@@ -13,14 +13,17 @@ from numpy.typing import NDArray
 from truearm.errors import InputError
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.truths import DEFAULT_TOOL, stationed
+from truearm.measurement.devices.hexapod.kinematics import rigid_motion
 from truearm.measurement.twin import Twin, directions
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import Tool
 from truearm.modeling.robot import Robot
+from truearm.modeling.transform import Transform
 
 IntArray = NDArray[np.intp]
 _DRAWS: Final = 200
 _DRAWN: Final = 2000
+_TRIED: Final = 100
 
 
 class Arm(Protocol):
@@ -89,7 +92,8 @@ def measured_with(
     Parameters
     ----------
     nominal
-        The robot as it is known; where it stands and what it carries is taken from the twin.
+        The robot as it is known; where it stands and what it carries is taken from the twin. A twin may count its base
+        from elsewhere (from axis 2, say), so the nominal robot stands where its flange is nearest to the true one.
     twin
         The true robot, given the device's tool if it needs one.
     count
@@ -102,7 +106,7 @@ def measured_with(
         twin = replace(twin, robot=carrying)
     values = twin.robot.values
     places = {t.name: [values[t.parameter(axis)] for axis in "xyz"] for t in twin.robot.targets}
-    standing = nominal.with_frames(twin.robot.base, places)
+    standing = nominal.with_frames(_where_it_stands(nominal, twin.robot), places)
     return device.campaign(standing, twin, count, device.sigma if sigma is None else sigma, rng)
 
 
@@ -110,6 +114,10 @@ def standing_for(device: Device, robot: Robot) -> Robot:
     """Return a robot where a simulated instrument sees it, with the device's tool or, if that needs none, its own."""
     tool = device.tool or next(iter(robot.tools.values()), DEFAULT_TOOL)
     return stationed(robot, tool)
+def _where_it_stands(nominal: Robot, true: Robot) -> Transform:
+    q = nominal.random_configurations(_TRIED, np.random.default_rng(0))
+    at_origin = nominal.with_frames(Transform(), {})
+    return Transform.from_matrix(*rigid_motion(at_origin.poses(q)[0], true.poses(q)[0]))
 
 
 def recorded(

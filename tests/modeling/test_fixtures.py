@@ -19,6 +19,7 @@ from truearm.modeling.transform import Transform
 from truearm.robots import load_robot
 
 TURNED = (math.cos(0.4), math.sin(0.4) * 0.6, 0.0, math.sin(0.4) * 0.8)
+IRB120 = load_robot("irb120")
 PLACE = Transform((0.4, -0.3, 0.2), TURNED)
 
 
@@ -51,7 +52,7 @@ def product(*parts: Array) -> Array:
 
 
 def beside(kind: FixtureKind, place: Transform = PLACE, name: str = "table") -> Robot:
-    return load_robot("irb120").with_fixtures({name: (kind, place)})
+    return IRB120.with_fixtures({name: (kind, place)})
 
 
 def matrix_of(robot: Robot, name: str) -> Array:
@@ -124,7 +125,7 @@ def test_other_fixtures_take_the_place_of_those_before_and_forget_their_values()
     assert [f.name for f in again.fixtures] == ["table", "wall"]
     assert again.values["fixture_table_rx"] == 0.0
     assert again.values["fixture_table_x"] == 0.4
-    assert {n: v for n, v in robot.with_fixtures({}).values.items()} == dict(load_robot("irb120").values)
+    assert {n: v for n, v in robot.with_fixtures({}).values.items()} == dict(IRB120.values)
 
 
 def test_a_fixture_called_fixture_is_not_called_so_twice() -> None:
@@ -134,11 +135,11 @@ def test_a_fixture_called_fixture_is_not_called_so_twice() -> None:
 
 def test_two_fixtures_whose_parameters_would_have_one_name_are_refused() -> None:
     with pytest.raises(InputError, match=r"fixture_7_x: two parameters .* same name.*Rename the target or fixture"):
-        load_robot("irb120").with_fixtures({"7": ("point", PLACE), "fixture_7": ("point", PLACE)})
+        IRB120.with_fixtures({"7": ("point", PLACE), "fixture_7": ("point", PLACE)})
 
 
 def test_a_fixture_and_a_target_may_share_a_name() -> None:
-    robot = load_robot("irb120").with_frames(Transform(), {"ball": (0.0, 0.0, 0.1)})
+    robot = IRB120.with_frames(Transform(), {"ball": (0.0, 0.0, 0.1)})
     both = robot.with_fixtures({"ball": ("point", PLACE)})
     assert {"target_ball_x", "fixture_ball_x"} <= set(both.parameters)
 
@@ -148,7 +149,7 @@ def test_an_unknown_fixture_is_refused_with_those_there_are(name: str) -> None:
     with pytest.raises(InputError, match=rf"no fixture of this name; got '{name}'; allowed: table"):
         beside("plane").fixture_sweep(name)
     with pytest.raises(InputError, match="none: the robot has no fixtures"):
-        load_robot("irb120").fixture(name)
+        IRB120.fixture(name)
 
 
 # -- robot files -----------------------------------------------------------------------------------------
@@ -166,7 +167,7 @@ NAMES = ("table", "7", "the left cup", "Größe: [x]", "yes", "'quoted'", "# no 
 
 @pytest.mark.parametrize("kind", FIXTURE_KINDS)
 def test_a_robot_file_keeps_fixtures(tmp_path: Path, kind: FixtureKind) -> None:
-    robot = load_robot("irb120").with_fixtures(dict.fromkeys(NAMES, (kind, PLACE)))
+    robot = IRB120.with_fixtures(dict.fromkeys(NAMES, (kind, PLACE)))
     for name in NAMES:
         robot = moved(robot, name)
     again = reread(robot, tmp_path)

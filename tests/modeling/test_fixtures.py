@@ -125,7 +125,7 @@ def test_other_fixtures_take_the_place_of_those_before_and_forget_their_values()
     assert [f.name for f in again.fixtures] == ["table", "wall"]
     assert again.values["fixture_table_rx"] == 0.0
     assert again.values["fixture_table_x"] == 0.4
-    assert {n: v for n, v in robot.with_fixtures({}).values.items()} == dict(IRB120.values)
+    assert dict(robot.with_fixtures({}).values) == dict(IRB120.values)
 
 
 def test_a_fixture_called_fixture_is_not_called_so_twice() -> None:

@@ -19,7 +19,8 @@ _THERE: Final = 1e-10  # m
 _STARTS: Final = 24
 _ROUNDS: Final = 25
 _DAMPING: Final = 1e-6
-_MARGIN: Final = 1e-3
+#: How far from the limits an arm is left by the nominal robot [rad or m, or that share of the range]: jogging needs room.
+_MARGIN: Final = 0.05
 
 #: How many places are offered for each that is needed.
 SPARE: Final = 3
@@ -93,6 +94,7 @@ def postures_at(
         If too few are within reach.
     """
     low, high = np.array([joint.limits or (-np.inf, np.inf) for joint in nominal.joints]).T
+    room = _MARGIN * np.minimum(1.0, high - low)
     found = np.full((len(goals), len(nominal.joints)), np.nan)
     for _ in range(_ROUNDS):
         reached = np.flatnonzero(np.isfinite(found[:, 0]))[:count]
@@ -106,7 +108,7 @@ def postures_at(
             q = q + _least(nominal.joint_jacobian(q, target)[:, :3], missing)
         place, _ = nominal.poses(q, target)
         good = np.linalg.norm(goals[of] - place, axis=1) < 1e-8
-        good &= ((q > low + _MARGIN) & (q < high - _MARGIN)).all(axis=1)
+        good &= ((q > low + room) & (q < high - room)).all(axis=1)
         if facing is not None:
             pointing = nominal.poses(q)[1][:, :, 2]
             good &= np.einsum("ni,ni->n", pointing, facing[of]) > np.cos(within)

@@ -269,7 +269,7 @@ def test_a_target_at_the_very_point_moves_no_distance_and_makes_no_fuss() -> Non
     robot = robot_with("rigid")
     data = readings_of(robot, [("distance", "point")])
     here = truth(robot, data.joints[:1], "ball", None)[0, :3, 3]
-    there = robot.with_fixtures({"point": ("point", Transform(tuple(here.tolist())))})  # type: ignore[arg-type]
+    there = robot.with_fixtures({"point": ("point", Transform(tuple(here.tolist())))})
     J = problem_of(there, data).linearised(problem_of(there, data).free.start)[1]
     assert np.isfinite(J).all()
 

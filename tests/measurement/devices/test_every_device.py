@@ -18,14 +18,14 @@ from truearm.measurement.dataset import Dataset
 from truearm.measurement.devices import DEVICES, measured_with, named_device
 from truearm.measurement.readers.canonical import csv_text, read_csv
 from truearm.measurement.statistics import errors_of
-from truearm.measurement.truths import truth_twin
+from truearm.measurement.truths import joint_truths, truth_twin
 from truearm.measurement.twin import Twin
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 from truearm.robots import load_robot
 
-GEOMETRIC = {m.name: m for m in MODELS}["geometric"]
+GEOMETRIC, ELASTIC = ({m.name: m for m in MODELS}[name] for name in ("geometric", "elastic"))
 NAMES = [device.name for device in DEVICES]
 #: Readings are recovered to this [m or rad]: half a nanometre is what a jogged arm may still be off.
 EXACT = 1e-9
@@ -268,6 +268,24 @@ def test_without_noise_everything_else_follows(name: str, robot: str) -> None:
     assert flange > 1e-4  # it was not so before
 
 
+@pytest.mark.parametrize("name", ["strings", "ballbar", "five-lasers", "plane"])
+def test_an_arm_that_bends_is_identified_from_its_own_loops(name: str) -> None:
+    """The twin sags by its own moments; the elastic model has to find that in readings of any kind."""
+    rng, device = np.random.default_rng(2), named_device(name)
+    robot = nominal("irb120").with_effects(ELASTIC.effects)
+    soft = {"compliance_2": 2e-5, "compliance_3": 4e-5, "compliance_4": 1e-4, "compliance_5": 1e-4}
+    drawn = truth_twin(robot, "random", rng).robot.with_values(soft)
+    data = measured_with(device, nominal("irb120"), Twin(drawn, joint_truths(drawn)), 80, rng, 0.0)
+    training, held_out = data.of_configurations(range(60)), data.of_configurations(range(60, 80))
+    laden = nominal("irb120").carrying(drawn.payload)
+    fits = [identify(laden, training, model) for model in (ELASTIC, GEOMETRIC)]
+    elastic, rigid = (errors_of(fit.robot, held_out) for fit in fits)
+    found = np.concatenate([elastic.position_norms, elastic.length_norms]).max()
+    # the joints' tilts and the loads follow each other to a thousandth of the sag
+    assert found < 1e-5
+    assert found < 0.05 * np.concatenate([rigid.position_norms, rigid.length_norms]).max()
+
+
 @every_device
 def test_a_robot_of_three_joints_is_calibrated_or_refused(name: str) -> None:
     """With three joints a stylus cannot be turned: a plate, or a point, is out of reach or does not tell the tool."""
@@ -314,6 +332,14 @@ def test_stated_intervals_hold_the_truth_as_often_as_they_say() -> None:
 
 
 # -- refusals ----------------------------------------------------------------------------------------------
+
+
+def test_a_level_plate_does_not_see_what_moves_the_arm_along_it() -> None:
+    """Lengths across the first axis carry the tool along the plate, whatever the posture: they stay beliefs."""
+    _, data = read_by("plane", sigma=None)
+    fit = identify(nominal("irb120"), data, GEOMETRIC)
+    assert {fit.standing(name) for name in ("a_1", "a_2", "theta_offset_1")} <= {"uninformed", "not-determined"}
+    assert fit.standing("a_3") == fit.standing("theta_offset_3") == "identified"
 
 
 def cramped(robot: Robot) -> Robot:

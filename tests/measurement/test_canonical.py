@@ -270,7 +270,7 @@ Q = ",qw,qx,qy,qz"
         (PLAIN.replace("side", '"si"de"'), ["line 3", "quotes do not fit"]),
         (
             f"{HEADER},role\na,1,2,t,1,2,3,base\n",
-            ["line 2, column role", "'base'", "target or reference", "beside"],
+            ["line 2, column role", "'base'", "target, reference or fixture", "beside"],
         ),
         (f"{HEADER},role\na,1,2,t,1,2,3,\n", ["line 2, column role", "the cell is empty"]),
         (f"{HEADER},role\na,1,2,t,1,2,3,reference\n", ["all rows are reference points"]),

@@ -16,6 +16,7 @@ from truearm.measurement.devices.hexapod.poses import CUPS, poses
 from truearm.measurement.devices.jogging import site
 from truearm.modeling.chain import Array
 from truearm.modeling.inverse import inverse
+from truearm.modeling.inverse.branches import branch_rule
 from truearm.modeling.parts import Tool
 from truearm.modeling.robot import Robot
 
@@ -87,6 +88,13 @@ class HexapodPoses(Device):
 
     def _reachable(self, nominal: Robot) -> tuple[Array, IntArray, IntArray, Array]:
         """Return the best places of the fixture, and place, pose and joints of all configurations there."""
+        if branch_rule(nominal) is None:
+            raise InputError(
+                f"{nominal.name} cannot take the poses of the device",
+                where=self.name,
+                allowed="a robot with six turning joints whose branches have names",
+                cure="Take another device.",
+            )
         wanted = poses()
         position, rotation = np.array([p.position for p in wanted]), np.array([p.rotation for p in wanted])
         middle = triangle([DEVICE.base] * 3, "B").mean(axis=0)

@@ -349,8 +349,10 @@ def test_a_level_plate_does_not_see_what_moves_the_arm_along_it() -> None:
     _, data = read_by("plane", count=210, sigma=None)
     data = replace(data.of_readings(data.against == 0), fixtures=("plate_level",))
     fit = identify(nominal("irb120"), data, GEOMETRIC)
-    assert {fit.standing(name) for name in ("a_1", "a_2", "theta_offset_1")} <= {"uninformed", "not-determined"}
-    assert fit.standing("a_3") == fit.standing("theta_offset_3") == "identified"
+    assert fit.status is Status.RANK_LOSS
+    assert {"a_2", "d_2", "d_3"} <= set(fit.unseen)
+    assert {"a_1", "a_2", "d_1", "theta_offset_1"} <= set(fit.blind)
+    assert fit.standing("theta_offset_3") == "identified"
 
 
 def cramped(robot: Robot) -> Robot:

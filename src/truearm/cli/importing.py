@@ -55,6 +55,59 @@ def table(
     typer.echo(f"{data.configurations} configurations, targets {', '.join(data.targets)}: {out}")
 
 
+@app.command()
+def circle(
+    scan: Annotated[list[str], typer.Option(metavar="NAME=IMAGE", help="A scanned page; repeat for each.")],
+    points: Annotated[
+        list[str],
+        typer.Option(metavar="NAME=FILE", help="Joints, angle and height read while it was drawn; one a page."),
+    ],
+    out: Annotated[Path, typer.Option("--out", metavar="DATA.csv", help="File to write.")],
+    dpi: Annotated[
+        str | None, typer.Option(metavar="N|X,Y", help="Dots per inch of the scans.", show_default="as the files say")
+    ] = None,
+    sigma: Annotated[
+        float | None, typer.Option(metavar="MM", help="Deviation of radius and height.", show_default="not declared")
+    ] = None,
+) -> None:
+    """Circles that the robot drew with a pencil: scanned pages and the potentiometer's readings."""
+    from truearm.files import refuse_overwriting, write_text
+    from truearm.measurement.readers.canonical import csv_text
+    from truearm.measurement.readers.drawn_circles import Page, read_drawn_circles
+    from truearm.units import sized_si
+
+    scans, tables = _named(scan, "--scan"), _named(points, "--points")
+    for name in (*scans, *tables):
+        if name not in scans or name not in tables:
+            raise InputError(
+                "every page needs a scan and a table",
+                where="--points" if name in scans else "--scan",
+                came=f"nothing for {name}",
+                allowed="the same names in --scan and --points",
+            )
+    refuse_overwriting(out, [*scans.values(), *tables.values()])
+    pages = {name: Page(scans[name], tables[name]) for name in scans}
+    deviation = None if sigma is None else sized_si(sigma, "mm", "--sigma", deviation=True)
+    data = read_drawn_circles(pages, _dots(dpi), deviation)
+    write_text(out, csv_text(data))
+    typer.echo(f"{data.configurations} configurations on {len(pages)} page{'s' if len(pages) > 1 else ''}: {out}")
+    gaps = int((~data.has_reading).sum())
+    if gaps:
+        typer.echo(f"  {gaps} missing {'distance' if gaps == 1 else 'distances'}, where the line has gaps")
+
+
+def _dots(text: str | None) -> float | tuple[float, float] | None:
+    if text is None:
+        return None
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in (1, 2):
+        raise InputError("a resolution belongs here", where="--dpi", came=text, allowed="a number, or X,Y")
+    return numbers[0] if len(numbers) == 1 else (numbers[0], numbers[1])
+
+
 def _named(entries: list[str], option: str) -> dict[str, Path]:
     named: dict[str, Path] = {}
     for entry in entries:

@@ -156,11 +156,15 @@ def dataset_of(readings: Readings, configurations: Configurations) -> Dataset:
     if readings.reference.any():
         references = _part(readings, configurations, readings.reference, position, quaternion)
     targets = _part(readings, configurations, ~readings.reference, position, quaternion)
-    order = _order(configurations.labels)
+    return in_order(replace(targets, references=references))
+
+
+def in_order(data: Dataset) -> Dataset:
+    """Return data with the order of measurement, if the labels tell it."""
+    order = _order(data.labels)
     return replace(
-        targets,
-        references=references,
-        approach=None if order is None else approach_of(configurations.joints, order),
+        data,
+        approach=None if order is None else approach_of(data.joints, order),
         number=None if order is None else np.asarray(order - min(int(order.min()), _FIRST), float),
     )
 

@@ -7,6 +7,7 @@ from typing import Final
 from truearm.errors import InputError, nearest_names
 from truearm.measurement.devices.artefacts import MARKERS, PLANAR_ARTEFACT, SPATIAL_ARTEFACT
 from truearm.measurement.devices.device import Arm, Device, measured_with
+from truearm.measurement.devices.drawn_circle.pencil import DRAWN_CIRCLE
 from truearm.measurement.devices.lengths import BALLBAR, STRINGS
 from truearm.measurement.devices.printed_circle import TOUCH_UP
 from truearm.measurement.devices.small_volumes import FIVE_LASERS, GAUGES, STEREO
@@ -31,6 +32,7 @@ DEVICES: Final[tuple[Device, ...]] = (
     TWO_SPHERES,
     POINT,
     TOUCH_UP,
+    DRAWN_CIRCLE,
 )
 
 

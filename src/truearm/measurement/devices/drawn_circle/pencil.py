@@ -9,7 +9,7 @@ import numpy as np
 
 from truearm.errors import InputError
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.devices.device import Arm, Device, recorded
+from truearm.measurement.devices.device import Arm, Device, IntArray, recorded
 from truearm.measurement.devices.jogging import followed, postures_at, site
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import Tool
@@ -19,7 +19,7 @@ from truearm.modeling.robot import Robot
 _ROUND: Final = 48
 #: Postures that a circle is begun in until one goes all the way round.
 _BEGUN: Final = 6
-_ROUNDS: Final = 4
+_ROUNDS: Final = 8
 #: How far the pencil leans at the start, and anywhere.
 _LEANS: Final = np.deg2rad(60.0)
 _SLIPS: Final = np.deg2rad(75.0)
@@ -50,7 +50,7 @@ class PencilCircle(Device):
     """
 
     radius: float = 0.1
-    slopes: tuple[float, ...] = (float(np.deg2rad(45.0)), float(np.deg2rad(15.0)), float(np.deg2rad(75.0)))
+    slopes: tuple[float, ...] = (float(np.deg2rad(45.0)), float(np.deg2rad(25.0)), float(np.deg2rad(65.0)))
     circles: int = 2
     centre: tuple[float, float, float] | None = None
 
@@ -58,9 +58,8 @@ class PencilCircle(Device):
         """Return distances from the middle and heights over the page at even steps round all circles, one by one."""
         base = nominal.base
         middle = site(nominal) if self.centre is None else base.rotation @ np.array(self.centre) + base.translation
-        pages = np.array(
-            [base.rotation @ _page(slope, (middle - base.translation) @ base.rotation) for slope in self.slopes]
-        )
+        out = (middle - base.translation) @ base.rotation
+        pages = np.array([base.rotation @ _page(slope, out) for slope in self.slopes])
         drawn = len(self.slopes) * self.circles
         each = -(-count // drawn)
         joints, page = self._drawn(nominal, middle, pages, each, rng)
@@ -99,7 +98,7 @@ class PencilCircle(Device):
 
     def _drawn(
         self, nominal: Robot, middle: Array, pages: Array, each: int, rng: np.random.Generator
-    ) -> tuple[Array, Array]:
+    ) -> tuple[Array, IntArray]:
         """Return the joint readings ``(circles, each, joints)`` of all circles, and the page of each circle."""
         name = nominal.targets[0].name
         of = np.repeat(np.arange(len(pages)), self.circles)
@@ -110,14 +109,16 @@ class PencilCircle(Device):
         found = np.full((len(of), each, len(nominal.joints)), np.nan)
         for _ in range(_ROUNDS):
             missing = np.flatnonzero(np.isnan(found[:, 0, 0]))
-            begun = np.tile(missing, _BEGUN)
+            begun = np.tile(missing, 2 * _BEGUN)
+            facing = -pages[of[begun], :, 2]
             starts = places[of[begun], 0]
             reached, q = postures_at(
-                nominal, name, starts, len(starts), rng, self.name, facing=-pages[of[begun], :, 2], within=_LEANS
+                nominal, name, starts, _BEGUN * len(missing), rng, self.name, facing=facing, within=_LEANS
             )
+            begun, facing = begun[reached], facing[reached]
             q, whole = followed(nominal, name, q, np.moveaxis(places[of[begun]], 0, 1))
             pencil = np.array([nominal.poses(at)[1][:, :, 2] for at in q])
-            whole &= (np.einsum("kni,ni->kn", pencil, -pages[of[begun], :, 2]) > np.cos(_SLIPS)).all(axis=0)
+            whole &= (np.einsum("kni,ni->kn", pencil, facing) > np.cos(_SLIPS)).all(axis=0)
             for k in np.flatnonzero(whole).tolist():
                 found[begun[k]] = q[::fine, k]
             if np.isfinite(found).all():

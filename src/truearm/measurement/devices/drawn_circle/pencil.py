@@ -71,7 +71,7 @@ class PencilCircle(Device):
         height = on_page[:, 2] + sigma * rng.standard_normal(count)
         none = np.full(count, np.nan)
         centres = tuple(f"centre_{k + 1}" for k in range(drawn))
-        fixtures = (*centres, *(f"page_{k + 1}" for k in range(len(pages))))
+        fixtures = (*centres, *(f"paper_{k + 1}" for k in range(len(pages))))
         return recorded(
             nominal,
             self.name,

@@ -272,8 +272,9 @@ def _with_target(robot: Robot, data: Dataset, target: int, kinds: Mapping[str, F
 
 def _fixture_places(robot: Robot, data: Dataset, kinds: Mapping[str, FixtureKind]) -> dict[str, Place]:
     """Return where the fixtures stand, from the places of the targets; known places as they are known."""
-    tips = {t.name: robot.poses(data.postures, t.name)[0] for t in robot.targets if t.name in data.targets}
-    flange = robot.poses(data.postures)[0]
+    at = robot.loaded(data.postures)
+    tips = {t.name: robot.poses(at, t.name)[0] for t in robot.targets if t.name in data.targets}
+    flange = robot.poses(at)[0]
     known = {} if data.setup is None else _known(data.setup)
     places: dict[str, Place] = {}
     for index, name in enumerate(data.fixtures):

@@ -75,7 +75,7 @@ class Counts:
         Configurations to judge by.
     """
 
-    registry: int = 60
+    registry: int = 48
     touched: int = 24
     drawn: int = 72
     unseen: int = 100

@@ -13,7 +13,6 @@ from truearm.measurement.devices.artefacts import MARKERS
 from truearm.reporting.drawing import AFTER, BEFORE, Figure, axis, figure, logarithmic_axis
 from truearm.reporting.numbers import rounded
 from truearm.studies.katana_campaigns import (
-    CAMERAS,
     DOCUMENT,
     LOW_COST,
     OPTOTRAK,
@@ -58,26 +57,12 @@ def study(seeds: int, progress: Callable[[str], None], counts: Counts | None = N
         progress(f"seed {seed + 1} of {seeds}")
         runs.append(run_devices(seed, counts))
 
-    def left(what: str, start: Start) -> float:
-        return float(np.median([run.reached[what, start].moved[0] for run in runs]))
-
-    cheap = ("low-cost set-up: touch-up and drawn circle", "tilting first")
-    seen, true = (
-        [float(np.median([of(run, key) for run in runs])) for key in (("before", ""), cheap)] for of in (_seen, _true)
-    )
     return Study(
         name="katana-devices",
         title="A Katana 450 measured with every instrument",
-        source="D. Patel, doctoral thesis on the Katana 450, sections 3.3, 3.7, 4.5 and 5.5, Tables 4.5 and 4.6; geometry"
-        " of Table 3.2",
-        answer=f"What the joints do matters more than the instrument. With geometry alone {left(MARKERS.name, STARTS[0]):.2f}"
-        f" mm are left on unseen poses whether markers of 0.03 mm or a touch probe on two spheres"
-        f" ({left('two-spheres', STARTS[0]):.2f} mm) are used; with tilting from inclinometers first it is"
-        f" {left(MARKERS.name, STARTS[1]):.3f} and {left('two-spheres', STARTS[1]):.3f} mm. The document's low-cost set-up,"
-        f" made a measurement, reaches {left(LOW_COST, STARTS[1]):.2f} mm. A loop that is closed at a point or a plane"
-        f" leaves {left('point', STARTS[1]):.1f} and {left('plane', STARTS[1]):.1f} mm, since nothing tells it how large"
-        f" the robot is. The drawn circle shows an improvement of its form, {seen[0]:.2f} to {seen[1]:.2f} mm, and is"
-        f" blind to where it lies: the tip was {true[0]:.2f} and is {true[1]:.2f} mm from where it should be.",
+        source="D. Patel, doctoral thesis on the Katana 450, sections 3.3, 3.7, 4.5 and 5.5, Tables 4.5 and 4.6;"
+        " geometry of Table 3.2",
+        answer=_answer(runs),
         seeds=seeds,
         tables=(
             _document(runs),
@@ -96,18 +81,40 @@ def study(seeds: int, progress: Callable[[str], None], counts: Counts | None = N
             " model that lacks something is not as good as the instrument, and where it is told so, closed loops put"
             " the lack into lengths (a ball within 2 mm went 38 mm astray with geometry alone).",
             "Tilting first: clearance, backlash and stiffness from simulated inclinometers of 0.001 deg and 8 pairs of"
-            " poses, as in the study katana-tilting, then geometry from the instrument. The pairs need an instrument that"
-            " reads positions, for joint 1 alone, about which gravity has no moment.",
+            " poses, as in the study katana-tilting, then geometry from the instrument. The pairs need an instrument"
+            " that reads positions, for joint 1 alone, about which gravity has no moment.",
             f"The document's rows have the 200 mm attachment; all other devices touch or see the point of the pencil,"
-            f" 130 mm further out, where errors are larger. The registry's devices have {counts.registry} configurations"
-            f" each, the touch-up {counts.touched} contacts on two pages, the drawn circles {counts.drawn} points on six"
-            " circles, two on each of three pages. The document's own touch-up has four points on one page, which is too"
-            " little to calibrate with.",
+            f" 130 mm further out, where errors are larger. The registry's devices have {counts.registry}"
+            f" configurations each, the touch-up {counts.touched} contacts on two pages, the drawn circles"
+            f" {counts.drawn} points on six circles, two on each of three pages. The document's own touch-up has four"
+            " points on one page, which is too little to calibrate with.",
             "The drawn circle's reading is the distance from the middle and the height over the page of the tip of the"
             " unsprung pencil, each with 0.02 mm. The document reads the line by eye and the height by potentiometer.",
             "The circle of section 5.5.1 is followed in motion, as in the study katana-trajectory: what is left with"
             " tilting known is mostly the play of joint 1.",
         ),
+    )
+
+
+def _answer(runs: Sequence[DeviceRun]) -> str:
+    def left(what: str, start: Start) -> float:
+        return float(np.median([run.reached[what, start].moved[0] for run in runs]))
+
+    tilting = STARTS[1]
+    seen, true = (
+        [float(np.median([of(run, key) for run in runs])) for key in (("before", ""), (LOW_COST, tilting))]
+        for of in (_seen, _true)
+    )
+    markers, spheres = ([left(what, start) for start in STARTS] for what in (MARKERS.name, "two-spheres"))
+    return (
+        f"What the model knows of the joints matters more than the instrument. With geometry alone {markers[0]:.2f} mm"
+        f" are left on unseen configurations after markers and {spheres[0]:.2f} mm after a touch probe on two spheres;"
+        f" with tilting from inclinometers first, {markers[1]:.3f} and {spheres[1]:.3f} mm. The document's low-cost"
+        f" set-up, made a measurement, leaves {left(LOW_COST, tilting):.2f} mm. Loops closed at a point or a plane"
+        f" leave {left('point', tilting):.1f} and {left('plane', tilting):.1f} mm, since nothing tells them how large"
+        " the robot is. The drawn circle shows an improvement of its form, from"
+        f" {seen[0]:.2f} to {seen[1]:.2f} mm, and not where it lies: the tip was {true[0]:.2f} mm from where it should"
+        f" be, and is {true[1]:.2f} mm after the low-cost calibration, which cannot know where the robot stands."
     )
 
 
@@ -173,8 +180,8 @@ def _document(runs: Sequence[DeviceRun]) -> Table:
     return Table(
         "The document's three instruments",
         "Error of the tip on unseen poses in the instrument's own frame, 200 mm attachment: 118 poses with the Optotrak"
-        " as in chapters 3 and 4, and 30 points with each of the three as in section 3.3, which prints no calibration of"
-        " the other two. A quarter is allowed: robot and poses are others.",
+        " as in chapters 3 and 4, and 30 points with each of the three as in section 3.3, which prints no calibration"
+        " of the other two. A quarter is allowed: robot and poses are others.",
         tuple(rows),
     )
 
@@ -196,13 +203,13 @@ def _why(start: Start, k: int) -> str:
 
 def _registry(runs: Sequence[DeviceRun], start: Start) -> Table:
     why = {
-        "stereo": "Balls within 2 mm tell the places' distances from each other nothing, and hardly how long links are.",
+        "stereo": "Balls within 2 mm of three places nobody measured hardly tell how long links are.",
         "point": "Nothing has a length: as large a robot as one likes keeps its tip at the point.",
         "plane": "Nothing has a length here either.",
         "two-spheres": "The distance of the spheres tells the size: it takes no more than that.",
         "touch-up": "By hand to 0.2 mm, 24 contacts.",
         "drawn-circle": "Led by the nominal robot; two postures of the arm on each page are few.",
-        LOW_COST: "Better than either: the printed points tell what a circle does not, and the line is finer than a hand.",
+        LOW_COST: "Better than either: printed points tell what a circle does not, a line is finer than a hand.",
     }
     rows = [
         Row(
@@ -299,8 +306,8 @@ def _page(runs: Sequence[DeviceRun]) -> Table:
     return Table(
         "The circle of section 5.5.1 on the page",
         "The twin goes round it in motion, commanded by the nominal robot and by what two instruments made of it. The"
-        " page shows how far the line is from a circle of the right size about its own middle, and the potentiometer how"
-        " far from its own plane: where the circle lies, and what goes on along the line, it does not show.",
+        " page shows how far the line is from a circle of the right size about its own middle, and the potentiometer"
+        " how far from its own plane: where the circle lies, and what goes on along the line, it does not show.",
         tuple(rows),
     )
 
@@ -324,8 +331,8 @@ def _visible(runs: Sequence[DeviceRun]) -> Table:
     }
     return Table(
         "What instruments see of the Katana",
-        "Share of configurations drawn evenly from the joint limits that show enough of the tool, 2.6 m away. What the arm"
-        " hides is not asked.",
+        "Share of configurations drawn evenly from the joint limits that show enough of the tool, 2.6 m away. What the"
+        " arm hides is not asked.",
         tuple(Row(what, "%", [run.sees[what] for run in runs], explanation=why.get(what, "")) for what in runs[0].sees),
     )
 
@@ -380,6 +387,6 @@ def _on_page(run: DeviceRun) -> Picture:
     return Picture(
         "page",
         "What the page shows, as in Figure 5.13",
-        "First seed: the line beside a circle of the right size about its own middle, and the height over its own plane.",
+        "First seed: the line beside a circle of the right size about its own middle, and the height over its plane.",
         drawn,
     )

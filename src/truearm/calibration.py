@@ -20,7 +20,7 @@ from truearm.identification.advice import check_fit
 from truearm.identification.bounds import Bounds, read_bounds
 from truearm.identification.fit import Fit, Redundant, Status, identify, place
 from truearm.identification.losses import LOSSES, Loss
-from truearm.identification.models import MODELS, Model
+from truearm.identification.models import FRAMES, MODELS, Model
 from truearm.identification.plausibility import check_against
 from truearm.identification.selection import AUTO, Selection, select
 from truearm.identification.settling import check_settling
@@ -211,7 +211,8 @@ def calibrate(
     data
         Readings, or a canonical CSV file.
     model
-        One of :data:`truearm.identification.models.MODELS` by name, or ``auto``: the joint effects that
+        One of :data:`truearm.identification.models.MODELS` by name; ``frames``, which leaves the robot as it is and
+        finds base, targets and fixtures alone, a tool's tip for example; or ``auto``: the joint effects that
         cross-validation on the training part says the data can carry.
     train
         How many configurations to train on, drawn with `seed`; the rest is held out. None is 70 %; ``all`` holds
@@ -237,7 +238,7 @@ def calibrate(
         For anything that cannot be used, with a message that says what to do.
     """
     urdf = None
-    named = _chosen(model, {m.name: m for m in MODELS} | {AUTO: None}, "model")
+    named = _chosen(model, {m.name: m for m in (FRAMES, *MODELS)} | {AUTO: None}, "model")
     for name in effects:
         _chosen(name, {effect.name: effect for effect in EFFECTS}, "effect")
     if effects and named is None:

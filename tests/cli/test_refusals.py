@@ -75,7 +75,7 @@ def test_a_folder_is_no_file(truearm: Truearm, small: Path, tmp_path: Path) -> N
         (1, "x [mm]", "x", ["line 1, column 9, x", "no unit is given", "mm, m, um, in", "Units are never guessed"]),
         (1, "x [mm]", "x [ft]", ["got 'ft'", "allowed: mm, m, um, in"]),
         (1, "joint_6 [deg]", "joint_7 [deg]", ["joint_6 is missing"]),
-        (1, "y [mm]", "height [mm]", ["line 1", "the column is not known", "height [mm]"]),
+        (1, "y [mm]", "depth [mm]", ["line 1", "the column is not known", "depth [mm]"]),
         (1, "target", "targets", ["the column is not known", "Did you mean target?"]),
     ],
 )
@@ -135,7 +135,7 @@ def test_training_must_leave_something(truearm: Truearm, small: Path, tmp_path: 
     ("option", "text", "part"),
     [
         ("--train", "half", "--train: a number of configurations belongs here; got 'half'"),
-        ("--model", "geometry", "there is no model of this name; got 'geometry'; allowed: offsets, joints, geometric"),
+        ("--model", "geometry", "there is no model of this name; got 'geometry'; allowed: frames, offsets, joints"),
         ("--loss", "hubert", "Did you mean huber?"),
         ("--redundancy", "keep", "allowed: prior, drop"),
         ("--bounds", "nowhere.yaml", "nowhere.yaml: there is no such file"),

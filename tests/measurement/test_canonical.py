@@ -6,7 +6,6 @@ import contextlib
 import math
 import re
 import tempfile
-import time
 from pathlib import Path
 
 import numpy as np
@@ -270,7 +269,7 @@ Q = ",qw,qx,qy,qz"
         (PLAIN.replace("side", '"si"de"'), ["line 3", "quotes do not fit"]),
         (
             f"{HEADER},role\na,1,2,t,1,2,3,base\n",
-            ["line 2, column role", "'base'", "target or reference", "beside"],
+            ["line 2, column role", "'base'", "target, reference or fixture", "beside"],
         ),
         (f"{HEADER},role\na,1,2,t,1,2,3,\n", ["line 2, column role", "the cell is empty"]),
         (f"{HEADER},role\na,1,2,t,1,2,3,reference\n", ["all rows are reference points"]),
@@ -434,24 +433,6 @@ def test_any_text_is_read_or_refused_and_nothing_else(text: str) -> None:
         path.write_bytes(text.encode("utf-8", "surrogatepass"))
         with contextlib.suppress(InputError):
             read_csv(path)
-
-
-def test_it_is_fast(write: WriteFile) -> None:
-    generator = np.random.default_rng(1)
-    numbers = generator.normal(size=(1500, 9))
-    numbers[:, :6] = np.repeat(numbers[::3, :6], 3, axis=0)
-    header = ",".join(["configuration", *(f"joint_{n} [deg]" for n in range(1, 7)), "target", "x [mm],y [mm],z [mm]"])
-    rows = [
-        f"{row // 3}," + ",".join(map(repr, values[:6])) + f",t{row % 3}," + ",".join(map(repr, values[6:])) + ",0.02"
-        for row, values in enumerate(numbers.tolist())
-    ]
-    path = write("\n".join([f"{header},sigma [mm]", *rows]))
-    taken = []
-    for _ in range(5):
-        start = time.perf_counter()
-        assert read_csv(path).configurations == 500
-        taken.append(time.perf_counter() - start)
-    assert min(taken) < 0.05
 
 
 # -- circumstances -----------------------------------------------------------------------------------------

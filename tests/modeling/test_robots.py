@@ -117,6 +117,7 @@ def test_truth_is_near_the_nominal_robot(robot_id: str) -> None:
 def test_invented_numbers_say_so() -> None:
     assert "invented" in load_robot("li3").source.lower()
     assert "invented" in load_robot("li3").title.lower()
+    assert "invented" in load_robot("lrmate200ic").truths["invented"].source
 
 
 @pytest.mark.parametrize(

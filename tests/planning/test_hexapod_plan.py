@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import reduce
 
 import numpy as np
 import pytest
@@ -11,9 +12,11 @@ from scipy.optimize import minimize
 from truearm.errors import InputError
 from truearm.identification.fit import identify
 from truearm.identification.models import MODELS
+from truearm.measurement.dataset import Dataset
 from truearm.measurement.devices.hexapod.geometry import DEVICE, triangle
 from truearm.measurement.devices.hexapod.kinematics import leg_lengths
 from truearm.measurement.devices.hexapod.poses import HexapodPose, poses
+from truearm.measurement.devices.hexapod.session import joined
 from truearm.measurement.devices.hexapod.simulated import ballbar
 from truearm.measurement.statistics import errors_of
 from truearm.measurement.twin import Twin, measure
@@ -23,6 +26,7 @@ from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 from truearm.planning.hexapod.campaign import Campaign, touching, two_steps
 from truearm.planning.hexapod.clearance import arm_links, clearance
+from truearm.planning.hexapod.placements import identify_placements, in_one_frame
 from truearm.planning.hexapod.reachable import Reachable, reachable
 from truearm.planning.hexapod.steps import steps_text
 from truearm.planning.hexapod.tool import with_cups
@@ -221,3 +225,64 @@ def test_a_robot_that_is_too_wrong_is_refused(arm: tuple[Robot, tuple[HexapodPos
     twisted = Twin(robot.with_values({"theta_offset_6": np.radians(3.0)}))
     with pytest.raises(InputError, match=r"not one pose is within the ballbar's range.*3 poses"):
         two_steps(robot, twisted, touches, wanted, plan.rows[:3], ELASTIC, bar)
+
+
+# -- several places -------------------------------------------------------------------------------------------
+
+
+def at_places(twin: Twin, counts: tuple[int, ...], noise: float) -> tuple[list[Transform], list[Dataset]]:
+    """Return frames and what is measured in them, with a little more noise than the ballbar has."""
+    rng = np.random.default_rng(5)
+    frames, data = [], []
+    for count in counts:
+        q, _ = np.linalg.qr(rng.standard_normal((3, 3)))
+        frame = Transform.from_matrix(q * np.linalg.det(q), rng.uniform(-0.5, 0.5, 3))
+        seen = measure(twin, twin.robot.random_configurations(count, rng), noise, rng)
+        position = (seen.position - np.array(frame.translation)) @ frame.rotation
+        frames.append(frame)
+        data.append(replace(seen, position=position, sigma=None, approach=None, number=None))
+    return frames, data
+
+
+def test_places_come_into_one_frame_by_the_model(arm: tuple[Robot, tuple[HexapodPose, ...]]) -> None:
+    robot, _ = arm
+    cups = {target.name: [robot.values[target.parameter(a)] for a in "xyz"] for target in robot.targets}
+    frames, data = at_places(Twin(robot), (4, 6, 5), 0.0)
+    known = robot.with_frames(_inverse_of(frames[0]), cups)
+    together = in_one_frame(known, data)
+    for frame, before, after in zip(frames, data, together, strict=True):
+        world = before.position @ frame.rotation.T + np.array(frame.translation)
+        expected = (world - np.array(frames[0].translation)) @ frames[0].rotation
+        assert after.position == pytest.approx(expected, abs=1e-12)
+
+
+def _inverse_of(frame: Transform) -> Transform:
+    return Transform.from_matrix(frame.rotation.T, -frame.rotation.T @ np.array(frame.translation))
+
+
+def test_more_places_tell_more(arm: tuple[Robot, tuple[HexapodPose, ...]]) -> None:
+    robot, _ = arm
+    true = wrong(robot, 0.3, 8)
+    twin = Twin(true.robot, {n: JointTruth(compliance=t.compliance) for n, t in true.joints.items()})
+    frames, data = at_places(twin, (14, 30, 30), 1e-4)
+    unseen = measure(twin, robot.random_configurations(60, np.random.default_rng(9)), 0.0, np.random.default_rng(0))
+    there = (unseen.position - np.array(frames[0].translation)) @ frames[0].rotation
+    unseen = replace(unseen, position=there)
+    left = []
+    for places in (data[:1], data):
+        fit = identify_placements(robot, places, ELASTIC)
+        left.append(errors_of(fit.robot, unseen).position_norms.mean())
+    assert left[1] < 0.7 * left[0]
+    # as many readings in one frame would tell about as much
+    world = [
+        replace(part, position=part.position @ frame.rotation.T + np.array(frame.translation))
+        for frame, part in zip(frames, data, strict=True)
+    ]
+    best = identify(robot, reduce(joined, world), ELASTIC)
+    back = replace(unseen, position=there @ frames[0].rotation.T + np.array(frames[0].translation))
+    assert left[1] < 2.0 * errors_of(best.robot, back).position_norms.mean()
+
+
+def test_no_place_is_refused(arm: tuple[Robot, tuple[HexapodPose, ...]]) -> None:
+    with pytest.raises(InputError, match="at least one place"):
+        identify_placements(arm[0], [], ELASTIC)

@@ -148,7 +148,7 @@ def test_a_temperature_is_in_no_plan() -> None:
 def test_a_robot_without_targets_tells_nothing() -> None:
     rng, arm = np.random.default_rng(0), load_robot("irb120")
     with pytest.raises(InputError, match="no targets"):
-        sensitivity(arm, random_candidates(arm, 5, rng), MODEL["geometric"], 1e-4)
+        sensitivity(arm, random_candidates(arm, 5, rng), MODEL["geometric"].free(arm), 1e-4)
 
 
 def test_where_the_robot_stands_does_not_matter() -> None:
@@ -179,7 +179,7 @@ def test_the_predicted_error_comes_true() -> None:
     arm = with_targets(nominal)
     rng = np.random.default_rng(1)
     where = random_candidates(arm, 15, rng), random_candidates(arm, 200, rng)
-    measured, elsewhere = (sensitivity(arm, one, MODEL["geometric"], noise) for one in where)
+    measured, elsewhere = (sensitivity(arm, one, MODEL["geometric"].free(arm), noise) for one in where)
     told = predict(arm, measured, np.arange(15), elsewhere, where[1].joints, noise, rng)
     assert told.planned == pytest.approx(np.mean(errors), rel=0.1)
     assert told.planned > 1.1 * told.floor

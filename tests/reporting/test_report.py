@@ -279,7 +279,7 @@ def test_parameters_in_their_units() -> None:
         assert f"{unit} {row}" in text
     assert " uninformed" in text
     assert "believed" in report_html(report)
-    assert "Base and targets (15 parameters)" in text
+    assert "Base, targets and fixtures (15 parameters)" in text
 
 
 def test_fixed_parameters_have_no_change() -> None:

@@ -13,6 +13,7 @@ from truearm.cli.axes import axes
 from truearm.cli.calibrate import calibrate
 from truearm.cli.check import check
 from truearm.cli.convert import convert
+from truearm.cli.devices import devices
 from truearm.cli.distances import distances
 from truearm.cli.hexapod import app as hexapod
 from truearm.cli.ik import ik
@@ -67,6 +68,7 @@ app.command()(axes)
 app.command()(tolerance)
 app.command()(lines)
 app.command()(simulate)
+app.command()(devices)
 app.add_typer(importing, name="import")
 app.add_typer(hexapod, name="hexapod")
 app.command()(robots)

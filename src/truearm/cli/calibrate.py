@@ -23,7 +23,8 @@ def calibrate(
         str,
         typer.Option(
             metavar="MODEL",
-            help="offsets, joints, geometric, elastic, tilting, full, or auto: the effects that the data can carry.",
+            help="offsets, joints, geometric, elastic, tilting, full; auto: the effects that the data can carry; "
+            "frames: base, tool and fixtures alone.",
         ),
     ] = "geometric",
     train: Annotated[

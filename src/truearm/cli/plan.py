@@ -31,6 +31,14 @@ def plan(
     candidates: Annotated[
         int, typer.Option(metavar="N", min=1, help="Random configurations to choose from, without --from.")
     ] = 5000,
+    device: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="An instrument of 'truearm devices'; not with --from.",
+            show_default="one that reads every target everywhere",
+        ),
+    ] = None,
     constraints: Annotated[
         Path | None, typer.Option(metavar="FILE", help="What a configuration must keep.", show_default=False)
     ] = None,
@@ -44,7 +52,7 @@ def plan(
 ) -> None:
     """Choose the configurations that tell most, in a measuring order, and say how accurate the result will be.
 
-    Every target on the robot's tool is measured at each of them with a tracker. Writes PLAN.csv and PLAN.html.
+    Without a device every target on the robot's tool is measured at each of them. Writes PLAN.csv and PLAN.html.
     """
     import shlex
     import sys
@@ -53,8 +61,9 @@ def plan(
 
     from truearm.calibration import check_joints, load_data, named_model
     from truearm.files import refuse_overwriting, writable_file, write_files
+    from truearm.measurement.devices import named_device
     from truearm.planning.constraints import read_constraints
-    from truearm.planning.measurement_plan import plan_measurements, random_candidates, with_targets
+    from truearm.planning.measurement_plan import device_candidates, plan_measurements, random_candidates, with_targets
     from truearm.planning.plan_table import plan_csv
     from truearm.reporting.plan_report import answer, plan_html
     from truearm.robots import load_robot, urdf_source
@@ -73,12 +82,24 @@ def plan(
     deviation = sized_si(noise, "mm", "--noise", deviation=True)
     rules = None if constraints is None else read_constraints(constraints)
     rng = np.random.default_rng(seed)
+    if device is not None and candidates_of is not None:
+        raise InputError(
+            "a device finds its own configurations to choose from",
+            where="--device",
+            came=f"{device} with --from",
+            cure="Leave one of them out; --constraints narrows the choice.",
+        )
+    instrument = None if device is None else named_device(device)
     with progress() as say:
         say("reading the robot")
         loaded = load_robot(robot).carrying(read_payload(payload), read_gravity(gravity))
         labels = None
         own = bool(loaded.targets)
-        if candidates_of is None:
+        readings = None
+        if instrument is not None:
+            seen, readings, choice = device_candidates(loaded, instrument, candidates, rng)
+            own = True
+        elif candidates_of is None:
             seen = with_targets(loaded)
             choice = random_candidates(seen, candidates, rng)
         else:
@@ -99,6 +120,7 @@ def plan(
             constraints=rules,
             where=str(constraints),
             seen_from_the_origin=own,
+            readings=readings,
         )
         say("writing the files")
         command = shlex.join(["truearm", *sys.argv[1:]])

@@ -50,6 +50,13 @@ def check_fit(fit: Fit) -> list[Notice]:
                 f"depend. {Status.RANK_LOSS.advice}",
             )
         )
+    if fit.trusted:
+        words = "Nothing outside the robot says where it stands: its base is the world."
+        if "size" in fit.trusted:
+            words += " No length was measured either: the size of everything rests on the nominal lengths."
+        if fit.blind:
+            words += f" Not seen, and left at nominal values: {'; '.join(fit.blind)}."
+        found.append(Notice("closed-loop", words))
     if fit.at_bound:
         found.append(Notice("at-bound", f"At a bound: {', '.join(fit.at_bound)}. {Status.AT_BOUND.advice}"))
     if fit.redundancies:

@@ -14,7 +14,7 @@ from truearm.identification.bounds import Bounds, bound_vectors
 from truearm.identification.losses import MEDIAN_NORM, Loss, norms_of
 from truearm.identification.models import FRAMES, Model
 from truearm.identification.problem import SETUP, Problem, check_circumstances, check_solvable
-from truearm.identification.redundancy import Redundancy, find_redundancies, unseen_but_felt
+from truearm.identification.redundancy import Redundancy, find_redundancies, in_words, taken_on_trust, unseen_but_felt
 from truearm.identification.solver import SMALL, Solution, solve
 from truearm.identification.standing import initial_standing, unanchored
 from truearm.measurement.dataset import Dataset
@@ -81,6 +81,12 @@ class Fit:
         Parameters held because the data cannot tell them apart, with the combination.
     at_bound, unseen
         Names of parameters at a bound, and of those that the data leave undetermined though predictions need them.
+    trusted
+        What nobody measured and every prediction depends on: ``base`` where nothing says how the robot stands, ``size``
+        where no length was measured either.
+    blind
+        What readings without an anchor do not see: combinations of the robot's parameters in words, such as
+        ``d_3 - d_2``, of which the first keeps its nominal value.
     sigma
         Standard deviation of a reading [m or rad] by observation, declared (root mean square) or estimated.
     declared
@@ -104,6 +110,8 @@ class Fit:
     redundancies: tuple[Redundancy, ...]
     at_bound: tuple[str, ...]
     unseen: tuple[str, ...]
+    trusted: tuple[str, ...]
+    blind: tuple[str, ...]
     sigma: dict[str, float]
     declared: bool
     excess: float
@@ -323,6 +331,7 @@ def _fit(
     held = tuple(robot.parameters[r.dropped] for r in dropped)
     looked_at = FreeParameters((*(robot.parameters[n] for n in free.names), *held))
     unseen = unseen_but_felt(robot, problem.data, looked_at)
+    trusted = taken_on_trust(problem.data)
     used = solution.weight / np.median(solution.weight) if loss == "l1" else solution.weight
     weight = np.full(len(problem.data.target), np.nan)
     first = 0
@@ -353,12 +362,24 @@ def _fit(
         redundancies=dropped,
         at_bound=tuple(n for n, bound in zip(free.names, at_bound, strict=True) if bound),
         unseen=unseen,
+        trusted=trusted,
+        blind=_blind(problem, x) if trusted else (),
         sigma=sigma,
         declared=declared == set(noise),
         excess=excess,
         weight=weight,
         steps=steps,
     )
+
+
+def _blind(problem: Problem, vector: Array) -> tuple[str, ...]:
+    """Return the combinations of the robot's own parameters that the readings do not see."""
+    beside = {p.name for p in problem.free.parameters if p.group in ("target", "fixture")}
+    own = [
+        {n: c for n, c in redundancy.members.items() if n not in beside}
+        for redundancy in find_redundancies(problem, vector)
+    ]
+    return tuple(in_words(members, problem.free) for members in own if members)
 
 
 def _covariance(A: Array, uncertain: NDArray[np.bool_], priors: bool) -> Array:

@@ -14,12 +14,14 @@ from typing import Final
 
 import numpy as np
 
+from truearm.errors import InputError
 from truearm.identification.fit import identify
 from truearm.identification.frames import initial_frames
 from truearm.identification.models import MODELS
+from truearm.identification.standing import initial_standing
 from truearm.measurement.checks import Suspect, Suspicion, constellation, judged
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.statistics import errors_of
+from truearm.measurement.statistics import Errors, errors_of
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
@@ -54,7 +56,9 @@ def check_against(robot: Robot, data: Dataset) -> tuple[list[Notice], list[Suspe
         The nominal robot, with as many joints as the data; its base and targets are left out of account.
     """
     found = _beyond_limits(robot, data)
-    data = data.in_instrument_frame()
+    if data.fixture is not None:
+        slips = _fixture_slips(robot, data)
+        return [*slips, *found], [] if slips else _far_from_fixtures(robot, data)
     if not data.has_position.any():
         return found, []
     slips = _slips(robot, data)
@@ -116,13 +120,54 @@ def _best(robot: Robot, data: Dataset, slips: list[_Slip]) -> _Slip | None:
     return slips[best] if shares[best] * _BETTER < _misfit(robot, data) / _spread(data) else None
 
 
+def _fixture_slips(robot: Robot, data: Dataset) -> list[Notice]:
+    """Return the first slip that explains readings against fixtures: turned about, several may fit alike."""
+    some = _some(data, _ENOUGH // 2)
+    size = _misfit(robot, some)
+    if size <= _GOOD:
+        return []
+    for slip in (*_length_slips(some), *_joint_slips(some)):
+        mended = _misfit(robot, slip.data)
+        if mended <= _GOOD and _BETTER * mended / _spread(slip.data) < size / _spread(some):
+            return [Notice(slip.code, f"{slip.words}.")]
+    return []
+
+
+def _far_from_fixtures(robot: Robot, data: Dataset) -> list[Suspect]:
+    """Doubt readings against fixtures that a robust geometric fit leaves far off."""
+    geometric = next(m for m in MODELS if m.name == "geometric")
+    errors = errors_of(identify(robot, data, geometric, loss="cauchy").robot, data)
+    off = _off(errors)
+    allowed = max(_FAR_AT_LEAST, _FAR * float(np.nanmedian(off)))
+    return [
+        Suspect(
+            "outliers", data.labels[data.configuration[r]], data.targets[data.target[r]], f"{off[r] * 1e3:.3g} mm off"
+        )
+        for r in np.flatnonzero(np.nan_to_num(off) > allowed).tolist()
+    ]
+
+
+def _off(errors: Errors) -> Array:
+    """Return how far off each position, distance or height is [m], NaN where there is none."""
+    off: Array = np.linalg.norm(errors.position, axis=1)
+    return off if errors.length is None else np.where(np.isfinite(off), off, np.abs(errors.length))
+
+
 def _misfit(robot: Robot, data: Dataset) -> float:
-    """Return the median distance that the placed nominal robot leaves [m]."""
-    return float(np.median(errors_of(initial_frames(robot, data), data).position_norms))
+    """Return the median distance that the placed nominal robot leaves [m]; infinite if it cannot be placed."""
+    if data.fixture is None:
+        return float(np.median(errors_of(initial_frames(robot, data), data).position_norms))
+    try:
+        return float(np.nanmedian(_off(errors_of(initial_standing(robot, data), data))))
+    except InputError:
+        return math.inf
 
 
 def _spread(data: Dataset) -> float:
     """Return how far the readings lie apart [m]: positions that shrink fit better, but not in proportion."""
+    if data.fixture is not None:
+        counted = [data.position, *(v[:, None] for v in (data.distance, data.height) if v is not None)]
+        return float(np.sqrt(np.nanmean(np.concatenate([v.reshape(-1) for v in counted]) ** 2))) + 1e-3
     return float(np.sqrt(np.mean(np.var(data.position[data.has_position], axis=0)))) + 1e-12
 
 
@@ -133,8 +178,20 @@ def _length_slips(data: Dataset) -> Iterator[_Slip]:
         (25.4, "25.4 times too small, as if inches were called mm"),
         (1 / 25.4, "25.4 times too large, as if mm were called inches"),
     ):
-        words = f"The positions are {words}. Mend the unit in the header"
-        yield _Slip("unit-length", words, replace(data, position=data.position * factor))
+        what = "positions" if data.fixture is None else "lengths"
+        words = f"The {what} are {words}. Mend the unit in the header"
+        yield _Slip("unit-length", words, _scaled(data, factor))
+
+
+def _scaled(data: Dataset, factor: float) -> Dataset:
+    """Return the data with all measured lengths so many times as large."""
+
+    def scaled(values: Array | None) -> Array | None:
+        return None if values is None else values * factor
+
+    setup = None if data.setup is None else _scaled(data.setup, factor)
+    more = {"distance": scaled(data.distance), "height": scaled(data.height), "setup": setup}
+    return replace(data, position=data.position * factor, **more)  # type: ignore[arg-type]
 
 
 def _joint_slips(data: Dataset) -> Iterator[_Slip]:
@@ -168,10 +225,10 @@ def _joint_slips(data: Dataset) -> Iterator[_Slip]:
         yield _Slip("joint-sign", words + "Exchange their columns", with_joints(joints))
 
 
-def _some(data: Dataset) -> Dataset:
-    if data.configurations <= _ENOUGH:
+def _some(data: Dataset, enough: int = _ENOUGH) -> Dataset:
+    if data.configurations <= enough:
         return data
-    return data.of_configurations(np.linspace(0, data.configurations - 1, _ENOUGH).astype(np.intp))
+    return data.of_configurations(np.linspace(0, data.configurations - 1, enough).astype(np.intp))
 
 
 def _only(data: Dataset, target: int) -> Dataset:

@@ -192,7 +192,7 @@ def unseen_but_felt(robot: Robot, data: Dataset, free: FreeParameters, seed: int
             parts.append(robot.angular(sweep, q, free.names))
         moved = [part.reshape(len(free.names), -1).T * free.prior for part in parts]
         if trusted:
-            moved = _but_for(trusted, robot, sweep, moved)
+            moved = but_for(trusted, robot, sweep, moved)
         felt = np.concatenate([felt, *moved])
     _, strength, turned = np.linalg.svd(felt @ unseen.T, full_matrices=False)
     lost = (
@@ -217,8 +217,18 @@ def taken_on_trust(data: Dataset) -> tuple[str, ...]:
     return "base", "size"
 
 
-def _but_for(trusted: Sequence[str], robot: Robot, sweep: Sweep, moved: Sequence[Array]) -> list[Array]:
-    """Take out of moves of a target what a motion of the whole robot does, and a change of its size."""
+def but_for(trusted: Sequence[str], robot: Robot, sweep: Sweep, moved: Sequence[Array]) -> list[Array]:
+    """Take out of moves of a target what a motion of the whole robot does, and a change of its size.
+
+    Parameters
+    ----------
+    trusted
+        From :func:`taken_on_trust`.
+    sweep
+        To the target, at n configurations.
+    moved
+        How it moves [m], and turns if that is asked too, by each parameter, ``(3 n, parameters)`` each.
+    """
     base = [f"base_{axis}" for axis in ("x", "y", "z", "rx", "ry", "rz")]
     places = [sweep.places[name] for name in base]
     columns = [part.reshape(6, -1).T for part in (sweep.linear(places), sweep.angular(places))[: len(moved)]]

@@ -143,7 +143,8 @@ def select(
                 bounds_file=bounds_file,
                 small=_ROUGH,
             )
-            spread = errors_of(fit.robot, held_out).position_spread
+            judged = errors_of(fit.robot, held_out)
+            spread = judged.position_spread or judged.length_spread
             errors.append(np.nan if spread is None else spread.mean)
         return np.array(errors)
 
@@ -176,8 +177,9 @@ def select(
 
 def _fold(training: Dataset, held_out: Dataset) -> tuple[Dataset, Dataset]:
     """Return both parts, without those held-out positions whose target the training part does not place."""
-    placed = np.isin(held_out.target, training.target[training.has_position])
-    return training, replace(held_out, position=np.where(placed[:, None], held_out.position, np.nan), quaternion=None)
+    read = training.has_position if training.fixture is None else training.has_reading
+    placed = np.isin(held_out.target, training.target[read]) & np.isin(held_out.against, training.against[read])
+    return training, replace(held_out.of_readings(placed), quaternion=None)
 
 
 def _open(robot: Robot, effects: tuple[str, ...], data: Dataset) -> list[str]:

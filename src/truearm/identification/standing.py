@@ -35,9 +35,10 @@ _STEP: Final = 0.09
 _TRIED: Final = 6
 #: Deviation that readings are weighed with while targets are looked for [m or rad].
 _ROUGH: Final = 1e-3
-_FLAT: Final = 1e-6
 #: Heights that fit worse than this on one side of a plane belong to the other [m].
 _CLEARLY: Final = 2e-3
+#: How many readings that takes.
+_ENOUGH: Final = 120
 _TELLS: Final = 1e-5
 
 
@@ -63,10 +64,14 @@ def initial_standing(robot: Robot, data: Dataset) -> Robot:
     missing = [t for t in range(len(data.targets)) if data.targets[t] not in {t.name for t in placed.targets}]
     for target in missing:
         placed = _with_target(placed, data, target, kinds)
-    places = _fixture_places(placed, data, kinds)
-    placed = placed.with_fixtures(places)
+    placed = placed.with_fixtures(_fixture_places(placed, data, kinds))
     _refuse_alike(placed, data)
     return placed
+
+
+def with_fixtures_of(robot: Robot, data: Dataset) -> Robot:
+    """Return a robot that stands where it says, with its own targets, and with the fixtures of readings of these."""
+    return robot if data.fixture is None else robot.with_fixtures(_fixture_places(robot, data, _kinds(data)))
 
 
 def unanchored(free: FreeParameters, data: Dataset) -> FreeParameters:
@@ -224,6 +229,10 @@ def _also(robot: Robot, found: Mapping[str, Array]) -> Robot:
 def _with_target(robot: Robot, data: Dataset, target: int, kinds: Mapping[str, FixtureKind]) -> Robot:
     """Return the robot with a target whose place only distances and heights tell."""
     mine = replace(data.of_readings(data.target == target), setup=None, sigma=None, sigma_rot=None)
+    if len(mine.target) > _ENOUGH:
+        some = np.zeros(len(mine.target), dtype=bool)
+        some[np.linspace(0, len(some) - 1, _ENOUGH).astype(np.intp)] = True
+        mine = mine.of_readings(some)
     name = data.targets[target]
     p, R = robot.poses(mine.postures)
     p, R = p[mine.configuration], R[mine.configuration]

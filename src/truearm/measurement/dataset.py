@@ -129,8 +129,9 @@ class Dataset:
     @property
     def has_reading(self) -> NDArray[np.bool_]:
         """Which readings hold anything."""
-        parts = [self.position, *(v for v in (self.quaternion, self.distance, self.height) if v is not None)]
-        return np.asarray(np.any([np.isfinite(v.reshape(len(v), -1)).all(axis=1) for v in parts], axis=0))
+        lengths = [np.isfinite(v) for v in (self.distance, self.height) if v is not None]
+        whole = [np.isfinite(v).all(axis=1) for v in (self.position, self.quaternion) if v is not None]
+        return np.asarray(np.any([*whole, *lengths], axis=0))
 
     @property
     def anchored(self) -> bool:

@@ -56,16 +56,16 @@ def truth_twin(robot: Robot, truth: str, rng: np.random.Generator) -> Twin:
         joints = joint_truths(true)
         for number, compliance in published.compliance.items():
             joints[number] = replace(joints.get(number, PERFECT), compliance=compliance)
-        return Twin(_stationed(true, tool), joints, _contact(true))
+        return Twin(stationed(true, tool), joints, _contact(true))
     if truth == "nominal":
-        return Twin(_stationed(robot, tool), joint_truths(robot), _contact(robot))
+        return Twin(stationed(robot, tool), joint_truths(robot), _contact(robot))
     if truth == "random":
         drawn = {
             p.name: p.value + p.prior * float(rng.standard_normal())
             for p in robot.parameters.values()
             if p.group in ("geometry", "joint zero")
         }
-        return Twin(_stationed(robot.with_values(drawn), tool), joint_truths(robot), _contact(robot))
+        return Twin(stationed(robot.with_values(drawn), tool), joint_truths(robot), _contact(robot))
     if not Path(truth).suffix and not exists(Path(truth)):
         known = truth_names(robot)
         near = nearest_names(truth, known)
@@ -84,7 +84,7 @@ def truth_twin(robot: Robot, truth: str, rng: np.random.Generator) -> Twin:
             came=f"{len(other.joints)} joints",
             allowed=f"{len(robot.joints)}, of the same kinds",
         )
-    return Twin(other if other.targets else _stationed(other, tool), joint_truths(other), _contact(other))
+    return Twin(other if other.targets else stationed(other, tool), joint_truths(other), _contact(other))
 
 
 def joint_truths(robot: Robot) -> dict[int, JointTruth]:
@@ -120,8 +120,8 @@ def _contact(robot: Robot) -> Contact:
     return "document" if "clearance-linear-contact" in robot.effect_names else "exact"
 
 
-def _stationed(robot: Robot, tool: Tool) -> Robot:
-    """Return the robot with its base as it is, seen from the station, carrying the tool.
+def stationed(robot: Robot, tool: Tool) -> Robot:
+    """Return a robot with its base as it is, seen from the station, carrying a tool.
 
     A payload that the robot has already includes the tool's mass.
     """

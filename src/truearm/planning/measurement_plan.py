@@ -13,7 +13,10 @@ from numpy.typing import NDArray
 from truearm.errors import InputError
 from truearm.identification.frames import initial_frames
 from truearm.identification.models import Model
+from truearm.identification.redundancy import taken_on_trust
+from truearm.identification.standing import unanchored, with_fixtures_of
 from truearm.measurement.dataset import Dataset
+from truearm.measurement.devices import Device, standing_for
 from truearm.measurement.truths import DEFAULT_TOOL
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import NO_PAYLOAD, Payload
@@ -24,7 +27,7 @@ from truearm.planning.exchange import FIRST, most_telling, most_telling_number
 from truearm.planning.observability import INDICES, observability
 from truearm.planning.ordering import short_order
 from truearm.planning.prediction import Prediction, predict
-from truearm.planning.sensitivity import sensitivity
+from truearm.planning.sensitivity import sensitivity, sensitivity_of_readings
 
 #: How far before a configuration each joint stops, to come to it moving forward [rad; m for sliding joints].
 APPROACH: Final = {"revolute": np.deg2rad(2.0), "prismatic": 5e-3}
@@ -128,6 +131,37 @@ def random_candidates(robot: Robot, count: int, rng: np.random.Generator) -> Pos
     return Postures(joints, approach=np.ones_like(joints), number=np.zeros(count))
 
 
+@dataclass(frozen=True)
+class _AsSaid:
+    """A robot taken at its word, as a device measures it."""
+
+    robot: Robot
+
+    def frames(self, joints: Array) -> Mapping[str, Array]:
+        found = {}
+        for target in self.robot.targets:
+            frame = np.tile(np.eye(4), (len(joints), 1, 1))
+            frame[:, :3, 3], frame[:, :3, :3] = self.robot.poses(joints, target.name)
+            found[target.name] = frame
+        return found
+
+
+def device_candidates(
+    robot: Robot, device: Device, count: int, rng: np.random.Generator
+) -> tuple[Robot, Dataset, Postures]:
+    """Return configurations that a device could measure.
+
+    Returns
+    -------
+    The robot where the device has it stand, with its tool; what the device would read of it without noise; and the
+    postures, each joint coming to them moving forward.
+    """
+    seen = standing_for(device, robot)
+    readings = device.campaign(seen, _AsSaid(seen.rigid), count, 0.0, rng)
+    at = Postures(readings.joints, approach=np.ones_like(readings.joints), number=np.zeros(count))
+    return seen, readings, at
+
+
 def plan_measurements(
     robot: Robot,
     candidates: Postures,
@@ -141,6 +175,7 @@ def plan_measurements(
     constraints: Constraints | None = None,
     where: str = "constraints",
     seen_from_the_origin: bool = True,
+    readings: Dataset | None = None,
 ) -> MeasurementPlan:
     """Choose configurations to measure.
 
@@ -166,6 +201,9 @@ def plan_measurements(
         What a configuration must keep besides the robot's limits, and the file that says so, for messages.
     seen_from_the_origin
         Whether the instrument stands at the origin of the robot's world, as after a calibration.
+    readings
+        What a device would read at the candidates, see :func:`device_candidates`; None for the positions of all targets
+        at each.
 
     Raises
     ------
@@ -189,7 +227,14 @@ def plan_measurements(
     rejected = {name: int(np.sum(~keeps)) for name, keeps in kept.items()}
     usable = np.flatnonzero(np.all(list(kept.values()), axis=0))
     _refuse_too_few(FIRST if poses is None else poses, len(usable), len(candidates), rejected)
-    told = sensitivity(seen, candidates.at(usable), model, noise)
+    if readings is None:
+        free = model.free(seen)
+        trusted: tuple[str, ...] = ()
+        told = sensitivity(seen, candidates.at(usable), free, noise)
+    else:
+        seen = with_fixtures_of(seen, readings)
+        free, trusted = unanchored(model.free(seen), readings), taken_on_trust(readings)
+        told = sensitivity_of_readings(seen, readings.of_configurations(usable), free, noise)
     among = told.told_apart(FIRST if poses is None else poses)
     rows, known = np.ascontiguousarray(told.rows[..., among]), told.known[np.ix_(among, among)]
     if poses is not None and poses * rows.shape[1] < len(among):
@@ -207,6 +252,7 @@ def plan_measurements(
     chosen = usable[order]
     joints = candidates.joints[chosen]
     elsewhere = random_candidates(seen, _ELSEWHERE, rng)
+    predicted = sensitivity(seen, elsewhere, free, noise, trusted)
     chosen_rows = rows[order].reshape(-1, len(among))
     return MeasurementPlan(
         robot=seen,
@@ -222,7 +268,7 @@ def plan_measurements(
         usable=len(usable),
         left_out=tuple(name for k, name in enumerate(told.free.names) if k not in among),
         seconds=seconds,
-        prediction=predict(seen, told, order, sensitivity(seen, elsewhere, model, noise), elsewhere.joints, noise, rng),
+        prediction=predict(seen, told, order, predicted, elsewhere.joints, noise, rng),
     )
 
 

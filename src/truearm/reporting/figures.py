@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from truearm.identification.fit import Fit
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
-from truearm.modeling.transform import Transform
 from truearm.reporting.drawing import (
     AFTER,
     BEFORE,
@@ -75,21 +74,21 @@ def histogram(before: Array, after: Array, unit: str, what: str) -> Figure:
     return figure(traces, 330, xaxis=x, yaxis=axis("readings"), barmode="overlay", bargap=0)
 
 
-def workspace(part: Dataset, base: Transform, before: Array, after: Array) -> Figure:
-    """Show where readings were taken, coloured by their position error, with a switch between before and after.
+def workspace(part: Dataset, tips: Array, before: Array, after: Array) -> Figure:
+    """Show where readings were taken, coloured by their error, with a switch between before and after.
 
     Parameters
     ----------
     part
         The readings.
-    base
-        ``T_world_base``.
+    tips
+        Where the target of each is, in the robot's base frame [m], ``(readings, 3)``.
     before, after
-        Position error of each reading [mm], NaN where none was read.
+        Error of each reading [mm], NaN where none was read.
     """
     kept = np.isfinite(before) & np.isfinite(after)
     before, after = before[kept], after[kept]
-    points = (part.position[kept] - np.array(base.translation)) @ base.rotation * 1e3
+    points = tips[kept] * 1e3
     names = [
         [html.escape(part.labels[c]), html.escape(part.targets[t]), b, a]
         for c, t, b, a in zip(
@@ -159,14 +158,14 @@ def workspace(part: Dataset, base: Transform, before: Array, after: Array) -> Fi
 def residuals(
     data: Dataset, parts: Sequence[tuple[str, NDArray[np.intp], Array]], doubted: NDArray[np.bool_]
 ) -> Figure:
-    """Show the position error after calibration of every configuration, mean over its targets, as measured.
+    """Show the error after calibration of every configuration, mean over its targets, as measured.
 
     Parameters
     ----------
     data
         All readings.
     parts
-        Training and then held-out: name, indices of the configurations, position error of each reading [mm].
+        Training and then held-out: name, indices of the configurations, error of each reading [mm].
     doubted
         Which training readings the loss doubted.
     """
@@ -216,9 +215,9 @@ def residuals(
             }
         )
     shown = np.concatenate([np.asarray(trace["y"], float) for trace in traces]) if traces else np.ones(1)
-    y = axis("position error [mm]")
+    y = axis("error [mm]")
     if shown.max() > 2 * _LOGARITHMIC * float(np.median(shown)) and shown.min() > 0:
-        y = logarithmic_axis("position error [mm]", float(shown.min()), float(shown.max()))
+        y = logarithmic_axis("error [mm]", float(shown.min()), float(shown.max()))
     else:
         y["rangemode"] = "tozero"
     return figure(traces, 360, xaxis=axis("configuration, in measuring order"), yaxis=y)

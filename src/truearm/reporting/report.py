@@ -31,7 +31,7 @@ from truearm.reporting.tables import (
     strongest_pairs,
 )
 
-_FRAMES: Final = ("base", "target")
+_FRAMES: Final = ("base", "target", "fixture")
 #: A reading whose weight is less than this share of the median weight was not believed.
 _DOUBTED: Final = 0.5
 
@@ -96,6 +96,11 @@ class Report:
         """Orientation errors [mrad], likewise; empty where none was read."""
         return spread_rows(self.nominal, self.train, self.validation, "orientation")
 
+    @property
+    def length(self) -> tuple[SpreadRow, ...]:
+        """Errors of distances and heights [mm], likewise; empty where none was read."""
+        return spread_rows(self.nominal, self.train, self.validation, "length")
+
     def figures(self) -> dict[str, Figure]:
         """Return the pictures by the name of their place on the page."""
         nominal, judged = self.nominal, self.judged
@@ -108,16 +113,26 @@ class Report:
             drawn["orientation-histogram"] = histogram(
                 nominal.orientation_norms * 1e3, judged.orientation_norms * 1e3, "mrad", "orientation error"
             )
-        if len(judged.position_norms):
-            drawn["workspace"] = workspace(
-                self.judged_part, self.fit.robot.base, _millimetres(nominal), _millimetres(judged)
+        if len(judged.length_norms):
+            drawn["length-histogram"] = histogram(
+                nominal.length_norms * 1e3, judged.length_norms * 1e3, "mm", "error of distances and heights"
             )
+        if np.isfinite(_millimetres(judged)).any():
+            drawn["workspace"] = workspace(self.judged_part, self._tips(), _millimetres(nominal), _millimetres(judged))
         parts = [("training", self.training, _millimetres(self.train))]
         if self.validation is not None:
             parts.append(("held out", self.held_out, _millimetres(self.validation)))
         drawn["residuals"] = residuals(self.data, parts, self._doubted())
         drawn["correlations"] = correlation_map(self.fit)
         return drawn
+
+    def _tips(self) -> Array:
+        """Return where the target of each judged reading is, in the robot's base frame [m], ``(readings, 3)``."""
+        part, robot = self.judged_part, self.fit.robot
+        seen = robot.loaded(part.postures)
+        tips = np.array([robot.poses(seen, name)[0] for name in part.targets])
+        base = robot.base
+        return np.asarray((tips[part.target, part.configuration] - np.array(base.translation)) @ base.rotation)
 
     def _doubted(self) -> NDArray[np.bool_]:
         """Return which training readings a robust loss left less than half the weight of a typical one.
@@ -151,6 +166,6 @@ def report_html(report: Report) -> str:
 
 
 def _millimetres(errors: Errors) -> Array:
-    """Return the position error of each reading, NaN where none was read."""
+    """Return the error of each position, distance or height, NaN where none was read."""
     norms: Array = np.linalg.norm(errors.position, axis=1) * 1e3
-    return norms
+    return norms if errors.length is None else np.where(np.isfinite(norms), norms, np.abs(errors.length) * 1e3)

@@ -20,7 +20,11 @@ _DECIMALS: Final = {
 }
 #: Correlated pairs that are listed.
 _PAIRS: Final = 10
-_SIGMA_SHOWN: Final = {"position": ("mm", 1e3), "orientation": ("mrad", 1e3)}
+_SIGMA_SHOWN: Final = {
+    **dict.fromkeys(("position", "distance", "height"), ("mm", 1e3)),
+    "orientation": ("mrad", 1e3),
+}
+_PER: Final = {"position": "coordinate", "orientation": "rotation axis", "distance": "reading", "height": "reading"}
 
 
 @dataclass(frozen=True)
@@ -52,15 +56,19 @@ class SpreadRow:
 
 
 def spread_rows(nominal: Errors, train: Errors, validation: Errors | None, kind: str) -> tuple[SpreadRow, ...]:
-    """Return the errors of one kind, ``position`` in mm or ``orientation`` in mrad; nothing where none was read."""
+    """Return the errors of one kind, ``position`` and ``length`` in mm, ``orientation`` in mrad; none without any."""
     part = "training" if validation is None else "held out"
     cases = [(part, "before", nominal), (part, "after", train if validation is None else validation)]
     if validation is not None:
         cases.append(("training", "after", train))
     rows = []
     for part, robot, errors in cases:
-        spread: Spread | None = errors.position_spread if kind == "position" else errors.orientation_spread
-        norms = errors.position_norms if kind == "position" else errors.orientation_norms
+        spread: Spread | None
+        spread, norms = {
+            "position": (errors.position_spread, errors.position_norms),
+            "orientation": (errors.orientation_spread, errors.orientation_norms),
+            "length": (errors.length_spread, errors.length_norms),
+        }[kind]
         if spread is not None:
             figures = (spread.mean * 1e3, spread.rms * 1e3, spread.p95 * 1e3, spread.max * 1e3)
             rows.append(SpreadRow(part, robot, errors.configurations, len(norms), figures))
@@ -169,9 +177,8 @@ class NoiseRow:
 
 def noise_rows(fit: Fit) -> Sequence[NoiseRow]:
     """Return the deviation of a reading for each kind of observation."""
-    per = {"position": "coordinate", "orientation": "rotation axis"}
     return [
-        NoiseRow(kind, per[kind], _SIGMA_SHOWN[kind][0], sigma * _SIGMA_SHOWN[kind][1])
+        NoiseRow(kind, _PER[kind], _SIGMA_SHOWN[kind][0], sigma * _SIGMA_SHOWN[kind][1])
         for kind, sigma in fit.sigma.items()
     ]
 

@@ -43,15 +43,30 @@ class Entry:
 
 STUDIES: Final = (
     Entry(
+        "hexapod-device",
+        "what one ballbar between six cups can measure, and how well (Nubiola 3)",
+        "truearm.studies.hexapod_device",
+    ),
+    Entry(
         "irb120-axes",
         "one joint of an IRB 120 turned at a time: compliance, run-out and backlash (Nubiola 2.4)",
         "truearm.studies.irb120_axes",
+    ),
+    Entry(
+        "irb120-devices",
+        "a simulated IRB 120 calibrated with tracker, cameras and every other instrument (Nubiola 1.7, 2.2 to 2.7)",
+        "truearm.studies.irb120_devices",
     ),
     Entry(
         "irb120-faro",
         "a measured IRB 120: what every model leaves, and where it comes from (with --data)",
         "truearm.studies.irb120_faro",
         ("joints_commanded.txt", *(f"{kind}_{number}.txt" for kind in ("target", "base") for number in (1, 2, 3))),
+    ),
+    Entry(
+        "irb120-hexapod",
+        "a simulated IRB 120 judged and calibrated with one ballbar (Nubiola 2.6.3 and 3.5)",
+        "truearm.studies.irb120_hexapod",
     ),
     Entry(
         "irb120-simulation",
@@ -82,6 +97,16 @@ STUDIES: Final = (
         "kr5-gdt",
         "a KUKA KR 5: joint errors from circles, tolerances, seven lines before and after compensation (KR5 paper)",
         "truearm.studies.kr5_gdt",
+    ),
+    Entry(
+        "li-table",
+        "an arm of three joints that touches a tilted table of known points, fitted in bounds (Li et al.)",
+        "truearm.studies.li_table",
+    ),
+    Entry(
+        "lrmate-hexapod",
+        "an LR Mate calibrated with one ballbar in two steps, and with a tracker; its truth is invented (Nubiola 4)",
+        "truearm.studies.lrmate_hexapod",
     ),
 )
 

@@ -18,7 +18,7 @@ from truearm.measurement.devices import DEVICES, Device, measured_with
 from truearm.measurement.devices.artefacts import MARKERS, PLANAR_ARTEFACT, SPATIAL_ARTEFACT, Artefact
 from truearm.measurement.devices.drawn_circle.pencil import DRAWN_CIRCLE, PencilCircle
 from truearm.measurement.devices.hexapod.kinematics import rigid_motion
-from truearm.measurement.devices.printed_circle import TOUCH_UP
+from truearm.measurement.devices.known_points import TOUCH_UP
 from truearm.measurement.devices.tracker import TRACKER, Tracker
 from truearm.measurement.twin import Twin
 from truearm.modeling.chain import Array

@@ -17,7 +17,7 @@ from truearm.errors import InputError
 from truearm.modeling.chain import Array
 
 #: Pairs that are worked on at once.
-_BLOCK: Final = 80_000
+_BLOCK: Final = 160_000
 #: Bins of the histogram at most, and the first digits of their width.
 _BINS: Final = 200
 _WIDTHS: Final = (1.0, 2.0, 5.0, 10.0)

@@ -6,15 +6,16 @@ from typing import Final
 
 from truearm.errors import InputError, nearest_names
 from truearm.measurement.devices.artefacts import MARKERS, PLANAR_ARTEFACT, SPATIAL_ARTEFACT
-from truearm.measurement.devices.device import Arm, Device, measured_with
+from truearm.measurement.devices.device import Arm, Device, measured_with, standing_for
 from truearm.measurement.devices.drawn_circle.pencil import DRAWN_CIRCLE
+from truearm.measurement.devices.hexapod_poses import HEXAPOD
+from truearm.measurement.devices.known_points import CALIBRATION_TABLE, TOUCH_UP
 from truearm.measurement.devices.lengths import BALLBAR, STRINGS
-from truearm.measurement.devices.printed_circle import TOUCH_UP
 from truearm.measurement.devices.small_volumes import FIVE_LASERS, GAUGES, STEREO
 from truearm.measurement.devices.touching import PLANE, POINT, SPHERE, TWO_SPHERES
 from truearm.measurement.devices.tracker import MEASUREMENT_ARM, TRACKER
 
-__all__ = ["DEVICES", "Arm", "Device", "measured_with", "named_device"]
+__all__ = ["DEVICES", "Arm", "Device", "measured_with", "named_device", "standing_for"]
 
 DEVICES: Final[tuple[Device, ...]] = (
     TRACKER,
@@ -23,6 +24,7 @@ DEVICES: Final[tuple[Device, ...]] = (
     SPATIAL_ARTEFACT,
     MARKERS,
     BALLBAR,
+    HEXAPOD,
     STRINGS,
     STEREO,
     FIVE_LASERS,
@@ -31,6 +33,7 @@ DEVICES: Final[tuple[Device, ...]] = (
     SPHERE,
     TWO_SPHERES,
     POINT,
+    CALIBRATION_TABLE,
     TOUCH_UP,
     DRAWN_CIRCLE,
 )

@@ -59,6 +59,11 @@ class Artefact(Device):
     def campaign(self, nominal: Robot, arm: Arm, count: int, sigma: float, rng: np.random.Generator) -> Dataset:
         """Return the pose of the artefact at random configurations that show enough of it."""
         joints, _ = shown(nominal, count, rng, self.visible, self.name)
+        return self.read(nominal, arm, joints, sigma, rng)
+
+    def read(self, nominal: Robot, arm: Arm, joints: Array, sigma: float, rng: np.random.Generator) -> Dataset:
+        """Return the pose of the artefact at joint readings ``(n, joints)``."""
+        count = len(joints)
         frames = arm.frames(joints)[nominal.targets[0].name]
         place = frames[:, :3, 3] + sigma * rng.standard_normal((count, 3))
         spread = sigma / self.size

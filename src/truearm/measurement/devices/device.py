@@ -12,13 +12,18 @@ from numpy.typing import NDArray
 
 from truearm.errors import InputError
 from truearm.measurement.dataset import Dataset
+from truearm.measurement.truths import DEFAULT_TOOL, stationed
+from truearm.measurement.devices.hexapod.kinematics import rigid_motion
 from truearm.measurement.twin import Twin, directions
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import Tool
 from truearm.modeling.robot import Robot
+from truearm.modeling.transform import Transform
 
 IntArray = NDArray[np.intp]
 _DRAWS: Final = 200
+_DRAWN: Final = 2000
+_TRIED: Final = 100
 
 
 class Arm(Protocol):
@@ -87,7 +92,8 @@ def measured_with(
     Parameters
     ----------
     nominal
-        The robot as it is known; where it stands and what it carries is taken from the twin.
+        The robot as it is known; where it stands and what it carries is taken from the twin. A twin may count its base
+        from elsewhere (from axis 2, say), so the nominal robot stands where its flange is nearest to the true one.
     twin
         The true robot, given the device's tool if it needs one.
     count
@@ -100,8 +106,20 @@ def measured_with(
         twin = replace(twin, robot=carrying)
     values = twin.robot.values
     places = {t.name: [values[t.parameter(axis)] for axis in "xyz"] for t in twin.robot.targets}
-    standing = nominal.with_frames(twin.robot.base, places)
+    standing = nominal.with_frames(_where_it_stands(nominal, twin.robot), places)
     return device.campaign(standing, twin, count, device.sigma if sigma is None else sigma, rng)
+
+
+def standing_for(device: Device, robot: Robot) -> Robot:
+    """Return a robot where a simulated instrument sees it, with the device's tool or, if that needs none, its own."""
+    tool = device.tool or next(iter(robot.tools.values()), DEFAULT_TOOL)
+    return stationed(robot, tool)
+
+
+def _where_it_stands(nominal: Robot, true: Robot) -> Transform:
+    q = nominal.random_configurations(_TRIED, np.random.default_rng(0))
+    at_origin = nominal.with_frames(Transform(), {})
+    return Transform.from_matrix(*rigid_motion(at_origin.poses(q)[0], true.poses(q)[0]))
 
 
 def recorded(
@@ -136,6 +154,11 @@ def recorded(
     """
     names = tuple(dict.fromkeys(target))
     n = len(joints)
+    if fixture is not None:
+        used = np.unique(fixture[fixture >= 0])
+        place = np.full(len(fixtures), -1)
+        place[used] = np.arange(len(used))
+        fixtures, fixture = tuple(fixtures[k] for k in used), place[fixture]
     return Dataset(
         source=source,
         labels=tuple(str(k + 1) for k in range(n)),
@@ -177,7 +200,7 @@ def shown(
     """
     found, seen = [], []
     for _ in range(_DRAWS):
-        drawn = nominal.random_configurations(500, rng)
+        drawn = nominal.random_configurations(_DRAWN, rng)
         sees = visible(nominal, drawn)
         some = sees.any(axis=1)
         found.append(drawn[some])
@@ -187,7 +210,7 @@ def shown(
     raise InputError(
         f"{what} sees too few configurations of {nominal.name}",
         where="--device",
-        came=f"{sum(map(len, found))} among {500 * _DRAWS} within the limits",
+        came=f"{sum(map(len, found))} among {_DRAWN * _DRAWS} within the limits",
         allowed=f"{count} or more",
         cure="Take fewer poses, or another device.",
     )

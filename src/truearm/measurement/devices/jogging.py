@@ -17,6 +17,8 @@ _STEPS: Final = 40
 _STRIDE: Final = 0.3  # rad or m at most in a step
 _THERE: Final = 1e-10  # m
 _STARTS: Final = 24
+_TOGETHER: Final = 4000
+_MOST: Final = 0.8
 _ROUNDS: Final = 25
 _DAMPING: Final = 1e-6
 _MARGIN: Final = 1e-3
@@ -99,10 +101,13 @@ def postures_at(
         if len(reached) == count:
             return reached, found[reached]
         open_goals = np.flatnonzero(np.isnan(found[:, 0]))[: 2 * count]
-        of = np.repeat(open_goals, _STARTS)
+        of = np.repeat(open_goals, max(2, min(_STARTS, _TOGETHER // len(open_goals))))
         q = nominal.random_configurations(len(of), rng)
         for _ in range(_STEPS):
             missing = goals[of] - nominal.poses(q, target)[0]
+            far = np.linalg.norm(missing, axis=1)
+            if np.mean(far < 1e-8) > _MOST:
+                break
             q = q + _least(nominal.joint_jacobian(q, target)[:, :3], missing)
         place, _ = nominal.poses(q, target)
         good = np.linalg.norm(goals[of] - place, axis=1) < 1e-8

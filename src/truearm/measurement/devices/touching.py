@@ -19,28 +19,38 @@ _STYLUS: Final = Tool({"stylus": (0.02, 0.01, 0.15)})
 
 @dataclass(frozen=True)
 class PlaneProbe(Device):
-    """A touch probe on a flat plate: its tip is in a plane, where nobody knows.
+    """A touch probe on a flat plate, level and leaning to two sides: its tip is in a plane, where nobody knows.
+
+    A level plate alone says nothing of lengths across an upright first axis.
 
     Attributes
     ----------
     size
         Side of the plate [m].
+    leaning
+        By how much it leans [rad].
     """
 
-    size: float = 0.4
+    size: float = 0.3
+    leaning: float = np.deg2rad(30.0)
 
     def campaign(self, nominal: Robot, arm: Arm, count: int, sigma: float, rng: np.random.Generator) -> Dataset:
-        """Return contacts all over the plate, the probe within 60 deg of upright."""
-        turned, middle = nominal.base.rotation, site(nominal)
-        places = np.column_stack([rng.uniform(-0.5, 0.5, (SPARE * count, 2)) * self.size, np.zeros(SPARE * count)])
-        name, up = nominal.targets[0].name, turned[:, 2]
-        goals = middle + places @ turned.T
-        facing = np.tile(-up, (len(goals), 1))
-        _, joints = postures_at(nominal, name, goals, count, rng, self.name, facing=facing)
+        """Return contacts all over the plate in turns, the probe within 60 deg of its normal."""
+        base, middle = nominal.base.rotation, site(nominal)
+        c, s = np.cos(self.leaning), np.sin(self.leaning)
+        about_x, about_y = [[1, 0, 0], [0, c, -s], [0, s, c]], [[c, 0, s], [0, 1, 0], [-s, 0, c]]
+        plates = base @ np.array([np.eye(3), about_x, about_y])
+        of = np.arange(SPARE * count) % len(plates)
+        places = np.column_stack([rng.uniform(-0.5, 0.5, (len(of), 2)) * self.size, np.zeros(len(of))])
+        name = nominal.targets[0].name
+        goals = middle + np.einsum("nij,nj->ni", plates[of], places)
+        facing = -plates[of, :, 2]
+        kept, joints = postures_at(nominal, name, goals, count, rng, self.name, facing=facing)
+        of, up = of[kept], -facing[kept]
         miss = sigma * rng.standard_normal(count)
 
         def short(place: Array) -> Array:
-            return np.asarray((miss - (place - middle) @ up)[:, None] * up)
+            return np.asarray((miss - np.sum((place - middle) * up, axis=1))[:, None] * up)
 
         joints = jogged(nominal, arm, name, joints, short)
         return recorded(
@@ -50,8 +60,8 @@ class PlaneProbe(Device):
             range(count),
             [name] * count,
             height=np.zeros(count),
-            fixtures=("plate",),
-            fixture=np.zeros(count, dtype=np.intp),
+            fixtures=("plate_level", "plate_leaning_1", "plate_leaning_2"),
+            fixture=of.astype(np.intp),
             sigma=sigma,
         )
 
@@ -153,7 +163,7 @@ class HeldAtPoint(Device):
 
 PLANE: Final = PlaneProbe(
     "plane",
-    "touch probe on a flat plate of 400 mm",
+    "touch probe on a flat plate of 300 mm, level and leaning by 30 deg to two sides",
     "Nubiola, section 1.2 (Ikits and Hollerbach; Zhuang et al.); deviation ours",
     sigma=5e-6,
     tool=_STYLUS,

@@ -8,8 +8,8 @@ the final calibration is made from all.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,11 +17,12 @@ from truearm.errors import InputError
 from truearm.identification.fit import Fit, identify
 from truearm.identification.models import Model
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.devices.hexapod.geometry import side_names, triangle
-from truearm.measurement.devices.hexapod.kinematics import rigid_motion, tool_cups
+from truearm.measurement.devices.hexapod.geometry import triangle
+from truearm.measurement.devices.hexapod.kinematics import rigid_motion
 from truearm.measurement.devices.hexapod.poses import HexapodPose
+from truearm.measurement.devices.hexapod.session import cups_dataset, joined, measure_poses, set_up
 from truearm.measurement.devices.hexapod.sheet import PlannedRow
-from truearm.measurement.devices.hexapod.simulated import Ballbar, measured_legs, measured_sides
+from truearm.measurement.devices.hexapod.simulated import Ballbar
 from truearm.measurement.devices.hexapod.world_frame import WorldFrame, world_frame
 from truearm.measurement.twin import Twin
 from truearm.modeling.chain import Array
@@ -134,24 +135,13 @@ def two_steps(
     InputError
         If a distance of a fixture, or every pose, is beyond the ballbar's range.
     """
-    names = [target.name for target in robot.targets]
     by_number = {pose.number: pose for pose in wanted}
-    at_cups = [_cups(twin, names, joints) for joints in touches]
-    base_cups = np.array([cups[0] for cups in at_cups])
-    base = _sides(measured_sides(bar, base_cups, "B"), "B")
-    tool = _sides(measured_sides(bar, at_cups[0], "T"), "T")
+    fixtures = set_up(twin, touches, bar)
 
     def measured(tried: Sequence[int], joints: Array) -> dict[int, Array]:
         """Return the tool's cups in the fixture's frame at each row of which all legs were in range."""
-        found: dict[int, Array] = {}
-        for row, reading in zip(tried, joints, strict=True):
-            bar.initialise()
-            design = rows[row].design
-            legs = measured_legs(bar, design, base_cups, _cups(twin, names, reading))
-            if len(legs) == 6:
-                lengths = np.array([legs[name] for name in design.leg_names])
-                found[row] = tool_cups(design, rows[row].solution, base, tool, lengths)
-        return found
+        cups = measure_poses(twin, fixtures, [rows[row] for row in tried], joints, bar)
+        return {row: at for row, at in zip(tried, cups, strict=True) if np.isfinite(at).all()}
 
     nominal = np.array([row.joints for row in rows])
     first = measured(range(len(rows)), nominal)
@@ -162,7 +152,7 @@ def two_steps(
             came=f"{len(rows)} poses beyond +/- {bar.device.reach * 1e3:g} mm",
             cure="Calibrate the joint zeros by other means first.",
         )
-    data = _dataset(robot, list(first), nominal[list(first)], np.array(list(first.values())))
+    data = _data(robot, first, nominal)
     preliminary = identify(robot, data, model)
     left = [row for row in range(len(rows)) if row not in first]
     again = nominal.copy()
@@ -170,12 +160,12 @@ def two_steps(
         again[left] = _corrected(preliminary.robot, [by_number[rows[row].pose] for row in left], nominal[left])
     second = measured(left, again[left])
     if second:
-        more = _dataset(robot, list(second), again[list(second)], np.array(list(second.values())))
-        data = _joined(data, more)
+        more = _data(robot, second, again)
+        data = joined(data, more)
     return Campaign(
         touches=touches,
-        base_cups=base_cups,
-        sides=base,
+        base_cups=fixtures.base_cups,
+        sides=fixtures.base,
         first=tuple(first),
         second=tuple(second),
         out_of_range=tuple(row for row in left if row not in second),
@@ -183,23 +173,6 @@ def two_steps(
         preliminary=preliminary,
         final=identify(robot, data, model) if second else preliminary,
     )
-
-
-def _cups(twin: Twin, names: Sequence[str], joints: Array) -> Array:
-    frames = twin.target_frames(joints)
-    return np.array([frames[name][:3, 3] for name in names])
-
-
-def _sides(read: dict[str, float], fixture: str) -> Array:
-    names = side_names(fixture)
-    for name in names:
-        if name not in read:
-            raise InputError(
-                f"the distance {name} is beyond the range of the ballbar",
-                where="fixture",
-                cure="Set the cups nearer to their nominal distance.",
-            )
-    return np.array([read[name] for name in names])
 
 
 def _corrected(robot: Robot, poses: Sequence[HexapodPose], near: Array) -> Array:
@@ -213,26 +186,6 @@ def _corrected(robot: Robot, poses: Sequence[HexapodPose], near: Array) -> Array
     return np.where(usable[:, None], found.joints, near)
 
 
-def _dataset(robot: Robot, labels: Sequence[int], joints: Array, cups: Array) -> Dataset:
-    n = len(labels)
-    return Dataset(
-        source="hexapod",
-        labels=tuple(str(label + 1) for label in labels),
-        joints=joints,
-        joint_kinds=tuple(joint.kind for joint in robot.joints),
-        targets=tuple(target.name for target in robot.targets),
-        configuration=np.repeat(np.arange(n), 3),
-        target=np.tile(np.arange(3), n),
-        position=cups.reshape(-1, 3),
-    )
-
-
-def _joined(a: Dataset, b: Dataset) -> Dataset:
-    return replace(
-        a,
-        labels=a.labels + b.labels,
-        joints=np.vstack([a.joints, b.joints]),
-        configuration=np.concatenate([a.configuration, b.configuration + a.configurations]),
-        target=np.concatenate([a.target, b.target]),
-        position=np.vstack([a.position, b.position]),
-    )
+def _data(robot: Robot, cups: Mapping[int, Array], joints: Array) -> Dataset:
+    labels = [str(row + 1) for row in cups]
+    return cups_dataset(robot, labels, joints[list(cups)], np.array(list(cups.values())))

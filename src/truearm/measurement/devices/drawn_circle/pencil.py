@@ -9,7 +9,7 @@ import numpy as np
 
 from truearm.errors import InputError
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.devices.device import Arm, Device, IntArray, recorded
+from truearm.measurement.devices.device import Arm, Device, recorded
 from truearm.measurement.devices.jogging import followed, postures_at, site
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import Tool
@@ -23,8 +23,8 @@ _ROUNDS: Final = 8
 #: How far the pencil leans at the start, and anywhere.
 _LEANS: Final = np.deg2rad(60.0)
 _SLIPS: Final = np.deg2rad(75.0)
-#: The middle of a circle lies in its page [m].
-_FLAT: Final = 1e-5
+#: Points of a circle, at least, before another is drawn.
+_FEWEST: Final = 6
 
 
 @dataclass(frozen=True)
@@ -60,9 +60,11 @@ class PencilCircle(Device):
         middle = site(nominal) if self.centre is None else base.rotation @ np.array(self.centre) + base.translation
         out = (middle - base.translation) @ base.rotation
         pages = np.array([base.rotation @ _page(slope, out) for slope in self.slopes])
-        drawn = len(self.slopes) * self.circles
+        drawn = max(1, min(len(pages) * self.circles, count // _FEWEST))
+        pages = pages[:drawn]
         each = -(-count // drawn)
-        joints, page = self._drawn(nominal, middle, pages, each, rng)
+        page = np.arange(drawn) % len(pages)
+        joints = self._drawn(nominal, middle, pages[page], each, rng)
         circle = np.repeat(np.arange(drawn), each)[:count]
         joints, page = joints.reshape(-1, joints.shape[2])[:count], page[circle]
         place = arm.frames(joints)[nominal.targets[0].name][:, :3, 3] - middle
@@ -82,51 +84,37 @@ class PencilCircle(Device):
             height=np.concatenate([none, height]),
             fixtures=fixtures,
             fixture=np.concatenate([circle, drawn + page]),
-            setup=recorded(
-                nominal,
-                self.name,
-                np.zeros((1, joints.shape[1])),
-                [0] * drawn,
-                centres,
-                height=np.zeros(drawn),
-                fixtures=fixtures,
-                fixture=drawn + np.arange(drawn) // self.circles,
-                sigma=_FLAT,
-            ),
             sigma=sigma,
         )
 
-    def _drawn(
-        self, nominal: Robot, middle: Array, pages: Array, each: int, rng: np.random.Generator
-    ) -> tuple[Array, IntArray]:
-        """Return the joint readings ``(circles, each, joints)`` of all circles, and the page of each circle."""
+    def _drawn(self, nominal: Robot, middle: Array, pages: Array, each: int, rng: np.random.Generator) -> Array:
+        """Return the joint readings ``(circles, each, joints)`` of circles on given pages ``(circles, 3, 3)``."""
         name = nominal.targets[0].name
-        of = np.repeat(np.arange(len(pages)), self.circles)
         fine = -(-_ROUND // each)
         around = 2 * np.pi * np.arange(each * fine) / (each * fine)
         path = self.radius * np.column_stack([np.cos(around), np.sin(around), np.zeros(len(around))])
         places = middle + np.einsum("pij,nj->pni", pages, path)
-        found = np.full((len(of), each, len(nominal.joints)), np.nan)
+        found = np.full((len(pages), each, len(nominal.joints)), np.nan)
         for _ in range(_ROUNDS):
             missing = np.flatnonzero(np.isnan(found[:, 0, 0]))
             begun = np.tile(missing, 2 * _BEGUN)
-            facing = -pages[of[begun], :, 2]
-            starts = places[of[begun], 0]
+            facing = -pages[begun, :, 2]
+            starts = places[begun, 0]
             reached, q = postures_at(
                 nominal, name, starts, _BEGUN * len(missing), rng, self.name, facing=facing, within=_LEANS
             )
             begun, facing = begun[reached], facing[reached]
-            q, whole = followed(nominal, name, q, np.moveaxis(places[of[begun]], 0, 1))
+            q, whole = followed(nominal, name, q, np.moveaxis(places[begun], 0, 1))
             pencil = np.array([nominal.poses(at)[1][:, :, 2] for at in q])
             whole &= (np.einsum("kni,ni->kn", pencil, facing) > np.cos(_SLIPS)).all(axis=0)
             for k in np.flatnonzero(whole).tolist():
                 found[begun[k]] = q[::fine, k]
             if np.isfinite(found).all():
-                return found, of
+                return found
         raise InputError(
             f"{nominal.name} does not come round the circle",
             where=self.name,
-            came=f"{int(np.isfinite(found[:, 0, 0]).sum())} of {len(of)} circles drawn",
+            came=f"{int(np.isfinite(found[:, 0, 0]).sum())} of {len(pages)} circles drawn",
             cure="Take a smaller circle, pages that are less steep, or another device.",
         )
 

@@ -40,6 +40,14 @@ class WorldFrame:
     residual: Array
 
 
+def plain_frame(points: Array) -> Transform:
+    """Return the frame of three points ``(3, 3)``: origin in the first, x through the second, the third at +y."""
+    x = (points[1] - points[0]) / np.linalg.norm(points[1] - points[0])
+    z = np.cross(x, points[2] - points[0])
+    z /= np.linalg.norm(z)
+    return Transform.from_matrix(np.column_stack([x, np.cross(z, x), z]), points[0])
+
+
 def world_frame(points: Array, sides: Sequence[float] | Array) -> WorldFrame:
     """Return the frame of the base fixture.
 
@@ -59,10 +67,8 @@ def world_frame(points: Array, sides: Sequence[float] | Array) -> WorldFrame:
     seen = np.array([np.linalg.norm(points[a] - points[b]) for a, b in SIDES])
     p = triangle(seen, "B")[:, :2]
     q = triangle(sides, "B")[:, :2]
-    x = (points[1] - points[0]) / seen[0]
-    z = np.cross(x, points[2] - points[0])
-    z /= np.linalg.norm(z)
-    R = np.column_stack([x, np.cross(z, x), z])
+    plain = plain_frame(points)
+    R = plain.rotation
     from_middle, to_middle = q - q.mean(axis=0), p - p.mean(axis=0)
     turned = (from_middle[:, 0] * to_middle[:, 1] - from_middle[:, 1] * to_middle[:, 0]).sum()
     angle = np.arctan2(turned, (from_middle * to_middle).sum())
@@ -74,7 +80,7 @@ def world_frame(points: Array, sides: Sequence[float] | Array) -> WorldFrame:
     places = origin + np.pad(q, ((0, 0), (0, 1))) @ R_frame.T
     return WorldFrame(
         frame=Transform.from_matrix(R_frame, origin),
-        plain=Transform.from_matrix(R, points[0]),
+        plain=plain,
         seen=seen,
         residual=points - places,
     )

@@ -1,0 +1,102 @@
+"""The study of instruments on the IRB 120 with small settings, and the parts it is made of."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from truearm.measurement.devices import named_device
+from truearm.measurement.truths import truth_twin
+from truearm.studies import irb120_instruments_tables
+from truearm.studies.irb120_devices import study
+from truearm.studies.irb120_setups import SETUPS, shares, twin_of, visible_configurations
+from truearm.studies.irb120_twin import Truth, driven, running_out
+from truearm.studies.study import Study
+
+
+@pytest.fixture(scope="module")
+def small() -> Study:
+    devices = [named_device(name) for name in ("tracker", "ballbar", "point")]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(irb120_instruments_tables, "ZONED", ("geometric", "elastic"))
+        patch.setattr(irb120_instruments_tables, "DIVISIONS", {"2 x 1 x 2": (2, 1, 2)})
+        return study(1, lambda _: None, unseen=12, candidates=100, devices=devices, training=(30, 60))
+
+
+def medians(found: Study, title: str) -> dict[str, float]:
+    (table,) = (table for table in found.tables if table.title.startswith(title))
+    return {row.what: row.median for row in table.rows}
+
+
+def test_the_documents_comparison(small: Study) -> None:
+    before, after = medians(small, "Before"), medians(small, "After")
+    assert before["planar artefact: mean"] == pytest.approx(4.639, rel=0.25)
+    for setup in SETUPS:
+        left = after[f"{setup.name}, {setup.configurations} configurations: mean"]
+        assert left == pytest.approx(setup.after, rel=0.7)
+        assert left < 0.12 * before[f"{setup.name}: mean"]
+    assert after["tracker, no compliance in the model: mean"] > 2.0 * after["tracker, 38 configurations: mean"]
+    crossed = medians(small, "Calibrated with one")
+    assert len(crossed) == 18
+    assert max(crossed.values()) < 1.5
+    ballbar = [row for table in small.tables if table.title.startswith("Ballbar") for row in table.rows]
+    assert len(ballbar) == 18
+    assert all(row.median == pytest.approx(row.published, rel=0.8) for row in ballbar if "deviation" in row.what)
+
+
+def test_every_instrument_and_what_closed_loops_miss(small: Study) -> None:
+    few, more = medians(small, "Every instrument"), medians(small, "Three times")
+    assert few["tracker: mean"] < 0.05
+    assert few["point: mean"] > 5.0 * few["tracker: mean"]
+    assert more["ballbar: mean"] < few["ballbar: mean"]
+    lost = medians(small, "Directions")
+    assert lost["ballbar: directions not seen"] == 6.0  # where the base stands
+    assert lost["point: directions not seen"] == 7.0  # and the size
+    assert lost["point: mean but for a change of size"] < few["point: mean"]
+    assert not any(what.startswith("tracker") for what in lost)
+
+
+def test_zones_and_tool(small: Study) -> None:
+    zones = medians(small, "A model for each zone")
+    one, four = (zones[f"geometric, 60 configurations, {cut}: mean"] for cut in ("one model", "2 x 1 x 2 zones"))
+    assert four < one
+    assert zones["elastic, 60 configurations, one model: mean"] < four
+    tool = medians(small, "A tool")
+    assert tool["nominal robot, 36 touches"] > 3.0 * tool["true robot, 36 touches"]
+    # n touches turned evenly to all sides tell the tool to sigma sqrt(3 / n) in length, the point being unknown.
+    assert tool["true robot, 36 touches"] < 3.0 * 0.05 * np.sqrt(3.0 / 36.0)
+    assert len(small.pictures) == 3
+
+
+def test_visibility_by_spherical_caps() -> None:
+    """Directions spread evenly over the sphere would be seen by the share of the caps: the region is near to that."""
+    rng = np.random.default_rng(0)
+    tracker, planar, spatial = (shares(setup, 4000, rng)["of all configurations"] for setup in SETUPS)
+    assert tracker == pytest.approx(100.0 * 3.0 * 0.5 * (1.0 - np.cos(np.radians(30.0))), rel=0.25)
+    assert planar == pytest.approx(100.0 * (1.0 - np.cos(np.radians(15.0))), rel=0.25)
+    assert spatial == 100.0
+
+
+def test_seen_configurations_show_the_plate_to_the_cameras() -> None:
+    planar = SETUPS[1]
+    joints, _ = visible_configurations(planar, 40, np.random.default_rng(1))
+    # By the twin, which stands and turns a little otherwise, and computes by another path.
+    flange = Truth.of(twin_of(planar, planar.truth), joints).flange
+    to_cameras = -flange[:, :3, 3] / np.linalg.norm(flange[:, :3, 3], axis=1, keepdims=True)
+    lean = np.degrees(np.arccos(np.abs(np.einsum("ni,ni->n", flange[:, :3, 1], to_cameras))))
+    assert lean.max() < 15.0 + 5.0  # the artefact is up to 0.16 m beside the flange, 2.6 m away
+
+
+def test_run_out_turns_each_joint_by_its_sine() -> None:
+    nominal = driven()
+    twin = running_out(truth_twin(nominal, "nominal", np.random.default_rng(0)))
+    joints = nominal.random_configurations(4, np.random.default_rng(2))
+    amplitude = np.array([0.004, 0.032, 0.028, 0.044, 0.049, 0.061])
+    phase = np.array([150.0, 0.0, 195.0, 315.0, 270.0, 210.0])
+    turned = joints + np.radians(amplitude) * np.sin(joints + np.radians(phase))
+    stiff = replace(twin, joints={number: replace(j, compliance=0.0) for number, j in twin.joints.items()})
+    found = Truth.of(stiff, joints).places((0.0, 0.0, 0.1))
+    plain = twin.robot.with_frames(twin.robot.base, {"tip": (0.0, 0.0, 0.1)})
+    assert found == pytest.approx(plain.poses(turned, "tip")[0], abs=1e-12)

@@ -1,0 +1,104 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from truearm.studies.li import (
+    BEYOND,
+    PLACE,
+    arm,
+    at_bounds,
+    board,
+    by_hand,
+    fit,
+    following_errors,
+    tables,
+    truth,
+    verification,
+)
+from truearm.studies.li_run import METHODS, THEIRS, TOGETHER, UNBOUNDED
+from truearm.studies.li_table import study
+from truearm.studies.study import Row, Study, Table
+
+
+@pytest.fixture(scope="module")
+def found() -> Study:
+    return study(2, lambda _: None, unseen=60)
+
+
+def row(table: Table, what: str) -> Row:
+    return next(row for row in table.rows if row.what == what)
+
+
+def named(found: Study, start: str) -> Table:
+    return next(table for table in found.tables if table.title.startswith(start))
+
+
+def test_the_board_has_a_circle_and_a_straight_path() -> None:
+    points = board()
+    assert points.shape == (33, 3)
+    np.testing.assert_allclose(np.hypot(points[:24, 0], points[:24, 1]), 0.08, atol=1e-15)
+    assert not points[24:, 0].any()
+    roll = tables(points)["roll"].in_world - np.array(PLACE.translation)
+    np.testing.assert_allclose(roll[:, 2], points[:, 1] * np.sin(np.radians(11.7)), atol=1e-12)
+
+
+def test_the_documents_bounds_hold() -> None:
+    rng, nominal = np.random.default_rng(0), arm()
+    twin = truth(nominal, rng, BEYOND)
+    data = by_hand(tables(board())["normal"], twin, rng)  # in the table's frame: nothing fits, so bounds must hold
+    fitted = fit(nominal, data, "distances", True)
+    for p in fitted.parameters.values():
+        if p.group in ("joint zero", "geometry"):
+            width = {"m": 5e-3, "rad": np.radians(2.0)}[p.unit]
+            assert abs(p.value - nominal.values[p.name]) <= width * (1 + 1e-9)
+    assert at_bounds(nominal, fitted) > 0
+    assert at_bounds(nominal, nominal) == 0
+
+
+def test_a_robot_that_knows_itself_follows() -> None:
+    twin = truth(arm(), np.random.default_rng(1))
+    assert following_errors(twin.robot, twin, verification()).max() < 1e-6
+    assert 20.0 < following_errors(arm(), twin, verification()).mean() < 22.0
+
+
+def test_with_play(found: Study) -> None:
+    points, path, ways = found.tables[0], found.tables[1], named(found, "With play")
+    assert row(points, "before").verdict == "agrees"
+    assert row(points, "after, normal table").verdict == "agrees"
+    assert all(row.published is None for row in path.rows if row.what.startswith("mean"))
+    for tilt in ("normal", "roll", "pitch", TOGETHER):
+        assert row(ways, f"{tilt}: {THEIRS}").median < row(ways, "before").median
+        assert row(ways, f"{tilt}: {THEIRS}").highest < row(ways, f"{tilt}: {UNBOUNDED}").lowest
+
+
+def test_without_play(found: Study) -> None:
+    ways = named(found, "Without play")
+    bounded, unbounded = row(ways, f"normal: {THEIRS}"), row(ways, f"normal: {UNBOUNDED}")
+    assert all(2 * a < b for a, b in zip(bounded.ours, unbounded.ours, strict=True))
+    assert all(row(ways, f"{TOGETHER}: {method}").highest < 0.3 for method in METHODS)
+
+
+def test_geometry_beyond_the_bounds_is_still_mostly_taken_away(found: Study) -> None:
+    table = named(found, "Geometry alone")
+    assert [r.verdict for r in table.rows] == ["agrees", "agrees", "differs", "differs", "differs"]
+    assert max(r.highest for r in table.rows[2:]) < 8.0
+
+
+def test_each_reading_of_the_objective_is_best_by_itself(found: Study) -> None:
+    distances, distances_other, components_other, components = (r.ours for r in named(found, "Two readings").rows)
+    assert all(a < b for a, b in zip(distances, distances_other, strict=True))
+    assert all(a < b for a, b in zip(components, components_other, strict=True))
+
+
+def test_the_table_alone(found: Study) -> None:
+    rows = named(found, "The table alone").rows
+    before, after = rows[0::6], rows[3::6]
+    for old, new in zip(before, after, strict=True):
+        assert "other points of the table" in old.what
+        assert new.highest < 0.2 < old.highest
+
+
+def test_absolute_values_do_not_notice_mistakes(found: Study) -> None:
+    distances, components, squares, unbounded = (r.median for r in named(found, "Three holes").rows)
+    assert max(distances, components) < 0.4 < 0.8 < min(squares, unbounded)

@@ -1,0 +1,124 @@
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from truearm.measurement.devices.hexapod.geometry import triangle
+from truearm.measurement.twin import Twin, measure
+from truearm.measurement.twin_joint import JointTruth
+from truearm.modeling.transform import Transform
+from truearm.studies.lrmate import (
+    FIXTURE,
+    NAMES,
+    REFERENCE,
+    Cups,
+    allowed_configurations,
+    identified_as_printed,
+    invented_twin,
+    judged,
+    nominal_robot,
+    standing_in,
+    touches,
+    unseen,
+)
+from truearm.studies.lrmate_hexapod import study
+from truearm.studies.study import Study, Table
+
+
+@pytest.fixture(scope="module")
+def found() -> Study:
+    return study(1, lambda _: None, configurations=300, others=120)
+
+
+def table(found: Study, words: str) -> Table:
+    return next(table for table in found.tables if words in table.title)
+
+
+def ours(found: Study, words: str) -> dict[str, float]:
+    return {row.what: row.median for row in table(found, words).rows}
+
+
+def test_two_steps_measure_what_the_document_measured(found: Study) -> None:
+    steps = table(found, "two steps")
+    assert {row.verdict for row in steps.rows if row.published is not None} == {"agrees"}
+    counts = ours(found, "two steps")
+    measured = sum(count for what, count in counts.items() if " step: " in what) + counts["never in range"]
+    assert measured == counts["of these measured or tried"] == 61
+
+
+def test_as_printed_the_final_model_is_the_worse_one_and_the_base_is_why(found: Study) -> None:
+    errors = ours(found, "Table 4.3")
+    printed = {step: errors[f"{step}, base by three cups: mean"] for step in ("preliminary", "final")}
+    assert errors["nominal, base known: mean"] > printed["final"] > printed["preliminary"]
+    assert errors["final, base and cups found: mean"] < printed["preliminary"] / 2
+    assert errors["final, base and cups found: mean"] < errors["preliminary, base and cups found: mean"]
+    assert ours(found, "World frame")["final, ten more rounds of touching and identifying, mean error"] > 1.0
+
+
+def test_a_tracker_is_better_away_from_the_fixture(found: Study) -> None:
+    near = ours(found, "Near the fixture")
+    tracker = near["tracker, 50 positions: mean beyond 400 mm"]
+    assert tracker < near["final, base and cups found: mean beyond 400 mm"]
+    assert tracker < near["final, base by three cups: mean beyond 400 mm"] / 3
+    assert ours(found, "Other robots")["final, base and cups found, over tracker, beyond 400 mm"] > 1.0
+    rows = {row.what: row for row in table(found, "Table 4.3").rows}
+    assert rows["tracker, 50 positions: mean"].verdict == "agrees"
+
+
+def test_it_says_that_the_truth_is_invented_and_is_written_whole(found: Study) -> None:
+    assert "invented" in found.answer
+    assert "invented" in nominal_robot()[0].truths["invented"].source
+    assert "invented" in found.html()
+    assert len(found.pictures) == 6
+    json.dumps(found.summary(), allow_nan=False)
+
+
+def test_the_reference_point_is_300_mm_from_the_cups() -> None:
+    assert np.linalg.norm(triangle([0.3] * 3, "B") - REFERENCE, axis=1) == pytest.approx([0.3] * 3, abs=1e-15)
+    assert REFERENCE[2] > 0
+
+
+def test_another_world_changes_no_distance_and_is_undone() -> None:
+    robot, _ = nominal_robot()
+    q = robot.random_configurations(6, np.random.default_rng(0))
+    position, rotation = robot.poses(q, "2")
+    there, turned = standing_in(robot, FIXTURE).poses(q, "2")
+    assert there @ FIXTURE.rotation.T + np.array(FIXTURE.translation) == pytest.approx(position, abs=1e-14)
+    assert FIXTURE.rotation @ turned == pytest.approx(rotation, abs=1e-14)
+
+
+def test_the_printed_identification_finds_a_robot_of_its_own_kind() -> None:
+    robot, _ = nominal_robot()
+    truth = robot.truths["invented"]
+    true = robot.with_values({name: value for name, value in truth.values.items() if name in NAMES})
+    twin = Twin(true, {number: JointTruth(compliance=c) for number, c in truth.compliance.items()})
+    rng = np.random.default_rng(1)
+    data = measure(twin, allowed_configurations(robot, 30, rng), 0.0, rng)
+    at = touches(robot)
+    cups = np.array([twin.target_frames(joints)["1"][:3, 3] for joints in at])
+    sides = np.linalg.norm(cups - np.roll(cups, -1, axis=0), axis=1)
+    # The frame of the cups by their places, made here another way than by the triangle's fit.
+    x = (cups[1] - cups[0]) / sides[0]
+    z = np.cross(x, cups[2] - cups[0])
+    z /= np.linalg.norm(z)
+    frame = Transform.from_matrix(np.column_stack([x, np.cross(z, x), z]), cups[0])
+    data = replace(data, position=(data.position - np.array(frame.translation)) @ frame.rotation)
+    elastic = true.with_effects(("compliance",))
+    known = elastic.with_values({f"compliance_{number}": c for number, c in truth.compliance.items()})
+    found = identified_as_printed(robot, known, data, Cups(at, sides))
+    assert [found.values[name] for name in NAMES] == pytest.approx([known.values[name] for name in NAMES], abs=1e-7)
+    held_out = unseen(robot, twin, allowed_configurations(robot, 30, rng)).seen_from(frame)
+    errors = judged(found, held_out)
+    assert errors.position.max() < 1e-7
+    assert errors.orientation.max() < 1e-6
+    assert errors.pairs.maximum < 2e-7
+
+
+def test_the_twin_has_what_no_model_has() -> None:
+    joints = invented_twin(nominal_robot()[0]).joints
+    assert all(truth.gear and truth.backlash for truth in joints.values())
+    assert joints[1].compliance == 0.0
+    assert joints[2].bearing > 0.0 > joints[2].cubic

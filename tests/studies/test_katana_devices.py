@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from truearm.measurement.devices import DEVICES, measured_with, named_device
+from truearm.measurement.devices import measured_with, named_device
 from truearm.measurement.observations import compared
 from truearm.measurement.twin import Twin
 from truearm.studies.katana import katana
-from truearm.studies.katana_campaigns import Counts, OnPage, together
+from truearm.studies.katana_campaigns import USED, Counts, OnPage, together
 from truearm.studies.katana_devices import study
 from truearm.studies.study import Study
 
@@ -28,7 +28,7 @@ def test_every_device_is_in_both_tables(found: Study) -> None:
     tables = {table.title: table for table in found.tables}
     for start in ("geometry alone", "tilting first"):
         rows = tables[f"Every device, {start}"].rows
-        assert [row.what.partition(",")[0] for row in rows[1:-1]] == [device.name for device in DEVICES]
+        assert [row.what.partition(",")[0] for row in rows[1:-1]] == [device.name for device in USED]
         assert all(np.isfinite(row.median) for row in rows)
 
 
@@ -77,4 +77,3 @@ def test_two_campaigns_together_keep_every_reading() -> None:
     assert both.joints == pytest.approx(np.concatenate([part.joints for part in parts]))
     read = [[(fixture, kind.name, len(r)) for _, fixture, kind, r in compared(data)] for data in (both, *parts)]
     assert read[0] == [*read[1], *read[2]]
-    assert both.setup is parts[1].setup

@@ -9,6 +9,7 @@ from typing import Final, Literal
 import numpy as np
 
 from truearm.compensation.trajectories import corrected
+from truearm.errors import InputError
 from truearm.identification.fit import Fit, identify, place
 from truearm.identification.models import MODELS
 from truearm.identification.redundancy import taken_on_trust
@@ -18,6 +19,7 @@ from truearm.measurement.devices import DEVICES, Device, measured_with
 from truearm.measurement.devices.artefacts import MARKERS, PLANAR_ARTEFACT, SPATIAL_ARTEFACT, Artefact
 from truearm.measurement.devices.drawn_circle.pencil import DRAWN_CIRCLE, PencilCircle
 from truearm.measurement.devices.hexapod.kinematics import rigid_motion
+from truearm.measurement.devices.hexapod_poses import HEXAPOD
 from truearm.measurement.devices.known_points import TOUCH_UP
 from truearm.measurement.devices.tracker import TRACKER, Tracker
 from truearm.measurement.twin import Twin
@@ -56,6 +58,9 @@ DOCUMENT: Final[Mapping[str, tuple[Device, int]]] = {
     f"{TRACKED}, 30 points": (replace(TRACKER, within=_CONE, tool=_ATTACHMENT), 30),
     f"{CAMERAS}, 30 points": (replace(SPATIAL_ARTEFACT, sigma=6e-5, tool=_ATTACHMENT), 30),
 }
+#: The hexapod's tool has to take whole poses, which five joints cannot.
+USED: Final = tuple(device for device in DEVICES if device.name != HEXAPOD.name)
+_TRIES: Final = 10
 Start = Literal["geometry alone", "tilting first"]
 STARTS: Final[tuple[Start, ...]] = ("geometry alone", "tilting first")
 _GEOMETRIC: Final = next(model for model in MODELS if model.name == "geometric")
@@ -187,16 +192,16 @@ def run_devices(seed: int, counts: Counts) -> DeviceRun:
 
     read = {}
     for what, (device, count) in DOCUMENT.items():
-        data = measured_with(device, nominal, at_end, count, rng)
+        data = _measured(device, nominal, at_end, count, rng)
         judge(what, data, end)
         apart = data.position - nominal.with_frames(_STANDS, _ATTACHMENT.targets).poses(data.joints, TIP)[0]
         read[what] = _mean_and_largest(np.linalg.norm(apart, axis=1))
     low_cost = []
-    for device in DEVICES:
+    for device in USED:
         led = device if device.tool is None else replace(device, tool=_POINT)
         if isinstance(led, PencilCircle):
             led = replace(led, centre=_MIDDLE, radius=_RADIUS)
-        data = measured_with(led, nominal, with_pencil, counts.of(device), rng)
+        data = _measured(led, nominal, with_pencil, counts.of(device), rng)
         judge(device.name, data, tip)
         if device.name in (TOUCH_UP.name, DRAWN_CIRCLE.name):
             low_cost.append(data)
@@ -207,10 +212,7 @@ def run_devices(seed: int, counts: Counts) -> DeviceRun:
 
 
 def together(first: Dataset, second: Dataset) -> Dataset:
-    """Return two campaigns with the same robot and target and with fixtures of their own as one.
-
-    The second may know something of its fixtures, the first not.
-    """
+    """Return two campaigns with the same robot and target and with fixtures of their own as one."""
     k, n = first.configurations, len(first.target)
 
     def stacked(a: Array | None, b: Array | None) -> Array:
@@ -229,11 +231,20 @@ def together(first: Dataset, second: Dataset) -> Dataset:
         height=stacked(first.height, second.height),
         fixtures=(*first.fixtures, *second.fixtures),
         fixture=np.concatenate([first.against, len(first.fixtures) + second.against]),
-        setup=second.setup,
         sigma=stacked(first.sigma, second.sigma),
         approach=None,
         number=None,
     )
+
+
+def _measured(device: Device, nominal: Robot, truth: Twin, count: int, rng: np.random.Generator) -> Dataset:
+    """Return a campaign; where an arm cannot be jogged to a place because a joint falls to and fro there, another."""
+    for _ in range(_TRIES - 1):
+        try:
+            return measured_with(device, nominal, truth, count, rng)
+        except InputError:
+            continue
+    return measured_with(device, nominal, truth, count, rng)
 
 
 def _standing(robot: Robot, places: Mapping[str, tuple[float, float, float]]) -> Twin:

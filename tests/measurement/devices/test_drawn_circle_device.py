@@ -44,19 +44,19 @@ def test_a_perfect_robot_draws_the_circle_on_every_page() -> None:
 
 
 def test_each_circle_is_one_way_round_a_page_in_one_posture() -> None:
-    """Places of the pencil by the nominal robot: six circles of five points, two on each of three slopes."""
+    """Places of the pencil by the nominal robot: six circles of six points, two on each of three slopes."""
     robot = katana().with_frames(STANDS, {"pencil": (0.02, 0.01, 0.15)})
-    data = drawn(Twin(robot), 30)
-    places = robot.poses(data.joints, "pencil")[0].reshape(6, 5, 3)
+    data = drawn(Twin(robot), 36)
+    places = robot.poses(data.joints, "pencil")[0].reshape(6, 6, 3)
     opposite = np.linalg.norm(places - np.roll(places, 1, axis=1), axis=2)
-    assert opposite == pytest.approx(2 * DRAWN_CIRCLE.radius * np.sin(np.pi / 5), abs=1e-9)
+    assert opposite == pytest.approx(2 * DRAWN_CIRCLE.radius * np.sin(np.pi / 6), abs=1e-9)
     up = STANDS.rotation[:, 2]
     normals = np.array([np.cross(p[1] - p[0], p[2] - p[0]) for p in places])
     slopes = np.arccos(normals @ up / np.linalg.norm(normals, axis=1))
-    assert slopes == pytest.approx(np.repeat(DRAWN_CIRCLE.slopes, 2))
-    moves = np.abs(np.diff(data.joints.reshape(6, 5, -1), axis=1))
+    assert slopes == pytest.approx(np.tile(DRAWN_CIRCLE.slopes, 2))
+    moves = np.abs(np.diff(data.joints.reshape(6, 6, -1), axis=1))
     assert moves.max() < 1.5
-    assert np.abs(data.joints[0] - data.joints[5]).max() > 0.05  # the second circle of the page: another posture
+    assert np.abs(data.joints[0] - data.joints[18]).max() > 0.05  # the second circle of the page: another posture
     low, high = np.array([joint.limits for joint in robot.joints]).T
     assert ((data.joints > low) & (data.joints < high)).all()
 
@@ -65,7 +65,8 @@ def test_what_is_read_is_where_the_true_pencil_is() -> None:
     """Distance and height of the twin's tip over the first page, by hand."""
     truth = Twin(published("standard").with_frames(STANDS, {"pencil": (0.02, 0.01, 0.15)}))
     device = replace(DRAWN_CIRCLE, centre=(0.0, -0.3, 0.14), slopes=(np.deg2rad(45.0),), circles=1)
-    data = measured_with(device, katana(), truth, 12, np.random.default_rng(1), 0.0)
+    nominal = katana().with_frames(STANDS, {"pencil": (0.02, 0.01, 0.15)})
+    data = device.campaign(nominal, truth, 12, 0.0, np.random.default_rng(1))
     tip = (truth.frames(data.joints)["pencil"][:, :3, 3] - STANDS.translation) @ STANDS.rotation - (0.0, -0.3, 0.14)
     height = tip @ np.array([0.0, 1.0, 1.0]) / np.sqrt(2.0)  # rises away from the robot, which is towards -y
     assert data.distance is not None
@@ -92,9 +93,9 @@ def test_without_noise_the_true_robot_is_found(seed: int) -> None:
     data = drawn(truth, 72, seed)
     fit = identify(katana(), data, GEOMETRIC, redundancy="drop")
     assert fit.unseen == ()
-    assert max(fit.sigma.values()) < 1e-8
+    assert max(fit.sigma.values()) < 1e-7
     for name in ("a_3", "a_4", "theta_offset_2", "theta_offset_3", "beta_3"):
-        assert fit.robot.values[name] == pytest.approx(truth.robot.values[name], abs=1e-7)
+        assert fit.robot.values[name] == pytest.approx(truth.robot.values[name], abs=2e-6)
     assert taken_on_trust(data) == ("base",)
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from truearm.errors import InputError
 from truearm.identification.bounds import Bounds, bound_vectors
-from truearm.identification.losses import MEDIAN_NORM, Loss, norms_of
+from truearm.identification.losses import Loss, norms_of, robust_scale
 from truearm.identification.models import FRAMES, Model
 from truearm.identification.problem import SETUP, Problem, check_circumstances, check_solvable
 from truearm.identification.redundancy import Redundancy, find_redundancies, in_words, taken_on_trust, unseen_but_felt
@@ -35,8 +35,9 @@ _NOISE_FLOOR: Final = 1e-9
 #: Rounds until deviations and loads agree with the solution; each leaves a hundredth of the loads' error or less.
 _ROUNDS: Final = 6
 _LOADS_AGREE: Final = 1e-4  # of the last step, in the joints' deflections [rad or m]
-# Spatial median in three dimensions against the mean, for normal noise (Brown 1983).
+# Spatial median in three dimensions against the mean, for normal noise (Brown 1983), and the median of single numbers.
 _L1_EFFICIENCY: Final = 0.849
+_L1_EFFICIENCY_OF_ONE: Final = 2.0 / np.pi
 
 
 class Status(Enum):
@@ -284,7 +285,8 @@ def _noise(problem: Problem, solution: Solution, loss: Loss) -> dict[str, tuple[
         if loss == "linear":
             found[name] = (float(np.sqrt(np.sum(mine**2) / freedom)), freedom)
         else:
-            found[name] = (float(np.median(norms[of_readings == name])) / MEDIAN_NORM, freedom)
+            of_name = of_readings == name
+            found[name] = (robust_scale(norms[of_name], problem.components[of_name]), freedom)
     return found
 
 
@@ -317,7 +319,9 @@ def _fit(
     noise = _noise(problem, solution, loss)
     declared = {problem.kind(b) for b in problem.blocks if b.declared} - {SETUP}
     excess = _excess({name: noise[name] for name in noise if name in declared}) if declared else 1.0
-    spread = excess / np.sqrt(_L1_EFFICIENCY) if loss == "l1" else excess
+    single = float(np.sum(problem.components == 1)) / problem.rows
+    efficiency = single * _L1_EFFICIENCY_OF_ONE + (1.0 - single) * _L1_EFFICIENCY
+    spread = excess / np.sqrt(efficiency) if loss == "l1" else excess
     covariance = _covariance(A / spread, ~at_bound, problem.priors) * np.outer(free.prior, free.prior)
     deviation = np.sqrt(np.diag(covariance))
     informed = np.clip(1.0 - (deviation / free.prior) ** 2, 0.0, 1.0)

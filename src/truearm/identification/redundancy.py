@@ -195,10 +195,12 @@ def unseen_but_felt(robot: Robot, data: Dataset, free: FreeParameters, seed: int
             moved = but_for(trusted, robot, sweep, moved)
         felt = np.concatenate([felt, *moved])
     _, strength, turned = np.linalg.svd(felt @ unseen.T, full_matrices=False)
-    lost = (
-        turned[: len(strength)][strength > (_FELT_TRUSTED if trusted else _FELT) * np.linalg.norm(felt, axis=0).max()]
-        @ unseen
-    )
+    largest = np.linalg.norm(felt, axis=0)
+    least = _FELT * largest.max()
+    if trusted:
+        own = [p.group not in ("base", "target", "fixture") for p in free.parameters]
+        least = _FELT_TRUSTED * max(largest[own], default=0.0)
+    lost = turned[: len(strength)][strength > least] @ unseen
     involved = np.linalg.norm(lost, axis=0) > _INVOLVED
     return tuple(name for name, is_in in zip(free.names, involved.tolist(), strict=True) if is_in)
 

@@ -117,7 +117,7 @@ def solve(
     steps, converged = 0, False
     for steps in range(1, _STEPS[loss] + 1):
         norms = _norms(here)
-        scale = _next_scale(loss, norms, scale, steps)
+        scale = _next_scale(loss, norms, problem.components, scale, steps)
         w = weights(loss, norms, scale)
         R, c = _triangle(here, w)
         cost = _cost(here, w)
@@ -148,14 +148,14 @@ def solve(
 _FLOOR: Final = 1e-4  # an l1 reading closer than this share of the median counts as met
 
 
-def _next_scale(loss: Loss, norms: Array, scale: float | None, step: int) -> float:
+def _next_scale(loss: Loss, norms: Array, components: NDArray[np.intp], scale: float | None, step: int) -> float:
     if loss == "linear":
         return 1.0
     if loss == "l1":
         floor = 0.3 * _FLOOR * float(np.median(norms)) + 1e-300
         return max(floor, float(np.median(norms)) if scale is None else 0.5 * scale)
     if scale is None or step <= 10:  # then held, so that the weights can settle
-        return max(robust_scale(norms), 1e-300)
+        return max(robust_scale(norms, components), 1e-300)
     return scale
 
 

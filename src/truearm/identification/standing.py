@@ -61,9 +61,10 @@ def initial_standing(robot: Robot, data: Dataset) -> Robot:
         return initial_frames(robot, data)
     kinds = _kinds(data)
     placed = _placed(robot, data, kinds)
-    missing = [t for t in range(len(data.targets)) if data.targets[t] not in {t.name for t in placed.targets}]
-    for target in missing:
-        placed = _with_target(placed, data, target, kinds)
+    have = {target.name for target in placed.targets}
+    for target in dict.fromkeys(data.target[data.has_reading & (data.against >= 0)].tolist()):
+        if data.targets[target] not in have:
+            placed = _with_target(placed, data, target, kinds)
     placed = placed.with_fixtures(_fixture_places(placed, data, kinds))
     _refuse_alike(placed, data)
     return placed
@@ -104,33 +105,42 @@ def _kinds(data: Dataset) -> dict[str, FixtureKind]:
                 cure="Give them fixtures of different names.",
             )
         found[name] = seen[0] if seen else "point"
-    for name in () if data.setup is None else data.setup.targets:
-        found.setdefault(name, "point")
+    if data.setup is not None:
+        for name in dict.fromkeys((*data.setup.targets, *(data.fixtures[f] for f in data.setup.against if f >= 0))):
+            if found.setdefault(name, "point") == "plane":
+                raise InputError(
+                    "a plane has no place and no distance from another fixture",
+                    where=f"{data.source}, fixture {name}",
+                    allowed="heights over it, and nothing known of itself",
+                    cure="Remove its row of the role fixture.",
+                )
     return found
 
 
 def _placed(robot: Robot, data: Dataset, kinds: Mapping[str, FixtureKind]) -> Robot:
     """Return the robot with its base and with those targets that positions give."""
+    setup = data.setup
     if data.has_position.any():
-        return initial_frames(robot, data)
-    if data.setup is not None and data.setup.has_position.any():
-        return min(
-            (initial_frames(robot, seen) for seen in _triangulated(data, data.setup)),
-            key=lambda found: _misfit(found, data, data.setup),  # type: ignore[arg-type]
-        )
-    base, targets = robot.base, dict[str, Transform | Array]()
+        placed = initial_frames(robot, data)
+    elif setup is not None and setup.has_position.any():
+        sides = [initial_frames(robot, seen) for seen in _triangulated(data, setup)]
+        placed = min(sides, key=lambda found: _misfit(found, data, setup))
+    else:
+        placed = robot.with_frames(robot.base, {})
     for index, name in enumerate(data.fixtures):
         if kinds[name] == "frame":
-            there = initial_frames(robot, _as_instrument(data, index))
-            for target in there.targets:
-                if target.name not in targets:
-                    values = [there.values[target.parameter(axis)] for axis in "xyz"]
-                    if target.quaternion is None:
-                        targets[target.name] = np.array(values)
-                    else:
-                        targets[target.name] = Transform((values[0], values[1], values[2]), target.quaternion)
-    placed = robot.with_frames(base, targets)  # type: ignore[arg-type]
+            placed = _also(placed, {**_targets(initial_frames(robot, _as_instrument(data, index))), **_targets(placed)})
     return _at_points(placed, data, kinds)
+
+
+def _targets(robot: Robot) -> dict[str, Transform | Array]:
+    """Return where the targets of a robot are on its flange."""
+    places: dict[str, Transform | Array] = {}
+    for target in robot.targets:
+        x, y, z = (robot.values[target.parameter(axis)] for axis in "xyz")
+        turned = target.quaternion
+        places[target.name] = np.array([x, y, z]) if turned is None else Transform((x, y, z), turned)
+    return places
 
 
 def _as_instrument(data: Dataset, fixture: int) -> Dataset:
@@ -215,24 +225,27 @@ def _at_points(robot: Robot, data: Dataset, kinds: Mapping[str, FixtureKind]) ->
     return _also(robot, found)
 
 
-def _also(robot: Robot, found: Mapping[str, Array]) -> Robot:
+def _also(robot: Robot, found: Mapping[str, Transform | Array]) -> Robot:
     """Return the robot with some targets more."""
-    places: dict[str, Transform | Array] = {}
-    for target in robot.targets:
-        x, y, z = (robot.values[target.parameter(axis)] for axis in "xyz")
-        places[target.name] = (
-            np.array([x, y, z]) if target.quaternion is None else Transform((x, y, z), target.quaternion)
-        )
-    return robot.with_frames(robot.base, {**places, **found})  # type: ignore[dict-item]
+    return robot.with_frames(robot.base, {**_targets(robot), **found})  # type: ignore[dict-item]
 
 
 def _with_target(robot: Robot, data: Dataset, target: int, kinds: Mapping[str, FixtureKind]) -> Robot:
     """Return the robot with a target whose place only distances and heights tell."""
-    mine = replace(data.of_readings(data.target == target), setup=None, sigma=None, sigma_rot=None)
+    mine = data.of_readings(data.has_reading & (data.target == target) & (data.against >= 0))
     if len(mine.target) > _ENOUGH:
         some = np.zeros(len(mine.target), dtype=bool)
         some[np.linspace(0, len(some) - 1, _ENOUGH).astype(np.intp)] = True
         mine = mine.of_readings(some)
+    touched = np.unique(mine.against)
+    mine = replace(
+        mine,
+        fixtures=tuple(data.fixtures[f] for f in touched.tolist()),
+        fixture=np.searchsorted(touched, mine.against),
+        setup=None,
+        sigma=None,
+        sigma_rot=None,
+    )
     name = data.targets[target]
     p, R = robot.poses(mine.postures)
     p, R = p[mine.configuration], R[mine.configuration]
@@ -240,13 +253,13 @@ def _with_target(robot: Robot, data: Dataset, target: int, kinds: Mapping[str, F
     grid = np.stack(np.meshgrid(steps, steps, steps), axis=-1).reshape(-1, 3)
     tips = p + np.einsum("nij,gj->gni", R, grid)
     cost = np.zeros(len(grid))
-    for index in np.unique(mine.against).tolist():
+    for index in range(len(mine.fixtures)):
         of = mine.against == index
         points = tips[:, of]
-        if mine.distance is not None and np.isfinite(mine.distance[of]).all():
+        if mine.distance is not None and np.isfinite(mine.distance[of]).any():
             centre = _centres(points, mine.distance[of])
             off = np.linalg.norm(points - centre[:, None], axis=2) - mine.distance[of]
-        elif mine.height is not None and np.isfinite(mine.height[of]).all():
+        elif mine.height is not None and np.isfinite(mine.height[of]).any():
             spread = points - points.mean(axis=1, keepdims=True)
             h = mine.height[of] - mine.height[of].mean()
             normal = _normals(spread, h)
@@ -254,29 +267,16 @@ def _with_target(robot: Robot, data: Dataset, target: int, kinds: Mapping[str, F
         else:
             continue
         cost += np.sum(off**2, axis=1)
-    best: tuple[float, Robot] | None = None
+    found = []
     for start in np.argsort(cost)[:_TRIED].tolist():
         tried = _also(robot, {name: grid[start]})
         tried = tried.with_fixtures(_fixture_places(tried, mine, kinds))
-        groups = ("target", "fixture")
-        free = FreeParameters(
-            tuple(
-                q
-                for q in tried.parameters.values()
-                if q.group in groups and (q.group == "fixture" or q.name in tried.target(name).chain.parameters)
-            )
-        )
-        noise = {observation.name: _ROUGH for observation in OBSERVATIONS}
-        problem = Problem(tried, replace(mine, targets=mine.targets), free, noise)
-        solution = solve(problem)
-        found = tried.with_values(dict(zip(free.names, map(float, solution.vector), strict=True)))
-        worth = float(solution.residual @ solution.residual)
-        if best is None or worth < best[0]:
-            best = worth, found
-    assert best is not None
-    values = best[1].values
-    there = np.array([values[best[1].target(name).parameter(axis)] for axis in "xyz"])
-    return _also(robot, {name: there})
+        own = tried.target(name).chain.parameters
+        free = FreeParameters(tuple(q for q in tried.parameters.values() if q.group == "fixture" or q.name in own))
+        solution = solve(Problem(tried, mine, free, dict.fromkeys(_names(), _ROUGH)))
+        there = solution.vector[[free.names.index(tried.target(name).parameter(axis)) for axis in "xyz"]]
+        found.append((float(solution.residual @ solution.residual), there))
+    return _also(robot, {name: min(found, key=lambda one: one[0])[1]})
 
 
 def _fixture_places(robot: Robot, data: Dataset, kinds: Mapping[str, FixtureKind]) -> dict[str, Place]:
@@ -289,10 +289,11 @@ def _fixture_places(robot: Robot, data: Dataset, kinds: Mapping[str, FixtureKind
     for index, name in enumerate(data.fixtures):
         read = np.flatnonzero((data.against == index) & data.has_reading)
         points = np.array([tips[data.targets[data.target[r]]][data.configuration[r]] for r in read.tolist()])
-        if name in known:
-            place = Transform(known[name])
-        elif kinds[name] == "frame":
+        if kinds[name] == "frame":
             place = _frame(robot, data, index)
+            place = Transform(known[name], place.quaternion) if name in known else place
+        elif name in known:
+            place = Transform(known[name])
         elif data.height is not None and kinds[name] == "plane":
             place = _plane(points, data.height[read], flange[data.configuration[read]])
         else:
@@ -402,12 +403,18 @@ def _standing_parameters(robot: Robot, data: Dataset, groups: Iterable[str]) -> 
 
 
 def _misfit(robot: Robot, data: Dataset, setup: Dataset) -> float:
-    """Return how badly a placed robot fits the distances."""
-    places = _fixture_places(robot, data, dict.fromkeys((*data.fixtures, *setup.targets), "point"))
-    there = robot.with_fixtures(places)
-    free = _standing_parameters(there, data, ("base",))
-    residual = Problem(there, replace(data, setup=None), free, dict.fromkeys(_names(), _ROUGH)).residual(free.start)
-    return float(residual @ residual)
+    """Return how badly a placed robot fits its targets' distances from known points, summed squares [m^2]."""
+    known = _known(setup)
+    off = 0.0
+    for target in robot.targets:
+        tips = robot.poses(data.postures, target.name)[0]
+        mine = data.target == data.targets.index(target.name)
+        for index, name in enumerate(data.fixtures):
+            if data.distance is not None and name in known:
+                read = mine & (data.against == index) & np.isfinite(data.distance)
+                far = np.linalg.norm(tips[data.configuration[read]] - np.array(known[name]), axis=1)
+                off += float(np.sum((far - data.distance[read]) ** 2))
+    return off
 
 
 def _names() -> tuple[str, ...]:

@@ -227,7 +227,7 @@ def _seen_by(setup: Setup) -> Robot:
 def _rows(setup: Setup, joints: Array, seen: NDArray[np.bool_], *, tool_known: bool = False) -> tuple[Array, Array]:
     """Return what each configuration would tell, of the nests that are seen, and what is known beforehand."""
     robot = ELASTIC.prepared(without_beta(driven()).carrying(setup.payload).with_frames(STATION, setup.nests))
-    told = sensitivity(robot, Postures(joints), ELASTIC, _ABOUT)
+    told = sensitivity(robot, Postures(joints), ELASTIC.free(robot), _ABOUT)
     counted = np.repeat(np.broadcast_to(seen, (len(joints), len(setup.nests))), 3, axis=1)
     told = replace(told, rows=told.rows * counted[..., None])
     free = told.free.parameters

@@ -53,7 +53,7 @@ def named_device(name: str) -> Device:
     near = nearest_names(name, known)
     raise InputError(
         "there is no device of this name",
-        where="--device",
+        where="device",
         came=name,
         allowed=", ".join(known),
         cure=f"Did you mean {' or '.join(near)}?" if near else None,

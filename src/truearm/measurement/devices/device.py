@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from truearm.errors import InputError
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.truths import DEFAULT_TOOL, stationed
 from truearm.measurement.devices.hexapod.kinematics import rigid_motion
+from truearm.measurement.truths import DEFAULT_TOOL, stationed
 from truearm.measurement.twin import Twin, directions
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import Tool
@@ -101,6 +101,13 @@ def measured_with(
     sigma
         Standard deviation of a reading [m]; the device's own if None, no noise if zero.
     """
+    if count < 1 or (sigma is not None and sigma < 0.0):
+        raise InputError(
+            "a campaign needs configurations, and a deviation is not negative",
+            where=device.name,
+            came=f"{count} configurations, deviation {sigma}",
+            allowed="1 configuration or more, deviation 0 or more",
+        )
     if device.tool is not None:
         carrying = twin.robot.with_frames(twin.robot.base, device.tool.targets)
         twin = replace(twin, robot=carrying)
@@ -209,7 +216,7 @@ def shown(
             return np.concatenate(found)[:count], np.concatenate(seen)[:count]
     raise InputError(
         f"{what} sees too few configurations of {nominal.name}",
-        where="--device",
+        where="device",
         came=f"{sum(map(len, found))} among {_DRAWN * _DRAWS} within the limits",
         allowed=f"{count} or more",
         cure="Take fewer poses, or another device.",

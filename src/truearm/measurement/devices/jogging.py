@@ -21,7 +21,8 @@ _TOGETHER: Final = 4000
 _MOST: Final = 0.8
 _ROUNDS: Final = 25
 _DAMPING: Final = 1e-6
-_MARGIN: Final = 1e-3
+#: How far from the limits the nominal robot stays [rad or m, or that share of the range]: jogging needs room.
+_MARGIN: Final = 0.05
 
 #: How many places are offered for each that is needed.
 SPARE: Final = 3
@@ -45,13 +46,22 @@ def jogged(nominal: Robot, arm: Arm, target: str, joints: Array, gap: Gap) -> Ar
     Raises
     ------
     InputError
-        If it does not arrive.
+        If it does not arrive, or only beyond the limits of its joints.
     """
+    low, high = _limits(nominal)
     joints = joints.copy()
     for _ in range(_STEPS):
         missing = gap(arm.frames(joints)[target][:, :3, 3])
         if float(np.abs(missing).max()) < _THERE:
-            return joints
+            beyond = int(((joints < low) | (joints > high)).any(axis=1).sum())
+            if beyond == 0:
+                return joints
+            raise InputError(
+                "the tool can be jogged to where it is measured only beyond the limits of the joints",
+                where=nominal.name,
+                came=f"{beyond} of {len(joints)} postures beyond them",
+                cure="The truth is too far from the nominal robot: take another seed, or another truth.",
+            )
         joints += _least(nominal.joint_jacobian(joints, target)[:, :3], missing)
     raise InputError(
         "the tool cannot be jogged to where it is measured",
@@ -94,7 +104,8 @@ def postures_at(
     InputError
         If too few are within reach.
     """
-    low, high = np.array([joint.limits or (-np.inf, np.inf) for joint in nominal.joints]).T
+    low, high = _limits(nominal)
+    room = _MARGIN * np.minimum(1.0, high - low)
     found = np.full((len(goals), len(nominal.joints)), np.nan)
     for _ in range(_ROUNDS):
         reached = np.flatnonzero(np.isfinite(found[:, 0]))[:count]
@@ -111,7 +122,7 @@ def postures_at(
             q = q + _least(nominal.joint_jacobian(q, target)[:, :3], missing)
         place, _ = nominal.poses(q, target)
         good = np.linalg.norm(goals[of] - place, axis=1) < 1e-8
-        good &= ((q > low + _MARGIN) & (q < high - _MARGIN)).all(axis=1)
+        good &= ((q > low + room) & (q < high - room)).all(axis=1)
         if facing is not None:
             pointing = nominal.poses(q)[1][:, :, 2]
             good &= np.einsum("ni,ni->n", pointing, facing[of]) > np.cos(within)
@@ -166,6 +177,12 @@ def site(nominal: Robot) -> Array:
     far = float(np.quantile(np.hypot(tips[:, 0], tips[:, 1]), 0.9))
     height = float(np.quantile(tips[:, 2], 0.35))
     return np.asarray(base.rotation @ np.array([0.7 * far, 0.0, height]) + base.translation)
+
+
+def _limits(robot: Robot) -> tuple[Array, Array]:
+    """Return the lowest and the highest reading of each joint, ``(joints,)``, infinite where there is none."""
+    low, high = np.array([joint.limits or (-np.inf, np.inf) for joint in robot.joints]).T
+    return low, high
 
 
 def _least(J: Array, missing: Array) -> Array:

@@ -105,7 +105,7 @@ def read_csv(path: Path) -> Dataset:
         quaternion=numbers(*_QUATERNION) if "qw" in columns else None,
         sigma=numbers("sigma", deviation=True)[:, 0] if "sigma" in columns else None,
         sigma_rot=numbers("sigma_rot", deviation=True)[:, 0] if "sigma_rot" in columns else None,
-        fixture=cells.columns[columns["fixture"].place] if "fixture" in columns else None,
+        fixture=cells.texts(columns["fixture"].place, missing=True) if "fixture" in columns else None,
         distance=numbers("distance")[:, 0] if "distance" in columns else None,
         height=numbers("height")[:, 0] if "height" in columns else None,
     )

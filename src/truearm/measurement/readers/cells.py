@@ -92,10 +92,10 @@ class Cells:
         """Return the file, line and column of a cell, for messages."""
         return f"{self.source}, line {self.lines[row]}, column {self.names[column]}"
 
-    def texts(self, column: int) -> tuple[str, ...]:
-        """Return a column of texts, one line each, none of them empty."""
+    def texts(self, column: int, *, missing: bool = False) -> tuple[str, ...]:
+        """Return a column of texts, one line each, none of them empty unless they may be `missing`."""
         cells = self.columns[column]
-        if "" in cells:
+        if "" in cells and not missing:
             raise InputError(
                 "the cell is empty",
                 where=self.place(cells.index(""), column),
@@ -103,7 +103,7 @@ class Cells:
                 cure="Only readings may be missing: fill the cell, or remove the row.",
             )
         for text in dict.fromkeys(cells):
-            if not is_one_line(text):
+            if text and not is_one_line(text):
                 raise InputError(
                     "the text has a line break or another control character",
                     where=self.place(cells.index(text), column),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Final
 
 import numpy as np
 
@@ -11,6 +12,9 @@ from truearm.measurement.dataset import Dataset
 from truearm.measurement.readers.cells import Cells
 from truearm.measurement.readers.rows import Readings
 from truearm.modeling.chain import Array
+
+#: What a row may say of a fixture.
+_OF_SETUP: Final = ("target", "role", "fixture", "x", "y", "z", "distance", "sigma")
 
 
 def check_lengths(cells: Cells, readings: Readings, places: Mapping[str, int]) -> None:
@@ -76,15 +80,15 @@ def read_setup(cells: Cells, columns: Mapping[str, tuple[int, str]], data: Datas
     data
         What is measured against them.
     """
-    for name, (place, _) in columns.items():
-        if name == "configuration" or name.startswith("joint_"):
+    for heading, (place, _) in columns.items():
+        if heading not in _OF_SETUP:
             for row, cell in enumerate(cells.columns[place]):
                 if cell:
                     raise InputError(
-                        "a fixture stands still: it belongs to no configuration",
+                        "this says nothing of a fixture, which stands still beside the robot",
                         where=cells.place(row, place),
                         came=cell,
-                        allowed="nothing in configuration and joints",
+                        allowed=f"cells filled in {', '.join(_OF_SETUP)} alone",
                         cure="Empty the cell, or give the row the role target.",
                     )
 
@@ -95,29 +99,36 @@ def read_setup(cells: Cells, columns: Mapping[str, tuple[int, str]], data: Datas
         return cells.numbers(place, unit, missing=True, deviation=deviation)
 
     names = cells.texts(columns["target"][0])
-    others = cells.columns[columns["fixture"][0]] if "fixture" in columns else ("",) * len(names)
+    others = cells.texts(columns["fixture"][0], missing=True) if "fixture" in columns else ("",) * len(names)
     position = np.column_stack([numbers(axis) for axis in "xyz"])
     distance, sigma = numbers("distance"), numbers("sigma", deviation=True)
-    column = "target"
     for row, (name, other) in enumerate(zip(names, others, strict=True)):
         where = f"{cells.source}, line {cells.lines[row]}"
-        placed, apart = bool(np.isfinite(position[row]).all()), bool(np.isfinite(distance[row]))
+        placed, apart = bool(np.isfinite(position[row]).any()), bool(np.isfinite(distance[row]))
         for one in filter(None, (name, other)):
             if one not in data.fixtures:
                 near = nearest_names(one, data.fixtures)
                 raise InputError(
                     "nothing is measured against this fixture",
-                    where=f"{where}, column {column if one == name else 'fixture'}",
+                    where=f"{where}, column {'target' if one == name else 'fixture'}",
                     came=one,
                     allowed=", ".join(data.fixtures) or "no row names a fixture",
                     cure=f"Did you mean {' or '.join(near)}?" if near else "Remove the row.",
                 )
-        if placed == apart or apart != bool(other) or name == other:
+        part_missing = placed and not np.isfinite(position[row]).all()
+        if placed == apart or part_missing or apart != bool(other) or name == other:
             raise InputError(
                 "the row does not say what is known of the fixture",
                 where=where,
                 allowed="x, y and z of its place in the instrument's frame, or its distance from another fixture",
                 cure="Fill in x, y, z, or fixture and distance.",
+            )
+        if distance[row] <= 0.0:
+            raise InputError(
+                "a distance must be above zero",
+                where=cells.place(row, columns["distance"][0]),
+                came=cells.columns[columns["distance"][0]][row],
+                allowed="a number above 0",
             )
         if np.isnan(sigma[row]):
             raise InputError(
@@ -136,7 +147,7 @@ def read_setup(cells: Cells, columns: Mapping[str, tuple[int, str]], data: Datas
         targets=targets,
         configuration=np.zeros(len(names), dtype=np.intp),
         target=np.array([targets.index(name) for name in names], dtype=np.intp),
-        position=np.where(np.isnan(position).any(axis=1, keepdims=True), np.nan, position),
+        position=position,
         distance=distance if np.isfinite(distance).any() else None,
         fixtures=data.fixtures,
         fixture=against if (against >= 0).any() else None,

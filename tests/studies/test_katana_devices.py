@@ -16,7 +16,7 @@ from truearm.studies.study import Study
 
 @pytest.fixture(scope="module")
 def found() -> Study:
-    return study(1, lambda _: None, Counts(registry=16, touched=16, drawn=36, unseen=20))
+    return study(1, lambda _: None, Counts(registry=16, touched=16, drawn=72, unseen=20))
 
 
 def value(found: Study, table: str, what: str) -> float:
@@ -77,3 +77,4 @@ def test_two_campaigns_together_keep_every_reading() -> None:
     assert both.joints == pytest.approx(np.concatenate([part.joints for part in parts]))
     read = [[(fixture, kind.name, len(r)) for _, fixture, kind, r in compared(data)] for data in (both, *parts)]
     assert read[0] == [*read[1], *read[2]]
+    assert both.setup is parts[1].setup

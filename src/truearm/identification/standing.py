@@ -106,7 +106,9 @@ def _kinds(data: Dataset) -> dict[str, FixtureKind]:
             )
         found[name] = seen[0] if seen else "point"
     if data.setup is not None:
-        for name in dict.fromkeys((*data.setup.targets, *(data.fixtures[f] for f in data.setup.against if f >= 0))):
+        apart = np.isfinite(data.setup.distance) if data.setup.distance is not None else np.zeros(0, dtype=bool)
+        others = data.setup.against[apart] if len(apart) else np.zeros(0, dtype=np.intp)
+        for name in dict.fromkeys((*data.setup.targets, *(data.fixtures[f] for f in others.tolist() if f >= 0))):
             if found.setdefault(name, "point") == "plane":
                 raise InputError(
                     "a plane has no place and no distance from another fixture",

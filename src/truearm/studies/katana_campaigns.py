@@ -231,6 +231,7 @@ def together(first: Dataset, second: Dataset) -> Dataset:
         height=stacked(first.height, second.height),
         fixtures=(*first.fixtures, *second.fixtures),
         fixture=np.concatenate([first.against, len(first.fixtures) + second.against]),
+        setup=second.setup,
         sigma=stacked(first.sigma, second.sigma),
         approach=None,
         number=None,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from truearm.identification.standing import initial_standing
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.devices import measured_with, named_device
 from truearm.measurement.devices.drawn_circle.pencil import DRAWN_CIRCLE
+from truearm.measurement.readers.canonical import csv_text, read_csv
 from truearm.measurement.twin import Twin
 from truearm.modeling.transform import Transform
 from truearm.robots import load_robot
@@ -44,19 +46,19 @@ def test_a_perfect_robot_draws_the_circle_on_every_page() -> None:
 
 
 def test_each_circle_is_one_way_round_a_page_in_one_posture() -> None:
-    """Places of the pencil by the nominal robot: six circles of six points, two on each of three slopes."""
+    """Places of the pencil by the nominal robot: six circles of twelve points, two on each of three slopes."""
     robot = katana().with_frames(STANDS, {"pencil": (0.02, 0.01, 0.15)})
-    data = drawn(Twin(robot), 36)
-    places = robot.poses(data.joints, "pencil")[0].reshape(6, 6, 3)
+    data = drawn(Twin(robot), 72)
+    places = robot.poses(data.joints, "pencil")[0].reshape(6, 12, 3)
     opposite = np.linalg.norm(places - np.roll(places, 1, axis=1), axis=2)
-    assert opposite == pytest.approx(2 * DRAWN_CIRCLE.radius * np.sin(np.pi / 6), abs=1e-9)
+    assert opposite == pytest.approx(2 * DRAWN_CIRCLE.radius * np.sin(np.pi / 12), abs=1e-9)
     up = STANDS.rotation[:, 2]
     normals = np.array([np.cross(p[1] - p[0], p[2] - p[0]) for p in places])
     slopes = np.arccos(normals @ up / np.linalg.norm(normals, axis=1))
     assert slopes == pytest.approx(np.tile(DRAWN_CIRCLE.slopes, 2))
-    moves = np.abs(np.diff(data.joints.reshape(6, 6, -1), axis=1))
+    moves = np.abs(np.diff(data.joints.reshape(6, 12, -1), axis=1))
     assert moves.max() < 1.5
-    assert np.abs(data.joints[0] - data.joints[18]).max() > 0.05  # the second circle of the page: another posture
+    assert np.abs(data.joints[0] - data.joints[36]).max() > 0.05  # the second circle of the page: another posture
     low, high = np.array([joint.limits for joint in robot.joints]).T
     assert ((data.joints > low) & (data.joints < high)).all()
 
@@ -76,6 +78,19 @@ def test_what_is_read_is_where_the_true_pencil_is() -> None:
     assert np.abs(height).max() > 5e-5
 
 
+def test_a_file_keeps_that_the_middle_of_each_circle_is_in_its_page(tmp_path: Path) -> None:
+    data = drawn(Twin(katana().with_frames(STANDS, {})), 24)
+    path = tmp_path / "drawn.csv"
+    path.write_text(csv_text(data))
+    again = read_csv(path)
+    assert again.setup is not None
+    assert again.setup.height is not None
+    assert again.setup.height == pytest.approx(0.0)
+    assert [again.setup.fixtures[f] for f in again.setup.against.tolist()] == ["paper_1", "paper_2"]
+    assert [again.setup.targets[t] for t in again.setup.target.tolist()] == ["centre_1", "centre_2"]
+    assert again.distance == pytest.approx(data.distance, nan_ok=True)
+
+
 def test_readings_scatter_as_they_declare() -> None:
     robot = Twin(katana().with_frames(STANDS, {}))
     data = drawn(robot, 300, sigma=None)
@@ -93,9 +108,9 @@ def test_without_noise_the_true_robot_is_found(seed: int) -> None:
     data = drawn(truth, 72, seed)
     fit = identify(katana(), data, GEOMETRIC, redundancy="drop")
     assert fit.unseen == ()
-    assert max(fit.sigma.values()) < 1e-7
+    assert max(fit.sigma.values()) < 1e-8
     for name in ("a_3", "a_4", "theta_offset_2", "theta_offset_3", "beta_3"):
-        assert fit.robot.values[name] == pytest.approx(truth.robot.values[name], abs=2e-6)
+        assert fit.robot.values[name] == pytest.approx(truth.robot.values[name], abs=1e-7)
     assert taken_on_trust(data) == ("base",)
 
 
@@ -103,7 +118,7 @@ def test_without_noise_the_true_robot_is_found(seed: int) -> None:
 def test_pages_start_with_the_pencil_above_them(seed: int) -> None:
     """Heights of a robot that was led along a page are its errors: they say nothing of which side it is on."""
     truth = Twin(published("standard").with_frames(STANDS, {}))
-    data = drawn(truth, 48, seed)
+    data = drawn(truth, 72, seed)
     start = initial_standing(katana(), data)
     up = [float(start.fixture_sweep(f"paper_{k}").matrix()[0][2, 2]) for k in (1, 2, 3)]
     assert up == pytest.approx(np.cos(DRAWN_CIRCLE.slopes), abs=0.1)

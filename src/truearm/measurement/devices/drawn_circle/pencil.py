@@ -24,7 +24,9 @@ _ROUNDS: Final = 8
 _LEANS: Final = np.deg2rad(60.0)
 _SLIPS: Final = np.deg2rad(75.0)
 #: Points of a circle, at least, before another is drawn.
-_FEWEST: Final = 6
+_FEWEST: Final = 12
+#: The middle of a circle lies in its page [m].
+_FLAT: Final = 1e-5
 
 
 @dataclass(frozen=True)
@@ -84,6 +86,17 @@ class PencilCircle(Device):
             height=np.concatenate([none, height]),
             fixtures=fixtures,
             fixture=np.concatenate([circle, drawn + page]),
+            setup=recorded(
+                nominal,
+                self.name,
+                np.zeros((1, joints.shape[1])),
+                [0] * drawn,
+                centres,
+                height=np.zeros(drawn),
+                fixtures=fixtures,
+                fixture=drawn + np.arange(drawn) % len(pages),
+                sigma=_FLAT,
+            ),
             sigma=sigma,
         )
 

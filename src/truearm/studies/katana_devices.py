@@ -79,7 +79,7 @@ def study(seeds: int, progress: Callable[[str], None], counts: Counts | None = N
             "Each calibration frees every geometric parameter within its prior (1 mm, 0.1 deg), base and tool; the"
             " document holds base and tool as known. Deviations of readings are estimated from what the fit leaves: a"
             " model that lacks something is not as good as the instrument, and where it is told so, closed loops put"
-            " the lack into lengths (a ball within 2 mm went 38 mm astray with geometry alone).",
+            " the lack into lengths.",
             "Tilting first: clearance, backlash and stiffness from simulated inclinometers of 0.001 deg and 8 pairs of"
             " poses, as in the study katana-tilting, then geometry from the instrument. The pairs need an instrument"
             " that reads positions, for joint 1 alone, about which gravity has no moment.",
@@ -207,6 +207,8 @@ def _registry(runs: Sequence[DeviceRun], start: Start) -> Table:
         "stereo": "Balls within 2 mm of three places nobody measured hardly tell how long links are.",
         "point": "Nothing has a length: as large a robot as one likes keeps its tip at the point.",
         "plane": "Nothing has a length here either.",
+        "gauges": "Three places of 10 mm, each reading for itself: little leverage, and much hangs on the postures.",
+        "sphere": "A radius of 17 mm is the only length.",
         "two-spheres": "The distance of the spheres tells the size: it takes no more than that.",
         "touch-up": "By hand to 0.2 mm, 24 contacts.",
         "drawn-circle": "Led by the nominal robot; two postures of the arm on each page are few.",

@@ -27,7 +27,19 @@ NOMINAL = load_robot("irb120")
 GEOMETRIC = {m.name: m for m in MODELS}["geometric"]
 ASKEW = Transform((0.5, -0.4, 0.3), (0.5, 0.5, -0.5, 0.5))
 #: What the device does not tell as it stands, because it is the world that is the robot's base.
-LOOPS = ("ballbar", "stereo", "five-lasers", "gauges", "plane", "sphere", "two-spheres", "point", "touch-up")
+LOOPS = (
+    "ballbar",
+    "hexapod",
+    "stereo",
+    "five-lasers",
+    "gauges",
+    "plane",
+    "sphere",
+    "two-spheres",
+    "point",
+    "calibration-table",
+    "touch-up",
+)
 
 
 @cache
@@ -286,7 +298,9 @@ def test_a_fixture_of_two_kinds_is_refused() -> None:
     assert data.height is not None
     height, distance = data.height.copy(), np.full(len(data.height), np.nan)
     distance[::2], height[::2] = 0.3, np.nan
-    with pytest.raises(InputError, match=r"fixture plate: the readings disagree.*got 'plane and point'.*different na"):
+    with pytest.raises(
+        InputError, match=r"fixture plate_level: the readings disagree.*got 'plane and point'.*different na"
+    ):
         initial_standing(NOMINAL, replace(data, height=height, distance=distance))
 
 
@@ -294,13 +308,13 @@ def test_a_fixture_of_two_kinds_is_refused() -> None:
 def test_a_plane_whose_place_is_known_is_refused(against: int) -> None:
     _, data = read_by("plane")
     known = recorded(
-        NOMINAL, "known", np.zeros((1, 6)), [0], ["plate"], position=np.array([[0.3, 0.0, 0.1]]),
-        fixtures=("plate",), fixture=np.array([-1]), sigma=1e-5,
+        NOMINAL, "known", np.zeros((1, 6)), [0], ["plate_level"], position=np.array([[0.3, 0.0, 0.1]]),
+        sigma=1e-5,
     )  # fmt: skip
     if against == 0:
-        known = replace(known, targets=("peg",), fixture=np.array([0]), distance=np.array([0.2]))
-        known = replace(known, position=np.full((1, 3), np.nan))
-    with pytest.raises(InputError, match=r"fixture plate: a plane has no place and no distance"):
+        known = replace(known, targets=("peg",), fixtures=("plate_level",), fixture=np.array([0]))
+        known = replace(known, position=np.full((1, 3), np.nan), distance=np.array([0.2]))
+    with pytest.raises(InputError, match=r"fixture plate_level: a plane has no place and no distance"):
         initial_standing(NOMINAL, replace(data, setup=known))
 
 

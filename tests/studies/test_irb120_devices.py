@@ -22,7 +22,7 @@ def small() -> Study:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(irb120_instruments_tables, "ZONED", ("geometric", "elastic"))
         patch.setattr(irb120_instruments_tables, "DIVISIONS", {"2 x 1 x 2": (2, 1, 2)})
-        return study(1, lambda _: None, unseen=12, candidates=100, devices=devices, training=(30, 60))
+        return study(1, lambda _: None, unseen=12, candidates=100, devices=devices, training=(30, 150))
 
 
 def medians(found: Study, title: str) -> dict[str, float]:
@@ -60,9 +60,9 @@ def test_every_instrument_and_what_closed_loops_miss(small: Study) -> None:
 
 def test_zones_and_tool(small: Study) -> None:
     zones = medians(small, "A model for each zone")
-    one, four = (zones[f"geometric, 60 configurations, {cut}: mean"] for cut in ("one model", "2 x 1 x 2 zones"))
+    one, four = (zones[f"geometric, 150 configurations, {cut}: mean"] for cut in ("one model", "2 x 1 x 2 zones"))
     assert four < one
-    assert zones["elastic, 60 configurations, one model: mean"] < four
+    assert zones["elastic, 150 configurations, one model: mean"] < four
     tool = medians(small, "A tool")
     assert tool["nominal robot, 36 touches"] > 3.0 * tool["true robot, 36 touches"]
     # n touches turned evenly to all sides tell the tool to sigma sqrt(3 / n) in length, the point being unknown.

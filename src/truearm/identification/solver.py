@@ -22,6 +22,8 @@ SMALL: Final = 1e-6
 #: Size of a step that counts as one, where the prior is no scale (base and targets) [m or rad].
 _GEOMETRIC: Final = 1e-3
 _STEPS: Final = {"linear": 60, "huber": 100, "cauchy": 100, "l1": 300}
+#: How much larger the last step may be where single numbers pull with one strength however near they are.
+_CREEPS: Final = 10.0
 
 
 class Solvable(Protocol):
@@ -135,7 +137,7 @@ def solve(
         if not accepted:
             break
         here = trial
-        last = float(np.abs(step / np.minimum(prior, _GEOMETRIC)).max()) < small
+        last = float(np.abs(step / np.minimum(prior, _GEOMETRIC)).max()) < small * (_CREEPS if loss == "l1" else 1.0)
         if last or predicted <= 1e-24 * max(cost, 1.0):
             converged = loss != "l1" or scale <= _FLOOR * float(np.median(_norms(here)) + 1e-300)
             if converged:

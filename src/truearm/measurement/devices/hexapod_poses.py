@@ -16,16 +16,18 @@ from truearm.measurement.devices.hexapod.poses import CUPS, poses
 from truearm.measurement.devices.jogging import site
 from truearm.modeling.chain import Array
 from truearm.modeling.inverse import inverse
+from truearm.modeling.inverse.branches import branch_rule
 from truearm.modeling.parts import Tool
 from truearm.modeling.robot import Robot
 
-#: Where the fixture is tried about the middle of the reach: share of the way out, and how much lower [m].
+#: Where the fixture is put: shares of the way out to the middle of the reach, and how much lower than that [m].
 _OUT: Final = (0.6, 0.8, 1.0)
-_LOWER: Final = (0.1, 0.3)
+_LOWER: Final = 0.2
 #: How far a pose is jogged beside its nominal place, within the range of the bar [m].
 _ASIDE: Final = 4e-4
-#: Deviation of a coordinate of a cup, in deviations of a length: the root mean square over Table 3.1, worked out anew.
-_CUP: Final = 1.6
+#: Declared deviation of a coordinate of a cup, in deviations of a length: the root mean square over Table 3.1, worked
+#: out anew, is 1.6, and nine coordinates of a pose weigh no more than its six lengths.
+_CUP: Final = 2.0
 _STEPS: Final = 20
 _STILL: Final = 1e-9
 
@@ -35,16 +37,9 @@ class HexapodPoses(Device):
     """Six lengths of a ballbar between three cups of a base fixture and three of the tool (Nubiola, chapter 3).
 
     The fixture is put to several places, where nobody knows exactly, and the robot is jogged until all six lengths are
-    within the range of the bar. What a length is off by moves each coordinate of a cup by 1.6 times as much, which is
-    what readings declare; that the cups of a pose err together is not told.
-
-    Attributes
-    ----------
-    places
-        To how many places the fixture is put.
+    within the range of the bar. That the cups of a pose err together is not told; the deviation is declared so large
+    that what comes of it is right.
     """
-
-    places: int = 3
 
     def campaign(self, nominal: Robot, arm: Arm, count: int, sigma: float, rng: np.random.Generator) -> Dataset:
         """Return the places of the tool's cups in the frame of the fixture, at poses on all branches."""
@@ -54,7 +49,7 @@ class HexapodPoses(Device):
             raise InputError(
                 f"{nominal.name} can take too few poses of the device",
                 where=self.name,
-                came=f"{len(joints)} configurations at {self.places} places of the fixture",
+                came=f"{len(joints)} configurations at {len(origins)} places of the fixture",
                 allowed=f"{count} or more",
                 cure="Take fewer poses.",
             )
@@ -80,29 +75,33 @@ class HexapodPoses(Device):
             np.repeat(np.arange(count), 3),
             names * count,
             position=np.concatenate(read),
-            fixtures=tuple(f"fixture_{k + 1}" for k in range(self.places)),
+            fixtures=tuple(f"fixture_{k + 1}" for k in range(len(origins))),
             fixture=np.repeat(place, 3),
             sigma=sigma,
         )
 
     def _reachable(self, nominal: Robot) -> tuple[Array, IntArray, IntArray, Array]:
-        """Return the best places of the fixture, and place, pose and joints of all configurations there."""
+        """Return the places of the fixture, and place, pose and joints of all configurations there."""
+        if branch_rule(nominal) is None:
+            raise InputError(
+                f"{nominal.name} cannot take the poses of the device",
+                where=self.name,
+                allowed="a robot with six turning joints whose branches have names",
+                cure="Take another device.",
+            )
         wanted = poses()
         position, rotation = np.array([p.position for p in wanted]), np.array([p.rotation for p in wanted])
         middle = triangle([DEVICE.base] * 3, "B").mean(axis=0)
         centre = (site(nominal) - np.array(nominal.base.translation)) @ nominal.base.rotation
-        tried = []
-        for out in _OUT:
-            for lower in _LOWER:
-                origin = centre * (out, out, 1.0) - (0.0, 0.0, lower) - middle
-                found = inverse(nominal, position + origin, rotation, branch="all")
-                usable = np.array([status.usable for status in found.status])
-                tried.append((origin, found.pose[usable], found.joints[usable]))
-        tried.sort(key=lambda one: -len(one[1]))
-        best = tried[: self.places]
-        place = np.repeat(np.arange(len(best)), [len(rows) for _, rows, _ in best])
-        poses_of = np.concatenate([rows for _, rows, _ in best])
-        return np.array([origin for origin, _, _ in best]), place, poses_of, np.concatenate([q for _, _, q in best])
+        origins = np.array([centre * (out, out, 1.0) - (0.0, 0.0, _LOWER) - middle for out in _OUT])
+        place, pose, joints = [], [], []
+        for k, origin in enumerate(origins):
+            found = inverse(nominal, position + origin, rotation, branch="all")
+            usable = np.array([status.usable for status in found.status])
+            place.append(np.full(int(usable.sum()), k))
+            pose.append(found.pose[usable])
+            joints.append(found.joints[usable])
+        return origins, np.concatenate(place), np.concatenate(pose), np.concatenate(joints)
 
 
 def _jogged(nominal: Robot, arm: Arm, names: list[str], joints: Array, goals: Array) -> Array:
@@ -123,6 +122,6 @@ HEXAPOD: Final = HexapodPoses(
     "hexapod",
     "places of three cups from six lengths of a ballbar, the base fixture at three places",
     "Nubiola, chapter 3: 72 poses, a cup within 3 um in 95 of 100 readings",
-    sigma=1.6 * DEVICE.sigma,
+    sigma=_CUP * DEVICE.sigma,
     tool=Tool({f"cup_{k + 1}": (float(x), float(y), float(z)) for k, (x, y, z) in enumerate(CUPS)}),
 )

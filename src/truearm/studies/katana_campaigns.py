@@ -80,10 +80,10 @@ class Counts:
         Configurations to judge by.
     """
 
-    registry: int = 40
+    registry: int = 48
     touched: int = 24
     drawn: int = 72
-    unseen: int = 80
+    unseen: int = 100
 
     def of(self, device: Device) -> int:
         """Return how many configurations a device of the registry gets."""

@@ -147,7 +147,7 @@ REFUSED = {
     "a line break in a name": (changed(5, "fixture", '"a\nb"'), r"column fixture: the text has a line break"),
     "a fixture with a label": (changed(8, "configuration", "4"), r"line 8, column configuration: this says nothing"),
     "a fixture with joints": (changed(8, "joint_1", "1.0"), r"line 8, column joint_1 \[deg\]: this says nothing"),
-    "a fixture with a height": (changed(8, "height", "1.0"), r"line 8, column height \[mm\]: this says nothing"),
+    "a fixture with a place and a height": (changed(8, "height", "1.0"), r"line 8: the row does not say what is known"),
     "a turned fixture": (changed(8, "qw", "1.0"), r"line 8, column qw: this says nothing.*Empty the cell"),
     "a warm fixture": (changed(8, "temperature", "20.0"), r"line 8, column temperature.*: this says nothing"),
     "a fixture without a place": (changed(9, "distance", ""), r"line 9: the row does not say what is known"),

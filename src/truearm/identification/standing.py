@@ -35,6 +35,8 @@ _STEP: Final = 0.09
 _TRIED: Final = 6
 #: Deviation that readings are weighed with while targets are looked for [m or rad].
 _ROUGH: Final = 1e-3
+#: Heights that fit worse than this on one side of a plane belong to the other [m].
+_CLEARLY: Final = 2e-3
 #: How many readings that takes.
 _ENOUGH: Final = 120
 _TELLS: Final = 1e-5
@@ -104,7 +106,9 @@ def _kinds(data: Dataset) -> dict[str, FixtureKind]:
             )
         found[name] = seen[0] if seen else "point"
     if data.setup is not None:
-        for name in dict.fromkeys((*data.setup.targets, *(data.fixtures[f] for f in data.setup.against if f >= 0))):
+        apart = np.isfinite(data.setup.distance) if data.setup.distance is not None else np.zeros(0, dtype=bool)
+        others = data.setup.against[apart] if len(apart) else np.zeros(0, dtype=np.intp)
+        for name in dict.fromkeys((*data.setup.targets, *(data.fixtures[f] for f in others.tolist() if f >= 0))):
             if found.setdefault(name, "point") == "plane":
                 raise InputError(
                     "a plane has no place and no distance from another fixture",
@@ -279,8 +283,9 @@ def _with_target(robot: Robot, data: Dataset, target: int, kinds: Mapping[str, F
 
 def _fixture_places(robot: Robot, data: Dataset, kinds: Mapping[str, FixtureKind]) -> dict[str, Place]:
     """Return where the fixtures stand, from the places of the targets; known places as they are known."""
-    tips = {t.name: robot.poses(data.postures, t.name)[0] for t in robot.targets if t.name in data.targets}
-    flange = robot.poses(data.postures)[0]
+    at = robot.loaded(data.postures)
+    tips = {t.name: robot.poses(at, t.name)[0] for t in robot.targets if t.name in data.targets}
+    flange = robot.poses(at)[0]
     known = {} if data.setup is None else _known(data.setup)
     places: dict[str, Place] = {}
     for index, name in enumerate(data.fixtures):
@@ -317,11 +322,16 @@ def _frame(robot: Robot, data: Dataset, index: int) -> Transform:
 
 
 def _plane(points: Array, heights: Array, flange: Array) -> Transform:
-    """Return a frame in the plane over which points ``(n, 3)`` have these heights; the flange is on its upper side."""
+    """Return a frame in the plane over which points ``(n, 3)`` have these heights.
+
+    The flange is on its upper side, unless the heights clearly say otherwise: where the robot was led along the plane
+    they are its own errors, which an uncalibrated robot explains on either side.
+    """
     middle = points.mean(axis=0)
     h = heights - heights.mean()
     normal = _normals((points - middle)[None], h)[0]
-    if not h.any() and float(normal @ (flange - points).mean(axis=0)) < 0.0:
+    off = (points - middle) @ -normal - h
+    if float(normal @ (flange - points).mean(axis=0)) < 0.0 and float(np.sqrt(np.mean(off**2))) < _CLEARLY:
         normal = -normal
     x = np.cross(np.eye(3)[np.argmin(np.abs(normal))], normal)
     x /= np.linalg.norm(x)
@@ -363,16 +373,31 @@ def _point(points: Array, data: Dataset, read: IntArray, where: str) -> tuple[fl
 def _centres(points: Array, distances: Array) -> Array:
     """Return for sets of points ``(g, n, 3)`` the centres ``(g, 3)`` from which they lie at these distances.
 
-    ``|x|^2 - d^2 = 2 c x - |c|^2`` is linear in the centre and in its square, which is left free.
+    ``|x|^2 - d^2 = 2 c x - |c|^2`` is linear in the centre and in its square, which is left free. Points that nearly
+    lie in a plane say so only within it; the square then tells how far from it the centre is, on either side. Of the
+    three centres the one that fits best is returned.
     """
     middle = points.mean(axis=1, keepdims=True)
     x = points - middle
-    rows = np.concatenate([2.0 * x, -np.ones((*x.shape[:2], 1))], axis=2)
     right = np.sum(x * x, axis=2) - distances**2
+    _, axes = np.linalg.eigh(np.swapaxes(x, 1, 2) @ x)
+    choices = [_solved(x, right)[:, :3]]
+    flat = _solved(x @ axes[:, :, 1:], right)
+    beside = np.sqrt(np.maximum(flat[:, 2] - np.sum(flat[:, :2] ** 2, axis=1), 0.0))
+    for side in (1.0, -1.0):
+        choices.append(np.einsum("gij,gj->gi", axes, np.column_stack([side * beside, flat[:, :2]])))
+    centres = np.stack(choices, axis=1)
+    off = np.linalg.norm(x[:, None] - centres[:, :, None], axis=3) - distances
+    chosen = np.argmin(np.sum(off**2, axis=2), axis=1)
+    return np.asarray(middle[:, 0] + centres[np.arange(len(centres)), chosen])
+
+
+def _solved(x: Array, right: Array) -> Array:
+    """Return what solves ``2 c x - s = right`` best, for sets of points ``(g, n, k)``: c and s, ``(g, k + 1)``."""
+    rows = np.concatenate([2.0 * x, -np.ones((*x.shape[:2], 1))], axis=2)
     gram = np.swapaxes(rows, 1, 2) @ rows
-    gram = gram + 1e-9 * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.diag([1.0, 1.0, 1.0, 0.0])
-    solved = np.linalg.solve(gram, np.swapaxes(rows, 1, 2) @ right[..., None])[..., 0]
-    return np.asarray(middle[:, 0] + solved[:, :3])
+    gram = gram + 1e-9 * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.diag([*np.ones(x.shape[2]), 0.0])
+    return np.asarray(np.linalg.solve(gram, np.swapaxes(rows, 1, 2) @ right[..., None])[..., 0])
 
 
 def _standing_parameters(robot: Robot, data: Dataset, groups: Iterable[str]) -> FreeParameters:

@@ -61,7 +61,7 @@ class Sighting:
         moved = moved.copy()
         for k, slide, turn in zip(mine, self.fixture.linear(places), self.fixture.angular(places), strict=True):
             moved[k] -= slide + cross(*np.broadcast_arrays(turn, arm))
-        return np.stack([self._turned(one) for one in moved])
+        return self._turned(moved, at=1)
 
     def angular(self, velocity: Array, names: tuple[str, ...]) -> Array:
         """Return how the target turns with parameters [rad per unit], as :meth:`linear`."""
@@ -72,10 +72,10 @@ class Sighting:
         moved = moved.copy()
         for k, turn in zip(mine, self.fixture.angular([self.fixture.places[names[k]] for k in mine]), strict=True):
             moved[k] -= turn
-        return np.stack([self._turned(one) for one in moved])
+        return self._turned(moved, at=1)
 
-    def _turned(self, vector: Array) -> Array:
-        """Return vectors ``(3, ..., k)`` of the world in the axes of the fixture."""
+    def _turned(self, vector: Array, at: int = 0) -> Array:
+        """Return vectors ``(3, ..., k)`` of the world in the axes of the fixture; `at` is where their 3 is."""
         if self.fixture is None or not any(element.turns for element in self.fixture.elements):
             return vector
-        return np.stack([np.sum(axis * vector, axis=0) for axis in self.fixture.rotation])
+        return np.stack([np.sum(axis * vector, axis=at) for axis in self.fixture.rotation], axis=at)

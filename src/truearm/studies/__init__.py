@@ -74,6 +74,11 @@ STUDIES: Final = (
         "truearm.studies.irb120_simulation",
     ),
     Entry(
+        "katana-devices",
+        "a simulated Katana 450 calibrated with every instrument, and the circle it draws (Patel 3.3 and 5.5.2)",
+        "truearm.studies.katana_devices",
+    ),
+    Entry(
         "katana-influence",
         "influence of each parameter, and identification by it, on a simulated Katana 450 (Patel 3.5 to 3.7)",
         "truearm.studies.katana_influence",

@@ -104,8 +104,8 @@ def run_circle(seed: int, step: float, poses: int) -> CircleRun:
     """
     rng = np.random.default_rng(seed)
     nominal, truth = katana(PENCIL), twin(published("standard", PENCIL))
-    circle, line = (timed(path, SPEED, _RAMP, step) for path in (Circle.through(*_POINTS), Line(*_LINE)))
-    motion, on_line = _motions(nominal, circle, line, rng)
+    circle, line = paths(step)
+    motion, on_line = motions(nominal, circle, line, rng)
 
     causes = _causes()
     quick = timed(Circle.through(*_POINTS), FAST, 40 * _RAMP, step * SPEED / FAST)
@@ -177,7 +177,13 @@ def _causes() -> Mapping[str, Robot]:
     }
 
 
-def _motions(
+def paths(step: float) -> tuple[Trajectory, Trajectory]:
+    """Return the circle of section 5.5.1 and its diameter, with a time between samples [s]."""
+    circle, line = (timed(path, SPEED, _RAMP, step) for path in (Circle.through(*_POINTS), Line(*_LINE)))
+    return circle, line
+
+
+def motions(
     robot: Robot, circle: Trajectory, line: Trajectory, rng: np.random.Generator
 ) -> tuple[JointMotion, JointMotion]:
     """Return motions along both paths from a posture drawn at random, far from singular ones."""

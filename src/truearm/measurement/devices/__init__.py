@@ -7,6 +7,7 @@ from typing import Final
 from truearm.errors import InputError, nearest_names
 from truearm.measurement.devices.artefacts import MARKERS, PLANAR_ARTEFACT, SPATIAL_ARTEFACT
 from truearm.measurement.devices.device import Arm, Device, measured_with, standing_for
+from truearm.measurement.devices.drawn_circle.pencil import DRAWN_CIRCLE
 from truearm.measurement.devices.hexapod_poses import HEXAPOD
 from truearm.measurement.devices.known_points import CALIBRATION_TABLE, TOUCH_UP
 from truearm.measurement.devices.lengths import BALLBAR, STRINGS
@@ -34,6 +35,7 @@ DEVICES: Final[tuple[Device, ...]] = (
     POINT,
     CALIBRATION_TABLE,
     TOUCH_UP,
+    DRAWN_CIRCLE,
 )
 
 

@@ -140,6 +140,34 @@ def postures_at(
     )
 
 
+def followed(nominal: Robot, target: str, joints: Array, places: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Return how the nominal robot leads a target along paths, by the shortest joint moves.
+
+    Parameters
+    ----------
+    joints
+        Where to begin, ``(n, joints)``.
+    places
+        Of the target in the world along each path [m], ``(steps, n, 3)``; few millimetres apart.
+
+    Returns
+    -------
+    Joint readings ``(steps, n, joints)``, and which of the paths were followed to the end within the limits ``(n,)``.
+    """
+    low, high = np.array([joint.limits or (-np.inf, np.inf) for joint in nominal.joints]).T
+    q, went, whole = joints, [], np.ones(len(joints), dtype=bool)
+    for goal in places:
+        for _ in range(_STEPS):
+            missing = goal - nominal.poses(q, target)[0]
+            far = np.abs(missing).max(axis=1)
+            if float(far.max(where=whole, initial=0.0)) < _THERE:
+                break
+            q = q + _least(nominal.joint_jacobian(q, target)[:, :3], missing)
+        whole = whole & (far < _THERE) & ((q > low + _MARGIN) & (q < high - _MARGIN)).all(axis=1)
+        went.append(q)
+    return np.array(went), whole
+
+
 def site(nominal: Robot) -> Array:
     """Return a place in the middle of the reach, in front of the base, in the world [m]."""
     rng = np.random.default_rng(0)

@@ -14,7 +14,7 @@ from truearm.measurement.readers.rows import Readings
 from truearm.modeling.chain import Array
 
 #: What a row may say of a fixture.
-_OF_SETUP: Final = ("target", "role", "fixture", "x", "y", "z", "distance", "sigma")
+_OF_SETUP: Final = ("target", "role", "fixture", "x", "y", "z", "distance", "height", "sigma")
 
 
 def check_lengths(cells: Cells, readings: Readings, places: Mapping[str, int]) -> None:
@@ -69,7 +69,7 @@ def check_lengths(cells: Cells, readings: Readings, places: Mapping[str, int]) -
 
 
 def read_setup(cells: Cells, columns: Mapping[str, tuple[int, str]], data: Dataset) -> Dataset:
-    """Read what is known of the fixtures: where they stand, or how far from each other, and how well.
+    """Read what is known of the fixtures: where they stand, how far from each other or how high over one, and how well.
 
     Parameters
     ----------
@@ -101,10 +101,11 @@ def read_setup(cells: Cells, columns: Mapping[str, tuple[int, str]], data: Datas
     names = cells.texts(columns["target"][0])
     others = cells.texts(columns["fixture"][0], missing=True) if "fixture" in columns else ("",) * len(names)
     position = np.column_stack([numbers(axis) for axis in "xyz"])
-    distance, sigma = numbers("distance"), numbers("sigma", deviation=True)
+    distance, height, sigma = numbers("distance"), numbers("height"), numbers("sigma", deviation=True)
     for row, (name, other) in enumerate(zip(names, others, strict=True)):
         where = f"{cells.source}, line {cells.lines[row]}"
         placed, apart = bool(np.isfinite(position[row]).any()), bool(np.isfinite(distance[row]))
+        over = bool(np.isfinite(height[row]))
         for one in filter(None, (name, other)):
             if one not in data.fixtures:
                 near = nearest_names(one, data.fixtures)
@@ -116,12 +117,13 @@ def read_setup(cells: Cells, columns: Mapping[str, tuple[int, str]], data: Datas
                     cure=f"Did you mean {' or '.join(near)}?" if near else "Remove the row.",
                 )
         part_missing = placed and not np.isfinite(position[row]).all()
-        if placed == apart or part_missing or apart != bool(other) or name == other:
+        if placed + apart + over != 1 or part_missing or placed == bool(other) or name == other:
             raise InputError(
                 "the row does not say what is known of the fixture",
                 where=where,
-                allowed="x, y and z of its place in the instrument's frame, or its distance from another fixture",
-                cure="Fill in x, y, z, or fixture and distance.",
+                allowed="x, y and z of its place in the instrument's frame, its distance from another fixture, or its"
+                " height over one that is a plane",
+                cure="Fill in x, y, z, or fixture and distance, or fixture and height.",
             )
         if distance[row] <= 0.0:
             raise InputError(
@@ -149,6 +151,7 @@ def read_setup(cells: Cells, columns: Mapping[str, tuple[int, str]], data: Datas
         target=np.array([targets.index(name) for name in names], dtype=np.intp),
         position=position,
         distance=distance if np.isfinite(distance).any() else None,
+        height=height if np.isfinite(height).any() else None,
         fixtures=data.fixtures,
         fixture=against if (against >= 0).any() else None,
         sigma=sigma,

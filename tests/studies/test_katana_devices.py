@@ -1,0 +1,80 @@
+"""The study katana-devices: instruments on a Katana twin, and the page that the twin draws on."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from truearm.measurement.devices import measured_with, named_device
+from truearm.measurement.observations import compared
+from truearm.measurement.twin import Twin
+from truearm.studies.katana import katana
+from truearm.studies.katana_campaigns import USED, Counts, OnPage, together
+from truearm.studies.katana_devices import study
+from truearm.studies.study import Study
+
+
+@pytest.fixture(scope="module")
+def found() -> Study:
+    return study(1, lambda _: None, Counts(registry=16, touched=16, drawn=72, unseen=20))
+
+
+def value(found: Study, table: str, what: str) -> float:
+    (row,) = (row for t in found.tables if t.title == table for row in t.rows if row.what == what)
+    return row.median
+
+
+def test_every_device_is_in_both_tables(found: Study) -> None:
+    tables = {table.title: table for table in found.tables}
+    for start in ("geometry alone", "tilting first"):
+        rows = tables[f"Every device, {start}"].rows
+        assert [row.what.partition(",")[0] for row in rows[1:-1]] == [device.name for device in USED]
+        assert all(np.isfinite(row.median) for row in rows)
+
+
+def test_tilting_is_worth_more_than_the_instrument(found: Study) -> None:
+    left = {
+        (start, what): value(found, f"Every device, {start}", f"{what}, 16 configurations, mean")
+        for start in ("geometry alone", "tilting first")
+        for what in ("markers", "measurement-arm", "two-spheres")
+    }
+    for what in ("markers", "measurement-arm", "two-spheres"):
+        assert left["tilting first", what] < 0.5 * left["geometry alone", what]
+
+
+def test_closed_loops_say_what_they_do_not_see(found: Study) -> None:
+    table = "What closed loops do not see"
+    assert value(found, table, "five-lasers: directions that it does not see") == 6
+    assert value(found, table, "point: directions that it does not see") == 7
+    (row,) = (row for t in found.tables for row in t.rows if row.what == "plane: directions that it does not see")
+    assert "where the robot stands and how large it is" in row.explanation
+
+
+def test_the_page_shows_a_part_of_the_true_error(found: Study) -> None:
+    table = "The circle of section 5.5.1 on the page"
+    seen, moved, true = (
+        value(found, table, f"before: {what}")
+        for what in ("as the page shows it", "after the best rigid motion", "true mean distance")
+    )
+    assert 0.02 < seen < moved + 0.03 < true
+    after = value(found, table, "markers, tilting first: true mean distance")
+    assert after < 0.3 * true
+    assert "Plotly" in found.html()
+
+
+def test_what_the_page_shows_is_outward_and_upward() -> None:
+    three = np.array([3e-1, 0.0])
+    page = OnPage(along=np.zeros(2), outward=three, height=np.array([4e-1, 0.0]), distance=three, moved=three)
+    assert page.seen == pytest.approx(0.25)
+
+
+def test_two_campaigns_together_keep_every_reading() -> None:
+    robot = Twin(katana().with_frames(katana().base, {"pencil": (0.0, 0.0, 0.13)}))
+    rng = np.random.default_rng(0)
+    parts = [measured_with(named_device(name), katana(), robot, 8, rng) for name in ("touch-up", "drawn-circle")]
+    both = together(*parts)
+    assert both.configurations == 16
+    assert both.joints == pytest.approx(np.concatenate([part.joints for part in parts]))
+    read = [[(fixture, kind.name, len(r)) for _, fixture, kind, r in compared(data)] for data in (both, *parts)]
+    assert read[0] == [*read[1], *read[2]]
+    assert both.setup is parts[1].setup

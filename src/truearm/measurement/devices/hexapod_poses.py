@@ -13,7 +13,7 @@ from truearm.measurement.devices.device import Arm, Device, IntArray, recorded
 from truearm.measurement.devices.hexapod.geometry import DEVICE, triangle
 from truearm.measurement.devices.hexapod.kinematics import leg_lengths, tool_cups
 from truearm.measurement.devices.hexapod.poses import CUPS, poses
-from truearm.measurement.devices.jogging import site
+from truearm.measurement.devices.jogging import SPARE, site
 from truearm.modeling.chain import Array
 from truearm.modeling.inverse import inverse
 from truearm.modeling.inverse.branches import branch_rule
@@ -45,23 +45,28 @@ class HexapodPoses(Device):
         """Return the places of the tool's cups in the frame of the fixture, at poses on all branches."""
         wanted = poses()
         origins, place_of, pose_of, joints = self._reachable(nominal)
-        if len(joints) < count:
+        order = rng.permutation(len(joints))[: SPARE * count]
+        names = [target.name for target in nominal.targets]
+        base, turned = nominal.base, nominal.base.rotation
+        aside = rng.uniform(-1.0, 1.0, (len(order), 1, 3)) * _ASIDE
+        goals = np.array([wanted[k].cups for k in pose_of[order]]) + aside + origins[place_of[order]][:, None]
+        goals = goals @ turned.T + np.array(base.translation)
+        at = _jogged(nominal, arm, names, joints[order], goals)
+        frames = arm.frames(at)
+        seen = np.stack([frames[name][:, :3, 3] for name in names], axis=1)
+        low, high = np.array([joint.limits or (-np.inf, np.inf) for joint in nominal.joints]).T
+        there = np.linalg.norm(seen - goals, axis=2).max(axis=1) < _ASIDE
+        kept = np.flatnonzero(there & ((at >= low) & (at <= high)).all(axis=1))[:count]
+        if len(kept) < count:
             raise InputError(
                 f"{nominal.name} can take too few poses of the device",
                 where=self.name,
-                came=f"{len(joints)} configurations at {len(origins)} places of the fixture",
+                came=f"{len(kept)} of {len(order)} tried, at {len(origins)} places of the fixture",
                 allowed=f"{count} or more",
                 cure="Take fewer poses.",
             )
-        chosen = rng.permutation(len(joints))[:count]
-        place, pose = place_of[chosen], [wanted[k] for k in pose_of[chosen]]
-        names = [target.name for target in nominal.targets]
-        base, turned = nominal.base, nominal.base.rotation
-        aside = rng.uniform(-1.0, 1.0, (count, 1, 3)) * _ASIDE
-        goals = np.array([one.cups for one in pose]) + aside + origins[place][:, None]
-        at = _jogged(nominal, arm, names, joints[chosen], goals @ turned.T + np.array(base.translation))
-        frames = arm.frames(at)
-        seen = np.stack([frames[name][:, :3, 3] for name in names], axis=1)
+        at, seen, place = at[kept], seen[kept], place_of[order][kept]
+        pose = [wanted[k] for k in pose_of[order][kept]]
         cups = (seen - np.array(base.translation)) @ turned - origins[place][:, None]
         feet, bar = triangle([DEVICE.base] * 3, "B"), sigma / _CUP * rng.standard_normal((count, 6))
         read = []

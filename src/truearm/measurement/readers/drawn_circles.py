@@ -35,8 +35,8 @@ class Page:
     scan
         Image of the page.
     points
-        CSV with the columns ``configuration``, ``joint_1 [deg]`` .., ``angle [deg]`` on the page and ``height [mm]`` over
-        it.
+        CSV with the columns ``configuration``, ``joint_1 [deg]`` .., ``angle [deg]`` on the page and ``height [mm]``
+        over it.
     """
 
     scan: Path

@@ -39,6 +39,7 @@ LOOPS = (
     "point",
     "calibration-table",
     "touch-up",
+    "drawn-circle",
 )
 
 
@@ -62,7 +63,8 @@ def test_readings_of_the_nominal_robot_give_its_own_places(device: str) -> None:
     standing = initial_standing(NOMINAL, data)
     found = np.array([place_of(standing, name) for name in data.targets])
     true = np.array([place_of(twin.robot, name) for name in data.targets])
-    np.testing.assert_allclose(found, true, atol=1e-6)  # the search for a touching tip keeps to 1 m a little
+    # the search for a touching tip keeps to 1 m a little, and more where lines are nearly flat about their middles
+    np.testing.assert_allclose(found, true, atol=1e-4 if device == "drawn-circle" else 1e-6)
     if data.anchored:
         np.testing.assert_allclose(standing.base.translation, twin.robot.base.translation, atol=1e-9)
         np.testing.assert_allclose(standing.base.rotation, twin.robot.base.rotation, atol=1e-9)

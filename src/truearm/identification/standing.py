@@ -36,7 +36,7 @@ _TRIED: Final = 6
 #: Deviation that readings are weighed with while targets are looked for [m or rad].
 _ROUGH: Final = 1e-3
 #: Heights that fit worse than this on one side of a plane belong to the other [m].
-_CLEARLY: Final = 2e-3
+_CLEARLY: Final = 5e-3
 #: How many readings that takes.
 _ENOUGH: Final = 120
 _TELLS: Final = 1e-5
@@ -346,8 +346,9 @@ def _normals(points: Array, heights: Array) -> Array:
         return flat
     gram = np.swapaxes(points, 1, 2) @ points
     lift = np.swapaxes(points, 1, 2) @ heights
-    steep = np.linalg.solve(gram + 1e-12 * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(3), lift[..., None])
-    steep = steep[..., 0] / np.linalg.norm(steep[..., 0], axis=1, keepdims=True)
+    ridge = 1e-12 * np.trace(gram, axis1=1, axis2=2) + 1e-30  # readings may be of one place
+    steep = np.linalg.solve(gram + ridge[:, None, None] * np.eye(3), lift[..., None])[..., 0]
+    steep = steep / np.maximum(np.linalg.norm(steep, axis=1, keepdims=True), 1e-300)
     choices = np.stack([flat, -flat, steep], axis=1)
     off = np.einsum("gni,gci->gcn", points, choices) - heights
     chosen = np.argmin(np.sum(off**2, axis=2), axis=1)

@@ -16,12 +16,14 @@ from truearm.identification.standing import initial_standing, unanchored
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.devices import DEVICES, measured_with, named_device
 from truearm.measurement.devices.device import recorded
+from truearm.measurement.statistics import errors_of
 from truearm.measurement.truths import truth_twin
 from truearm.measurement.twin import Twin
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 from truearm.robots import load_robot
+from truearm.studies import katana
 
 NOMINAL = load_robot("irb120")
 GEOMETRIC = {m.name: m for m in MODELS}["geometric"]
@@ -326,3 +328,19 @@ def test_only_places_are_fitted_where_nothing_else_is_asked() -> None:
     assert {fit.robot.parameters[n].group for n in fit.free.names} == {"target", "fixture"}
     geometry = [p for p in fit.robot.parameters.values() if p.group in ("geometry", "joint zero")]
     assert all(p.value == NOMINAL.values[p.name] != twin.robot.values[p.name] for p in geometry)
+
+
+@pytest.mark.parametrize("device", ["stereo", "plane"])
+def test_readings_that_the_model_cannot_follow_do_not_overrule_the_priors(device: str) -> None:
+    """The joints lean and have play, the model is rigid, and the readings claim micrometres."""
+    arm = load_robot("katana450")
+    twin = katana.twin(arm)
+    data = measured_with(named_device(device), arm, twin, 48, np.random.default_rng(3))
+    fit = identify(arm.carrying(twin.robot.payload), data, GEOMETRIC)
+    moved = [abs(p.value - p.nominal) / p.prior for p in fit.robot.parameters.values() if p.group in GEOMETRIC.groups]
+    assert max(moved) < 3.0  # believed to the letter, they moved lengths by more than ten
+    assert fit.excess > 5.0
+    residual = errors_of(fit.robot, data)
+    off = np.concatenate([residual.position.reshape(-1), residual.length if residual.length is not None else []])
+    sigma = named_device(device).sigma
+    assert fit.excess == pytest.approx(np.sqrt(np.nanmean(off**2)) / sigma, rel=0.4)

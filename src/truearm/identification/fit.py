@@ -237,24 +237,38 @@ def _limits_of(limits: tuple[Array, Array], free: FreeParameters, kept: FreePara
 def _solve_with_noise(
     problem: Problem, loss: Loss, limits: tuple[Array, Array] | None, small: float
 ) -> tuple[Solution, Problem]:
-    """Solve; then again with what the solution says of undeclared deviations and of the loads at every joint."""
+    """Solve; then again with what the solution says of deviations and of the loads at every joint.
+
+    Deviations are estimated where they are not declared. Declared ones are widened by what the residuals say where
+    there is no anchor: believed to the letter, readings of a closed loop that the model cannot follow would overrule
+    every prior, for the sake of directions that they hardly see.
+    """
     solution = solve(problem, loss, limits, small)
     undeclared = {problem.kind(b) for b in problem.blocks if not b.declared}
     steps = solution.steps
     settled = False
     for _ in range(_ROUNDS):
         noise = {**problem.noise}
-        for name, (estimate, _) in _noise(problem, solution, loss).items():
+        found_noise = _noise(problem, solution, loss)
+        known = {name: found_noise[name] for name in found_noise if name not in undeclared}
+        wider = _excess(known) if known and not problem.data.anchored else 1.0
+        for name, (estimate, _) in found_noise.items():
             if name in undeclared:
                 noise[name] = max(estimate * noise[name], _NOISE_FLOOR)
         change = max((abs(np.log(noise[n] / problem.noise[n])) for n in undeclared), default=0.0)
         found = dict(zip(problem.free.names, map(float, solution.vector), strict=True))
         started = FreeParameters(tuple(replace(p, value=found[p.name]) for p in problem.free.parameters))
-        there = replace(problem, robot=problem.robot.with_values(found), noise=noise, free=started)
+        there = replace(
+            problem,
+            robot=problem.robot.with_values(found),
+            noise=noise,
+            free=started,
+            widened=problem.widened * wider,
+        )
         shift = _load_shift(problem, there)
-        if (settled and shift < _LOADS_AGREE * small) or (not undeclared and shift == 0.0):
+        if (settled and shift < _LOADS_AGREE * small) or (not undeclared and shift == 0.0 and wider == 1.0):
             break
-        settled = change < 0.02
+        settled = change < 0.02 and wider < 1.02
         problem = there
         solution = solve(problem, loss, limits, small)
         steps += solution.steps
@@ -322,6 +336,7 @@ def _fit(
     single = float(np.sum(problem.components == 1)) / problem.rows
     efficiency = single * _L1_EFFICIENCY_OF_ONE + (1.0 - single) * _L1_EFFICIENCY
     spread = excess / np.sqrt(efficiency) if loss == "l1" else excess
+    excess *= problem.widened
     covariance = _covariance(A / spread, ~at_bound, problem.priors) * np.outer(free.prior, free.prior)
     deviation = np.sqrt(np.diag(covariance))
     informed = np.clip(1.0 - (deviation / free.prior) ** 2, 0.0, 1.0)

@@ -85,6 +85,8 @@ class Problem:
         Standard deviation [m or rad] by observation name, for readings that declare none.
     priors
         Whether the parameters' priors are rows of the problem.
+    widened
+        How many times larger than declared the deviations of the readings are taken.
     """
 
     robot: Robot
@@ -92,6 +94,7 @@ class Problem:
     free: FreeParameters
     noise: dict[str, float]
     priors: bool = True
+    widened: float = 1.0
 
     @cached_property
     def blocks(self) -> tuple[Block, ...]:
@@ -102,7 +105,8 @@ class Problem:
     def _blocks_of(self, data: Dataset) -> Iterator[Block]:
         for target, fixture, observation, readings in compared(data):
             sigma = observation.declared_sigma(data)
-            known = np.full(len(readings), self.noise[observation.name]) if sigma is None else sigma[readings]
+            wider = self.widened if data is self.data else 1.0
+            known = np.full(len(readings), self.noise[observation.name]) if sigma is None else wider * sigma[readings]
             seen = data.configuration[readings]
             everywhere = np.array_equal(seen, np.arange(data.configurations))
             yield Block(observation, data, target, fixture, readings, slice(None) if everywhere else seen, known)

@@ -400,6 +400,14 @@ def validate(
             where=data.source,
             cure="Add the column temperature [degC].",
         )
+    identified = {p.group for p in robot.parameters.values() if p.deviation is not None}
+    if data.anchored and robot.fixtures and identified and "base" not in identified:
+        raise InputError(
+            "the robot was calibrated without any instrument's frame, so it does not know where this one stands",
+            where=data.source,
+            cure="Place it first: 'truearm calibrate CALIBRATED.yaml DATA.csv --model frames', or compare distances: "
+            "'truearm distances'.",
+        )
     for name in data.targets:
         robot.target(name)
     for name in data.fixtures:

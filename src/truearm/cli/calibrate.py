@@ -100,9 +100,20 @@ def print_calibration(calibration: Calibration) -> None:
     typer.echo(f"  calibrated  {error_line(summary['train'])}")
     if calibration.selection is not None:
         typer.echo(f"Chosen model: {calibration.fit.model.summary}")
+    if calibration.fit.model.name == "frames":
+        print_places(calibration)
     typer.echo(f"Status: {summary['status']}. {calibration.status.advice}")
     for warning in summary["warnings"]:
         typer.echo(f"Warning ({warning['code']}): {warning['message']}")
+
+
+def print_places(calibration: Calibration) -> None:
+    """Print where the targets are on the flange, with their deviations."""
+    for target in calibration.robot.targets:
+        found = [calibration.robot.parameters[target.parameter(axis)] for axis in "xyz"]
+        place = ", ".join(f"{p.value * 1e3:.3f}" for p in found)
+        told = ", ".join("?" if p.deviation is None else f"{p.deviation * 1e3:.2g}" for p in found)
+        typer.echo(f"Target {target.name} on the flange: ({place}) mm, deviations ({told}) mm")
 
 
 def exit_unless_finished(calibration: Calibration) -> None:

@@ -133,6 +133,8 @@ def plan(
         if lost:
             typer.echo(f"  {name}: broken by {lost} of {made.candidates}")
     typer.echo("  " + "  ".join(f"{name} {value:.4g}" for name, value in made.indices.items()))
+    for name, place in made.fixtures.items():
+        typer.echo(f"  {name} at ({', '.join(f'{v * 1e3:.1f}' for v in place)}) mm in the base frame")
     for sentence in answer(made):
         typer.echo(sentence)
     typer.echo(f"Written: {out}, {page}")

@@ -34,7 +34,7 @@ def simulate(
             show_default="one that sees every target everywhere",
         ),
     ] = None,
-    seed: Annotated[int, typer.Option(metavar="S", min=0, help="Of configurations and noise.")] = 0,
+    seed: Annotated[int, typer.Option(metavar="S", min=0, help="Of configurations, noise and a random truth.")] = 0,
     payload: PayloadText = None,
     gravity: GravityText = None,
 ) -> None:

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
+import numpy as np
+
 from truearm.identification.fit import Fit, Status
+from truearm.identification.redundancy import but_for
 from truearm.modeling.conventions import parallel_joints_without_beta
 from truearm.notices import Notice
 
@@ -15,6 +19,8 @@ _NEGATIVE: Final = 4.0
 #: Share of the prior variance that the data should remove, and of parameters of effects that may fall short of it.
 _HALF: Final = 0.5
 _CROWDED: Final = 0.05
+#: Configurations at which positions are asked for.
+_ANYWHERE: Final = 200
 
 
 def check_fit(fit: Fit) -> list[Notice]:
@@ -54,6 +60,11 @@ def check_fit(fit: Fit) -> list[Notice]:
         words = "Nothing outside the robot says where it stands: its base is the world."
         if "size" in fit.trusted:
             words += " No length was measured either: the size of everything rests on the nominal lengths."
+        told = _positions_told(fit)
+        words += (
+            " The held-out error is one of readings; positions anywhere are told to about "
+            f"{told * 1e3:.2g} mm on average, but for that."
+        )
         if fit.blind:
             words += f" Not seen, and left at nominal values: {'; '.join(fit.blind)}."
         found.append(Notice("closed-loop", words))
@@ -173,3 +184,19 @@ def _check_effects(fit: Fit) -> list[Notice]:
             )
         )
     return found
+
+
+def _positions_told(fit: Fit, seed: int = 0) -> float:
+    """Return the mean error of the targets' positions that the covariance lets expect at random configurations [m].
+
+    What is taken on trust, where the base is and perhaps the size of everything, is left out of account.
+    """
+    robot, names = fit.robot, fit.free.names
+    q = robot.loaded(robot.random_configurations(_ANYWHERE, np.random.default_rng(seed)))
+    lengths = []
+    for target in robot.targets:
+        sweep = robot.sweep(q, target.name)
+        (moved,) = but_for(fit.trusted, robot, sweep, [robot.linear(sweep, q, names).reshape(len(names), -1).T])
+        variance = np.sum((moved @ fit.covariance) * moved, axis=1).reshape(3, -1).mean(axis=0)
+        lengths.append(math.sqrt(8.0 / math.pi) * np.sqrt(np.maximum(variance, 0.0)))
+    return float(np.mean(lengths))

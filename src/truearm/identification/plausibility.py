@@ -15,20 +15,24 @@ from typing import Final
 import numpy as np
 
 from truearm.errors import InputError
-from truearm.identification.fit import identify
+from truearm.identification.fit import Fit, identify
 from truearm.identification.frames import initial_frames
 from truearm.identification.models import MODELS
+from truearm.identification.problem import Problem
 from truearm.identification.standing import initial_standing
 from truearm.measurement.checks import Suspect, Suspicion, constellation, judged
 from truearm.measurement.dataset import Dataset
+from truearm.measurement.observations import OBSERVATIONS
 from truearm.measurement.statistics import Errors, errors_of
 from truearm.modeling.chain import Array
+from truearm.modeling.parameters import FreeParameters
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.units import from_si
 
 #: A nominal robot that is placed better than this needs no explanation [m].
 _GOOD: Final = 3e-3
+_GOOD_FROM_FIXTURES: Final = 6e-3
 #: A slip explains the data if they fit this many times better with it mended.
 _BETTER: Final = 4.0
 #: Configurations looked at; more tell nothing new.
@@ -36,6 +40,10 @@ _ENOUGH: Final = 60
 #: A reading is doubted beyond this many median residuals, and at least so far off [m].
 _FAR: Final = 20.0
 _FAR_AT_LEAST: Final = 1e-3
+#: A campaign moves some joint by more than this [rad or m].
+_STILL: Final = 0.3
+#: What is said of a fixture is doubted beyond this many deviations.
+_FIXTURE_OFF: Final = 8.0
 #: A joint may be this far beyond its limit by rounding [rad or m].
 _OVER: Final = math.radians(0.05)
 
@@ -57,8 +65,15 @@ def check_against(robot: Robot, data: Dataset) -> tuple[list[Notice], list[Suspe
     """
     found = _beyond_limits(robot, data)
     if data.fixture is not None:
+        try:
+            initial_standing(robot, data)
+        except InputError as error:
+            return [Notice("fixtures-unlikely", str(error)), *found], []
         slips = _fixture_slips(robot, data)
-        return [*slips, *found], [] if slips else _far_from_fixtures(robot, data)
+        if slips:
+            return [*slips, *found], []
+        unlike, suspects = _far_from_fixtures(robot, data)
+        return [*unlike, *found], suspects
     if not data.has_position.any():
         return found, []
     slips = _slips(robot, data)
@@ -122,28 +137,62 @@ def _best(robot: Robot, data: Dataset, slips: list[_Slip]) -> _Slip | None:
 
 def _fixture_slips(robot: Robot, data: Dataset) -> list[Notice]:
     """Return the first slip that explains readings against fixtures: turned about, several may fit alike."""
-    some = _some(data, _ENOUGH // 2)
-    size = _misfit(robot, some)
-    if size <= _GOOD:
+    size = _misfit(robot, data)
+    if size <= _GOOD_FROM_FIXTURES:
         return []
-    for slip in (*_length_slips(some), *_joint_slips(some)):
+    for slip in (*_length_slips(data), *_joint_slips(data, at_once=1)):
+        if np.ptp(slip.data.joints, axis=0).max() < _STILL:
+            continue  # an arm that hardly moves fits any fixture
         mended = _misfit(robot, slip.data)
-        if mended <= _GOOD and _BETTER * mended / _spread(slip.data) < size / _spread(some):
+        if mended <= _GOOD_FROM_FIXTURES and _BETTER * mended / _spread(slip.data) < size / _spread(data):
             return [Notice(slip.code, f"{slip.words}.")]
-    return []
+    return [
+        Notice(
+            "fixtures-unlikely",
+            "With base, targets and fixtures where they suit the readings best, the nominal robot still misses half of "
+            f"these by more than {size * 1e3:.3g} mm. Are the fixtures those that the rows name, and do they stand "
+            "where the rows of the role fixture say?",
+        )
+    ]
 
 
-def _far_from_fixtures(robot: Robot, data: Dataset) -> list[Suspect]:
-    """Doubt readings against fixtures that a robust geometric fit leaves far off."""
+def _far_from_fixtures(robot: Robot, data: Dataset) -> tuple[list[Notice], list[Suspect]]:
+    """Doubt readings against fixtures that a robust geometric fit leaves far off, and what is said of fixtures."""
     geometric = next(m for m in MODELS if m.name == "geometric")
-    errors = errors_of(identify(robot, data, geometric, loss="cauchy").robot, data)
+    fit = identify(robot, data, geometric, loss="cauchy")
+    errors = errors_of(fit.robot, data)
     off = _off(errors)
     allowed = max(_FAR_AT_LEAST, _FAR * float(np.nanmedian(off)))
+    doubted = np.flatnonzero(np.nan_to_num(off) > allowed).tolist()
+    where = [(data.labels[data.configuration[r]], data.targets[data.target[r]]) for r in doubted]
+    suspects = [Suspect("outliers", *at, f"{off[r] * 1e3:.3g} mm off") for r, at in zip(doubted, where, strict=True)]
+    return _unlike_its_readings(fit, data), suspects
+
+
+def _unlike_its_readings(fit: Fit, data: Dataset) -> list[Notice]:
+    """Say where fixtures are not where, or not as far apart as, the file says."""
+    if data.setup is None:
+        return []
+    problem = Problem(fit.robot, data, FreeParameters(()), {observation.name: 1.0 for observation in OBSERVATIONS})
+    residual, first = problem.residual(np.zeros(0)), 0
+    found = []
+    for block in problem.blocks:
+        rows = residual[first : first + block.rows].reshape(len(block.readings), -1)
+        first += block.rows
+        if block.data is data:
+            continue
+        for off, sigma in zip(np.linalg.norm(rows, axis=1).tolist(), block.sigma.tolist(), strict=True):
+            if off > _FIXTURE_OFF:
+                beside = "" if block.fixture is None else f" against {block.fixture}"
+                found.append(f"{block.target}{beside} by {off * sigma * 1e3:.3g} mm, {off:.0f} times its deviation")
+    if not found:
+        return []
     return [
-        Suspect(
-            "outliers", data.labels[data.configuration[r]], data.targets[data.target[r]], f"{off[r] * 1e3:.3g} mm off"
+        Notice(
+            "fixture-misplaced",
+            f"What the file says of fixtures does not agree with what was measured from them: {', '.join(found)}. "
+            "Check the names, units and numbers of these rows.",
         )
-        for r in np.flatnonzero(np.nan_to_num(off) > allowed).tolist()
     ]
 
 
@@ -194,7 +243,8 @@ def _scaled(data: Dataset, factor: float) -> Dataset:
     return replace(data, position=data.position * factor, **more)  # type: ignore[arg-type]
 
 
-def _joint_slips(data: Dataset) -> Iterator[_Slip]:
+def _joint_slips(data: Dataset, at_once: int = 3) -> Iterator[_Slip]:
+    """Try joints in other units, with other signs, as many of these `at_once`, and in another order."""
     count = data.joints.shape[1]
     turning = [i for i in range(count) if data.joint_kinds[i] == "revolute"]
 
@@ -211,7 +261,7 @@ def _joint_slips(data: Dataset) -> Iterator[_Slip]:
             joints[:, group] *= factor
             which = "The joints" if len(group) > 1 else f"Joint {group[0] + 1}"
             yield _Slip("unit-angle", f"{which}: {words}. Mend the unit in the header", with_joints(joints))
-    for size in (1, 2, 3):
+    for size in range(1, at_once + 1):
         for group in map(list, combinations(range(count), size)):
             joints = data.joints.copy()
             joints[:, group] *= -1
@@ -225,10 +275,10 @@ def _joint_slips(data: Dataset) -> Iterator[_Slip]:
         yield _Slip("joint-sign", words + "Exchange their columns", with_joints(joints))
 
 
-def _some(data: Dataset, enough: int = _ENOUGH) -> Dataset:
-    if data.configurations <= enough:
+def _some(data: Dataset) -> Dataset:
+    if data.configurations <= _ENOUGH:
         return data
-    return data.of_configurations(np.linspace(0, data.configurations - 1, enough).astype(np.intp))
+    return data.of_configurations(np.linspace(0, data.configurations - 1, _ENOUGH).astype(np.intp))
 
 
 def _only(data: Dataset, target: int) -> Dataset:

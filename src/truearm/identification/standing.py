@@ -14,7 +14,7 @@ from typing import Final
 
 import numpy as np
 
-from truearm.errors import InputError
+from truearm.errors import InputError, nearest_names
 from truearm.identification.frames import initial_frames
 from truearm.identification.problem import Problem
 from truearm.identification.solver import solve
@@ -39,6 +39,8 @@ _ROUGH: Final = 1e-3
 _CLEARLY: Final = 5e-3
 #: How many readings that takes.
 _ENOUGH: Final = 120
+#: How many of one fixture, at least.
+_FEW: Final = 12
 _TELLS: Final = 1e-5
 
 
@@ -60,6 +62,7 @@ def initial_standing(robot: Robot, data: Dataset) -> Robot:
     if data.fixture is None:
         return initial_frames(robot, data)
     kinds = _kinds(data)
+    _refuse_few(data, kinds)
     placed = _placed(robot, data, kinds)
     have = {target.name for target in placed.targets}
     for target in dict.fromkeys(data.target[data.has_reading & (data.against >= 0)].tolist()):
@@ -235,10 +238,7 @@ def _also(robot: Robot, found: Mapping[str, Transform | Array]) -> Robot:
 def _with_target(robot: Robot, data: Dataset, target: int, kinds: Mapping[str, FixtureKind]) -> Robot:
     """Return the robot with a target whose place only distances and heights tell."""
     mine = data.of_readings(data.has_reading & (data.target == target) & (data.against >= 0))
-    if len(mine.target) > _ENOUGH:
-        some = np.zeros(len(mine.target), dtype=bool)
-        some[np.linspace(0, len(some) - 1, _ENOUGH).astype(np.intp)] = True
-        mine = mine.of_readings(some)
+    mine = _some_of_each_fixture(mine)
     touched = np.unique(mine.against)
     mine = replace(
         mine,
@@ -279,6 +279,40 @@ def _with_target(robot: Robot, data: Dataset, target: int, kinds: Mapping[str, F
         there = solution.vector[[free.names.index(tried.target(name).parameter(axis)) for axis in "xyz"]]
         found.append((float(solution.residual @ solution.residual), there))
     return _also(robot, {name: min(found, key=lambda one: one[0])[1]})
+
+
+def _some_of_each_fixture(data: Dataset) -> Dataset:
+    """Return readings that are enough to look for a target, as many of each fixture as of the others."""
+    if len(data.target) <= _ENOUGH:
+        return data
+    fixtures = np.unique(data.against)
+    some = np.zeros(len(data.target), dtype=bool)
+    for fixture in fixtures.tolist():
+        mine = np.flatnonzero(data.against == fixture)
+        count = min(len(mine), max(_FEW, _ENOUGH // len(fixtures)))
+        some[mine[np.linspace(0, len(mine) - 1, count).astype(np.intp)]] = True
+    return data.of_readings(some)
+
+
+def _refuse_few(data: Dataset, kinds: Mapping[str, FixtureKind]) -> None:
+    """Refuse fixtures that stand nowhere, for want of readings."""
+    known = {} if data.setup is None else _known(data.setup)
+    least = {"point": 4, "plane": 3, "frame": 1}
+    for index, name in enumerate(data.fixtures):
+        mine = (data.against == index) & data.has_reading
+        held = np.isfinite(data.position[mine]).all(axis=1).any()
+        count = int(mine.sum())
+        if name not in known and count < (1 if held else least[kinds[name]]):
+            near = nearest_names(name, [other for other in data.fixtures if other != name], 1)
+            raise InputError(
+                "a fixture was measured too few times to know where it stands",
+                where=f"{data.source}, fixture {name}",
+                came=f"{count} reading{'' if count == 1 else 's'} among {data.configurations} configurations",
+                allowed=f"{least[kinds[name]]} or more",
+                cure=f"Did you mean {near[0]}? Else measure more, or leave it out."
+                if near
+                else "Measure more, or leave it out.",
+            )
 
 
 def _fixture_places(robot: Robot, data: Dataset, kinds: Mapping[str, FixtureKind]) -> dict[str, Place]:
@@ -360,13 +394,8 @@ def _point(points: Array, data: Dataset, read: IntArray, where: str) -> tuple[fl
     if counted.any():
         x, y, z = (points[counted] - data.position[read][counted]).mean(axis=0).tolist()
         return x, y, z
-    if data.distance is None or len(points) < 4:
-        raise InputError(
-            "a fixture was measured too few times to know where it stands",
-            where=where,
-            came=f"{len(points)} readings",
-            allowed="4 or more",
-        )
+    if data.distance is None:
+        raise InputError("nothing was measured from this fixture", where=where)
     x, y, z = _centres(points[None], data.distance[read])[0].tolist()
     return x, y, z
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
@@ -69,6 +69,10 @@ class MeasurementPlan:
         Processor time of the search alone.
     prediction
         How accurate the calibration will be.
+    reads
+        What the device reads at each configuration, in words; nothing if no device was named.
+    fixtures
+        Where fixtures stand in the base frame [m], ``(3,)`` each; of a plane the foot of its distance from the origin.
     """
 
     robot: Robot
@@ -85,6 +89,8 @@ class MeasurementPlan:
     left_out: tuple[str, ...]
     seconds: float
     prediction: Prediction
+    reads: tuple[str, ...] = ()
+    fixtures: Mapping[str, Array] = field(default_factory=dict)
 
     def summary(self) -> dict[str, Any]:
         """Return the figures as ``--json`` prints them: errors in mm."""
@@ -97,6 +103,7 @@ class MeasurementPlan:
             "usable": self.usable,
             "rejected": dict(self.rejected),
             "left_out": list(self.left_out),
+            **({"fixtures_mm": {n: (1e3 * p).tolist() for n, p in self.fixtures.items()}} if self.fixtures else {}),
             "seconds": self.seconds,
             "prediction": {
                 "floor_mm": told.floor * 1e3,
@@ -254,7 +261,13 @@ def plan_measurements(
     elsewhere = random_candidates(seen, _ELSEWHERE, rng)
     predicted = sensitivity(seen, elsewhere, free, noise, trusted)
     chosen_rows = rows[order].reshape(-1, len(among))
+    at_fixtures = {}
+    for fixture in seen.fixtures if readings is not None else ():
+        place = seen.fixture_sweep(fixture.name).position[:, 0]
+        at_fixtures[fixture.name] = (place - np.array(seen.base.translation)) @ seen.base.rotation
     return MeasurementPlan(
+        reads=() if readings is None else _in_words(readings.of_configurations(chosen)),
+        fixtures=at_fixtures,
         robot=seen,
         model=model,
         objective=objective,
@@ -270,6 +283,22 @@ def plan_measurements(
         seconds=seconds,
         prediction=predict(seen, told, order, predicted, elsewhere.joints, noise, rng),
     )
+
+
+def _in_words(readings: Dataset) -> tuple[str, ...]:
+    """Say what is read at each configuration."""
+    words: list[list[str]] = [[] for _ in readings.labels]
+    for row, (c, t, f) in enumerate(zip(readings.configuration, readings.target, readings.against, strict=True)):
+        said = readings.targets[t]
+        beside = readings.fixtures[f] if f >= 0 else ""
+        if readings.distance is not None and np.isfinite(readings.distance[row]):
+            said += f" from {beside} {readings.distance[row] * 1e3:.2f} mm"
+        elif readings.height is not None and np.isfinite(readings.height[row]):
+            said += f" over {beside} {readings.height[row] * 1e3:.2f} mm"
+        elif beside:
+            said += f" at {beside} ({', '.join(f'{v * 1e3:.2f}' for v in readings.position[row])}) mm"
+        words[c].append(said)
+    return tuple("; ".join(one) for one in words)
 
 
 def _before(robot: Robot, joints: Array) -> Array:

@@ -457,11 +457,14 @@ def _check_split(training: Dataset, held_out: Dataset) -> None:
     for part, name in ((training, "training"), (held_out, "held-out")):
         for index in dict.fromkeys(part.against[part.has_reading].tolist()):
             if index not in fixtures:
+                alone = training.fixtures[index] if index >= 0 else ""
+                near = nearest_names(alone, [n for n in training.fixtures if n != alone], 1) if alone else []
                 raise InputError(
                     f"a fixture of the {name} part was not measured in the training part",
                     where=training.source,
-                    came=training.fixtures[index] if index >= 0 else "the instrument's own frame",
-                    cure="Raise --train, change --seed, or leave the fixture out.",
+                    came=alone or "the instrument's own frame",
+                    cure=f"{f'Did you mean {near[0]}? Else raise' if near else 'Raise'} --train, change --seed, or leave "
+                    "the fixture out.",
                 )
         for index in dict.fromkeys(part.target[part.has_reading].tolist()):
             if index not in placed:

@@ -16,6 +16,7 @@ import numpy as np
 
 from truearm.errors import InputError, nearest_names
 from truearm.identification.frames import initial_frames
+from truearm.identification.loci import centres_of, normals_of, plane_under, point_at_distances
 from truearm.identification.problem import Problem
 from truearm.identification.solver import solve
 from truearm.measurement.dataset import Dataset, IntArray
@@ -35,8 +36,6 @@ _STEP: Final = 0.09
 _TRIED: Final = 6
 #: Deviation that readings are weighed with while targets are looked for [m or rad].
 _ROUGH: Final = 1e-3
-#: Heights that fit worse than this on one side of a plane belong to the other [m].
-_CLEARLY: Final = 5e-3
 #: How many readings that takes.
 _ENOUGH: Final = 120
 #: How many of one fixture, at least.
@@ -169,7 +168,7 @@ def _triangulated(data: Dataset, setup: Dataset) -> Iterator[Dataset]:
             seen = np.isfinite(lengths[c, t]) & useful
             where.append(c)
             what.append(t)
-            found.append(_from_distances(anchors[seen], lengths[c, t, seen], side))
+            found.append(point_at_distances(anchors[seen], lengths[c, t, seen], side))
         if not found:
             raise InputError(
                 "no target was measured from enough known points",
@@ -191,22 +190,6 @@ def _triangulated(data: Dataset, setup: Dataset) -> Iterator[Dataset]:
             sigma=None,
             sigma_rot=None,
         )
-
-
-def _from_distances(anchors: Array, lengths: Array, side: float) -> Array:
-    """Return the point at these distances from known points, on one side of them if they lie in a plane."""
-    centre = anchors.mean(axis=0)
-    a = anchors - centre
-    _, s, Vt = np.linalg.svd(a)
-    flat = len(anchors) < 4 or s[2] < 1e-3 * s[0]
-    axes = Vt[:2] if flat else Vt
-    rows = np.column_stack([2.0 * a @ axes.T, -np.ones(len(a))])
-    solved = np.linalg.lstsq(rows, np.sum(a * a, axis=1) - lengths**2, rcond=None)[0]
-    inside = solved[:-1] @ axes
-    if not flat:
-        return np.asarray(centre + inside)
-    above = np.sqrt(max(float(solved[-1] - inside @ inside), 0.0))
-    return np.asarray(centre + inside + side * above * np.cross(Vt[0], Vt[1]))
 
 
 def _at_points(robot: Robot, data: Dataset, kinds: Mapping[str, FixtureKind]) -> Robot:
@@ -259,12 +242,12 @@ def _with_target(robot: Robot, data: Dataset, target: int, kinds: Mapping[str, F
         of = mine.against == index
         points = tips[:, of]
         if mine.distance is not None and np.isfinite(mine.distance[of]).any():
-            centre = _centres(points, mine.distance[of])
+            centre = centres_of(points, mine.distance[of])
             off = np.linalg.norm(points - centre[:, None], axis=2) - mine.distance[of]
         elif mine.height is not None and np.isfinite(mine.height[of]).any():
             spread = points - points.mean(axis=1, keepdims=True)
             h = mine.height[of] - mine.height[of].mean()
-            normal = _normals(spread, h)
+            normal = normals_of(spread, h)
             off = np.einsum("gni,gi->gn", spread, normal) - h
         else:
             continue
@@ -331,7 +314,7 @@ def _fixture_places(robot: Robot, data: Dataset, kinds: Mapping[str, FixtureKind
         elif name in known:
             place = Transform(known[name])
         elif data.height is not None and kinds[name] == "plane":
-            place = _plane(points, data.height[read], flange[data.configuration[read]])
+            place = plane_under(points, data.height[read], flange[data.configuration[read]])
         else:
             place = Transform(_point(points, data, read, f"{data.source}, fixture {name}"))
         places[name] = kinds[name], place
@@ -355,40 +338,6 @@ def _frame(robot: Robot, data: Dataset, index: int) -> Transform:
     return Transform.from_matrix(turned, np.array(robot.base.translation) - turned @ np.array(from_it.translation))
 
 
-def _plane(points: Array, heights: Array, flange: Array) -> Transform:
-    """Return a frame in the plane over which points ``(n, 3)`` have these heights.
-
-    The flange is on its upper side, unless the heights clearly say otherwise: where the robot was led along the plane
-    they are its own errors, which an uncalibrated robot explains on either side.
-    """
-    middle = points.mean(axis=0)
-    h = heights - heights.mean()
-    normal = _normals((points - middle)[None], h)[0]
-    off = (points - middle) @ -normal - h
-    if float(normal @ (flange - points).mean(axis=0)) < 0.0 and float(np.sqrt(np.mean(off**2))) < _CLEARLY:
-        normal = -normal
-    x = np.cross(np.eye(3)[np.argmin(np.abs(normal))], normal)
-    x /= np.linalg.norm(x)
-    return Transform.from_matrix(np.column_stack([x, np.cross(normal, x), normal]), middle - heights.mean() * normal)
-
-
-def _normals(points: Array, heights: Array) -> Array:
-    """Return for sets of points about their middle ``(g, n, 3)`` the normals ``(g, 3)`` along which they rise so."""
-    _, _, Vt = np.linalg.svd(points, full_matrices=False)
-    flat = Vt[:, -1]
-    if not heights.any():
-        return flat
-    gram = np.swapaxes(points, 1, 2) @ points
-    lift = np.swapaxes(points, 1, 2) @ heights
-    ridge = 1e-12 * np.trace(gram, axis1=1, axis2=2) + 1e-30  # readings may be of one place
-    steep = np.linalg.solve(gram + ridge[:, None, None] * np.eye(3), lift[..., None])[..., 0]
-    steep = steep / np.maximum(np.linalg.norm(steep, axis=1, keepdims=True), 1e-300)
-    choices = np.stack([flat, -flat, steep], axis=1)
-    off = np.einsum("gni,gci->gcn", points, choices) - heights
-    chosen = np.argmin(np.sum(off**2, axis=2), axis=1)
-    return np.asarray(choices[np.arange(len(choices)), chosen])
-
-
 def _point(points: Array, data: Dataset, read: IntArray, where: str) -> tuple[float, float, float]:
     counted = np.isfinite(data.position[read]).all(axis=1)
     if counted.any():
@@ -396,38 +345,8 @@ def _point(points: Array, data: Dataset, read: IntArray, where: str) -> tuple[fl
         return x, y, z
     if data.distance is None:
         raise InputError("nothing was measured from this fixture", where=where)
-    x, y, z = _centres(points[None], data.distance[read])[0].tolist()
+    x, y, z = centres_of(points[None], data.distance[read])[0].tolist()
     return x, y, z
-
-
-def _centres(points: Array, distances: Array) -> Array:
-    """Return for sets of points ``(g, n, 3)`` the centres ``(g, 3)`` from which they lie at these distances.
-
-    ``|x|^2 - d^2 = 2 c x - |c|^2`` is linear in the centre and in its square, which is left free. Points that nearly
-    lie in a plane say so only within it; the square then tells how far from it the centre is, on either side. Of the
-    three centres the one that fits best is returned.
-    """
-    middle = points.mean(axis=1, keepdims=True)
-    x = points - middle
-    right = np.sum(x * x, axis=2) - distances**2
-    _, axes = np.linalg.eigh(np.swapaxes(x, 1, 2) @ x)
-    choices = [_solved(x, right)[:, :3]]
-    flat = _solved(x @ axes[:, :, 1:], right)
-    beside = np.sqrt(np.maximum(flat[:, 2] - np.sum(flat[:, :2] ** 2, axis=1), 0.0))
-    for side in (1.0, -1.0):
-        choices.append(np.einsum("gij,gj->gi", axes, np.column_stack([side * beside, flat[:, :2]])))
-    centres = np.stack(choices, axis=1)
-    off = np.linalg.norm(x[:, None] - centres[:, :, None], axis=3) - distances
-    chosen = np.argmin(np.sum(off**2, axis=2), axis=1)
-    return np.asarray(middle[:, 0] + centres[np.arange(len(centres)), chosen])
-
-
-def _solved(x: Array, right: Array) -> Array:
-    """Return what solves ``2 c x - s = right`` best, for sets of points ``(g, n, k)``: c and s, ``(g, k + 1)``."""
-    rows = np.concatenate([2.0 * x, -np.ones((*x.shape[:2], 1))], axis=2)
-    gram = np.swapaxes(rows, 1, 2) @ rows
-    gram = gram + 1e-9 * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.diag([*np.ones(x.shape[2]), 0.0])
-    return np.asarray(np.linalg.solve(gram, np.swapaxes(rows, 1, 2) @ right[..., None])[..., 0])
 
 
 def _standing_parameters(robot: Robot, data: Dataset, groups: Iterable[str]) -> FreeParameters:

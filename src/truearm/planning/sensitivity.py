@@ -20,6 +20,9 @@ from truearm.modeling.parameters import PRIOR, FreeParameters
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
 
+#: Radius at which an angle that is read counts as a length [m].
+_LEVER: Final = 0.1
+
 
 @dataclass(frozen=True, eq=False)
 class Sensitivity:
@@ -130,10 +133,6 @@ def sensitivity_of_readings(robot: Robot, data: Dataset, free: FreeParameters, n
     rows[of_row[read], place[read]] = J[read] * size
     fixed = J[known] * size
     return Sensitivity(free, size, rows, fixed.T @ fixed)
-
-
-#: Radius at which an angle that is read counts as a length [m].
-_LEVER: Final = 0.1
 
 
 def check_known(robot: Robot, postures: Postures) -> None:

@@ -463,8 +463,7 @@ def _check_split(training: Dataset, held_out: Dataset) -> None:
                     f"a fixture of the {name} part was not measured in the training part",
                     where=training.source,
                     came=alone or "the instrument's own frame",
-                    cure=f"{f'Did you mean {near[0]}? Else raise' if near else 'Raise'} --train, change --seed, or leave "
-                    "the fixture out.",
+                    cure=f"Did you mean {near[0]}?" if near else "Raise --train, change --seed, or leave it out.",
                 )
         for index in dict.fromkeys(part.target[part.has_reading].tolist()):
             if index not in placed:

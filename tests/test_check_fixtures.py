@@ -141,3 +141,22 @@ def test_how_well_positions_are_told_is_true(device: str) -> None:
         grown = np.trace(np.diag(s) @ turn) / np.sum(a * a) if "size" in fit.trusted else 1.0
         true.append(1e3 * float(np.linalg.norm(grown * a @ U @ turn @ Vt - b, axis=1).mean()))
     assert 1 / 3 < np.mean(true) / np.mean(told) < 3
+
+
+@pytest.mark.parametrize("device", ["ballbar", "gauges", "five-lasers", "stereo", "measurement-arm"])
+def test_readings_beyond_the_range_of_a_device_are_named(device: str) -> None:
+    _, data = campaign(device)
+    assert check(data, device=device) == ()
+    if data.distance is not None:
+        far = replace(data, distance=data.distance + np.where(np.arange(len(data.distance)) == 4, 2.5e-3, 0.0))
+    else:
+        moved = np.where(np.arange(len(data.target))[:, None] == 4, 4.0, 0.0)
+        far = replace(data, position=data.position + moved)
+    found = [notice.message for notice in check(far, device=device) if notice.code == "beyond-range"]
+    assert len(found) == 1
+    assert f"1 readings are beyond what the device {device} can read (configuration/target): 5/" in found[0]
+
+
+def test_a_device_without_a_range_reads_all() -> None:
+    _, data = campaign("plane")
+    assert check(data, device="plane") == ()

@@ -25,7 +25,7 @@ from truearm.identification.plausibility import check_against
 from truearm.identification.selection import AUTO, Selection, select
 from truearm.identification.settling import check_settling
 from truearm.identification.transmission import check_transmission
-from truearm.measurement.checks import check_data
+from truearm.measurement.checks import check_data, check_range
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.readers.canonical import read_csv
 from truearm.measurement.statistics import Errors, errors_of
@@ -337,7 +337,9 @@ def calibrate(
     )
 
 
-def check(data: Dataset | str | Path, robot: Robot | str | Path | None = None) -> tuple[Notice, ...]:
+def check(
+    data: Dataset | str | Path, robot: Robot | str | Path | None = None, device: str | None = None
+) -> tuple[Notice, ...]:
     """Say what is wrong with measurements before they are believed.
 
     Parameters
@@ -347,18 +349,25 @@ def check(data: Dataset | str | Path, robot: Robot | str | Path | None = None) -
     robot
         The nominal robot, or what :func:`load_robot` takes. With it, units, joint order and signs, limits and single
         readings are checked too.
+    device
+        Name of the instrument, of ``truearm devices``; with it, readings beyond its range are named.
 
     Returns
     -------
     One notice for each kind of fault; none for believable data.
     """
     data = load_data(data) if isinstance(data, str | Path) else data
+    ranged: tuple[Notice, ...] = ()
+    if device is not None:
+        from truearm.measurement.devices import named_device  # with its inverse kinematics, only where it is asked for
+
+        ranged = tuple(check_range(data, named_device(device)))
     if robot is None:
-        return tuple(check_data(data))
+        return (*ranged, *check_data(data))
     robot = load_robot(robot) if isinstance(robot, str | Path) else robot
     check_joints(robot, data)
     against, suspects = check_against(robot, without_table_motion(data))
-    return (*check_data(data, suspects), *against)
+    return (*ranged, *check_data(data, suspects), *against)
 
 
 def validate(

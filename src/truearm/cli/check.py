@@ -14,11 +14,15 @@ def check(
     robot: Annotated[
         str | None, typer.Argument(metavar="[ROBOT]", help="A library id, a robot file or a URDF.", show_default=False)
     ] = None,
+    device: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="The instrument, of 'truearm devices': its range.", show_default=False),
+    ] = None,
     json: Json = False,
 ) -> None:
     """Say what is wrong with measurements before they are believed.
 
-    With ROBOT, also units, joint order and signs, limits, and readings that are far off.
+    With ROBOT, also units, joint order and signs, limits, and readings that are far off; with --device its range.
     """
     from truearm.calibration import check as run
     from truearm.calibration import load_data
@@ -26,7 +30,7 @@ def check(
     with progress() as say:
         say("checking")
         loaded = load_data(data)
-        notices = run(loaded, robot)
+        notices = run(loaded, robot, device)
     if json:
         print_json(
             {

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import permutations
-from typing import Final, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,9 @@ from numpy.typing import NDArray
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
 from truearm.notices import Notice
+
+if TYPE_CHECKING:
+    from truearm.measurement.devices.device import Device
 
 Suspicion = Literal["outliers", "targets-swapped", "target-mistaken"]
 
@@ -79,6 +82,21 @@ def _temperatures(data: Dataset) -> list[Notice]:
             "temperature-unlikely",
             f"The temperature goes from {low:g} to {high:g} degC; arms work between {_COLDEST:g} and {_WARMEST:g}. "
             "Is it in kelvin or degrees Fahrenheit?",
+        )
+    ]
+
+
+def check_range(data: Dataset, device: Device) -> list[Notice]:
+    """Say which readings are beyond the range of the device that they are said to come from."""
+    beyond = np.flatnonzero(device.beyond_range(data)).tolist()
+    if not beyond:
+        return []
+    words = _listed([f"{data.labels[data.configuration[r]]}/{data.targets[data.target[r]]}" for r in beyond])
+    return [
+        Notice(
+            "beyond-range",
+            f"{len(beyond)} readings are beyond what the device {device.name} can read (configuration/target): {words}."
+            f" It is a {device.summary}. Check the units, and that it was this device.",
         )
     ]
 

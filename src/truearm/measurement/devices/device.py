@@ -61,6 +61,10 @@ class Device(ABC):
     sigma: float
     tool: Tool | None = None
 
+    def beyond_range(self, data: Dataset) -> NDArray[np.bool_]:
+        """Return which readings the device cannot have read, ``(readings,)``; one without a range reads all."""
+        return np.zeros(len(data.target), dtype=bool)
+
     @abstractmethod
     def campaign(self, nominal: Robot, arm: Arm, count: int, sigma: float, rng: np.random.Generator) -> Dataset:
         """Return what it reads of an arm.

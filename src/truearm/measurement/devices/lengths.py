@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.devices.device import Arm, Device, recorded
@@ -36,6 +37,12 @@ class Ballbar(Device):
 
     length: float = 0.3
     range: float = 1e-3
+
+    def beyond_range(self, data: Dataset) -> NDArray[np.bool_]:
+        """Return which lengths differ from the bar's by more than its range."""
+        if data.distance is None:
+            return super().beyond_range(data)
+        return np.asarray(np.abs(data.distance - self.length) > self.range * (1.0 + 1e-9))
 
     def campaign(self, nominal: Robot, arm: Arm, count: int, sigma: float, rng: np.random.Generator) -> Dataset:
         """Return distances of the ball from three cups, in turns, in all directions that lie above the table."""

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.devices.device import Arm, Device, recorded
@@ -34,6 +35,10 @@ class SmallVolume(Device):
 
     range: tuple[float, float, float] = (0.01, 0.01, 0.01)
     places: int = 3
+
+    def beyond_range(self, data: Dataset) -> NDArray[np.bool_]:
+        """Return which places, counted from the middle of the box, are outside it."""
+        return np.asarray((np.abs(data.position) > 0.5 * np.array(self.range)).any(axis=1))
 
     def campaign(self, nominal: Robot, arm: Arm, count: int, sigma: float, rng: np.random.Generator) -> Dataset:
         """Return places of the ball all over the box, with the tool turned to all sides."""

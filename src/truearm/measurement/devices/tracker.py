@@ -60,6 +60,10 @@ class MeasurementArm(Device):
 
     reach: float = 3.0
 
+    def beyond_range(self, data: Dataset) -> NDArray[np.bool_]:
+        """Return which places are out of reach of its base."""
+        return np.asarray(np.linalg.norm(data.position, axis=1) > self.reach)
+
     def campaign(self, nominal: Robot, arm: Arm, count: int, sigma: float, rng: np.random.Generator) -> Dataset:
         """Return the positions of all targets within reach, at random configurations."""
 

@@ -160,3 +160,11 @@ def test_readings_beyond_the_range_of_a_device_are_named(device: str) -> None:
 def test_a_device_without_a_range_reads_all() -> None:
     _, data = campaign("plane")
     assert check(data, device="plane") == ()
+
+
+def test_stereo_cameras_read_a_sphere_larger_than_the_cube_that_is_used_of_it() -> None:
+    _, data = campaign("stereo")
+    for away, named in ((1.9e-3, 0), (2.1e-3, 1)):
+        position = data.position.copy()
+        position[3] = (0.0, away, 0.0)
+        assert len(check(replace(data, position=position), device="stereo")) == named

@@ -120,8 +120,6 @@ def test_some_configurations_keep_all_that_is_known_of_fixtures(tmp_path: Path) 
     assert some.distance is not None
     np.testing.assert_array_equal(some.distance, [np.nan, np.nan, 0.29975])
     assert some.against.tolist() == [-1, 0, 3]
-    plain = data.in_instrument_frame()
-    assert (plain.fixture, plain.fixtures, plain.setup, plain.has_position.tolist()) == (None, (), None, [True])
 
 
 def changed(line: int, cell: str, value: str, text: str = MIXED) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from ruamel.yaml import YAML
 
 from truearm.errors import InputError
 from truearm.modeling.chain import Array
-from truearm.modeling.fixtures import FIXTURE_KINDS, Fixture, FixtureKind
+from truearm.modeling.fixtures import Fixture, FixtureKind
 from truearm.modeling.formats.robot_file import read_robot, robot_text
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
@@ -107,7 +108,7 @@ def test_the_place_of_a_plane_is_in_the_plane() -> None:
     assert (np.array(PLACE.translation) - T[:3, 3]) @ T[:3, 2] == pytest.approx(0.0, abs=1e-15)
 
 
-@pytest.mark.parametrize("kind", FIXTURE_KINDS)
+@pytest.mark.parametrize("kind", get_args(FixtureKind))
 def test_many_trials_at_once_are_each_alone(kind: FixtureKind) -> None:
     robot = beside(kind)
     rng = np.random.default_rng(0)
@@ -165,7 +166,7 @@ def reread(robot: Robot, folder: Path) -> Robot:
 NAMES = ("table", "7", "the left cup", "Größe: [x]", "yes", "'quoted'", "# no comment", "fixture", "null")
 
 
-@pytest.mark.parametrize("kind", FIXTURE_KINDS)
+@pytest.mark.parametrize("kind", get_args(FixtureKind))
 def test_a_robot_file_keeps_fixtures(tmp_path: Path, kind: FixtureKind) -> None:
     robot = IRB120.with_fixtures(dict.fromkeys(NAMES, (kind, PLACE)))
     for name in NAMES:

@@ -158,12 +158,6 @@ class Dataset:
             sigma_rot=part(self.sigma_rot),
         )
 
-    def in_instrument_frame(self) -> Dataset:
-        """Return the readings that are not measured against a fixture."""
-        if self.fixture is None:
-            return self
-        return replace(self.of_readings(self.fixture < 0), fixture=None, fixtures=(), setup=None)
-
     def of_configurations(self, indices: Sequence[int] | IntArray) -> Dataset:
         """Return the readings at some configurations, with these in the given order."""
         indices = np.asarray(indices, dtype=np.intp)

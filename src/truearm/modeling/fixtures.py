@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final, Literal
+from typing import Literal
 
 from truearm.modeling.chain import Chain, Element
 from truearm.modeling.parts import SLIDES, TURNS
 from truearm.modeling.transform import Transform, fixed_rotation
 
 FixtureKind = Literal["point", "plane", "frame"]
-FIXTURE_KINDS: Final[tuple[FixtureKind, ...]] = ("point", "plane", "frame")
 
 
 @dataclass(frozen=True)

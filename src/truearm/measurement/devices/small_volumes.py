@@ -29,15 +29,20 @@ class SmallVolume(Device):
     ----------
     range
         Sides of the box [m].
+    sphere
+        Radius about the middle within which it reads, if that is no box [m]; the box then lies inside.
     places
         How many places it is put to.
     """
 
     range: tuple[float, float, float] = (0.01, 0.01, 0.01)
+    sphere: float | None = None
     places: int = 3
 
     def beyond_range(self, data: Dataset) -> NDArray[np.bool_]:
-        """Return which places, counted from the middle of the box, are outside it."""
+        """Return which places, counted from the middle, are outside the box or sphere."""
+        if self.sphere is not None:
+            return np.asarray(np.linalg.norm(data.position, axis=1) > self.sphere)
         return np.asarray((np.abs(data.position) > 0.5 * np.array(self.range)).any(axis=1))
 
     def campaign(self, nominal: Robot, arm: Arm, count: int, sigma: float, rng: np.random.Generator) -> Dataset:
@@ -67,10 +72,11 @@ class SmallVolume(Device):
 STEREO: Final = SmallVolume(
     "stereo",
     "two cameras that see the centre of a ball within 2 mm, at three places",
-    "Nubiola, section 1.7: ROSY, 0.020 mm, range 2 mm",
+    "Nubiola, section 1.7.3: ROSY, 0.020 mm within a sphere of +/-2 mm; a cube of 2 mm in it is used",
     sigma=1e-5,
     tool=_BALL,
     range=(0.002, 0.002, 0.002),
+    sphere=0.002,
 )
 FIVE_LASERS: Final = SmallVolume(
     "five-lasers",

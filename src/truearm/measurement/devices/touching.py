@@ -1,4 +1,4 @@
-"""Closed loops: a probe that touches a plane or a sphere, a tip held at a point (Nubiola, sections 1.2 and 1.7)."""
+"""Closed loops: a probe that touches a plane or a sphere, a tip held at a point (Nubiola, section 1.2)."""
 
 from __future__ import annotations
 
@@ -164,21 +164,21 @@ class HeldAtPoint(Device):
 PLANE: Final = PlaneProbe(
     "plane",
     "touch probe on a flat plate of 300 mm, level and leaning by 30 deg to two sides",
-    "Nubiola, section 1.2 (Ikits and Hollerbach; Zhuang et al.); deviation ours",
+    "Nubiola, section 1.2: planar constraints (Ikits and Hollerbach 1997); plate and deviation ours",
     sigma=5e-6,
     tool=_STYLUS,
 )
 SPHERE: Final = SphereProbe(
     "sphere",
     "touch probe on one sphere of 15 mm radius",
-    "Nubiola, section 1.7; deviation ours",
+    "Nubiola, section 1.2: diameter of a sphere as in MasterCal; sizes and deviation ours",
     sigma=5e-6,
     tool=_STYLUS,
 )
 TWO_SPHERES: Final = SphereProbe(
     "two-spheres",
     "touch probe on two spheres 300 mm apart, known to 0.001 mm",
-    "Nubiola, section 1.7: MasterCal; deviation ours",
+    "Nubiola, section 1.2: MasterCal; sizes and deviations ours",
     sigma=5e-6,
     tool=_STYLUS,
     apart=0.3,

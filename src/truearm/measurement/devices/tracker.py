@@ -1,4 +1,4 @@
-"""Instruments that read where targets are: laser tracker and measurement arm (Nubiola, section 2.2; Table 1)."""
+"""Instruments that read where targets are: laser tracker and measurement arm (Nubiola, sections 2.2 and 3.5)."""
 
 from __future__ import annotations
 
@@ -117,13 +117,13 @@ def positions(
 TRACKER: Final = Tracker(
     "tracker",
     "laser tracker and three reflectors, each seen within 30 deg of where it looks",
-    "Nubiola, section 2.2: volumetric 0.020 mm, reflector cones of +/-30 deg",
+    "Nubiola, section 2.2: 0.022 mm on a scale bar of 2.3 m, reflector cones of +/-30 deg; deviation a coordinate ours",
     sigma=1e-5,
 )
 MEASUREMENT_ARM: Final = MeasurementArm(
     "measurement-arm",
     "measurement arm whose stylus is held to the targets",
-    "Faro arm used as a check on 15 poses (G); deviation ours",
+    "Nubiola, section 3.5: FaroArm Platinum, a check on 15 poses; reach and deviation ours",
     sigma=2.5e-5,
     tool=Tool({"nest": (0.0, 0.0, 0.125)}),
 )

@@ -67,14 +67,13 @@ def read_page(path: Path, dpi: float | tuple[float, float] | None = None) -> Pag
         resolution or that is none of a scanner's (100 to 4800).
     """
     image, declared = _opened(path)
-    if dpi is None and declared is None:
+    given = declared if dpi is None else (dpi if isinstance(dpi, tuple) else (dpi, dpi))
+    if given is None:
         raise InputError(
             "the file does not say its resolution",
             where=str(path),
             cure="Give the dots per inch of the scan (dpi), or scan again and keep the file as the scanner wrote it.",
         )
-    given = declared if dpi is None else (dpi if isinstance(dpi, tuple) else (dpi, dpi))
-    assert given is not None
     if not all(math.isfinite(value) and _RESOLUTIONS[0] <= value <= _RESOLUTIONS[1] for value in given):
         raise InputError(
             "this is no resolution of a scan",

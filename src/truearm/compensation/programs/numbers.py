@@ -1,0 +1,47 @@
+"""Numbers as programs write them, and new numbers in their place."""
+
+from __future__ import annotations
+
+import re
+from typing import Final
+
+#: A number in a program.
+NUMBER: Final = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_PARTS: Final = re.compile(r"[+-]?\d*\.?(\d*)(?:[eE]([+-]?\d+))?")
+#: A number has more decimals only by mistake, and no float carries them.
+_MOST: Final = 15
+
+
+def decimals_of(text: str) -> int:
+    """Return how many decimals a number is written with; ``1.5e-3`` has four."""
+    found = _PARTS.fullmatch(text)
+    if found is None:
+        raise ValueError(f"{text!r} is no number")
+    return min(max(len(found[1]) - int(found[2] or 0), 0), _MOST)
+
+
+def rewritten(text: str, value: float, fewest: int) -> str:
+    """Return the text of a number with another value, or the text as it is if its value is the same.
+
+    Parameters
+    ----------
+    text
+        The number as it stands in the program.
+    value
+        The new value, in the same unit.
+    fewest
+        How many decimals it gets at least. It keeps those that it has.
+
+    Notes
+    -----
+    Two values are the same if they agree when written with that many decimals, or to a hundredth of the last of
+    `fewest`: what is smaller is the rounding of the arithmetic behind it.
+    """
+    old = float(text)
+    if abs(value - old) < 0.01 * 10.0**-fewest:
+        return text
+    decimals = max(decimals_of(text), fewest)
+    new = f"{value:.{decimals}f}"
+    if float(new) == round(old, decimals):
+        return text
+    return new if float(new) else new.lstrip("-")

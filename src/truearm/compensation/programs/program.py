@@ -1,0 +1,290 @@
+"""What every robot language is read into: where the numbers of targets stand in the text, and what they mean.
+
+A program is text, and stays text: a reader finds the numbers of targets and notes where each begins and ends. Whoever
+corrects the program puts other numbers in those places, and no other byte changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from truearm.compensation.programs.orientations import Orientation
+from truearm.modeling.transform import Transform
+
+MoveKind = Literal["joint", "linear", "circular"]
+
+
+@dataclass(frozen=True)
+class Source:
+    """The text of one file of a program.
+
+    Attributes
+    ----------
+    path
+        Of the file.
+    text
+        Its bytes as Latin-1, so that every character is one byte and no byte is lost, whatever its encoding.
+    """
+
+    path: Path
+    text: str
+
+    def line(self, place: int) -> int:
+        """Return the number of the line that a place in the text is on, from 1."""
+        return self.text.count("\n", 0, place) + 1
+
+
+@dataclass(frozen=True)
+class Form:
+    """What the numbers of a target mean.
+
+    A pose is x, y, z and the numbers of its orientation, in the order that `orientation` has; joints are readings as
+    the controller shows them, one for each joint of the robot.
+
+    Attributes
+    ----------
+    name
+        What the language calls it.
+    kind
+        ``pose``; ``joints``, angles of turning joints and lengths of sliding ones; ``pulses``, of the motors.
+    length
+        Metres in one unit of a length.
+    angle
+        Radians in one unit of an angle; of no meaning for quaternions and pulses.
+    orientation
+        How a pose is turned; None if its numbers are a position alone.
+    decimals
+        Fewest decimals of a number that is written: of lengths, and of angles or of a quaternion's numbers.
+    """
+
+    name: str
+    kind: Literal["pose", "joints", "pulses"]
+    length: float = 1e-3
+    angle: float = 1.0
+    orientation: Orientation | None = None
+    decimals: tuple[int, int] = (3, 4)
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """Which of the postures that reach a pose the program means; what is not said may be anything.
+
+    Attributes
+    ----------
+    shoulder, elbow, wrist
+        Words of the branches of :mod:`truearm.modeling.inverse.branches`.
+    readings
+        ``(joint, low, high)``: the joint, from 1, reads `low` or more and less than `high` [rad], as the controller
+        shows it.
+    near
+        Readings [rad or m], as the controller shows them, that the posture is nearest to; if None, and the rest leaves
+        a choice, nearest to where the robot comes from.
+    """
+
+    shoulder: Literal["front", "back"] | None = None
+    elbow: Literal["up", "down"] | None = None
+    wrist: Literal["noflip", "flip"] | None = None
+    readings: tuple[tuple[int, float, float], ...] = ()
+    near: tuple[float, ...] | None = None
+
+
+ANY_POSTURE = Configuration()
+
+
+@dataclass(frozen=True, slots=True)
+class ProgramTarget:
+    """A place in a program that the robot is sent to.
+
+    Attributes
+    ----------
+    source
+        Which file of the program it stands in, from 0.
+    line
+        Line in that file, from 1.
+    name
+        As the program calls it; empty where it has no name.
+    form
+        What its numbers mean.
+    values
+        Its numbers, in the file's units.
+    places
+        Where each of `values` stands in the text: ``(start, stop)``, or None for a number that is not written.
+    tool, frame
+        Names of the tool and of the work object, base or user frame that hold; empty for the flange and the robot's
+        own base.
+    configuration
+        The posture meant.
+    parent
+        Index of the target that this one is an offset from, None for none. A target and its parent have the same tool
+        and frame.
+    turned
+        Whether the offset is in the axes of the parent itself (RelTool, the colon of KRL) and not of the frame (Offs).
+    """
+
+    source: int
+    line: int
+    name: str
+    form: Form
+    values: tuple[float, ...]
+    places: tuple[tuple[int, int] | None, ...]
+    tool: str = ""
+    frame: str = ""
+    configuration: Configuration = ANY_POSTURE
+    parent: int | None = None
+    turned: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """An instruction that moves the robot.
+
+    Attributes
+    ----------
+    kind
+        How the tip goes.
+    target
+        Index of the target that it ends at.
+    source, line
+        File of the program, from 0, and line in it, from 1.
+    via
+        Index of the target that a circle passes.
+    routine
+        Which routine of the program, from 0: what stands before a routine's first move is not known.
+    statement
+        Where the whole instruction stands in the text, ``(start, stop)``, from its first to after its last character.
+    target_text, via_text
+        Where the words for the targets stand in the text, inside of `statement`.
+    """
+
+    kind: MoveKind
+    target: int
+    source: int
+    line: int
+    via: int | None = None
+    routine: int = 0
+    statement: tuple[int, int] = (0, 0)
+    target_text: tuple[int, int] = (0, 0)
+    via_text: tuple[int, int] | None = None
+
+
+@dataclass(frozen=True)
+class Skipped:
+    """A target that is left as it is.
+
+    Attributes
+    ----------
+    source, line
+        File of the program, from 0, and line in it, from 1.
+    reason
+        Why, in plain words.
+    """
+
+    source: int
+    line: int
+    reason: str
+
+
+@dataclass(frozen=True)
+class Program:
+    """A robot program: its texts, and what was found in them.
+
+    Attributes
+    ----------
+    language
+        Name of the language.
+    sources
+        Its files.
+    targets
+        In the order of the text.
+    moves
+        In the order of the text.
+    tools
+        By name, ``T_flange_tip`` as the program defines it, in the controller's flange frame.
+    frames
+        By name, ``T_base_frame`` as the program defines it, in the controller's base frame.
+    skipped
+        What looks like a target and cannot be corrected, with the reason.
+    unknown
+        How often an instruction occurs that the reader does not know and leaves alone, by its first word.
+    """
+
+    language: str
+    sources: tuple[Source, ...]
+    targets: tuple[ProgramTarget, ...]
+    moves: tuple[Move, ...] = ()
+    tools: Mapping[str, Transform] = field(default_factory=dict)
+    frames: Mapping[str, Transform] = field(default_factory=dict)
+    skipped: tuple[Skipped, ...] = ()
+    unknown: Mapping[str, int] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Edit:
+    """Text to put in the place of other text.
+
+    Attributes
+    ----------
+    source
+        File of the program, from 0.
+    start, stop
+        What is replaced, in the text as it was; nothing if they are the same, and the new text is put before it.
+    text
+        The new text.
+    """
+
+    source: int
+    start: int
+    stop: int
+    text: str
+
+
+@dataclass(frozen=True)
+class Division:
+    """A linear or circular move to be divided.
+
+    Attributes
+    ----------
+    move
+        Index of the move.
+    points
+        What the robot has to pass before the move's own target, one entry an instruction to insert: the numbers of its
+        target, and of its via for a circle (else None), in the form and units of the move's target. What a circle
+        passes on its last piece is its own entry's: ``via`` of the move itself becomes `last_via`.
+    last_via
+        Numbers of the via of the last piece, for a circle.
+    """
+
+    move: int
+    points: tuple[tuple[tuple[float, ...], tuple[float, ...] | None], ...]
+    last_via: tuple[float, ...] | None = None
+
+
+@dataclass(frozen=True)
+class Language:
+    """A robot language.
+
+    Attributes
+    ----------
+    name
+        Its name.
+    maker
+        Whose controllers speak it.
+    suffixes
+        Of its files, lower case with the dot. The suffix decides the language; what is in the file has to agree.
+    is_one
+        Whether a text looks like this language.
+    read
+        Read the files of one program, given together.
+    divide
+        Return the edits that divide moves; None if the language's programs cannot be divided yet.
+    """
+
+    name: str
+    maker: str
+    suffixes: tuple[str, ...]
+    is_one: Callable[[str], bool]
+    read: Callable[[Sequence[Source]], Program]
+    divide: Callable[[Program, Sequence[Division]], list[Edit]] | None = None

@@ -1,0 +1,133 @@
+"""Fake targets: what to write into a program so that the robot as it is goes where the program meant (Nubiola, 1.5).
+
+The controller believes in the nominal robot. It is sent to another pose: the one the nominal robot would have with the
+joint readings with which the calibrated robot is where it shall be.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.errors import InputError
+from truearm.modeling.chain import Array
+from truearm.modeling.inverse.branches import BRANCHES, branch_rule
+from truearm.modeling.inverse.kinematics import inverse
+from truearm.modeling.inverse.solutions import JointSolutions
+from truearm.modeling.robot import Robot
+
+
+def nominal_robot(robot: Robot) -> Robot:
+    """Return the robot that the controller believes in: the table of the robot file, no joint effects, no base.
+
+    However often the robot was calibrated, the rows of its joints stay what they were; what was identified stands in
+    its parameters. The world of the nominal robot is its base frame.
+
+    Raises
+    ------
+    InputError
+        If the robot is its nominal self, so that there is nothing to correct.
+    """
+    nominal = replace(
+        robot,
+        effect_names=(),
+        base_quaternion=(1.0, 0.0, 0.0, 0.0),
+        known={},
+        targets=(),
+        fixtures=(),
+    )
+    inside = (name for name, p in nominal.parameters.items() if p.group != "base")
+    if not robot.effect_names and all(robot.values[name] == nominal.values[name] for name in inside):
+        raise InputError(
+            "this robot is not calibrated: all its parameters are nominal",
+            where=robot.name,
+            cure="Give the calibrated.yaml that truearm calibrate wrote; a converted robot has lost its nominal values.",
+        )
+    return nominal
+
+
+@dataclass(frozen=True, eq=False)
+class FakeTargets:
+    """Fake targets, one a pose.
+
+    Attributes
+    ----------
+    flange
+        Where the nominal robot would have its flange in its base frame, ``(n, 4, 4)``: what to write.
+    solutions
+        Readings of the calibrated robot for the wanted poses, one row a pose, and how each was found.
+    """
+
+    flange: Array
+    solutions: JointSolutions
+
+    @property
+    def joints(self) -> Array:
+        """Readings with which the calibrated robot is where it shall be [rad or m], ``(n, joints)``."""
+        return self.solutions.joints
+
+
+def fake_targets(robot: Robot, flange: Array, near: Array) -> FakeTargets:
+    """Return the fake targets of wanted poses.
+
+    Parameters
+    ----------
+    robot
+        The calibrated robot, with its joint effects and payload.
+    flange
+        Wanted poses of the flange in the identified base frame, ``(n, 4, 4)`` [m].
+    near
+        Readings of the nominal robot where the program meant it to be, ``(n, joints)`` [rad or m]: the answers are on
+        the same branch and in the same turns.
+
+    Raises
+    ------
+    InputError
+        If the robot is not calibrated or an array has the wrong shape.
+    """
+    nominal = nominal_robot(robot)
+    rule = branch_rule(robot)
+    position, rotation = flange[:, :3, 3], flange[:, :3, :3]
+    if rule is None:
+        found = inverse(robot, position, rotation, seed=near)
+        return FakeTargets(matrices(nominal, found.joints), found)
+    number = rule.numbers(nominal.sweep(near))
+    parts = []
+    for branch in np.unique(number).tolist():
+        rows = np.flatnonzero(number == branch)
+        parts.append((rows, inverse(robot, position[rows], rotation[rows], branch=BRANCHES[branch], seed=near[rows])))
+    found = _merged(parts, len(flange))
+    return FakeTargets(matrices(nominal, found.joints), found)
+
+
+def _merged(parts: list[tuple[NDArray[np.intp], JointSolutions]], count: int) -> JointSolutions:
+    """Return solutions of parts of the poses, one row each, as those of all poses in their order."""
+    rows = np.concatenate([rows for rows, _ in parts]) if parts else np.zeros(0, int)
+    order = np.argsort(rows)
+
+    def joined(arrays: list[Array]) -> Array:
+        return np.asarray(np.concatenate(arrays)[order])
+
+    every = [found for _, found in parts]
+    return JointSolutions(
+        poses=count,
+        pose=np.arange(count),
+        joints=joined([s.joints for s in every]),
+        status=tuple(np.concatenate([np.array(s.status, object) for s in every])[order].tolist()),
+        branch=tuple(np.concatenate([np.array(s.branch, object) for s in every])[order].tolist()),
+        position_error=joined([s.position_error for s in every]),
+        orientation_error=joined([s.orientation_error for s in every]),
+        beyond=np.concatenate([s.beyond for s in every])[order],
+        singular_value=joined([s.singular_value for s in every]),
+        joint_names=every[0].joint_names,
+    )
+
+
+def matrices(robot: Robot, joints: Array) -> Array:
+    """Return poses ``(n, 4, 4)`` [m] of the flange of a robot whose base is the world."""
+    position, rotation = robot.poses(joints)
+    made = np.zeros((len(position), 4, 4))
+    made[:, :3, :3], made[:, :3, 3], made[:, 3, 3] = rotation, position, 1.0
+    return made

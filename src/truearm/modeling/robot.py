@@ -12,6 +12,7 @@ import numpy as np
 
 from truearm.errors import InputError, nearest_names
 from truearm.modeling.chain import Array, Chain, Element, Sweep, across, turn_about
+from truearm.modeling.controller import AS_THE_MODEL, Controller
 from truearm.modeling.conventions import Convention, convention
 from truearm.modeling.effects import EFFECTS, Effect, Layout
 from truearm.modeling.equilibrium import postures_in_equilibrium, readings_in_equilibrium
@@ -63,6 +64,8 @@ class Robot:
         Parameters that differ from the plain nominal ones.
     priors
         The file's own standard deviations of nominal values, by SI unit.
+    controller
+        How the robot's controller counts the joints, and where it has its frames.
     tools, truths
         For simulation.
     history
@@ -84,6 +87,7 @@ class Robot:
     effect_names: tuple[str, ...] = ()
     known: Mapping[str, Parameter] = field(default_factory=dict)
     priors: Mapping[str, float] = field(default_factory=dict)
+    controller: Controller = AS_THE_MODEL
     tools: Mapping[str, Tool] = field(default_factory=dict)
     truths: Mapping[str, Truth] = field(default_factory=dict)
     history: tuple[str, ...] = ()

@@ -1,0 +1,106 @@
+"""How a robot's controller counts its joints, and where it has its frames.
+
+Programs and teach pendants speak in the controller's readings and frames, which need not be the model's: a joint may
+count the other way, from another zero, or together with another joint, as the third of a FANUC robot counts the second.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+
+from truearm.errors import InputError
+from truearm.modeling.chain import Array
+from truearm.modeling.transform import IDENTITY, Transform
+
+
+@dataclass(frozen=True)
+class Controller:
+    """What a robot's controller shows, of the joints and the frames of the model::
+
+        reading_i = zero_i + sign_i * (joint_i + sum_j coupling_ij * joint_j)
+
+    Attributes
+    ----------
+    signs
+        1 or -1 for each joint; empty if all are 1.
+    zeros
+        What the controller reads where the joint is zero, and all that it is coupled with [rad or m]; empty if all
+        are 0.
+    couplings
+        For a joint how much of others its reading counts, by joint numbers from 1: ``{3: {2: 1.0}}`` if the reading
+        of joint 3 counts joint 2 as well.
+    pulses
+        Pulses of the motor per unit of the reading [1/rad or 1/m], None where unknown; empty if all are.
+    base
+        ``T_base_controllerbase``: the controller's base frame in the robot's.
+    flange
+        ``T_flange_controllerflange``: the controller's flange frame in the robot's.
+    """
+
+    signs: tuple[int, ...] = ()
+    zeros: tuple[float, ...] = ()
+    couplings: Mapping[int, Mapping[int, float]] = field(default_factory=dict)
+    pulses: tuple[float | None, ...] = ()
+    base: Transform = IDENTITY
+    flange: Transform = IDENTITY
+
+    def coupling(self, count: int) -> Array:
+        """Return what readings of `count` joints count, before signs and zeros: a matrix ``(count, count)``."""
+        matrix = np.eye(count)
+        for joint, others in self.couplings.items():
+            for other, share in others.items():
+                matrix[joint - 1, other - 1] = share
+        return matrix
+
+    def readings(self, joints: Array) -> Array:
+        """Return the controller's readings ``(n, joints)`` [rad or m] of joints ``(n, joints)`` of the model."""
+        counted = joints @ self.coupling(joints.shape[1]).T if self.couplings else joints
+        turned = counted * self.signs if self.signs else counted
+        return turned + self.zeros if self.zeros else turned
+
+    def joints(self, readings: Array) -> Array:
+        """Return the joints ``(n, joints)`` [rad or m] of the model at readings ``(n, joints)`` of the controller."""
+        turned = readings - self.zeros if self.zeros else readings
+        counted = turned * self.signs if self.signs else turned
+        if not self.couplings:
+            return counted
+        return np.linalg.solve(self.coupling(readings.shape[1]), counted.T).T
+
+    def pulses_of(self, readings: Array) -> Array:
+        """Return the pulses ``(n, joints)`` of the motors at readings ``(n, joints)`` of the controller [rad or m].
+
+        Raises
+        ------
+        InputError
+            If a joint's pulses are not known.
+        """
+        return readings * self._known_pulses(readings.shape[1])
+
+    def readings_of(self, pulses: Array) -> Array:
+        """Return the controller's readings ``(n, joints)`` [rad or m] at pulses ``(n, joints)`` of the motors.
+
+        Raises
+        ------
+        InputError
+            If a joint's pulses are not known.
+        """
+        return pulses / self._known_pulses(pulses.shape[1])
+
+    def _known_pulses(self, count: int) -> Array:
+        known = [pulses for pulses in self.pulses or (None,) * count if pulses is not None]
+        if len(known) < count:
+            missing = [i for i, pulses in enumerate(self.pulses or (None,) * count, 1) if pulses is None]
+            raise InputError(
+                "the motor pulses of a joint are not known",
+                where=f"joint {', '.join(map(str, missing))}",
+                cure="Say in the robot file how many make a degree or a mm, under controller, joints.",
+            )
+        return np.array(known)
+
+
+#: A controller that counts joints and has its frames as the model does.
+AS_THE_MODEL: Final = Controller()

@@ -43,7 +43,7 @@ def nominal_robot(robot: Robot) -> Robot:
         raise InputError(
             "this robot is not calibrated: all its parameters are nominal",
             where=robot.name,
-            cure="Give the calibrated.yaml that truearm calibrate wrote; a converted robot has lost its nominal values.",
+            cure="Give the calibrated.yaml of truearm calibrate; a converted robot has lost its nominal values.",
         )
     return nominal
 

@@ -1,4 +1,4 @@
-"""The postures that a program means: for every pose the joint readings of the nominal robot, as its controller picks them.
+"""The postures that a program means: the joint readings of the nominal robot, as its controller picks them.
 
 A pose can be reached in up to eight postures and several turns. Configuration data in the program say which is meant;
 where they leave a choice, or there are none, it is the posture nearest to where the robot comes from.
@@ -6,7 +6,7 @@ where they leave a choice, or there are none, it is the posture nearest to where
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -16,18 +16,23 @@ from numpy.typing import NDArray
 from truearm.compensation.programs.program import Configuration
 from truearm.errors import InputError
 from truearm.modeling.chain import Array
-from truearm.modeling.inverse.branches import BRANCHES, branch_rule
+from truearm.modeling.inverse.branches import branch_rule
 from truearm.modeling.inverse.closed_form import SLOTS, ClosedForm
 from truearm.modeling.inverse.kinematics import inverse
-from truearm.modeling.inverse.turns import beyond_limits, nearest_turns
+from truearm.modeling.inverse.turns import beyond_limits, limits, nearest_turns
 from truearm.modeling.robot import Robot
 
 _TURN: Final = 2.0 * np.pi
-#: A reading may be this far [rad] beyond a bound of the configuration: programs round, and a joint at 90 deg lies on
-#: the edge of a quadrant.
-SLACK: Final = np.radians(0.01)
-#: A posture may be this far [rad or m] beyond a limit: the program's numbers are rounded.
-_BEYOND: Final = 0.02
+#: A reading may be this far [rad] beyond a bound of the configuration: programs round, and joints often stand at 0.
+_ROUNDING: Final = float(np.radians(0.01))
+#: A posture may be this far [rad] beyond a limit: the numbers of the program are rounded.
+_SLACK: Final = 0.02
+#: What a branch's number says, by word and bit.
+_WORDS: Final = (
+    ("shoulder", 4, {"front": 0, "back": 4}),
+    ("elbow", 2, {"up": 0, "down": 2}),
+    ("wrist", 1, {"noflip": 0, "flip": 1}),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,33 +44,187 @@ class MeantPostures:
     joints
         [rad or m], ``(n, joints)``; NaN where there are none.
     reachable
-        Whether the nominal robot reaches the pose in any posture, ``(n,)``.
-    agreeing
-        Whether it does in the configuration that the program states, ``(n,)``.
+        Whether the nominal robot reaches the pose at all, ``(n,)``.
+    guessed
+        Index of the first pose whose posture nothing tells, neither its configuration nor where the robot comes from;
+        None if there is none.
     """
 
     joints: Array
     reachable: NDArray[np.bool_]
-    agreeing: NDArray[np.bool_]
+    guessed: int | None
 
 
-def meant_postures(nominal: Robot, flange: Array, configurations: Sequence[Configuration], order: Array) -> MeantPostures:
+def agrees(robot: Robot, joints: Array, configuration: Configuration, slack: float = _ROUNDING) -> NDArray[np.bool_]:
+    """Return whether joints ``(n, joints)`` of a robot lie within the readings of a configuration, ``(n,)``."""
+    shown = robot.controller.readings(joints)
+    inside = np.ones(len(joints), dtype=bool)
+    for joint, low, high in configuration.readings:
+        reading = shown[:, joint - 1]
+        inside &= (reading >= low - slack) & (reading < high + slack)
+    return inside
+
+
+def meant_postures(
+    nominal: Robot, flange: Array, configurations: Sequence[Configuration], known: Array, order: Iterable[int]
+) -> MeantPostures:
     """Return the postures that a program means.
 
     Parameters
     ----------
     nominal
-        The robot its controller believes in.
+        The robot that its controller believes in.
     flange
-        Poses of its flange in its base frame, ``(n, 4, 4)`` [m].
+        Poses of the flange in its base frame, ``(n, 4, 4)`` [m].
     configurations
         What the program says of each.
+    known
+        Readings ``(n, joints)`` [rad or m] of the model where the program gives joints, else NaN.
     order
-        Joint readings that are known ``(n, joints)``, NaN where they are to be found, in the order in which the robot
-        comes from one to the next.
+        Indices in the order in which the robot goes from one to the next; none of them need be there.
 
     Raises
     ------
     InputError
-        If the arm has fewer than six joints.
+        If there are poses and the arm has fewer than six joints.
     """
+    joints = known.copy()
+    reachable: NDArray[np.bool_] = np.asarray(~np.isnan(known).any(axis=1))
+    wanted = [int(i) for i in np.flatnonzero(~reachable)]
+    if not wanted:
+        return MeantPostures(joints, reachable, None)
+    if len(nominal.joints) < 6:
+        raise InputError(
+            "a program with poses needs an arm of six joints or more",
+            where=nominal.name,
+            came=f"{len(nominal.joints)} joints",
+            cure="Programs of joint targets alone can be corrected.",
+        )
+    rule = branch_rule(nominal)
+    form = ClosedForm(nominal, None) if rule is not None else None
+    if rule is None or form is None or not form.known:
+        return _by_seeds(nominal, flange, configurations, joints, wanted)
+    starts = form.starts(flange[wanted, :3, 3], flange[wanted, :3, :3])
+    candidates = starts.joints
+    possible: NDArray[np.bool_] = ~np.isnan(candidates[:, :, 0]) & ~starts.nearest
+    number = np.full(possible.shape, -1)
+    number[possible] = rule.numbers(nominal.trunk.sweep(candidates[possible].T))
+    fixed = np.zeros(candidates.shape, dtype=bool)
+    reachable[wanted] = possible.any(axis=1)
+    _confine(nominal, candidates, possible, number, fixed, [configurations[i] for i in wanted])
+    walk = _Walk(nominal, candidates, possible, number, fixed)
+    guessed = None
+    place = {index: row for row, index in enumerate(wanted)}
+    before: Array | None = None
+    for index in dict.fromkeys((*order, *range(len(flange)))):
+        row = place.get(index)
+        if row is not None:
+            near = configurations[index].near
+            reference = before if near is None else nominal.controller.joints(np.array([near]))[0]
+            if reference is None and guessed is None and walk.open[row]:
+                guessed = index
+            found = walk.chosen(row, reference)
+            if found is None:
+                continue
+            joints[index] = found
+        before = joints[index]
+    return MeantPostures(joints, reachable, guessed)
+
+
+def _confine(
+    nominal: Robot,
+    candidates: Array,
+    possible: NDArray[np.bool_],
+    number: NDArray[np.intp],
+    fixed: NDArray[np.bool_],
+    configurations: Sequence[Configuration],
+) -> None:
+    """Leave of the candidates ``(m, 8, 6)`` those of the configurations, in the turns that these say."""
+    groups: dict[Configuration, list[int]] = {}
+    for row, configuration in enumerate(configurations):
+        groups.setdefault(configuration, []).append(row)
+    signs = np.array(nominal.controller.signs or (1,) * len(nominal.joints))
+    for configuration, members in groups.items():
+        rows = np.array(members)
+        for word, bit, values in _WORDS:
+            said = getattr(configuration, word)
+            if said is not None:
+                possible[rows] &= (number[rows] & bit) == values[said]
+        for joint, low, high in configuration.readings:
+            shown = nominal.controller.readings(candidates[rows].reshape(-1, candidates.shape[2]))
+            reading = shown[:, joint - 1].reshape(len(rows), SLOTS)
+            with np.errstate(invalid="ignore"):
+                # Unbounded intervals say a side: the turn nearest to zero on that side.
+                if np.isfinite(low):
+                    turns = np.ceil((low - _ROUNDING - reading) / _TURN)
+                else:
+                    turns = np.floor((high + _ROUNDING - reading) / _TURN)
+                moved = reading + turns * _TURN
+                inside = (moved >= low - _ROUNDING) & (moved < high + _ROUNDING)
+            candidates[rows, :, joint - 1] += np.where(inside, signs[joint - 1] * turns * _TURN, 0.0)
+            fixed[rows, :, joint - 1] = True
+            possible[rows] &= inside
+
+
+class _Walk:
+    """The choice among candidates along the way."""
+
+    def __init__(
+        self,
+        nominal: Robot,
+        candidates: Array,
+        possible: NDArray[np.bool_],
+        number: NDArray[np.intp],
+        fixed: NDArray[np.bool_],
+    ) -> None:
+        self._candidates, self._number = candidates, number
+        low, high = limits(nominal)
+        free = ~fixed
+        turned = nearest_turns(nominal, candidates, np.zeros(candidates.shape[2]))
+        turned = np.where(free, turned, candidates)
+        beyond: NDArray[np.bool_] = np.asarray(beyond_limits(nominal, turned, _SLACK).any(axis=2))
+        within: NDArray[np.bool_] = possible & ~beyond
+        self._possible: NDArray[np.bool_] = np.asarray(np.where(within.any(axis=1, keepdims=True), within, possible))
+        self._low, self._high = low, high
+        with np.errstate(invalid="ignore"):
+            turns = np.floor((high - turned) / _TURN) + np.floor((turned - low) / _TURN)
+        several: NDArray[np.bool_] = np.asarray(free & (turns > 0))
+        turning = np.asarray((several & np.expand_dims(self._possible, 2)).any(axis=(1, 2)))
+        #: Whether there is a choice.
+        self.open: NDArray[np.bool_] = np.asarray((self._possible.sum(axis=1) > 1) | turning)
+        self._only = np.argmax(self._possible, axis=1)
+        self._any = self._possible.any(axis=1)
+        self._turned, self._several = turned, several
+
+    def chosen(self, row: int, reference: Array | None) -> Array | None:
+        """Return the readings of a pose nearest to a reference; None if it has none."""
+        if not self._any[row]:
+            return None
+        if not self.open[row]:
+            return np.asarray(self._turned[row, self._only[row]])
+        joints = self._turned[row]
+        if reference is None:
+            cost = np.abs(joints).max(axis=1) + 1e3 * self._number[row]
+        else:
+            turns = np.round((reference - joints) / _TURN) * self._several[row]
+            if turns.any():
+                low = np.ceil((self._low - joints) / _TURN)
+                high = np.floor((self._high - joints) / _TURN)
+                joints = joints + _TURN * np.clip(turns, np.minimum(low, 0.0), np.maximum(high, 0.0))
+            cost = np.abs(joints - reference).max(axis=1)
+        slot = int(np.argmin(np.where(self._possible[row], cost, np.inf)))
+        return np.asarray(joints[slot])
+
+
+def _by_seeds(
+    nominal: Robot, flange: Array, configurations: Sequence[Configuration], joints: Array, wanted: list[int]
+) -> MeantPostures:
+    """Return postures of an arm whose branches have no names: nearest to what the program says, else to zero."""
+    zero = (0.0,) * len(nominal.joints)
+    seeds = nominal.controller.joints(np.array([configurations[i].near or zero for i in wanted]))
+    found = inverse(nominal, flange[wanted, :3, 3], flange[wanted, :3, :3], seed=seeds)
+    reached = np.array([status.value != "unreachable" for status in found.status])
+    joints[np.array(wanted)[reached]] = found.joints[reached]
+    reachable: NDArray[np.bool_] = np.asarray(~np.isnan(joints).any(axis=1))
+    untold = [i for i in wanted if configurations[i].near is None]
+    return MeantPostures(joints, reachable, untold[0] if untold else None)

@@ -19,7 +19,9 @@ from truearm.modeling.transform import IDENTITY, Transform
 
 @dataclass(frozen=True)
 class Controller:
-    """What a robot's controller shows, of the joints and the frames of the model::
+    """What a robot's controller shows of the joints and the frames of the model.
+
+    ::
 
         reading_i = zero_i + sign_i * (joint_i + sum_j coupling_ij * joint_j)
 
@@ -68,7 +70,7 @@ class Controller:
         counted = turned * self.signs if self.signs else turned
         if not self.couplings:
             return counted
-        return np.linalg.solve(self.coupling(readings.shape[1]), counted.T).T
+        return np.asarray(np.linalg.solve(self.coupling(readings.shape[1]), counted.T).T)
 
     def pulses_of(self, readings: Array) -> Array:
         """Return the pulses ``(n, joints)`` of the motors at readings ``(n, joints)`` of the controller [rad or m].

@@ -14,6 +14,8 @@ _MOST: Final = 15
 
 def decimals_of(text: str) -> int:
     """Return how many decimals a number is written with; ``1.5e-3`` has four."""
+    if "e" not in text and "E" not in text:
+        return min(len(text.partition(".")[2]), _MOST)
     found = _PARTS.fullmatch(text)
     if found is None:
         raise ValueError(f"{text!r} is no number")

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from truearm.compensation.programs.orientations import Orientation
 from truearm.modeling.transform import Transform
@@ -221,8 +221,7 @@ class Program:
     unknown: Mapping[str, int] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class Edit:
+class Edit(NamedTuple):
     """Text to put in the place of other text.
 
     Attributes

@@ -1,0 +1,219 @@
+"""The tools and frames of a program, as its controller has them and where they really are.
+
+A program's poses are those of a tool in a frame: a work object, a base, a user frame. Its controller knows both by
+numbers that refer to the nominal flange and the nominal base. Where they really are, on the flange and in the base that
+calibration has identified, somebody has to measure; a file says it::
+
+    truearm: truearm-cell/1
+    units: {length: mm, angle: deg}
+    tools:
+      tGripper: {of: flange, translation: [0.1, -0.2, 150.3], quaternion: [1, 0, 0, 0]}
+    frames:
+      wobjTable: {of: world, translation: [812.4, 3.1, 250.0], quaternion: [1, 0, 0, 0]}
+      "2": {of: controller, translation: [500, 0, 0], wpr: [0, 0, 90]}
+
+``world`` is the instrument's frame, in which the robot was calibrated; ``base`` and ``flange`` are the identified base
+and flange; ``controller`` says what the controller has where the program does not define it. The robot's own base and
+flange are called ``base`` and ``flange``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Final, Literal
+
+import numpy as np
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+
+from truearm.compensation.programs.orientations import (
+    FIXED_XYZ_ANGLES,
+    MOVING_XYZ_ANGLES,
+    QUATERNION,
+    ROTATION_VECTOR,
+    ZYX_ANGLES,
+    Orientation,
+)
+from truearm.errors import InputError
+from truearm.files import read_yaml
+from truearm.modeling.chain import Array
+from truearm.modeling.robot import Robot
+from truearm.modeling.transform import Transform
+from truearm.units import sized_si
+
+SCHEMA: Final = "truearm-cell/1"
+
+#: The ways to give an orientation, by the entry's name.
+_ORIENTATIONS: Final[dict[str, Orientation]] = {
+    "quaternion": QUATERNION,
+    "abc": ZYX_ANGLES,
+    "wpr": FIXED_XYZ_ANGLES,
+    "rxryrz": MOVING_XYZ_ANGLES,
+    "rotation_vector": ROTATION_VECTOR,
+}
+
+Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
+Triple = tuple[Number, Number, Number]
+
+
+def _unit_length(q: tuple[float, ...]) -> tuple[float, ...]:
+    if abs(float(np.linalg.norm(q)) - 1.0) > 1e-3:
+        raise ValueError(f"a quaternion (w, x, y, z) must have length 1, this one has {np.linalg.norm(q):.6g}")
+    return q
+
+
+class _Entry(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class _Units(_Entry):
+    length: Literal["mm", "m", "in"]
+    angle: Literal["deg", "rad"]
+
+
+class _Place(_Entry):
+    translation: Triple = (0.0, 0.0, 0.0)
+    quaternion: Annotated[tuple[Number, Number, Number, Number], AfterValidator(_unit_length)] | None = None
+    abc: Triple | None = None
+    wpr: Triple | None = None
+    rxryrz: Triple | None = None
+    rotation_vector: Triple | None = None
+
+    @model_validator(mode="after")
+    def _one_orientation(self) -> _Place:
+        given = [name for name in _ORIENTATIONS if getattr(self, name) is not None]
+        if len(given) > 1:
+            raise ValueError(f"one orientation belongs here, not {' and '.join(given)}")
+        return self
+
+
+class _Tool(_Place):
+    of: Literal["flange", "controller"]
+    target: str | None = None
+    controller: _Place | None = None
+
+
+class _Frame(_Place):
+    of: Literal["world", "base", "controller"]
+    controller: _Place | None = None
+
+
+class CellFile(_Entry):
+    """Schema ``truearm-cell/1``."""
+
+    truearm: Literal["truearm-cell/1"]
+    units: _Units
+    tools: dict[str, _Tool] = {}
+    frames: dict[str, _Frame] = {}
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A tool or a frame.
+
+    Attributes
+    ----------
+    controller
+        What its controller has, in its flange or base frame; None if only the program can say.
+    identified
+        Where it really is, in the identified flange or base; None if nobody knows.
+    """
+
+    controller: Transform | None
+    identified: Transform | None
+
+
+@dataclass(frozen=True)
+class Cell:
+    """Tools and frames by name, in small letters; the flange and the base themselves are ``""``."""
+
+    tools: dict[str, Placed]
+    frames: dict[str, Placed]
+
+
+def matrix(place: Transform) -> Array:
+    """Return a transform as a matrix ``(4, 4)``."""
+    made = np.eye(4)
+    made[:3, :3], made[:3, 3] = place.rotation, place.translation
+    return made
+
+
+def read_cell(robot: Robot, tools: Path | None, frames: Path | None) -> Cell:
+    """Read which tools, and which frames, a program's are.
+
+    Parameters
+    ----------
+    robot
+        Calibrated; its base and targets are meant by ``world`` and ``target``.
+    tools, frames
+        Files of the schema above, of which the tools or the frames are taken; None for none.
+
+    Raises
+    ------
+    InputError
+        If a file is not of the schema, or has nothing of what it is read for.
+    """
+    return Cell(
+        {} if tools is None else _tools(robot, tools, _file(tools, "tools")),
+        {} if frames is None else _frames(robot, frames, _file(frames, "frames")),
+    )
+
+
+def _file(path: Path, part: str) -> CellFile:
+    content = read_yaml(path, CellFile)
+    if not getattr(content, part):
+        raise InputError(f"the file has no {part}", where=str(path), cure=f"Name them under {part}:.")
+    return content
+
+
+def _tools(robot: Robot, path: Path, content: CellFile) -> dict[str, Placed]:
+    made = {}
+    for name, entry in content.tools.items():
+        where = f"{path}, tools.{name}"
+        if entry.target is None:
+            place = _transform(entry, content.units, where)
+        else:
+            if entry.of == "controller":
+                raise InputError("a target is on the identified flange", where=where, came="of: controller")
+            place = _of_target(robot, entry.target)
+        made[_key(name, "flange")] = _placed(entry.of, place, entry.controller, content.units, where)
+    return made
+
+
+def _frames(robot: Robot, path: Path, content: CellFile) -> dict[str, Placed]:
+    made = {}
+    for name, entry in content.frames.items():
+        where = f"{path}, frames.{name}"
+        place = _transform(entry, content.units, where)
+        if entry.of == "world":
+            in_base = np.linalg.inv(matrix(robot.base)) @ matrix(place)
+            place = Transform.from_matrix(in_base[:3, :3], in_base[:3, 3])
+        made[_key(name, "base")] = _placed(entry.of, place, entry.controller, content.units, where)
+    return made
+
+
+def _key(name: str, own: str) -> str:
+    return "" if name.lower() == own else name.lower()
+
+
+def _placed(of: str, place: Transform, controller: _Place | None, units: _Units, where: str) -> Placed:
+    if of == "controller":
+        if controller is not None:
+            raise InputError("the entry itself says what the controller has", where=f"{where}.controller")
+        return Placed(place, None)
+    return Placed(None if controller is None else _transform(controller, units, f"{where}.controller"), place)
+
+
+def _of_target(robot: Robot, name: str) -> Transform:
+    sweep = robot.target(name).chain.sweep(np.zeros((0, 1)), robot.values)
+    return Transform.from_matrix(sweep.matrix()[0], sweep.position[:, 0])
+
+
+def _transform(place: _Place, units: _Units, where: str) -> Transform:
+    x, y, z = (sized_si(v, units.length, f"{where}.translation") for v in place.translation)
+    for name, orientation in _ORIENTATIONS.items():
+        given = getattr(place, name)
+        if given is not None:
+            numbers = given if name == "quaternion" else [sized_si(v, units.angle, f"{where}.{name}") for v in given]
+            return Transform.from_matrix(orientation.matrices(np.array([numbers]))[0], np.array([x, y, z]))
+    return Transform((x, y, z))

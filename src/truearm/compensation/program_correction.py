@@ -1,0 +1,337 @@
+"""Whole programs put right: from the poses that a program means to the numbers that bring the real robot there.
+
+Every target is taken as the tip of its tool in its frame. Where tool and frame really are decides what correct means;
+see :mod:`truearm.compensation.cell` for how to say it and :mod:`truearm.compensation.gauge` for what is done without.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.compensation.cell import Cell, Placed, matrix
+from truearm.compensation.fake_targets import FakeTargets, fake_targets, matrices, nominal_robot
+from truearm.compensation.gauge import base_shift, best_agreement, turns_between
+from truearm.compensation.meant_postures import MeantPostures, agrees, meant_postures
+from truearm.compensation.program_poses import edits_of, joint_numbers, joints_of, place, pose_numbers, poses_of
+from truearm.compensation.programs.program import Edit, Program, Skipped
+from truearm.errors import InputError, nearest_names
+from truearm.modeling.chain import Array
+from truearm.modeling.inverse.solutions import PoseStatus
+from truearm.modeling.robot import Robot
+from truearm.modeling.transform import IDENTITY
+
+#: The base that nobody measured is found with this many targets, evenly along the programs.
+_TARGETS_FOR_BASE: Final = 2000
+
+Told = Literal["identified", "assumed"]
+
+
+@dataclass(frozen=True, eq=False)
+class Correction:
+    """One program put right.
+
+    Attributes
+    ----------
+    program
+        As it was.
+    edits
+        What changes in its text.
+    corrected
+        Which targets, ``(n,)``.
+    skipped
+        What stays as it is, and why: what the reader could not use, and targets that cannot be computed.
+    before, after
+        Tips of the targets in their frames, ``(n, 4, 4)`` [m], as the program has them and as it shall.
+    tips
+        Tips that the targets mean in the controller's base frame, ``(n, 4, 4)`` [m].
+    joints
+        Readings of the model with which the real robot is there [rad or m], ``(n, joints)``.
+    """
+
+    program: Program
+    edits: tuple[Edit, ...]
+    corrected: NDArray[np.bool_]
+    skipped: tuple[Skipped, ...]
+    before: Array
+    after: Array
+    tips: Array
+    joints: Array
+
+    @cached_property
+    def moved(self) -> Array:
+        """By how much each target was moved [m], ``(n,)``; zero where it was not corrected."""
+        return np.asarray(np.linalg.norm(self.after[:, :3, 3] - self.before[:, :3, 3], axis=1))
+
+    @cached_property
+    def turned(self) -> Array:
+        """By how much each target was turned [rad], ``(n,)``."""
+        return np.asarray(np.linalg.norm(turns_between(self.before, self.after), axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class Frames:
+    """What was taken for the real base and flange.
+
+    Attributes
+    ----------
+    tools, frames
+        Whether the places of tools and frames were given, or assumed.
+    base, flange
+        ``T_base_nominalbase`` and ``T_flange_nominalflange`` ``(4, 4)``, where they were assumed.
+    """
+
+    tools: Told
+    frames: Told
+    base: Array
+    flange: Array
+
+
+@dataclass(frozen=True, eq=False)
+class CorrectedPrograms:
+    """Programs put right together, with one base and one flange.
+
+    Attributes
+    ----------
+    corrections
+        One a program.
+    frames
+        What they refer to.
+    guessed
+        Where the posture of a first pose was guessed, in words; empty if nowhere.
+    """
+
+    corrections: tuple[Correction, ...]
+    frames: Frames
+    guessed: tuple[str, ...]
+
+
+def corrected_programs(
+    robot: Robot, programs: Sequence[Program], cell: Cell, progress: Callable[[str], None] = lambda _: None
+) -> CorrectedPrograms:
+    """Put programs right.
+
+    Parameters
+    ----------
+    robot
+        Calibrated, with the payload of the production tool.
+    programs
+        They share what has to be assumed of base and flange, and so stay together.
+    cell
+        Tools and frames, as far as they were given.
+    progress
+        Called with what is being done.
+
+    Raises
+    ------
+    InputError
+        If the robot is not calibrated, a tool or frame is not defined, or only some of them have a real place.
+    """
+    nominal = nominal_robot(robot)
+    tools, frames = _told(programs, cell, "tool"), _told(programs, cell, "frame")
+    base, flange = np.eye(4), np.eye(4)
+    if "assumed" in (tools, frames):
+        base, flange = best_agreement(robot)
+    progress("finding the postures that the programs mean")
+    meant = [_Meant(robot, nominal, program, cell) for program in programs]
+    if frames == "assumed":
+        progress("finding where the base is")
+        parts = [(one, one.some(_TARGETS_FOR_BASE // len(meant) + 1)) for one in meant]
+
+        def corrected(shift: Array) -> tuple[Array, Array]:
+            tips = [one.tips_with(rows, shift, flange) for one, rows in parts]
+            return np.concatenate([a for a, _ in tips]), np.concatenate([b for _, b in tips])
+
+        base = base_shift(corrected, base)
+    progress("finding fake targets")
+    return CorrectedPrograms(
+        tuple(one.correction(base, flange) for one in meant),
+        Frames(tools, frames, base, flange),
+        tuple(one.guess for one in meant if one.guess),
+    )
+
+
+def _told(programs: Sequence[Program], cell: Cell, kind: Literal["tool", "frame"]) -> Told:
+    """Return whether the real places of all tools or frames in use were given, or of none."""
+    given = cell.tools if kind == "tool" else cell.frames
+    used = {
+        (target.tool if kind == "tool" else target.frame): place(program, target)
+        for program in programs
+        for target in reversed(program.targets)
+        if kind == "tool" or target.form.kind == "pose"
+    }
+    known = [name for name in used if given.get(name.lower(), Placed(None, None)).identified is not None]
+    missing = [name for name in used if name not in known]
+    if known and missing:
+        own = {"tool": "flange", "frame": "base"}[kind]
+        raise InputError(
+            f"only some of the {kind}s in use have a real place in the file",
+            where=used[missing[0]],
+            came=missing[0] or own,
+            cure=f"Give it one too, or none of them: without, the {own} is shifted so that nothing moves on average.",
+        )
+    return "identified" if known else "assumed"
+
+
+class _Meant:
+    """What one program means."""
+
+    def __init__(self, robot: Robot, nominal: Robot, program: Program, cell: Cell) -> None:
+        self._robot, self._nominal, self._program = robot, nominal, program
+        controller = robot.controller
+        targets = program.targets
+        self._base = _Places(program, cell.frames, "frame", matrix(controller.base))
+        self._tool = _Places(program, cell.tools, "tool", matrix(controller.flange))
+        known = joints_of(nominal, program)
+        self._joints_given: NDArray[np.bool_] = np.asarray(~np.isnan(known).any(axis=1))
+        poses = poses_of(program)
+        flange = np.zeros((len(targets), 4, 4))
+        by_pose, by_joints = ~self._joints_given, self._joints_given
+        back = np.linalg.inv(self._tool.shown)
+        flange[by_pose] = self._base.shown[by_pose] @ poses[by_pose] @ back[by_pose]
+        flange[by_joints] = matrices(nominal, known[by_joints])
+        #: Tips in their frames, and the nominal flange, as the program means them.
+        self._poses = np.where(
+            by_pose[:, None, None], poses, np.linalg.inv(self._base.shown) @ flange @ self._tool.shown
+        )
+        configurations = [target.configuration for target in targets]
+        order = [index for move in program.moves for index in (move.via, move.target) if index is not None]
+        self._postures: MeantPostures = meant_postures(nominal, flange, configurations, known, order)
+        found = self._postures
+        self.guess = "" if found.guessed is None else place(program, targets[found.guessed])
+        self._usable: NDArray[np.bool_] = np.asarray(~np.isnan(found.joints).any(axis=1))
+
+    def some(self, count: int) -> NDArray[np.intp]:
+        """Return up to `count` usable targets, evenly along the program."""
+        usable = np.flatnonzero(self._usable)
+        evenly = np.linspace(0, len(usable) - 1, min(count, len(usable))).astype(int)
+        return np.asarray(usable[np.unique(evenly)])
+
+    def tips_with(self, rows: NDArray[np.intp], base: Array, flange: Array) -> tuple[Array, Array]:
+        """Return tips of targets in the controller's base frame, as meant and as corrected, without those not found."""
+        found = self._found(rows, base, flange)
+        good = np.array([status.usable for status in found.solutions.status], dtype=bool)
+        meant = self._base.shown[rows] @ self._poses[rows]
+        return meant[good], (found.flange @ self._tool.shown[rows])[good]
+
+    def correction(self, base: Array, flange: Array) -> Correction:
+        """Return the program put right, with what was taken for the real base and flange."""
+        program, count = self._program, len(self._program.targets)
+        rows = np.flatnonzero(self._usable)
+        after, joints = self._poses.copy(), self._postures.joints.copy()
+        reasons: dict[int, str] = {}
+        for row in np.flatnonzero(~self._usable).tolist():
+            reasons[row] = (
+                "the nominal robot reaches it in no posture of the configuration that the program states"
+                if self._postures.reachable[row]
+                else "out of reach of the nominal robot: check its tool and frame"
+            )
+        if len(rows):
+            found = self._found(rows, base, flange)
+            joints[rows] = found.joints
+            for at, row in enumerate(rows.tolist()):
+                if not found.solutions.status[at].usable:
+                    reasons[row] = _reason(found, at)
+            reasons |= self._changed_turns(rows, joints, reasons)
+            after[rows] = np.linalg.inv(self._base.shown[rows]) @ found.flange @ self._tool.shown[rows]
+        corrected = np.ones(count, dtype=bool)
+        corrected[list(reasons)] = False
+        after[~corrected], joints[~corrected] = self._poses[~corrected], self._postures.joints[~corrected]
+        numbers = pose_numbers(program, self._poses, after, np.flatnonzero(corrected & ~self._joints_given))
+        numbers |= joint_numbers(self._nominal, program, joints, np.flatnonzero(corrected & self._joints_given))
+        targets = program.targets
+        left = [Skipped(targets[row].source, targets[row].line, reason) for row, reason in reasons.items()]
+        return Correction(
+            program=program,
+            edits=tuple(edits_of(program, numbers)),
+            corrected=corrected,
+            skipped=tuple(sorted((*program.skipped, *left), key=lambda s: (s.source, s.line))),
+            before=self._poses,
+            after=after,
+            tips=self._base.shown @ self._poses,
+            joints=joints,
+        )
+
+    def _found(self, rows: NDArray[np.intp], base: Array, flange: Array) -> FakeTargets:
+        wanted = self._base.real(rows, base) @ self._poses[rows] @ np.linalg.inv(self._tool.real(rows, flange))
+        return fake_targets(self._robot, wanted, self._postures.joints[rows])
+
+    def _changed_turns(self, rows: NDArray[np.intp], joints: Array, reasons: dict[int, str]) -> dict[int, str]:
+        """Return the targets that were in their configuration and would be no more, with the reason."""
+        groups: dict[object, list[int]] = {}
+        for row in rows.tolist():
+            configuration = self._program.targets[row].configuration
+            if row not in reasons and configuration.readings:
+                groups.setdefault(configuration, []).append(row)
+        changed: dict[int, str] = {}
+        for members in groups.values():
+            configuration = self._program.targets[members[0]].configuration
+            for bound in configuration.readings:
+                one = type(configuration)(readings=(bound,))
+                for row in np.array(members)[~agrees(self._robot, joints[members], one)].tolist():
+                    name = self._robot.joints[bound[0] - 1].name
+                    reading = self._robot.controller.readings(joints[row][None])[0, bound[0] - 1]
+                    changed[row] = (
+                        f"{name} would have to read {np.degrees(reading):.3f} deg, which is beyond what the "
+                        "configuration in the program says"
+                    )
+        return changed
+
+
+class _Places:
+    """Where the frames, or the tools, of a program's targets are: ``(n, 4, 4)`` of the nominal and the real robot."""
+
+    def __init__(self, program: Program, given: dict[str, Placed], kind: Literal["tool", "frame"], own: Array) -> None:
+        defined = {name.lower(): t for name, t in (program.tools if kind == "tool" else program.frames).items()}
+        names = [(target.tool if kind == "tool" else target.frame).lower() for target in program.targets]
+        unique = list(dict.fromkeys(names))
+        self._kind = kind
+        self._index = np.array([unique.index(name) for name in names], dtype=int)
+        shown, real = [], []
+        for name in unique:
+            entry = given.get(name, Placed(None, None))
+            here = defined.get(name, IDENTITY if name == "" else entry.controller or entry.identified)
+            if here is None:
+                raise _undefined(program, name, names, kind, [*defined, *given])
+            shown.append(own @ matrix(here))
+            real.append(None if entry.identified is None else matrix(entry.identified))
+        self._shown = np.array(shown).reshape(-1, 4, 4)
+        self._real: list[Array | None] = real
+
+    @property
+    def shown(self) -> Array:
+        """In the base or flange of the nominal robot."""
+        return np.asarray(self._shown[self._index])
+
+    def real(self, rows: NDArray[np.intp], shift: Array) -> Array:
+        """Return them in the identified base or flange; where nobody measured, with the shift that is assumed."""
+        pairs = list(zip(self._shown, self._real, strict=True))
+        # What is given by joints stays where it is to the first frame that was measured.
+        shifts = [real @ np.linalg.inv(shown) for shown, real in pairs if real is not None]
+        assumed = shifts[0] if shifts else shift
+        every = [assumed @ shown if real is None else real for shown, real in pairs]
+        return np.asarray(np.reshape(every, (-1, 4, 4))[self._index[rows]])
+
+
+def _undefined(program: Program, name: str, names: list[str], kind: str, known: list[str]) -> InputError:
+    target = program.targets[names.index(name)]
+    near = nearest_names(name, known)
+    return InputError(
+        f"this {kind} is used and never defined",
+        where=place(program, target),
+        came=target.tool if kind == "tool" else target.frame,
+        cure=(f"Did you mean {' or '.join(near)}? " if near else "")
+        + f"Give the file that defines it along with the program, or what the controller has with --{kind} FILE.",
+    )
+
+
+def _reason(found: FakeTargets, at: int) -> str:
+    status, solutions = found.solutions.status[at], found.solutions
+    if status is PoseStatus.BRANCH_LOST:
+        return f"the posture would change: it is reached as {solutions.branch[at]} only"
+    return solutions.advice(at).rstrip(".")

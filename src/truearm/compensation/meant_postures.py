@@ -193,7 +193,7 @@ class _Walk:
         #: Whether there is a choice.
         self.open: NDArray[np.bool_] = np.asarray((self._possible.sum(axis=1) > 1) | turning)
         self._only = np.argmax(self._possible, axis=1)
-        self._any = self._possible.any(axis=1)
+        self._any: NDArray[np.bool_] = np.asarray(self._possible.any(axis=1))
         self._turned, self._several = turned, several
 
     def chosen(self, row: int, reference: Array | None) -> Array | None:

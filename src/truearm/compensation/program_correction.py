@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Final, Literal
 
 import numpy as np
@@ -30,6 +30,9 @@ from truearm.modeling.transform import IDENTITY
 _TARGETS_FOR_BASE: Final = 2000
 
 Told = Literal["identified", "assumed"]
+#: For targets ``(m,)``, poses ``(m, 4, 4)`` of their tools in their frames and joints ``(m, joints)`` near to the answer:
+#: fake targets ``(m, 4, 4)``, and whether each was found ``(m,)``.
+Between = Callable[[NDArray[np.intp], Array, Array], tuple[Array, NDArray[np.bool_]]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,11 +107,14 @@ class CorrectedPrograms:
         What they refer to.
     guessed
         Where the posture of a first pose was guessed, in words; empty if nowhere.
+    between
+        One a program: how poses between its targets are put right.
     """
 
     corrections: tuple[Correction, ...]
     frames: Frames
     guessed: tuple[str, ...]
+    between: tuple[Between, ...]
 
 
 def corrected_programs(
@@ -153,6 +159,7 @@ def corrected_programs(
         tuple(one.correction(base, flange) for one in meant),
         Frames(tools, frames, base, flange),
         tuple(one.guess for one in meant if one.guess),
+        tuple(partial(one.between, base, flange) for one in meant),
     )
 
 
@@ -214,8 +221,10 @@ class _Meant:
 
     def tips_with(self, rows: NDArray[np.intp], base: Array, flange: Array) -> tuple[Array, Array]:
         """Return tips of targets in the controller's base frame, as meant and as corrected, without those not found."""
+        if not len(rows):
+            return np.zeros((0, 4, 4)), np.zeros((0, 4, 4))
         found = self._found(rows, base, flange)
-        good = np.array([status.usable for status in found.solutions.status], dtype=bool)
+        good = _usable(found)
         meant = self._base.shown[rows] @ self._poses[rows]
         return meant[good], (found.flange @ self._tool.shown[rows])[good]
 
@@ -256,6 +265,15 @@ class _Meant:
             tips=self._base.shown @ self._poses,
             joints=joints,
         )
+
+    def between(
+        self, base: Array, flange: Array, rows: NDArray[np.intp], poses: Array, near: Array
+    ) -> tuple[Array, NDArray[np.bool_]]:
+        """Return fake targets for poses in the frames, and with the tools, of targets; see :data:`Between`."""
+        wanted = self._base.real(rows, base) @ poses @ np.linalg.inv(self._tool.real(rows, flange))
+        found = fake_targets(self._robot, wanted, near)
+        fakes = np.linalg.inv(self._base.shown[rows]) @ found.flange @ self._tool.shown[rows]
+        return fakes, _usable(found)
 
     def _found(self, rows: NDArray[np.intp], base: Array, flange: Array) -> FakeTargets:
         wanted = self._base.real(rows, base) @ self._poses[rows] @ np.linalg.inv(self._tool.real(rows, flange))
@@ -328,6 +346,10 @@ def _undefined(program: Program, name: str, names: list[str], kind: str, known: 
         cure=(f"Did you mean {' or '.join(near)}? " if near else "")
         + f"Give the file that defines it along with the program, or what the controller has with --{kind} FILE.",
     )
+
+
+def _usable(found: FakeTargets) -> NDArray[np.bool_]:
+    return np.array([status.usable for status in found.solutions.status], dtype=bool)
 
 
 def _reason(found: FakeTargets, at: int) -> str:

@@ -6,6 +6,7 @@ corrects the program puts other numbers in those places, and no other byte chang
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -156,7 +157,8 @@ class Move:
     statement
         Where the whole instruction stands in the text, ``(start, stop)``, from its first to after its last character.
     target_text, via_text
-        Where the words for the targets stand in the text, inside of `statement`.
+        Where the words for the targets stand in the text, inside of `statement`. ``(0, 0)`` for a move that cannot be
+        divided.
     """
 
     kind: MoveKind
@@ -279,6 +281,13 @@ class Language:
         Read the files of one program, given together.
     divide
         Return the edits that divide moves; None if the language's programs cannot be divided yet.
+    quiet
+        A line without blanks around it that neither moves the robot nor changes where it goes: what may stand between
+        two moves if the second is to be divided. None if no move's start is ever sure.
+    together
+        Which files are one program: each for itself, those of one name but for the suffix, or all that are given.
+    companions
+        Pairs of suffixes: beside a file of the first may lie one of the second that belongs to it.
     """
 
     name: str
@@ -287,3 +296,14 @@ class Language:
     is_one: Callable[[str], bool]
     read: Callable[[Sequence[Source]], Program]
     divide: Callable[[Program, Sequence[Division]], list[Edit]] | None = None
+    quiet: re.Pattern[str] | None = None
+    together: Literal["file", "stem", "all"] = "file"
+    companions: tuple[tuple[str, str], ...] = ()
+
+    def programs(self, sources: Sequence[Source]) -> tuple[Program, ...]:
+        """Read files that may be of several programs."""
+        groups: dict[object, list[Source]] = {}
+        for source in sources:
+            keys = {"file": source.path, "stem": source.path.with_suffix(""), "all": None}
+            groups.setdefault(keys[self.together], []).append(source)
+        return tuple(self.read(group) for group in groups.values())

@@ -19,12 +19,14 @@ from truearm.modeling.transform import IDENTITY, Transform
 
 @dataclass(frozen=True)
 class Controller:
-    """What a robot's controller shows, of the joints and the frames of the model::
+    """What a robot's controller shows of the joints, and where its frames stand in those of the model.
 
-        reading_i = zero_i + sign_i * (joint_i + sum_j coupling_ij * joint_j)
+    ``reading_i = zero_i + sign_i * (joint_i + sum_j coupling_ij * joint_j)``
 
     Attributes
     ----------
+    source
+        Where this is known from.
     signs
         1 or -1 for each joint; empty if all are 1.
     zeros
@@ -41,6 +43,7 @@ class Controller:
         ``T_flange_controllerflange``: the controller's flange frame in the robot's.
     """
 
+    source: str = ""
     signs: tuple[int, ...] = ()
     zeros: tuple[float, ...] = ()
     couplings: Mapping[int, Mapping[int, float]] = field(default_factory=dict)
@@ -68,7 +71,7 @@ class Controller:
         counted = turned * self.signs if self.signs else turned
         if not self.couplings:
             return counted
-        return np.linalg.solve(self.coupling(readings.shape[1]), counted.T).T
+        return np.asarray(np.linalg.solve(self.coupling(readings.shape[1]), counted.T).T, float)
 
     def pulses_of(self, readings: Array) -> Array:
         """Return the pulses ``(n, joints)`` of the motors at readings ``(n, joints)`` of the controller [rad or m].
@@ -91,15 +94,15 @@ class Controller:
         return pulses / self._known_pulses(pulses.shape[1])
 
     def _known_pulses(self, count: int) -> Array:
-        known = [pulses for pulses in self.pulses or (None,) * count if pulses is not None]
-        if len(known) < count:
-            missing = [i for i, pulses in enumerate(self.pulses or (None,) * count, 1) if pulses is None]
+        pulses = self.pulses or (None,) * count
+        missing = [number for number, per_unit in enumerate(pulses, 1) if per_unit is None]
+        if missing:
             raise InputError(
-                "the motor pulses of a joint are not known",
+                "nobody knows how many motor pulses make a degree or a mm",
                 where=f"joint {', '.join(map(str, missing))}",
-                cure="Say in the robot file how many make a degree or a mm, under controller, joints.",
+                cure="Give pulses_per_degree or pulses_per_mm in the robot file, under controller, joints.",
             )
-        return np.array(known)
+        return np.array(pulses, dtype=float)
 
 
 #: A controller that counts joints and has its frames as the model does.

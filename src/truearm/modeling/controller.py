@@ -25,8 +25,6 @@ class Controller:
 
     Attributes
     ----------
-    source
-        Where this is known from.
     signs
         1 or -1 for each joint; empty if all are 1.
     zeros
@@ -41,15 +39,17 @@ class Controller:
         ``T_base_controllerbase``: the controller's base frame in the robot's.
     flange
         ``T_flange_controllerflange``: the controller's flange frame in the robot's.
+    source
+        Where this is known from.
     """
 
-    source: str = ""
     signs: tuple[int, ...] = ()
     zeros: tuple[float, ...] = ()
     couplings: Mapping[int, Mapping[int, float]] = field(default_factory=dict)
     pulses: tuple[float | None, ...] = ()
     base: Transform = IDENTITY
     flange: Transform = IDENTITY
+    source: str = ""
 
     def coupling(self, count: int) -> Array:
         """Return what readings of `count` joints count, before signs and zeros: a matrix ``(count, count)``."""

@@ -112,13 +112,13 @@ class ControllerEntry(BaseModel):
         zeros = tuple(zero(n) if n in counted else 0.0 for n in everyone)
         known = tuple(pulses(n) if n in counted else None for n in everyone)
         made = Controller(
-            source=self.source,
             signs=signs if -1 in signs else (),
             zeros=zeros if any(zeros) else (),
             couplings=couplings,
             pulses=known if any(known) else (),
             base=self.base.transform(length, f"{where}.base"),
             flange=self.flange.transform(length, f"{where}.flange"),
+            source=self.source,
         )
         if np.linalg.cond(made.coupling(len(joints))) > _CONDITION:
             raise InputError(

@@ -213,11 +213,13 @@ def test_round_trip(length: str, angle: str, tmp_path: Path) -> None:
 
 def test_the_examples_of_template_and_guide_are_entries(tmp_path: Path) -> None:
     template = (files("truearm.examples") / "new_robot.yaml").read_text("utf-8")
-    uncommented = re.sub(r"^# (controller:|  .*)", r"\1", template, flags=re.M)
+    before, entry, after = template.partition("# controller:\n")
+    commented = re.match(r"(?:#   .*\n)+", after)
+    assert commented is not None
     guide = Path(__file__).parents[2] / "docs" / "guide" / "robots.md"
     shown = guide.read_text("utf-8").partition("```yaml\n")[2].partition("```")[0]
     path = tmp_path / "robot.yaml"
-    for text in (uncommented.partition("# Optional: mass")[0], f"{template}\n{shown}"):
+    for text in (f"{before}{entry[2:]}{re.sub('(?m)^# ', '', commented[0])}", f"{template}\n{shown}"):
         path.write_text(text)
         its = read_robot(path).controller
         assert its.signs[2] == -1
@@ -272,7 +274,7 @@ def test_a_conversion_that_moves_the_base_says_where_the_controllers_was() -> No
 # in the last link: those frames are the controller's.
 Joints = Sequence[tuple[tuple[float, float, float], tuple[float, float, float], tuple[int, int, int]]]
 Still = tuple[tuple[float, float, float], tuple[float, float, float]]
-X, Y, Z, NO_X, NO_Y, NO_Z = (1, 0, 0), (0, 1, 0), (0, 0, 1), (-1, 0, 0), (0, -1, 0), (0, 0, -1)
+X, Y, Z, NO_X, NO_Y = (1, 0, 0), (0, 1, 0), (0, 0, 1), (-1, 0, 0), (0, -1, 0)
 HERE, NONE = (0, 0, 0), (0, 0, 0)
 
 
@@ -328,19 +330,18 @@ MODELS: dict[str, tuple[Joints, Still, Still]] = {
         ((0, 0, 330), NONE),
         (HERE, (180, -90, 0)),
     ),
-    # kroshu/kuka_robot_descriptions, kr6_r900_sixx_macro.xacro, with the lengths of the KR 5 arc (kuka_experimental,
-    # opw_kinematics_kr5.yaml).
+    # ros-industrial/kuka_experimental, kr5_arc_macro.xacro, flange and tool0 in one
     "kr5": (
         (
-            ((0, 0, 400), NONE, NO_Z),
-            ((180, 0, 0), NONE, Y),
-            ((600, 0, 0), NONE, Y),
-            ((0, 0, 120), NONE, NO_X),
-            ((620, 0, 0), NONE, Y),
-            ((115, 0, 0), NONE, NO_X),
+            ((0, 0, 400), (180, 0, 0), Z),
+            ((180, 0, 0), (90, 0, 0), Z),
+            ((600, 0, 0), NONE, Z),
+            ((0, -120, 0), (0, -90, 0), Z),
+            ((0, 0, -620), (0, 90, 0), Z),
+            (HERE, (0, -90, 0), Z),
         ),
         (HERE, NONE),
-        (HERE, (0, 90, 0)),
+        ((0, 0, -115), (0, 180, -90)),
     ),
     "ur5": (
         universal(89.159, 135.85, 425, -119.7, 392.25, 109.15, 94.65),
@@ -396,7 +397,7 @@ def test_poses_are_those_of_other_models_of_the_controller(robot_id: str) -> Non
         ("kr5", [0, -90, 90, 0, 0, 0], [915, 0, 1120], [[0, 0, -1], [0, 1, 0], [1, 0, 0]]),
         # FANUC: W 180, P -90, R 0, and the height is counted from axis 2.
         ("lrmate200ic", [0, 0, 0, 0, 0, 0], [475, 0, 375], [[0, 0, 1], [0, -1, 0], [1, 0, 0]]),
-        # J3 alone at 90 deg: the forearm points up from above the elbow, which lies behind it by 75 mm.
+        # J3 alone at 90 deg: the forearm points up, 75 mm behind the elbow.
         ("lrmate200ic", [0, 0, 90, 0, 0, 0], [0, 0, 700], [[-1, 0, 0], [0, -1, 0], [0, 0, 1]]),
         # J2 alone leans the upper arm and leaves the forearm level.
         ("lrmate200ic", [0, 90, 0, 0, 0, 0], [775, 0, 75], [[0, 0, 1], [0, -1, 0], [1, 0, 0]]),

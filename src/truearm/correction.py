@@ -290,14 +290,18 @@ def _warnings(robot: Robot, result: CorrectedPrograms, division: Sequence[Divide
     count = sum(int(one.corrected.sum()) for one in corrections)
     if frames.frames == "assumed":
         few = (
-            f" With {count} targets that leaves little or nothing of the correction: give the frame." if count <= _FEW else ""
+            f" With {count} targets that leaves little or nothing of the correction: give the frame."
+            if count <= _FEW
+            else ""
         )
         made.append(Notice("frames-assumed", f"{frame_words(frames)[0]}{few}"))
     if frames.tools == "assumed":
         made.append(Notice("tools-assumed", frame_words(frames)[-1]))
     skipped = sum(len(one.skipped) for one in corrections)
     if skipped:
-        made.append(Notice("targets-skipped", f"{skipped} targets were left as they are; each is listed with its reason."))
+        made.append(
+            Notice("targets-skipped", f"{skipped} targets were left as they are; each is listed with its reason.")
+        )
     unknown: Counter[str] = sum((Counter(one.program.unknown) for one in corrections), Counter())
     if unknown:
         words = ", ".join(f"{word} ({number})" for word, number in unknown.most_common(_LISTED))

@@ -12,6 +12,7 @@ import typer
 from truearm.cli.axes import axes
 from truearm.cli.calibrate import calibrate
 from truearm.cli.check import check
+from truearm.cli.compensate import compensate
 from truearm.cli.convert import convert
 from truearm.cli.devices import devices
 from truearm.cli.distances import distances
@@ -62,6 +63,7 @@ app.command()(check)
 app.command()(calibrate)
 app.command()(validate)
 app.command()(distances)
+app.command()(compensate)
 app.command()(ik)
 app.command()(plan)
 app.command()(axes)

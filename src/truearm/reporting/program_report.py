@@ -102,7 +102,9 @@ def frame_words(frames: Frames) -> list[str]:
         return f"{np.linalg.norm(shift[:3, 3]) * 1e3:.3f} mm and {turned:.4f} deg"
 
     if frames.frames == "identified":
-        said = ["The program's frames are where --frame says; targets are corrected in them, and may all move together."]
+        said = [
+            "The program's frames are where --frame says; targets are corrected in them, and may all move together."
+        ]
     else:
         said = [
             "No --frame was given. Calibration cannot know where a program's frames really are, so the base was shifted "
@@ -127,7 +129,11 @@ def program_html(report: ProgramReport) -> str:
         figures = {"path": path_figure(shown), "along": along_figure(shown)}
     if report.checked is not None:
         figures["checked"] = histogram(
-            report.checked.original * 1e3, report.checked.corrected * 1e3, "mm", "distance from where it was meant", "targets"
+            report.checked.original * 1e3,
+            report.checked.corrected * 1e3,
+            "mm",
+            "distance from where it was meant",
+            "targets",
         )
     every = [(file.file, one) for file in report.files for one in file.skipped]
     return page(

@@ -26,7 +26,7 @@ from truearm.errors import InputError
 from truearm.files import read_bytes
 from truearm.modeling.chain import Array, Element
 from truearm.modeling.conventions import JointKind
-from truearm.modeling.formats.robot_file import NAME
+from truearm.modeling.formats.entries import NAME
 from truearm.modeling.formats.urdf_tree import (
     KIND,
     ZERO,

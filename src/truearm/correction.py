@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+import shlex
+from collections import Counter
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -11,18 +13,27 @@ from typing import Any, Final
 
 import numpy as np
 
-from truearm.compensation.division import Divided
+from truearm.compensation.cell import read_cell
+from truearm.compensation.division import Divided, divided
 from truearm.compensation.gauge import turns_between
-from truearm.compensation.program_correction import CorrectedPrograms, Correction
+from truearm.compensation.program_correction import CorrectedPrograms, Correction, corrected_programs
 from truearm.compensation.program_files import (
     ProgramFile,
+    edited,
+    language_called,
+    program_files,
+    read_programs,
     recorded,
+    restored,
     write_programs,
 )
+from truearm.errors import InputError
 from truearm.files import writable_folder
+from truearm.modeling.parts import NO_PAYLOAD, Payload
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.reporting.program_report import ProgramReport, ReportedFile, frame_words, program_html
+from truearm.robots import load_robot
 
 REPORT: Final = "compensation.html"
 #: Corrections of calibration errors are smaller [m]; a larger mean comes of a wrong tool, frame or robot.
@@ -309,7 +320,18 @@ def _warnings(robot: Robot, result: CorrectedPrograms, division: Sequence[Divide
             Notice(
                 "instructions-unknown",
                 f"{sum(unknown.values())} instructions are not known and were left alone: {words}"
-                f"{', ..' if len(unknown) > _LISTED else ''}. If one of them moves the robot, its targets stay as they are.",
+                f"{', ..' if len(unknown) > _LISTED else ''}. If one of them moves the robot, its targets stay.",
+            )
+        )
+    edges = [(one, row) for one in corrections for row in one.on_edge]
+    if edges:
+        lines = ", ".join(str(one.program.targets[row].line) for one, row in edges[:_LISTED])
+        made.append(
+            Notice(
+                "configuration-on-edge",
+                f"{len(edges)} targets have a joint at the edge of a quadrant or turn of their configuration (0 deg, for "
+                f"one) and now a little beyond it: lines {lines}{', ..' if len(edges) > _LISTED else ''}. Controllers "
+                "take the nearest posture there, but step through these first.",
             )
         )
     if result.guessed:
@@ -317,7 +339,7 @@ def _warnings(robot: Robot, result: CorrectedPrograms, division: Sequence[Divide
             Notice(
                 "posture-guessed",
                 f"Nothing says in which posture the robot reaches its first pose ({'; '.join(result.guessed)}): it was "
-                "taken as the first that can be reached of front-up-noflip and so on, and those after it as near as can be.",
+                "taken as the first that can be reached of front-up-noflip and so on, and the next as near as can be.",
             )
         )
     moved = np.concatenate([one.moved[one.corrected] for one in corrections]) if count else np.zeros(0)

@@ -23,8 +23,9 @@ from truearm.modeling.inverse.turns import beyond_limits, limits, nearest_turns
 from truearm.modeling.robot import Robot
 
 _TURN: Final = 2.0 * np.pi
-#: A reading may be this far [rad] beyond a bound of the configuration: programs round, and joints often stand at 0.
-_ROUNDING: Final = float(np.radians(0.01))
+#: A reading may be this far [rad] beyond a bound of the configuration. Joints often stand at a bound, as at 0, and
+#: controllers then take the posture at hand: KUKA's ignore the turn of a joint within 2 deg of zero.
+ON_EDGE: Final = float(np.radians(2.0))
 #: A posture may be this far [rad] beyond a limit: the numbers of the program are rounded.
 _SLACK: Final = 0.02
 #: What a branch's number says, by word and bit.
@@ -55,7 +56,7 @@ class MeantPostures:
     guessed: int | None
 
 
-def agrees(robot: Robot, joints: Array, configuration: Configuration, slack: float = _ROUNDING) -> NDArray[np.bool_]:
+def agrees(robot: Robot, joints: Array, configuration: Configuration, slack: float = ON_EDGE) -> NDArray[np.bool_]:
     """Return whether joints ``(n, joints)`` of a robot lie within the readings of a configuration, ``(n,)``."""
     shown = robot.controller.readings(joints)
     inside = np.ones(len(joints), dtype=bool)
@@ -156,11 +157,11 @@ def _confine(
             with np.errstate(invalid="ignore"):
                 # Unbounded intervals say a side: the turn nearest to zero on that side.
                 if np.isfinite(low):
-                    turns = np.ceil((low - _ROUNDING - reading) / _TURN)
+                    turns = np.ceil((low - ON_EDGE - reading) / _TURN)
                 else:
-                    turns = np.floor((high + _ROUNDING - reading) / _TURN)
+                    turns = np.floor((high + ON_EDGE - reading) / _TURN)
                 moved = reading + turns * _TURN
-                inside = (moved >= low - _ROUNDING) & (moved < high + _ROUNDING)
+                inside = (moved >= low - ON_EDGE) & (moved < high + ON_EDGE)
             candidates[rows, :, joint - 1] += np.where(inside, signs[joint - 1] * turns * _TURN, 0.0)
             fixed[rows, :, joint - 1] = True
             possible[rows] &= inside

@@ -6,7 +6,7 @@ see :mod:`truearm.compensation.cell` for how to say it and :mod:`truearm.compens
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Final, Literal
@@ -19,7 +19,7 @@ from truearm.compensation.fake_targets import FakeTargets, fake_targets, matrice
 from truearm.compensation.gauge import base_shift, best_agreement, turns_between
 from truearm.compensation.meant_postures import MeantPostures, agrees, meant_postures
 from truearm.compensation.program_poses import edits_of, joint_numbers, joints_of, place, pose_numbers, poses_of
-from truearm.compensation.programs.program import Edit, Program, Skipped
+from truearm.compensation.programs.program import Configuration, Edit, Program, Skipped
 from truearm.errors import InputError, nearest_names
 from truearm.modeling.chain import Array
 from truearm.modeling.inverse.solutions import PoseStatus
@@ -28,9 +28,11 @@ from truearm.modeling.transform import IDENTITY
 
 #: The base that nobody measured is found with this many targets, evenly along the programs.
 _TARGETS_FOR_BASE: Final = 2000
+#: A joint within this of a bound [rad] is on it: the numbers of programs are rounded.
+_ROUNDING: Final = float(np.radians(0.01))
 
 Told = Literal["identified", "assumed"]
-#: For targets ``(m,)``, poses ``(m, 4, 4)`` of their tools in their frames and joints ``(m, joints)`` near to the answer:
+#: For targets ``(m,)``, poses ``(m, 4, 4)`` of their tools in their frames and joints ``(m, joints)`` near the answer:
 #: fake targets ``(m, 4, 4)``, and whether each was found ``(m,)``.
 Between = Callable[[NDArray[np.intp], Array, Array], tuple[Array, NDArray[np.bool_]]]
 
@@ -55,6 +57,8 @@ class Correction:
         Tips that the targets mean in the controller's base frame, ``(n, 4, 4)`` [m].
     joints
         Readings of the model with which the real robot is there [rad or m], ``(n, joints)``.
+    on_edge
+        Corrected targets with a joint that leaves the readings of its configuration, by less than controllers mind.
     """
 
     program: Program
@@ -65,6 +69,7 @@ class Correction:
     after: Array
     tips: Array
     joints: Array
+    on_edge: tuple[int, ...]
 
     @cached_property
     def moved(self) -> Array:
@@ -234,6 +239,7 @@ class _Meant:
         rows = np.flatnonzero(self._usable)
         after, joints = self._poses.copy(), self._postures.joints.copy()
         reasons: dict[int, str] = {}
+        on_edge: tuple[int, ...] = ()
         for row in np.flatnonzero(~self._usable).tolist():
             reasons[row] = (
                 "the nominal robot reaches it in no posture of the configuration that the program states"
@@ -247,6 +253,7 @@ class _Meant:
                 if not found.solutions.status[at].usable:
                     reasons[row] = _reason(found, at)
             reasons |= self._changed_turns(rows, joints, reasons)
+            on_edge = self._on_edge(rows, joints, reasons)
             after[rows] = np.linalg.inv(self._base.shown[rows]) @ found.flange @ self._tool.shown[rows]
         corrected = np.ones(count, dtype=bool)
         corrected[list(reasons)] = False
@@ -264,6 +271,7 @@ class _Meant:
             after=after,
             tips=self._base.shown @ self._poses,
             joints=joints,
+            on_edge=on_edge,
         )
 
     def between(
@@ -279,26 +287,41 @@ class _Meant:
         wanted = self._base.real(rows, base) @ self._poses[rows] @ np.linalg.inv(self._tool.real(rows, flange))
         return fake_targets(self._robot, wanted, self._postures.joints[rows])
 
-    def _changed_turns(self, rows: NDArray[np.intp], joints: Array, reasons: dict[int, str]) -> dict[int, str]:
-        """Return the targets that were in their configuration and would be no more, with the reason."""
-        groups: dict[object, list[int]] = {}
+    def _changed_turns(self, rows: NDArray[np.intp], joints: Array, reasons: Mapping[int, str]) -> dict[int, str]:
+        """Return the targets that would leave the readings of their configuration, with the reason."""
+        changed: dict[int, str] = {}
+        for configuration, members in self._configured(rows, reasons):
+            for bound in configuration.readings:
+                one = Configuration(readings=(bound,))
+                for row in members[~agrees(self._robot, joints[members], one)].tolist():
+                    name = self._robot.joints[bound[0] - 1].name
+                    reading = self._robot.controller.readings(joints[row][None])[0, bound[0] - 1]
+                    changed[row] = (
+                        f"{name} would have to read {np.degrees(reading):.2f} deg, which is beyond what the "
+                        "configuration in the program says"
+                    )
+        return changed
+
+    def _on_edge(self, rows: NDArray[np.intp], joints: Array, reasons: Mapping[int, str]) -> tuple[int, ...]:
+        """Return the targets that leave the readings of their configuration and did not before."""
+        found: list[int] = []
+        for configuration, members in self._configured(rows, reasons):
+            before = agrees(self._robot, self._postures.joints[members], configuration, _ROUNDING)
+            after = agrees(self._robot, joints[members], configuration, _ROUNDING)
+            found += members[before & ~after].tolist()
+        return tuple(sorted(found))
+
+    def _configured(
+        self, rows: NDArray[np.intp], reasons: Mapping[int, str]
+    ) -> Iterator[tuple[Configuration, NDArray[np.intp]]]:
+        """Return the targets without a reason against them by their configuration, where it says readings."""
+        groups: dict[Configuration, list[int]] = {}
         for row in rows.tolist():
             configuration = self._program.targets[row].configuration
             if row not in reasons and configuration.readings:
                 groups.setdefault(configuration, []).append(row)
-        changed: dict[int, str] = {}
-        for members in groups.values():
-            configuration = self._program.targets[members[0]].configuration
-            for bound in configuration.readings:
-                one = type(configuration)(readings=(bound,))
-                for row in np.array(members)[~agrees(self._robot, joints[members], one)].tolist():
-                    name = self._robot.joints[bound[0] - 1].name
-                    reading = self._robot.controller.readings(joints[row][None])[0, bound[0] - 1]
-                    changed[row] = (
-                        f"{name} would have to read {np.degrees(reading):.3f} deg, which is beyond what the "
-                        "configuration in the program says"
-                    )
-        return changed
+        for configuration, members in groups.items():
+            yield configuration, np.array(members)
 
 
 class _Places:

@@ -89,7 +89,7 @@ def program_files(paths: Sequence[Path], *, again: bool = False) -> tuple[Progra
     return tuple(ProgramFile(path, name, _original(path, again)) for path, name in zip(every, names, strict=True))
 
 
-def restored(paths: Sequence[Path]) -> tuple[tuple[ProgramFile, Record], ...]:
+def restored(paths: Sequence[Path]) -> tuple[ProgramFile, ...]:
     """Return the originals of corrected programs, out of their records.
 
     Raises
@@ -106,7 +106,7 @@ def restored(paths: Sequence[Path]) -> tuple[tuple[ProgramFile, Record], ...]:
                 where=str(path),
                 allowed=str(record_path(path)),
             )
-        made.append((ProgramFile(path, name, _unchanged_original(path, record)), record))
+        made.append(ProgramFile(path, name, _unchanged_original(path, record)))
     return tuple(made)
 
 

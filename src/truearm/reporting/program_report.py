@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truearm.compensation.division import Divided
 from truearm.compensation.gauge import turns_between
@@ -107,9 +108,9 @@ def frame_words(frames: Frames) -> list[str]:
         ]
     else:
         said = [
-            "No --frame was given. Calibration cannot know where a program's frames really are, so the base was shifted "
-            f"by {size(frames.base)} until the mean correction of all targets is zero: targets are right to each other, "
-            "and the program as a whole stays where it was."
+            "No --frame was given. Calibration cannot know where a program's frames really are, so the base was "
+            f"shifted by {size(frames.base)} until the mean correction of all targets is zero: targets are right to "
+            "each other, and the program as a whole stays where it was."
         ]
     if frames.tools == "identified":
         said.append("The program's tools are where --tool says, on the identified flange.")
@@ -262,7 +263,7 @@ def _line(points: Array, name: str, colour: str, width: float) -> Figure:
     }
 
 
-def _evenly(rows: Array) -> Array:
+def _evenly(rows: NDArray[np.intp]) -> NDArray[np.intp]:
     if len(rows) <= _DRAWN:
         return rows
     return np.asarray(rows[np.linspace(0, len(rows) - 1, _DRAWN).astype(int)])

@@ -329,8 +329,8 @@ def _warnings(robot: Robot, result: CorrectedPrograms, division: Sequence[Divide
         made.append(
             Notice(
                 "configuration-on-edge",
-                f"{len(edges)} targets have a joint at the edge of a quadrant or turn of their configuration (0 deg, for "
-                f"one) and now a little beyond it: lines {lines}{', ..' if len(edges) > _LISTED else ''}. Controllers "
+                f"{len(edges)} targets have a joint at the edge of a quadrant or turn of their configuration, such as 0 "
+                f"deg, and now a little beyond it: lines {lines}{', ..' if len(edges) > _LISTED else ''}. Controllers "
                 "take the nearest posture there, but step through these first.",
             )
         )

@@ -16,6 +16,7 @@ from truearm.cli.compensate import compensate
 from truearm.cli.convert import convert
 from truearm.cli.devices import devices
 from truearm.cli.distances import distances
+from truearm.cli.export import export
 from truearm.cli.hexapod import app as hexapod
 from truearm.cli.ik import ik
 from truearm.cli.importing import app as importing
@@ -76,6 +77,7 @@ app.add_typer(hexapod, name="hexapod")
 app.command()(robots)
 app.command()(show)
 app.command()(convert)
+app.command()(export)
 app.command("new-robot")(new_robot)
 app.command(help=HELP)(study)
 app.command()(example)

@@ -10,7 +10,8 @@ from truearm.compensation.programs.numbers import decimals_of, rewritten
 
 
 @pytest.mark.parametrize(
-    ("text", "decimals"), [("600", 0), ("600.", 0), ("-0.50", 2), (".125", 3), ("1.5e-3", 4), ("1.25E+1", 1), ("2e3", 0)]
+    ("text", "decimals"),
+    [("600", 0), ("600.", 0), ("-0.50", 2), (".125", 3), ("1.5e-3", 4), ("1.25E+1", 1), ("2e3", 0)],
 )
 def test_decimals_are_counted(text: str, decimals: int) -> None:
     assert decimals_of(text) == decimals

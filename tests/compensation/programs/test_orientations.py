@@ -138,4 +138,4 @@ def test_a_rotation_vector_beyond_half_a_turn_stays_there() -> None:
     R = ROTATION_VECTOR.matrices(near) @ Rotation.from_rotvec([0, 1e-3, 0]).as_matrix()
     numbers = ROTATION_VECTOR.numbers(R, near)
     np.testing.assert_allclose(ROTATION_VECTOR.matrices(numbers), R, atol=1e-12)
-    np.testing.assert_allclose(numbers[:3], near[:3] + [0, 1e-3, 0], atol=1e-12)
+    np.testing.assert_allclose(numbers[:3], near[:3] + np.array([0, 1e-3, 0]), atol=1e-12)

@@ -27,12 +27,13 @@ from truearm.compensation.program_files import (
     restored,
     write_programs,
 )
+from truearm.compensation.programs.program import Program, Source
 from truearm.errors import InputError
 from truearm.files import writable_folder
 from truearm.modeling.parts import NO_PAYLOAD, Payload
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
-from truearm.reporting.program_report import ProgramReport, ReportedFile, frame_words, program_html
+from truearm.reporting.program_report import Checked, ProgramReport, ReportedFile, frame_words, program_html
 from truearm.robots import load_robot
 
 REPORT: Final = "compensation.html"
@@ -105,6 +106,8 @@ class ProgramCorrection:
         What to know about it.
     command
         How to do it again.
+    checked
+        What a simulated robot does with the programs, where there is one.
     """
 
     robot: Robot
@@ -113,6 +116,7 @@ class ProgramCorrection:
     division: tuple[Divided, ...]
     warnings: tuple[Notice, ...]
     command: str
+    checked: Checked | None = None
 
     def summary(self) -> dict[str, Any]:
         """Return what ``--json`` prints."""
@@ -152,7 +156,13 @@ class ProgramCorrection:
             divisions=self.division,
             warnings=self.warnings,
             command=self.command,
+            checked=self.checked,
         )
+
+    def as_written(self) -> tuple[Program, ...]:
+        """Return the programs as they are read again from their new texts."""
+        language = language_called(self.files[0].correction.program.language)
+        return language.programs([Source(one.file.path, one.text.decode("latin-1")) for one in self.files])
 
     def save(self, folder: str | Path, progress: Callable[[str], None] = lambda _: None) -> tuple[Path, ...]:
         """Write programs, their records and the report ``compensation.html`` into a folder, all or nothing.
@@ -329,8 +339,8 @@ def _warnings(robot: Robot, result: CorrectedPrograms, division: Sequence[Divide
         made.append(
             Notice(
                 "configuration-on-edge",
-                f"{len(edges)} targets have a joint at the edge of a quadrant or turn of their configuration, such as 0 "
-                f"deg, and now a little beyond it: lines {lines}{', ..' if len(edges) > _LISTED else ''}. Controllers "
+                f"{len(edges)} targets have a joint at the edge of a quadrant or turn of their configuration, as 0, "
+                f"and now a little beyond it: lines {lines}{', ..' if len(edges) > _LISTED else ''}. Controllers "
                 "take the nearest posture there, but step through these first.",
             )
         )

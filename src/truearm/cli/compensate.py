@@ -113,3 +113,12 @@ def print_correction(correction: ProgramCorrection) -> None:
             typer.echo(f"  {division.moves} moves divided by {division.added} more targets")
     for warning in summary["warnings"]:
         typer.echo(f"Warning ({warning['code']}): {warning['message']}")
+
+
+def print_checked(correction: ProgramCorrection) -> None:
+    """Print how far from its targets a simulated robot comes with the original and with the corrected program."""
+    checked = correction.checked
+    if checked is not None:
+        typer.echo(f"Distance of {checked.robot} from where the program meant it to be:")
+        for name, missed in (("original program", checked.original), ("corrected program", checked.corrected)):
+            typer.echo(f"  {name:17}  mean {1e3 * missed.mean():.3f}  max {1e3 * missed.max():.3f} mm")

@@ -14,7 +14,7 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.compensation.cell import Cell, Placed, matrix
+from truearm.compensation.cell import NOTHING_GIVEN, Cell, Placed, matrix
 from truearm.compensation.fake_targets import FakeTargets, fake_targets, matrices, nominal_robot
 from truearm.compensation.gauge import base_shift, best_agreement, turns_between
 from truearm.compensation.meant_postures import MeantPostures, agrees, meant_postures
@@ -168,6 +168,14 @@ def corrected_programs(
     )
 
 
+def commanded(robot: Robot, program: Program, cell: Cell = NOTHING_GIVEN) -> Array:
+    """Return the readings of the model to which the controller sends the robot, ``(n, joints)`` [rad or m].
+
+    It believes in the nominal robot. NaN where it finds none; `cell` is asked for what the program does not define.
+    """
+    return _Meant(robot, nominal_robot(robot), program, cell).joints
+
+
 def _told(programs: Sequence[Program], cell: Cell, kind: Literal["tool", "frame"]) -> Told:
     """Return whether the real places of all tools or frames in use were given, or of none."""
     given = cell.tools if kind == "tool" else cell.frames
@@ -216,6 +224,7 @@ class _Meant:
         self._postures: MeantPostures = meant_postures(nominal, flange, configurations, known, order)
         found = self._postures
         self.guess = "" if found.guessed is None else place(program, targets[found.guessed])
+        self.joints = found.joints
         self._usable: NDArray[np.bool_] = np.asarray(~np.isnan(found.joints).any(axis=1))
 
     def some(self, count: int) -> NDArray[np.intp]:

@@ -15,7 +15,7 @@ from truearm.compensation.program_files import edited
 from truearm.compensation.program_poses import edits_of, numbers_of, pose_numbers, poses_of
 from truearm.compensation.programs import LANGUAGES
 from truearm.compensation.programs.numbers import NUMBER
-from truearm.compensation.programs.program import Division, Language, Program, Source
+from truearm.compensation.programs.program import Division, Edit, Language, Program, Source
 from truearm.errors import InputError
 
 SAMPLES = Path(__file__).parent / "samples"
@@ -36,10 +36,9 @@ def samples(language: Language) -> tuple[tuple[Source, ...], ...]:
     return tuple(programs)
 
 
-def texts(program: Program, edits: Sequence[object]) -> list[str]:
+def texts(program: Program, edits: Sequence[Edit]) -> list[str]:
     return [
-        edited(source.text, [e for e in edits if e.source == number])  # type: ignore[attr-defined]
-        for number, source in enumerate(program.sources)
+        edited(source.text, [e for e in edits if e.source == number]) for number, source in enumerate(program.sources)
     ]
 
 

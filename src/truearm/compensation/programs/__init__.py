@@ -6,5 +6,6 @@ from typing import Final
 
 from truearm.compensation.programs.jbi import JBI
 from truearm.compensation.programs.program import Language
+from truearm.compensation.programs.val3 import VAL3
 
-LANGUAGES: Final[tuple[Language, ...]] = (JBI,)
+LANGUAGES: Final[tuple[Language, ...]] = (JBI, VAL3)

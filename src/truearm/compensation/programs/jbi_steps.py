@@ -146,7 +146,7 @@ def arcs_of(steps: Sequence[Step | None]) -> Iterator[tuple[Step, ...]]:
     of other lengths are taken apart into ways that are not known.
     """
     row: list[Step] = []
-    for step in [*steps, None]:
+    for step in steps:
         if step is not None and step.word == "MOVC" and step.key != NOWHERE and step.alone:
             row.append(step)
             if not step.ends_arc:
@@ -163,6 +163,8 @@ def arcs_of(steps: Sequence[Step | None]) -> Iterator[tuple[Step, ...]]:
             yield (replace(step, word="MOVS"),)
         else:
             yield (step,)
+    if row:
+        yield from _row(row)
 
 
 def _row(row: list[Step]) -> Iterator[tuple[Step, ...]]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
+from truearm.compensation.programs.jbi import JBI
 from truearm.compensation.programs.program import Language
+from truearm.compensation.programs.val3 import VAL3
 
-LANGUAGES: Final[tuple[Language, ...]] = ()
+LANGUAGES: Final[tuple[Language, ...]] = (JBI, VAL3)

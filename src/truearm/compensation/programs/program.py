@@ -59,6 +59,9 @@ class Form:
         How a pose is turned; None if its numbers are a position alone.
     decimals
         Fewest decimals of a number that is written: of lengths, and of angles or of a quaternion's numbers.
+    absent
+        For languages that do not write zeros: what to put into the text for a number that is not written, with ``{}``
+        where the number goes, one for each number. Such a number is 0 and its place is empty, where the text belongs.
     """
 
     name: str
@@ -67,6 +70,7 @@ class Form:
     angle: float = 1.0
     orientation: Orientation | None = None
     decimals: tuple[int, int] = (3, 4)
+    absent: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -80,6 +84,8 @@ class Configuration:
     readings
         ``(joint, low, high)``: the joint, from 1, reads `low` or more and less than `high` [rad], as the controller
         shows it.
+    outside
+        ``(joint, low, high)``: the joint reads less than `low`, or `high` or more [rad].
     near
         Readings [rad or m], as the controller shows them, that the posture is nearest to; if None, and the rest leaves
         a choice, nearest to where the robot comes from.
@@ -89,6 +95,7 @@ class Configuration:
     elbow: Literal["up", "down"] | None = None
     wrist: Literal["noflip", "flip"] | None = None
     readings: tuple[tuple[int, float, float], ...] = ()
+    outside: tuple[tuple[int, float, float], ...] = ()
     near: tuple[float, ...] | None = None
 
 
@@ -112,7 +119,8 @@ class ProgramTarget:
     values
         Its numbers, in the file's units.
     places
-        Where each of `values` stands in the text: ``(start, stop)``, or None for a number that is not written.
+        Where each of `values` stands in the text: ``(start, stop)``; ``(place, place)`` for a number that is not
+        written and can be put in there, see :attr:`Form.absent`; None for one that cannot.
     tool, frame
         Names of the tool and of the work object, base or user frame that hold; empty for the flange and the robot's
         own base.

@@ -300,15 +300,12 @@ class _Meant:
         """Return the targets that would leave the readings of their configuration, with the reason."""
         changed: dict[int, str] = {}
         for configuration, members in self._configured(rows, reasons):
-            for bound in configuration.readings:
-                one = Configuration(readings=(bound,))
-                for row in members[~agrees(self._robot, joints[members], one)].tolist():
-                    name = self._robot.joints[bound[0] - 1].name
-                    reading = self._robot.controller.readings(joints[row][None])[0, bound[0] - 1]
-                    changed[row] = (
-                        f"{name} would have to read {np.degrees(reading):.2f} deg, which is beyond what the "
-                        "configuration in the program says"
-                    )
+            for row in members[~agrees(self._robot, joints[members], configuration)].tolist():
+                shown = np.degrees(self._robot.controller.readings(joints[row][None])[0])
+                words = ", ".join(f"{v:.2f}" for v in shown)
+                changed[row] = (
+                    f"it would leave the configuration in the program: the joints would have to read {words} deg"
+                )
         return changed
 
     def _on_edge(self, rows: NDArray[np.intp], joints: Array, reasons: Mapping[int, str]) -> tuple[int, ...]:
@@ -327,7 +324,7 @@ class _Meant:
         groups: dict[Configuration, list[int]] = {}
         for row in rows.tolist():
             configuration = self._program.targets[row].configuration
-            if row not in reasons and configuration.readings:
+            if row not in reasons and (configuration.readings or configuration.outside):
                 groups.setdefault(configuration, []).append(row)
         for configuration, members in groups.items():
             yield configuration, np.array(members)

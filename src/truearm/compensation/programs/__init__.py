@@ -5,5 +5,6 @@ from __future__ import annotations
 from typing import Final
 
 from truearm.compensation.programs.program import Language
+from truearm.compensation.programs.rapid import RAPID
 
-LANGUAGES: Final[tuple[Language, ...]] = ()
+LANGUAGES: Final[tuple[Language, ...]] = (RAPID,)

@@ -90,7 +90,7 @@ def divided(language: Language, correction: Correction, between: Between, farthe
     open_moves: list[_Dividing] = []
     for index, move in enumerate(program.moves):
         if move.kind != "joint":
-            before = _start(language, program, index)
+            before = _start(program, index)
             if before is None or not _sound(correction, move, before):
                 left.append(move.line)
             else:
@@ -178,17 +178,12 @@ class _Dividing:
         return Division(self.index, tuple(zip(ends[:-1], vias[:-1], strict=True)), vias[-1])
 
 
-def _start(language: Language, program: Program, index: int) -> int | None:
+def _start(program: Program, index: int) -> int | None:
     """Return the target that a move starts from, None if it is not sure."""
     move, before = program.moves[index], program.moves[index - 1] if index else None
     if before is None or before.routine != move.routine or before.source != move.source:
         return None
-    if move.target_text == (0, 0) or language.quiet is None:
-        return None
-    text = program.sources[move.source].text
-    between = text[before.statement[1] : move.statement[0]]
-    lines = [line for line in between.splitlines() if line.strip()]
-    if not all(language.quiet.fullmatch(line.strip()) for line in lines):
+    if (0, 0) in (move.target_text, move.statement):
         return None
     return before.target
 

@@ -6,6 +6,7 @@ from typing import Final
 
 from truearm.compensation.programs.jbi import JBI
 from truearm.compensation.programs.program import Language
+from truearm.compensation.programs.rapid import RAPID
 from truearm.compensation.programs.val3 import VAL3
 
-LANGUAGES: Final[tuple[Language, ...]] = (JBI, VAL3)
+LANGUAGES: Final[tuple[Language, ...]] = (RAPID, JBI, VAL3)

@@ -6,7 +6,6 @@ corrects the program puts other numbers in those places, and no other byte chang
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -161,7 +160,8 @@ class Move:
     via
         Index of the target that a circle passes.
     routine
-        Which routine of the program, from 0: what stands before a routine's first move is not known.
+        Which stretch of the program, from 0: the moves of a stretch follow each other in the text, and nothing between
+        them jumps, calls or moves the robot. Where the robot is before the first of them is not known.
     statement
         Where the whole instruction stands in the text, ``(start, stop)``, from its first to after its last character.
     target_text, via_text
@@ -289,9 +289,6 @@ class Language:
         Read the files of one program, given together.
     divide
         Return the edits that divide moves; None if the language's programs cannot be divided yet.
-    quiet
-        A line without blanks around it that neither moves the robot nor changes where it goes: what may stand between
-        two moves if the second is to be divided. None if no move's start is ever sure.
     together
         Which files are one program: each for itself, those of one name but for the suffix, or all that are given.
     companions
@@ -304,7 +301,6 @@ class Language:
     is_one: Callable[[str], bool]
     read: Callable[[Sequence[Source]], Program]
     divide: Callable[[Program, Sequence[Division]], list[Edit]] | None = None
-    quiet: re.Pattern[str] | None = None
     together: Literal["file", "stem", "all"] = "file"
     companions: tuple[tuple[str, str], ...] = ()
 

@@ -16,6 +16,7 @@ from truearm.compensation.program_files import edited
 from truearm.compensation.program_poses import edits_of, numbers_of, pose_numbers, poses_of
 from truearm.compensation.programs import LANGUAGES
 from truearm.compensation.programs.numbers import NUMBER
+from truearm.compensation.programs.orientations import QUATERNION
 from truearm.compensation.programs.program import Division, Edit, Language, Program, ProgramTarget, Source
 from truearm.errors import InputError
 
@@ -107,7 +108,10 @@ def test_a_correction_changes_numbers_of_targets_and_nothing_else(language: Lang
 def shifted(target: ProgramTarget) -> np.ndarray:
     """Return a small change of every number that is written."""
     size = 3.0 if target.form.kind == "pulses" else 2e-5 if target.form.length == 1.0 else 2e-2
-    return np.array([0.0 if span is None or span[0] == span[1] else size for span in target.places])
+    sizes = [size] * len(target.places)
+    if target.form.orientation is QUATERNION:  # stays one of length 1
+        sizes[3:] = [1e-4] * 4
+    return np.array([0.0 if s is None or s[0] == s[1] else v for s, v in zip(target.places, sizes, strict=True)])
 
 
 def without(text: str, spans: Sequence[tuple[int, int]]) -> list[str]:

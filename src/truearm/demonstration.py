@@ -91,7 +91,7 @@ def _corrected_plate(
     cell = _CELL.format(place=f"{x}, {y}, {z}", quaternion=quaternion)
     write_files(folder, {"cell.yaml": cell})
     correction = correct(
-        calibration.robot,
+        folder / "calibrated.yaml",
         [folder / _PLATE],
         tools=folder / "cell.yaml",
         frames=folder / "cell.yaml",

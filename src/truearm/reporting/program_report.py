@@ -25,6 +25,8 @@ from truearm.reporting.page import page
 _DRAWN: Final = 5000
 #: Rows in a table of targets that were skipped.
 _LISTED: Final = 500
+#: From far enough to see the axes of a tall picture.
+_CAMERA: Final = CAMERA | {"eye": {"x": 1.9, "y": 1.9, "z": 1.0}}
 #: How long the longest correction is drawn, as a share of the program's size.
 _ARROW: Final = 0.08
 
@@ -197,15 +199,17 @@ def path_figure(corrections: Sequence[Correction]) -> Figure:
             }
         )
     axes = {f"{letter}axis": scene_axis(f"{letter} [mm]") for letter in "xyz"}
-    return figure(traces, 620, scene={**axes, "aspectmode": "data", "camera": CAMERA})
+    return figure(traces, 620, scene={**axes, "aspectmode": "data", "camera": _CAMERA})
 
 
 def along_figure(corrections: Sequence[Correction]) -> Figure:
-    """Show by how much each target was moved and turned, in the order of the text."""
+    """Show by how much each target was moved and turned, in the order in which the program goes to them."""
     traces: list[Figure] = []
     start = 1
     for number, correction in enumerate(corrections):
-        rows = _evenly(np.flatnonzero(correction.corrected))
+        order = _order(correction)
+        steps = _evenly(np.flatnonzero(correction.corrected[order]))
+        rows = order[steps]
         targets = correction.program.targets
         names = [f"{html.escape(targets[row].name or 'inline')}, line {targets[row].line}" for row in rows.tolist()]
         program = html.escape(correction.program.sources[0].path.stem)
@@ -220,7 +224,7 @@ def along_figure(corrections: Sequence[Correction]) -> Figure:
                     "name": f"{what} [{unit}]",
                     "legendgroup": what,
                     "showlegend": number == 0,
-                    "x": (rows + start).tolist(),
+                    "x": (steps + start).tolist(),
                     "y": rounded(values, 4),
                     "yaxis": axes,
                     "text": names,
@@ -229,14 +233,21 @@ def along_figure(corrections: Sequence[Correction]) -> Figure:
                     "hovertemplate": f"{program}, %{{text}}: {what} by %{{y}} {unit}<extra></extra>",
                 }
             )
-        start += len(targets)
+        start += len(order)
     return figure(
         traces,
         380,
-        xaxis=axis("target, in the order of the text"),
+        xaxis=axis("step of the program, in the order of its text"),
         yaxis=axis("moved [mm]") | {"rangemode": "tozero"},
         yaxis2=axis("turned [deg]") | {"rangemode": "tozero", "overlaying": "y", "side": "right", "showgrid": False},
     )
+
+
+def _order(correction: Correction) -> NDArray[np.intp]:
+    """Return the targets in the order of the moves, vias too; in the order of the text where nothing moves to them."""
+    moves = [row for move in correction.program.moves for row in (move.via, move.target) if row is not None]
+    rest = sorted(set(range(len(correction.program.targets))) - set(moves))
+    return np.array([*moves, *rest], dtype=int)
 
 
 def _way(correction: Correction) -> Array:

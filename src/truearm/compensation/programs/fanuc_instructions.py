@@ -1,0 +1,185 @@
+"""What the instructions of a FANUC program (/MN) say: its moves, and how they use the positions."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter, defaultdict
+from collections.abc import Mapping
+from typing import Final, NamedTuple
+
+from truearm.compensation.programs.fanuc_text import LsFile, Statement
+from truearm.compensation.programs.program import MoveKind, Skipped
+
+#: What a reference such as P[3:approach] or PR[R[1]] is: its word and what its brackets hold.
+_REFERENCE: Final = r"(([A-Z]\w*)\[((?:[^\[\]\n]|\[[^\[\]\n]*\])*)\])"
+_MOVE: Final = re.compile(rf"[ \t]*([JLCAS])[ \t]+@?[ \t]*{_REFERENCE}", re.IGNORECASE)
+_SECOND: Final = re.compile(rf"[\s:@]*{_REFERENCE}", re.IGNORECASE)
+_SECOND_LINE: Final = re.compile(rf"\n[ \t]*:?[ \t]*@?[ \t]*{_REFERENCE}", re.IGNORECASE)
+_BRACKETS: Final = re.compile(r"\[[^\[\]]*\]")
+_NUMBER: Final = re.compile(r"[ \t]*0*(\d{1,9})[ \t]*(?::.*)?")
+_OPTION: Final = re.compile(r"\b(INC|RTCP|COORD|(?:TOOL_)?OFFSET|VOFFSET|(?:QUICK_)?SKIP)\b", re.IGNORECASE)
+_COMMENT: Final = re.compile(r"[ \t]*(?:!|//|--)")
+_WORD: Final = re.compile(r"[ \t]*\(*([$A-Z]\w*)", re.IGNORECASE)
+#: What sets the active user frame or tool: which of the two, of which groups, the number if it is one.
+_ACTIVE: Final = re.compile(
+    r"(?:U|\$MNU)(FRAME|TOOL)_?NUM[ \t]*(?:\[([^\]\n]*)\][ \t]*)?=(?:[ \t]*(\d{1,3})[ \t]*(?:;|$))?", re.IGNORECASE
+)
+
+#: The shape of arcs (A) and splines (S) is decided by their neighbours.
+_KINDS: Final[Mapping[str, MoveKind]] = {"J": "joint", "L": "linear", "C": "circular", "A": "circular", "S": "circular"}
+#: Options with which the numbers of a position are no place of the tool in a frame that stands still.
+_NO_PLACE: Final = {
+    "INC": "is a step (INC) and no place",
+    "RTCP": "is reached with a tool that stands still (RTCP)",
+    "COORD": "is in a frame that another motion group moves (COORD)",
+}
+#: Where a program may come from elsewhere.
+_JOINING: Final = frozenset({"LBL", "ELSE", "ENDIF", "FOR", "ENDFOR"})
+_KNOWN: Final = re.compile(
+    r"[AGDRSUW][IO]|[PSA]?R|F|M|TIMER|WAIT|IF|SELECT|JMP|CALL|RUN|END|ABORT|PAUSE|UALM|MESSAGE|OVERRIDE|PAYLOAD"
+    r"|U(?:FRAME|TOOL)(?:_NUM)?|(?:TOOL_|V)?OFFSET|SKIP|(?:UN)?LOCK|(?:JOINT|LINEAR)_MAX_SPEED|RSR|MONITOR|COL|PL"
+    r"|DIAG_REC|(?:ERROR|RESUME)_PROG|\$\w*"
+)
+
+#: Numbers of the active user frame and tool; None if a number is not known.
+Active = tuple[str | None, str | None]
+
+
+class Step(NamedTuple):
+    """A move instruction.
+
+    Attributes
+    ----------
+    kind, statement, target_text, via_text, routine
+        As in :class:`~truearm.compensation.programs.program.Move`.
+    target, via
+        Numbers of its positions; empty where a position is not of this program.
+    """
+
+    kind: MoveKind
+    statement: tuple[int, int]
+    target: str
+    target_text: tuple[int, int]
+    via: str
+    via_text: tuple[int, int] | None
+    routine: int
+
+
+class Instructions:
+    """What the instructions of a file say.
+
+    Attributes
+    ----------
+    steps
+        The moves to positions of the program, in the order of the text.
+    skipped
+        The moves to other places.
+    unknown
+        How often an instruction occurs that is not known, by its first word.
+    no_place
+        Positions, by number, whose numbers are no place of the tool in a frame that stands still, and why.
+    active
+        What was active at the moves to a position, by its number.
+    everywhere
+        What is ever active in the program: numbers of user frames, numbers of tools.
+    routine
+        The last routine.
+    """
+
+    def __init__(self, file: LsFile, source: int, routine: int) -> None:
+        self.steps: list[Step] = []
+        self.skipped: list[Skipped] = []
+        self.unknown: Counter[str] = Counter()
+        self.no_place: dict[str, str] = {}
+        self.active: dict[str, set[Active]] = defaultdict(set)
+        self.everywhere: tuple[set[str | None], set[str | None]] = (set(), set())
+        self.routine = routine
+        self._file, self._source = file, source
+        self._holds: list[str | None] = [None, None]
+        text = file.text
+        found: list[tuple[Statement, re.Match[str] | None]] = []
+        for statement in file.statements():
+            move = _MOVE.match(text, statement.start, statement.stop)
+            if move is None and _COMMENT.match(text, statement.start, statement.stop) is None:
+                for active in _settings(text[statement.start : statement.stop]):
+                    self.everywhere[_which(active)].add(active[3])
+                found.append((statement, None))
+            elif move is not None:
+                found.append((statement, move))
+        for statement, move in found:
+            if move is not None:
+                self._move(statement, move)
+            else:
+                self._other(text[statement.start : statement.stop])
+
+    def _skip(self, place: int, reason: str) -> None:
+        self.skipped.append(Skipped(self._source, self._file.line(place), reason))
+
+    def _reference(self, place: int, word: str, inside: str) -> str:
+        """Return the number of the position that a reference means; empty, and skipped, if it is none."""
+        number = _NUMBER.fullmatch(inside)
+        shown = f"{word}[{inside}]"
+        if word in "Pp" and number is not None:
+            return number[1]
+        if word in "Pp":
+            self._skip(place, f"which position {shown} is, is known only when the program runs")
+        elif word.upper() == "PR":
+            self._skip(place, f"{shown} is a position register, set elsewhere")
+        else:
+            self._skip(place, f"{shown} is no position of this program")
+        return ""
+
+    def _move(self, statement: Statement, move: re.Match[str]) -> None:
+        text, stop = self._file.text, statement.stop
+        target, target_text = self._reference(move.start(2), move[3], move[4]), move.span(2)
+        via, via_text = "", None
+        if move[1] in "Cc":
+            second = _SECOND.match(text, move.end(), stop) or _SECOND_LINE.search(text, move.end(), stop)
+            via, via_text = target, target_text
+            if second is None:
+                self._skip(move.start(2), "the circle has one position only")
+                target = ""
+            else:
+                target, target_text = self._reference(second.start(1), second[2], second[3]), second.span(1)
+        options: set[str] = set()
+        if _OPTION.search(text, move.end(), stop):
+            options = {word.upper() for word in _OPTION.findall(_BRACKETS.sub("[]", text[move.end() : stop]))}
+        for number in filter(None, (target, via)):
+            self.active[number].add((self._holds[0], self._holds[1]))
+            for option in options & _NO_PLACE.keys():
+                self.no_place[number] = _NO_PLACE[option]
+        self.routine += bool(options)
+        if target:
+            span = (move.start(1), stop)
+            kind = _KINDS[move[1].upper()]
+            self.steps.append(Step(kind, span, target, target_text, via, via_text, self.routine))
+        self.routine += bool(options) or not target
+
+    def _other(self, words: str) -> None:
+        for active in _settings(words):
+            alone = not words[: active.start()].strip()
+            self._holds[_which(active)] = active[3] if alone else None
+        found = _WORD.match(words)
+        word = found[1].upper() if found else ""
+        if word in _JOINING:
+            self.routine += 1
+            for which in (0, 1):
+                if len(self.everywhere[which]) > 1:
+                    self._holds[which] = None
+        elif found and _KNOWN.fullmatch(word) is None:
+            self.unknown[found[1]] += 1
+            self.routine += 1
+        elif "CALL" in words.upper():
+            self.routine += 1
+
+
+def _settings(words: str) -> list[re.Match[str]]:
+    """Return what sets the active user frame or tool of the first motion group in an instruction."""
+    if "NUM" not in words.upper():
+        return []
+    found = _ACTIVE.finditer(words)
+    return [active for active in found if active[2] is None or "1" in re.findall(r"\d+", active[2])]
+
+
+def _which(active: re.Match[str]) -> int:
+    return int(active[1].upper() == "TOOL")

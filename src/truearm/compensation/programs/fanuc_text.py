@@ -1,0 +1,241 @@
+"""The parts of a FANUC program in ASCII: sections, instructions, positions, and where each stands in the text."""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_right
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
+from typing import Final, NamedTuple
+
+from truearm.compensation.programs.program import Source
+from truearm.errors import InputError
+
+_FIRST: Final = re.compile(r"(?:\xef\xbb\xbf)?\s*/PROG\b", re.IGNORECASE)
+_SECTION: Final = re.compile(r"^[ \t]*/(MN|POS|END)\b", re.IGNORECASE | re.MULTILINE)
+_LINE: Final = re.compile(r"^[ \t]*(?:(\d{0,9})[ \t]*:)?(.*)$", re.MULTILINE)
+_BLANK: Final = re.compile(r"[ \t\n;]*")
+_NUMBER: Final = r"([+-]?(?:\d+(?:\.\d*)?|\.\d+))"
+#: Name, number, comment.
+_HEAD: Final = r"(P\[[ \t]*0*(\d{1,9})[ \t]*(?::([^\n]*?))?\])\s*\{"
+#: User frame, tool, configuration.
+_FRAMES: Final = r"\s*UF\s*:\s*(F|\d{1,3})\s*,\s*UT\s*:\s*(F|\d{1,3})\b(?:\s*,\s*CONFIG\s*:\s*'([^'\n]*)')?"
+_POSE: Final = dict(zip("XYZWPR", ("mm", "mm", "mm", "deg", "deg", "deg"), strict=True))
+#: A position of motion group 1 alone, with a pose and no external axes, as controllers write it.
+_PLAIN: Final = re.compile(
+    rf"{_HEAD}\s*GP1\s*:{_FRAMES}\s*,\s*"
+    + r"\s*,\s*".join(rf"{name}\s*=[ \t]*{_NUMBER}[ \t]*{unit}" for name, unit in _POSE.items())
+    + r"\s*\}[ \t]*;?",
+    re.IGNORECASE,
+)
+#: Any position: its head, the data of all motion groups.
+_POSITION: Final = re.compile(rf"{_HEAD}([^{{}}]*)\}}[ \t]*;?", re.IGNORECASE)
+_ANY_FRAMES: Final = re.compile(_FRAMES, re.IGNORECASE)
+_GROUP: Final = re.compile(r"\bGP(\d)\s*:", re.IGNORECASE)
+#: A field's name, its number and its unit; no number if what stands there is none with a unit.
+_FIELD: Final = re.compile(rf"\b([XYZWPR]|[JE]\d)\s*=[ \t]*(?:{_NUMBER}[ \t]*(mm|deg)\b)?", re.IGNORECASE)
+
+
+def is_one(text: str) -> bool:
+    """Return whether a text is a FANUC program in ASCII."""
+    return _FIRST.match(text) is not None
+
+
+class Statement(NamedTuple):
+    """An instruction: on one line, or on several of which the first alone has a number.
+
+    Attributes
+    ----------
+    number
+        Where its line number stands in the text, ``(start, stop)``; empty if it has none.
+    start, stop
+        From after the colon to after the last character, a semicolon if it is complete.
+    """
+
+    number: tuple[int, int]
+    start: int
+    stop: int
+
+
+class Field(NamedTuple):
+    """A number of a position: as it is written, where, and its unit."""
+
+    text: str
+    place: tuple[int, int]
+    unit: str
+
+
+class Position(NamedTuple):
+    """A position of the section /POS.
+
+    Attributes
+    ----------
+    number
+        Its number, without leading zeros.
+    comment
+        Its comment, without quotes.
+    start, stop
+        Where it stands.
+    name
+        Where its name stands, such as ``P[3:"approach"]``.
+    frame, tool, configuration
+        UF, UT and CONFIG as they are written, of the first motion group.
+    fields
+        Its numbers by name, of the first motion group.
+    alone
+        Whether it has no other motion group.
+    fault
+        Why its data are not complete; empty if they are.
+    """
+
+    number: str
+    comment: str
+    start: int
+    stop: int
+    name: tuple[int, int]
+    frame: str = ""
+    tool: str = ""
+    configuration: str = ""
+    fields: Mapping[str, Field] = MappingProxyType({})
+    alone: bool = True
+    fault: str = ""
+
+
+class LsFile:
+    """A FANUC program in ASCII.
+
+    Attributes
+    ----------
+    path
+        Its name, for messages.
+    text
+        Its text with every line end as line feeds, so that all places stay what they are.
+    instructions, positions
+        Where the sections /MN and /POS begin and end.
+
+    Raises
+    ------
+    InputError
+        If a section is missing.
+    """
+
+    def __init__(self, source: Source) -> None:
+        self.path = str(source.path)
+        self.text = source.text.replace("\r", "\n")
+        self._lines = [found.end() for found in re.finditer(r"\r\n?|\n", source.text)]
+        if not is_one(self.text):
+            raise InputError("there is no section /PROG", where=f"{self.path}, line 1", cure="Is this an LS file?")
+        places: dict[str, tuple[int, int]] = {}
+        wanted = ["MN", "POS", "END"]
+        for found in _SECTION.finditer(self.text):
+            if wanted and found[1].upper() == wanted[0]:
+                places[wanted.pop(0)] = found.span()
+        if wanted:
+            raise InputError(
+                f"there is no section /{wanted[0]}",
+                where=f"{self.path}, line {self.line(len(self.text))}",
+                allowed="sections /PROG, /MN, /POS and /END, in this order",
+                cure="Is the file complete?",
+            )
+        self.instructions = (places["MN"][1], places["POS"][0])
+        self.positions = (places["POS"][1], places["END"][0])
+
+    def line(self, place: int) -> int:
+        """Return the number of the line that a place in the text is on, from 1."""
+        return bisect_right(self._lines, place) + 1
+
+    def where(self, place: int) -> str:
+        """Return file and line of a place, for a message."""
+        return f"{self.path}, line {self.line(place)}"
+
+    def statements(self) -> Iterator[Statement]:
+        """Yield the instructions of /MN."""
+        number, start, stop = (0, 0), -1, -1
+        for found in _LINE.finditer(self.text, *self.instructions):
+            digits, words = found[1], found[2].rstrip()
+            if start >= 0 and digits:
+                yield Statement(number, start, stop)
+                start = -1
+            if start < 0:
+                if digits is None:
+                    continue
+                number, start = found.span(1), found.start(2)
+            stop = found.start(2) + len(words)
+            if words.endswith(";"):
+                yield Statement(number, start, stop)
+                start = -1
+        if start >= 0:
+            yield Statement(number, start, stop)
+
+    def taught(self) -> Iterator[Position]:
+        """Yield the positions of /POS; refuse what is none, and numbers that come twice."""
+        seen: set[str] = set()
+        place, stop = self.positions
+        while (place := _end_of_blank(self.text, place, stop)) < stop:
+            position = self._position(place, stop)
+            if position.number in seen:
+                raise InputError(f"P[{position.number}] is there twice", where=self.where(place))
+            seen.add(position.number)
+            yield position
+            place = position.stop
+
+    def _position(self, place: int, stop: int) -> Position:
+        plain = _PLAIN.match(self.text, place, stop)
+        if plain is not None:
+            _, number, comment, frame, tool, configuration, *texts = plain.groups()
+            fields = dict(zip(_POSE, map(Field, texts, plain.regs[7:], _POSE.values()), strict=True))
+            head = (number, _comment(comment), place, plain.end(), plain.span(1))
+            return Position(*head, frame, tool, configuration or "", fields)
+        found = _POSITION.match(self.text, place, stop)
+        if found is None:
+            raise InputError(
+                "this is no complete position",
+                where=self.where(place),
+                came=self.text[place : place + 40].partition("\n")[0],
+                allowed="P[number]{ data };",
+            )
+        position = Position(found[2], _comment(found[3]), place, found.end(), found.span(1))
+        start, end = found.span(4)
+        groups = list(_GROUP.finditer(self.text, start, end))
+        if groups:
+            ends = [group.start() for group in groups[1:]] + [end]
+            first = [(group.end(), end) for group, end in zip(groups, ends, strict=True) if group[1] == "1"]
+            if len(first) != 1:
+                return position._replace(fault="has no data of motion group 1" if not first else "has two groups 1")
+            start, end = first[0]
+        fields, fault = self._fields(start, end)
+        frames = _ANY_FRAMES.match(self.text, start, end)
+        if frames is None:
+            return position._replace(fault="has no UF and UT")
+        frame, tool, configuration = frames.groups("")
+        return position._replace(
+            frame=frame, tool=tool, configuration=configuration, fields=fields, alone=len(groups) < 2, fault=fault
+        )
+
+    def _fields(self, start: int, stop: int) -> tuple[dict[str, Field], str]:
+        """Return the fields of a motion group, and why they are not complete."""
+        fields: dict[str, Field] = {}
+        for found in _FIELD.finditer(self.text, start, stop):
+            name = found[1].upper()
+            if name in fields:
+                return fields, f"has {name} twice"
+            if found[2] is None:
+                untaught = self.text.startswith("*", found.end())
+                return fields, f"is not taught: {name} is ****" if untaught else f"has a {name} without mm or deg"
+            fields[name] = Field(found[2], found.span(2), found[3].lower())
+        joints = sum(name[0] == "J" for name in fields)
+        for name in [f"J{i + 1}" for i in range(joints)] or list(_POSE):
+            if name not in fields:
+                return fields, f"has no {name}"
+            if not joints and fields[name].unit != _POSE[name]:
+                return fields, f"has {name} in {fields[name].unit}"
+        return fields, ""
+
+
+def _end_of_blank(text: str, start: int, stop: int) -> int:
+    blank = _BLANK.match(text, start, stop)
+    return blank.end() if blank else start
+
+
+def _comment(text: str | None) -> str:
+    return text.strip().strip('"') if text else ""

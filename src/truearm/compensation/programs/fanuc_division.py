@@ -76,7 +76,7 @@ class _DividedFile:
             target = self._program.targets[move.target]
             position = self._taught[target.name[2:-1].partition(":")[0]]
             piece = self._piece(move)
-            if piece is None or not position.alone or len(position.fields) > len(target.values):
+            if piece is None or not position.alone or position.external:
                 continue
             words: list[str] = []
             for point, via in division.points:
@@ -110,10 +110,8 @@ class _DividedFile:
         self._last += 1
         name = f"P[{self._last}]"
         cuts = [(like.name, name)]
-        fields = {field.place: field for field in like.fields.values()}
-        for field, value in zip((fields[place] for place in target.places if place), numbers, strict=True):
-            decimals = target.form.decimals[0 if field.unit == "mm" else 1]
-            cuts.append((field.place, rewritten(field.text, value, decimals)))
+        for place, text, unit, value in zip(like.places, like.texts, like.units, numbers, strict=True):
+            cuts.append((place, rewritten(text, value, target.form.decimals[0 if unit == "mm" else 1])))
         at = like.start
         for (start, stop), words in sorted(cuts):
             self._added += [self._raw[at:start], words]

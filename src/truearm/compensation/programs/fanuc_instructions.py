@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Mapping
 from typing import Final, NamedTuple
 
@@ -18,7 +18,12 @@ _SECOND_LINE: Final = re.compile(rf"\n[ \t]*:?[ \t]*@?[ \t]*{_REFERENCE}", re.IG
 _BRACKETS: Final = re.compile(r"\[[^\[\]]*\]")
 _NUMBER: Final = re.compile(r"[ \t]*0*(\d{1,9})[ \t]*(?::.*)?")
 _OPTION: Final = re.compile(r"\b(INC|RTCP|COORD|(?:TOOL_)?OFFSET|VOFFSET|(?:QUICK_)?SKIP)\b", re.IGNORECASE)
+#: What most moves end with.
+_NO_OPTION: Final = re.compile(
+    r"[ \t]+\d+(?:%|[cm]m/(?:sec|min))[ \t]+(?:FINE|CNT\d+)[ \t]*(?:ACC\d+[ \t]*)?;$", re.IGNORECASE
+)
 _COMMENT: Final = re.compile(r"[ \t]*(?:!|//|--)")
+_COMMENT_LINE: Final = re.compile(rf"[ \t]*\d*[ \t]*:{_COMMENT.pattern}")
 _WORD: Final = re.compile(r"[ \t]*\(*([$A-Z]\w*)", re.IGNORECASE)
 #: What sets the active user frame or tool: which of the two, of which groups, the number if it is one.
 _ACTIVE: Final = re.compile(
@@ -77,9 +82,10 @@ class Instructions:
     unknown
         How often an instruction occurs that is not known, by its first word.
     no_place
-        Positions, by number, whose numbers are no place of the tool in a frame that stands still, and why.
+        Positions, by number, whose numbers are no place of the tool in a frame that stands still, and why. By the
+        empty number if a move is such that may go to any of them.
     active
-        What was active at the moves to a position, by its number.
+        What is active at the moves to a position, by its number; None where they differ.
     everywhere
         What is ever active in the program: numbers of user frames, numbers of tools.
     routine
@@ -91,25 +97,21 @@ class Instructions:
         self.skipped: list[Skipped] = []
         self.unknown: Counter[str] = Counter()
         self.no_place: dict[str, str] = {}
-        self.active: dict[str, set[Active]] = defaultdict(set)
+        self.active: dict[str, Active] = {}
         self.everywhere: tuple[set[str | None], set[str | None]] = (set(), set())
         self.routine = routine
         self._file, self._source = file, source
-        self._holds: list[str | None] = [None, None]
+        self._holds: Active = (None, None)
         text = file.text
-        found: list[tuple[Statement, re.Match[str] | None]] = []
+        for active in _ACTIVE.finditer(text, *file.instructions):
+            line = text.rfind("\n", 0, active.start()) + 1
+            if _COMMENT_LINE.match(text, line) is None and _is_first_group(active):
+                self.everywhere[_which(active)].add(active[3])
         for statement in file.statements():
             move = _MOVE.match(text, statement.start, statement.stop)
-            if move is None and _COMMENT.match(text, statement.start, statement.stop) is None:
-                for active in _settings(text[statement.start : statement.stop]):
-                    self.everywhere[_which(active)].add(active[3])
-                found.append((statement, None))
-            elif move is not None:
-                found.append((statement, move))
-        for statement, move in found:
             if move is not None:
                 self._move(statement, move)
-            else:
+            elif _COMMENT.match(text, statement.start, statement.stop) is None:
                 self._other(text[statement.start : statement.stop])
 
     def _skip(self, place: int, reason: str) -> None:
@@ -118,10 +120,10 @@ class Instructions:
     def _reference(self, place: int, word: str, inside: str) -> str:
         """Return the number of the position that a reference means; empty, and skipped, if it is none."""
         number = _NUMBER.fullmatch(inside)
-        shown = f"{word}[{inside}]"
-        if word in "Pp" and number is not None:
+        if word.upper() == "P" and number is not None:
             return number[1]
-        if word in "Pp":
+        shown = f"{word}[{inside}]"
+        if word.upper() == "P":
             self._skip(place, f"which position {shown} is, is known only when the program runs")
         elif word.upper() == "PR":
             self._skip(place, f"{shown} is a position register, set elsewhere")
@@ -142,12 +144,20 @@ class Instructions:
             else:
                 target, target_text = self._reference(second.start(1), second[2], second[3]), second.span(1)
         options: set[str] = set()
-        if _OPTION.search(text, move.end(), stop):
+        plain = via_text is None and _NO_OPTION.match(text, move.end(), stop)
+        if not plain and _OPTION.search(text, move.end(), stop):
             options = {word.upper() for word in _OPTION.findall(_BRACKETS.sub("[]", text[move.end() : stop]))}
-        for number in filter(None, (target, via)):
-            self.active[number].add((self._holds[0], self._holds[1]))
-            for option in options & _NO_PLACE.keys():
-                self.no_place[number] = _NO_PLACE[option]
+        for number in (target, via):
+            if number:
+                frame, tool = self.active.setdefault(number, self._holds)
+                if (frame, tool) != self._holds:
+                    held_frame, held_tool = self._holds
+                    agreed = frame if frame == held_frame else None, tool if tool == held_tool else None
+                    self.active[number] = agreed
+        for option in options & _NO_PLACE.keys():
+            self.no_place |= dict.fromkeys(filter(None, (target, via)), _NO_PLACE[option])
+            if not target and move[3].upper() == "P":
+                self.no_place[""] = _NO_PLACE[option]
         self.routine += bool(options)
         if target:
             span = (move.start(1), stop)
@@ -156,29 +166,30 @@ class Instructions:
         self.routine += bool(options) or not target
 
     def _other(self, words: str) -> None:
-        for active in _settings(words):
-            alone = not words[: active.start()].strip()
-            self._holds[_which(active)] = active[3] if alone else None
+        for active in _ACTIVE.finditer(words):
+            if _is_first_group(active):
+                alone = not words[: active.start()].strip()
+                self._hold(_which(active), active[3] if alone else None)
         found = _WORD.match(words)
         word = found[1].upper() if found else ""
         if word in _JOINING:
             self.routine += 1
             for which in (0, 1):
                 if len(self.everywhere[which]) > 1:
-                    self._holds[which] = None
+                    self._hold(which, None)
         elif found and _KNOWN.fullmatch(word) is None:
             self.unknown[found[1]] += 1
             self.routine += 1
         elif "CALL" in words.upper():
             self.routine += 1
 
+    def _hold(self, which: int, number: str | None) -> None:
+        frame, tool = self._holds
+        self._holds = (frame, number) if which else (number, tool)
 
-def _settings(words: str) -> list[re.Match[str]]:
-    """Return what sets the active user frame or tool of the first motion group in an instruction."""
-    if "NUM" not in words.upper():
-        return []
-    found = _ACTIVE.finditer(words)
-    return [active for active in found if active[2] is None or "1" in re.findall(r"\d+", active[2])]
+
+def _is_first_group(active: re.Match[str]) -> bool:
+    return active[2] is None or "1" in re.findall(r"\d+", active[2])
 
 
 def _which(active: re.Match[str]) -> int:

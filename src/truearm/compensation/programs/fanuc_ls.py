@@ -48,7 +48,6 @@ _JOINTS: Final = Form("joints", "joints", angle=math.pi / 180)
 #: Neither millimetres nor degrees are ever as many.
 _LARGEST: Final = 1e6
 _TRACKED: Final = re.compile(r"\bLINE_TRACK_SCHEDULE_NUMBER\s*:\s*0*[1-9]", re.IGNORECASE)
-_NAMES: Final = tuple("XYZWPR")
 
 
 class _Positions:
@@ -60,17 +59,15 @@ class _Positions:
 
     def target(self, position: Position) -> ProgramTarget | str:
         """Return a position as a target, or why it is left as it is."""
-        if position.fault or position.number in self._said.no_place:
-            return position.fault or self._said.no_place[position.number]
-        fields = position.fields
-        is_pose = "X" in fields and "J1" not in fields
-        names = _NAMES if is_pose else tuple(sorted(name for name in fields if name[0] == "J"))
-        chosen = [fields[name] for name in names]
-        values = tuple([float(field.text) for field in chosen])
+        number = position.number if position.number in self._said.active else ""
+        if position.fault or number in self._said.no_place:
+            return position.fault or self._said.no_place[number]
+        is_pose = position.names[0] == "X"
+        values = tuple([float(text) for text in position.texts])
         if not max(map(abs, values)) <= _LARGEST:
             raise InputError(
                 f"a number of P[{position.number}] is out of all proportion",
-                where=self._file.where(chosen[0].place[0]),
+                where=self._file.where(position.places[0][0]),
                 came=max(values, key=abs),
             )
         frame, tool = self._active(position.number, 0, position.frame), self._active(position.number, 1, position.tool)
@@ -78,10 +75,9 @@ class _Positions:
         if is_pose:
             if self._tracked:
                 return "is in a frame that moves with a conveyor (LINE_TRACK)"
-            if len(fields) > len(names):
-                for name, field in fields.items():
-                    if name[0] == "E" and float(field.text):
-                        return f"has {name} off zero, and that external axis may carry the robot"
+            for name, text in position.external:
+                if float(text):
+                    return f"has {name} off zero, and that external axis may carry the robot"
             if frame is None or tool is None:
                 what = "user frame" if frame is None else "tool"
                 return f"is for the active {what}, and the program does not say for certain which that is"
@@ -95,7 +91,7 @@ class _Positions:
             f"P[{position.number}:{position.comment}]" if position.comment else f"P[{position.number}]",
             _POSE if is_pose else _JOINTS,
             values,
-            tuple([field.place for field in chosen]),
+            tuple(position.places),
             tool or "",
             frame or "",
             posture,
@@ -105,9 +101,12 @@ class _Positions:
         """Return the name of a frame (0) or tool (1), None if it is not known."""
         if written not in "Ff":
             return written.lstrip("0")
-        uses = self._said.active.get(number)
-        held = {use[which] for use in uses} if uses else self._said.everywhere[which]
-        one = next(iter(held)) if len(held) == 1 else None
+        one: str | None
+        if number in self._said.active:
+            one = self._said.active[number][which]
+        else:
+            everywhere = self._said.everywhere[which]
+            one = next(iter(everywhere)) if len(everywhere) == 1 else None
         return None if one is None else one.lstrip("0")
 
 

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_right
-from collections.abc import Iterator, Mapping
-from types import MappingProxyType
+from collections.abc import Iterator, Sequence
 from typing import Final, NamedTuple
+
+import numpy as np
 
 from truearm.compensation.programs.program import Source
 from truearm.errors import InputError
 
 _FIRST: Final = re.compile(r"(?:\xef\xbb\xbf)?\s*/PROG\b", re.IGNORECASE)
-_SECTION: Final = re.compile(r"^[ \t]*/(MN|POS|END)\b", re.IGNORECASE | re.MULTILINE)
+_SECTION: Final = re.compile(r"\n/(MN|POS|END)\b", re.IGNORECASE)
 _LINE: Final = re.compile(r"^[ \t]*(?:(\d{0,9})[ \t]*:)?(.*)$", re.MULTILINE)
 _BLANK: Final = re.compile(r"[ \t\n;]*")
 _NUMBER: Final = r"([+-]?(?:\d+(?:\.\d*)?|\.\d+))"
@@ -20,11 +21,12 @@ _NUMBER: Final = r"([+-]?(?:\d+(?:\.\d*)?|\.\d+))"
 _HEAD: Final = r"(P\[[ \t]*0*(\d{1,9})[ \t]*(?::([^\n]*?))?\])\s*\{"
 #: User frame, tool, configuration.
 _FRAMES: Final = r"\s*UF\s*:\s*(F|\d{1,3})\s*,\s*UT\s*:\s*(F|\d{1,3})\b(?:\s*,\s*CONFIG\s*:\s*'([^'\n]*)')?"
-_POSE: Final = dict(zip("XYZWPR", ("mm", "mm", "mm", "deg", "deg", "deg"), strict=True))
+_POSE: Final = ("X", "Y", "Z", "W", "P", "R")
+_UNITS: Final = ("mm", "mm", "mm", "deg", "deg", "deg")
 #: A position of motion group 1 alone, with a pose and no external axes, as controllers write it.
 _PLAIN: Final = re.compile(
     rf"{_HEAD}\s*GP1\s*:{_FRAMES}\s*,\s*"
-    + r"\s*,\s*".join(rf"{name}\s*=[ \t]*{_NUMBER}[ \t]*{unit}" for name, unit in _POSE.items())
+    + r"\s*,\s*".join(rf"{name}\s*=[ \t]*{_NUMBER}[ \t]*{unit}" for name, unit in zip(_POSE, _UNITS, strict=True))
     + r"\s*\}[ \t]*;?",
     re.IGNORECASE,
 )
@@ -57,14 +59,6 @@ class Statement(NamedTuple):
     stop: int
 
 
-class Field(NamedTuple):
-    """A number of a position: as it is written, where, and its unit."""
-
-    text: str
-    place: tuple[int, int]
-    unit: str
-
-
 class Position(NamedTuple):
     """A position of the section /POS.
 
@@ -80,8 +74,10 @@ class Position(NamedTuple):
         Where its name stands, such as ``P[3:"approach"]``.
     frame, tool, configuration
         UF, UT and CONFIG as they are written, of the first motion group.
-    fields
-        Its numbers by name, of the first motion group.
+    names, texts, places, units
+        Its numbers: their names, x to r or J1 to the last joint, as they are written, where, and in mm or deg.
+    external
+        Where external axes of the first motion group are: name and number as it is written.
     alone
         Whether it has no other motion group.
     fault
@@ -96,7 +92,11 @@ class Position(NamedTuple):
     frame: str = ""
     tool: str = ""
     configuration: str = ""
-    fields: Mapping[str, Field] = MappingProxyType({})
+    names: Sequence[str] = ()
+    texts: Sequence[str] = ()
+    places: Sequence[tuple[int, int]] = ()
+    units: Sequence[str] = ()
+    external: Sequence[tuple[str, str]] = ()
     alone: bool = True
     fault: str = ""
 
@@ -122,14 +122,14 @@ class LsFile:
     def __init__(self, source: Source) -> None:
         self.path = str(source.path)
         self.text = source.text.replace("\r", "\n")
-        self._lines = [found.end() for found in re.finditer(r"\r\n?|\n", source.text)]
+        self._lines = _ends_of_lines(source.text)
         if not is_one(self.text):
             raise InputError("there is no section /PROG", where=f"{self.path}, line 1", cure="Is this an LS file?")
         places: dict[str, tuple[int, int]] = {}
         wanted = ["MN", "POS", "END"]
         for found in _SECTION.finditer(self.text):
             if wanted and found[1].upper() == wanted[0]:
-                places[wanted.pop(0)] = found.span()
+                places[wanted.pop(0)] = (found.start() + 1, found.end())
         if wanted:
             raise InputError(
                 f"there is no section /{wanted[0]}",
@@ -182,10 +182,22 @@ class LsFile:
     def _position(self, place: int, stop: int) -> Position:
         plain = _PLAIN.match(self.text, place, stop)
         if plain is not None:
-            _, number, comment, frame, tool, configuration, *texts = plain.groups()
-            fields = dict(zip(_POSE, map(Field, texts, plain.regs[7:], _POSE.values()), strict=True))
-            head = (number, _comment(comment), place, plain.end(), plain.span(1))
-            return Position(*head, frame, tool, configuration or "", fields)
+            _, number, comment, frame, tool, config, *texts = plain.groups("")
+            spans = plain.regs
+            return Position(
+                number,
+                _comment(comment),
+                place,
+                plain.end(),
+                spans[1],
+                frame,
+                tool,
+                config,
+                _POSE,
+                texts,
+                spans[7:],
+                _UNITS,
+            )
         found = _POSITION.match(self.text, place, stop)
         if found is None:
             raise InputError(
@@ -201,35 +213,50 @@ class LsFile:
             ends = [group.start() for group in groups[1:]] + [end]
             first = [(group.end(), end) for group, end in zip(groups, ends, strict=True) if group[1] == "1"]
             if len(first) != 1:
-                return position._replace(fault="has no data of motion group 1" if not first else "has two groups 1")
+                return position._replace(fault="has two groups 1" if first else "has no data of motion group 1")
             start, end = first[0]
-        fields, fault = self._fields(start, end)
         frames = _ANY_FRAMES.match(self.text, start, end)
         if frames is None:
             return position._replace(fault="has no UF and UT")
-        frame, tool, configuration = frames.groups("")
-        return position._replace(
-            frame=frame, tool=tool, configuration=configuration, fields=fields, alone=len(groups) < 2, fault=fault
-        )
+        frame, tool, config = frames.groups("")
+        position = position._replace(frame=frame, tool=tool, configuration=config, alone=len(groups) < 2)
+        return self._with_numbers(position, start, end)
 
-    def _fields(self, start: int, stop: int) -> tuple[dict[str, Field], str]:
-        """Return the fields of a motion group, and why they are not complete."""
-        fields: dict[str, Field] = {}
+    def _with_numbers(self, position: Position, start: int, stop: int) -> Position:
+        fields: dict[str, re.Match[str]] = {}
         for found in _FIELD.finditer(self.text, start, stop):
             name = found[1].upper()
             if name in fields:
-                return fields, f"has {name} twice"
+                return position._replace(fault=f"has {name} twice")
             if found[2] is None:
                 untaught = self.text.startswith("*", found.end())
-                return fields, f"is not taught: {name} is ****" if untaught else f"has a {name} without mm or deg"
-            fields[name] = Field(found[2], found.span(2), found[3].lower())
+                fault = f"is not taught: {name} is ****" if untaught else f"has a {name} without mm or deg"
+                return position._replace(fault=fault)
+            fields[name] = found
         joints = sum(name[0] == "J" for name in fields)
-        for name in [f"J{i + 1}" for i in range(joints)] or list(_POSE):
-            if name not in fields:
-                return fields, f"has no {name}"
-            if not joints and fields[name].unit != _POSE[name]:
-                return fields, f"has {name} in {fields[name].unit}"
-        return fields, ""
+        names = tuple(f"J{i + 1}" for i in range(joints)) or _POSE
+        missing = [name for name in names if name not in fields]
+        if missing:
+            return position._replace(fault=f"has no {missing[0]}")
+        units = tuple(fields[name][3].lower() for name in names)
+        if not joints and units != _UNITS:
+            return position._replace(fault="is not in mm and deg")
+        return position._replace(
+            names=names,
+            texts=[fields[name][2] for name in names],
+            places=tuple(fields[name].span(2) for name in names),
+            units=units,
+            external=[(name, found[2]) for name, found in fields.items() if name[0] == "E"],
+        )
+
+
+def _ends_of_lines(text: str) -> list[int]:
+    """Return where each line of a text ends, after its line feed, carriage return or both."""
+    characters = np.frombuffer(text.encode("latin-1", "replace"), dtype=np.uint8)
+    is_end = (characters == 10) | (characters == 13)
+    is_end[:-1] &= (characters[:-1] != 13) | (characters[1:] != 10)
+    ends: list[int] = (np.flatnonzero(is_end) + 1).tolist()
+    return ends
 
 
 def _end_of_blank(text: str, start: int, stop: int) -> int:

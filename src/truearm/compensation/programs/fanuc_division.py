@@ -22,17 +22,17 @@ from truearm.compensation.programs.program import Division, Edit, Move, Program,
 _WORD: Final = r"(?:[^\s\[\];]|\[[^\[\]\n]*\])+"
 #: Speed, termination, options that last, options that happen once.
 _REST: Final = re.compile(
-    rf"[ \t]+({_WORD})[ \t]+(?:FINE|(?:CNT|CR)[ \t]*(?:\d+|A?R\[[^\[\]\n]*\]))"
-    rf"((?:[ \t]+(?:ACC[ \t]*(?:\d+|A?R\[[^\[\]\n]*\])|PTH))*)(?:[ \t]+(?:T[AB]|D[AB])[ \t]+{_WORD})*[ \t]*;",
+    rf"[ \t]++({_WORD})[ \t]++(?:FINE|(?:CNT|CR)[ \t]*+(?:\d+|A?R\[[^\[\]\n]*\]))"
+    rf"((?:[ \t]++(?:ACC[ \t]*+(?:\d+|A?R\[[^\[\]\n]*\])|PTH))*)(?:[ \t]++(?:T[AB]|D[AB])[ \t]++{_WORD})*[ \t]*+;",
     re.IGNORECASE,
 )
 _SECONDS: Final = re.compile(r"(?<!/)sec$", re.IGNORECASE)
-_BETWEEN: Final = re.compile(r"[\s:@]*")
-_LINE_COUNT: Final = re.compile(r"\bLINE_COUNT[ \t]*=[ \t]*(\d{1,9})", re.IGNORECASE)
-_REFERRED: Final = re.compile(r"\bP\[[ \t]*(\d{1,9})", re.IGNORECASE)
+_BETWEEN: Final = re.compile(r"[\s:@]*+")
+_LINE_COUNT: Final = re.compile(r"\bLINE_COUNT[ \t]*+=[ \t]*+(\d{1,9})", re.IGNORECASE)
+_REFERRED: Final = re.compile(r"\bP\[[ \t]*+(\d{1,9})", re.IGNORECASE)
 #: The end of instructions that a move carries along, which are numbered from 1.
-_CARRIED_END: Final = re.compile(r"^[ \t]*-{4,}[ \t]*;", re.MULTILINE)
-_BLANK: Final = re.compile(r"[ \t]*")
+_CARRIED_END: Final = re.compile(r"^[ \t]*+-{4,}[ \t]*+;", re.MULTILINE)
+_BLANK: Final = re.compile(r"[ \t]*+")
 _LINE_END: Final = re.compile(r"\r\n?|\n")
 
 
@@ -71,7 +71,7 @@ class _DividedFile:
         """Return the edits of the file."""
         edits: list[Edit] = []
         inserted: dict[int, list[str]] = {}
-        for division in divisions:
+        for division in sorted(divisions, key=lambda division: self._program.moves[division.move].statement):
             move = self._program.moves[division.move]
             target = self._program.targets[move.target]
             position = self._taught[target.name[2:-1].partition(":")[0]]

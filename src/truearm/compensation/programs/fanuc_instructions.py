@@ -10,24 +10,24 @@ from typing import Final, NamedTuple
 from truearm.compensation.programs.fanuc_text import LsFile, Statement
 from truearm.compensation.programs.program import MoveKind, Skipped
 
-#: What a reference such as P[3:approach] or PR[R[1]] is: its word and what its brackets hold.
-_REFERENCE: Final = r"(([A-Z]\w*)\[((?:[^\[\]\n]|\[[^\[\]\n]*\])*)\])"
-_MOVE: Final = re.compile(rf"[ \t]*([JLCAS])[ \t]+@?[ \t]*{_REFERENCE}", re.IGNORECASE)
-_SECOND: Final = re.compile(rf"[\s:@]*{_REFERENCE}", re.IGNORECASE)
-_SECOND_LINE: Final = re.compile(rf"\n[ \t]*:?[ \t]*@?[ \t]*{_REFERENCE}", re.IGNORECASE)
+#: A reference: to a position by its number, such as P[3:approach]; or its word and what is between its brackets.
+_REFERENCE: Final = r"(P\[[ \t]*+0*(\d{1,9})[ \t]*+(?::[^\[\]\n]*)?\]|([A-Z]\w*)\[((?:[^\[\]\n]|\[[^\[\]\n]*\])*)\])"
+_MOVE: Final = re.compile(rf"[ \t]*+([JLCAS])[ \t]++@?[ \t]*+{_REFERENCE}", re.IGNORECASE)
+_SECOND: Final = re.compile(rf"[\s:@]*+{_REFERENCE}", re.IGNORECASE)
+_SECOND_LINE: Final = re.compile(rf"\n[ \t]*+:?[ \t]*+@?[ \t]*+{_REFERENCE}", re.IGNORECASE)
 _BRACKETS: Final = re.compile(r"\[[^\[\]]*\]")
-_NUMBER: Final = re.compile(r"[ \t]*0*(\d{1,9})[ \t]*(?::.*)?")
 _OPTION: Final = re.compile(r"\b(INC|RTCP|COORD|(?:TOOL_)?OFFSET|VOFFSET|(?:QUICK_)?SKIP)\b", re.IGNORECASE)
 #: What most moves end with.
 _NO_OPTION: Final = re.compile(
-    r"[ \t]+\d+(?:%|[cm]m/(?:sec|min))[ \t]+(?:FINE|CNT\d+)[ \t]*(?:ACC\d+[ \t]*)?;$", re.IGNORECASE
+    r"[ \t]++\d+(?:%|[cm]m/(?:sec|min))[ \t]++(?:FINE|CNT\d+)[ \t]*+(?:ACC\d+[ \t]*+)?;$", re.IGNORECASE
 )
-_COMMENT: Final = re.compile(r"[ \t]*(?:!|//|--)")
-_COMMENT_LINE: Final = re.compile(rf"[ \t]*\d*[ \t]*:{_COMMENT.pattern}")
-_WORD: Final = re.compile(r"[ \t]*\(*([$A-Z]\w*)", re.IGNORECASE)
+_COMMENT: Final = re.compile(r"[ \t]*+(?:!|//|--)")
+_COMMENT_LINE: Final = re.compile(rf"[ \t]*+\d*[ \t]*+:{_COMMENT.pattern}")
+_WORD: Final = re.compile(r"[ \t]*+\(*([$A-Z]\w*)", re.IGNORECASE)
 #: What sets the active user frame or tool: which of the two, of which groups, the number if it is one.
 _ACTIVE: Final = re.compile(
-    r"(?:U|\$MNU)(FRAME|TOOL)_?NUM[ \t]*(?:\[([^\]\n]*)\][ \t]*)?=(?:[ \t]*(\d{1,3})[ \t]*(?:;|$))?", re.IGNORECASE
+    r"(?:U|\$MNU)(FRAME|TOOL)_?NUM[ \t]*+(?:\[([^\]\n]*)\][ \t]*+)?=(?:[ \t]*+(\d{1,3})[ \t]*+(?:;|$))?",
+    re.IGNORECASE | re.MULTILINE,
 )
 
 #: The shape of arcs (A) and splines (S) is decided by their neighbours.
@@ -41,9 +41,10 @@ _NO_PLACE: Final = {
 #: Where a program may come from elsewhere.
 _JOINING: Final = frozenset({"LBL", "ELSE", "ENDIF", "FOR", "ENDFOR"})
 _KNOWN: Final = re.compile(
-    r"[AGDRSUW][IO]|[PSA]?R|F|M|TIMER|WAIT|IF|SELECT|JMP|CALL|RUN|END|ABORT|PAUSE|UALM|MESSAGE|OVERRIDE|PAYLOAD"
-    r"|U(?:FRAME|TOOL)(?:_NUM)?|(?:TOOL_|V)?OFFSET|SKIP|(?:UN)?LOCK|(?:JOINT|LINEAR)_MAX_SPEED|RSR|MONITOR|COL|PL"
-    r"|DIAG_REC|(?:ERROR|RESUME)_PROG|\$\w*"
+    r"(?:[AGDRSUW][IO]|[PSA]?R|RSR|F|M|PL|TIMER|MESSAGE|UALM|PAYLOAD|UFRAME|UTOOL|(?:JOINT|LINEAR)_MAX_SPEED)[ \t]*+\["
+    r"|(?:WAIT|IF|SELECT|JMP|CALL|RUN|END|ABORT|PAUSE|MONITOR|OVERRIDE|U(?:FRAME|TOOL)_NUM|(?:ERROR|RESUME)_PROG)\b"
+    r"|(?:(?:TOOL_|V)?OFFSET|SKIP)[ \t]++CONDITION\b|(?:UN)?LOCK[ \t]++PREG\b|COL[ \t]++(?:DETECT|GUARD)\b|\$",
+    re.IGNORECASE,
 )
 
 #: Numbers of the active user frame and tool; None if a number is not known.
@@ -117,11 +118,8 @@ class Instructions:
     def _skip(self, place: int, reason: str) -> None:
         self.skipped.append(Skipped(self._source, self._file.line(place), reason))
 
-    def _reference(self, place: int, word: str, inside: str) -> str:
-        """Return the number of the position that a reference means; empty, and skipped, if it is none."""
-        number = _NUMBER.fullmatch(inside)
-        if word.upper() == "P" and number is not None:
-            return number[1]
+    def _not_of_here(self, place: int, word: str, inside: str) -> str:
+        """Skip a reference that is to no position by its number; return the empty number."""
         shown = f"{word}[{inside}]"
         if word.upper() == "P":
             self._skip(place, f"which position {shown} is, is known only when the program runs")
@@ -133,7 +131,7 @@ class Instructions:
 
     def _move(self, statement: Statement, move: re.Match[str]) -> None:
         text, stop = self._file.text, statement.stop
-        target, target_text = self._reference(move.start(2), move[3], move[4]), move.span(2)
+        target, target_text = move[3] or self._not_of_here(move.start(2), move[4], move[5]), move.span(2)
         via, via_text = "", None
         if move[1] in "Cc":
             second = _SECOND.match(text, move.end(), stop) or _SECOND_LINE.search(text, move.end(), stop)
@@ -142,7 +140,8 @@ class Instructions:
                 self._skip(move.start(2), "the circle has one position only")
                 target = ""
             else:
-                target, target_text = self._reference(second.start(1), second[2], second[3]), second.span(1)
+                target = second[2] or self._not_of_here(second.start(1), second[3], second[4])
+                target_text = second.span(1)
         options: set[str] = set()
         plain = via_text is None and _NO_OPTION.match(text, move.end(), stop)
         if not plain and _OPTION.search(text, move.end(), stop):
@@ -156,7 +155,7 @@ class Instructions:
                     self.active[number] = agreed
         for option in options & _NO_PLACE.keys():
             self.no_place |= dict.fromkeys(filter(None, (target, via)), _NO_PLACE[option])
-            if not target and move[3].upper() == "P":
+            if not target and (move[4] or "").upper() == "P":
                 self.no_place[""] = _NO_PLACE[option]
         self.routine += bool(options)
         if target:
@@ -177,7 +176,7 @@ class Instructions:
             for which in (0, 1):
                 if len(self.everywhere[which]) > 1:
                     self._hold(which, None)
-        elif found and _KNOWN.fullmatch(word) is None:
+        elif found and _KNOWN.match(words, found.start(1)) is None:
             self.unknown[found[1]] += 1
             self.routine += 1
         elif "CALL" in words.upper():

@@ -140,10 +140,11 @@ def read(sources: Sequence[Source]) -> Program:
         gaps = 0
         for step in said.steps:
             index = places.get(step.target)
-            for wanted, where in ((step.target, step.target_text), (step.via, step.via_text)):
-                if wanted and where and wanted not in places:
-                    reason = f"P[{wanted}] is not among the positions of this program"
-                    said.skipped.append(Skipped(number, file.line(where[0]), reason))
+            if index is None or step.via:
+                for wanted, where in ((step.target, step.target_text), (step.via, step.via_text)):
+                    if wanted and where and wanted not in places:
+                        reason = f"P[{wanted}] is not among the positions of this program"
+                        said.skipped.append(Skipped(number, file.line(where[0]), reason))
             if index is None:
                 gaps += 1
                 continue

@@ -12,30 +12,29 @@ import numpy as np
 from truearm.compensation.programs.program import Source
 from truearm.errors import InputError
 
-_FIRST: Final = re.compile(r"(?:\xef\xbb\xbf)?\s*/PROG\b", re.IGNORECASE)
+_FIRST: Final = re.compile(r"(?:\xef\xbb\xbf)?\s*+/PROG\b", re.IGNORECASE)
 _SECTION: Final = re.compile(r"\n/(MN|POS|END)\b", re.IGNORECASE)
-_LINE: Final = re.compile(r"^[ \t]*(?:(\d{0,9})[ \t]*:)?(.*)$", re.MULTILINE)
-_BLANK: Final = re.compile(r"[ \t\n;]*")
+_LINE: Final = re.compile(r"^[ \t]*+(?:(\d{0,9})[ \t]*+:)?(.*)$", re.MULTILINE)
 _NUMBER: Final = r"([+-]?(?:\d+(?:\.\d*)?|\.\d+))"
 #: Name, number, comment.
-_HEAD: Final = r"(P\[[ \t]*0*(\d{1,9})[ \t]*(?::([^\n]*?))?\])\s*\{"
+_HEAD: Final = r"[ \t\n;]*+(P\[[ \t]*+0*(\d{1,9})[ \t]*+(?::([^\n]*?))?\])\s*+\{"
 #: User frame, tool, configuration.
-_FRAMES: Final = r"\s*UF\s*:\s*(F|\d{1,3})\s*,\s*UT\s*:\s*(F|\d{1,3})\b(?:\s*,\s*CONFIG\s*:\s*'([^'\n]*)')?"
+_FRAMES: Final = r"\s*+UF\s*+:\s*+(F|\d{1,3})\s*+,\s*+UT\s*+:\s*+(F|\d{1,3})\b(?:\s*+,\s*+CONFIG\s*+:\s*+'([^'\n]*)')?"
 _POSE: Final = ("X", "Y", "Z", "W", "P", "R")
 _UNITS: Final = ("mm", "mm", "mm", "deg", "deg", "deg")
 #: A position of motion group 1 alone, with a pose and no external axes, as controllers write it.
 _PLAIN: Final = re.compile(
-    rf"{_HEAD}\s*GP1\s*:{_FRAMES}\s*,\s*"
-    + r"\s*,\s*".join(rf"{name}\s*=[ \t]*{_NUMBER}[ \t]*{unit}" for name, unit in zip(_POSE, _UNITS, strict=True))
-    + r"\s*\}[ \t]*;?",
+    rf"{_HEAD}\s*+GP1\s*+:{_FRAMES}\s*+,\s*+"
+    + r"\s*+,\s*+".join(rf"{name}\s*+=[ \t]*+{_NUMBER}[ \t]*+{unit}" for name, unit in zip(_POSE, _UNITS, strict=True))
+    + r"\s*+\}[ \t]*+;?",
     re.IGNORECASE,
 )
 #: Any position: its head, the data of all motion groups.
-_POSITION: Final = re.compile(rf"{_HEAD}([^{{}}]*)\}}[ \t]*;?", re.IGNORECASE)
+_POSITION: Final = re.compile(rf"{_HEAD}([^{{}}]*)\}}[ \t]*+;?", re.IGNORECASE)
 _ANY_FRAMES: Final = re.compile(_FRAMES, re.IGNORECASE)
-_GROUP: Final = re.compile(r"\bGP(\d)\s*:", re.IGNORECASE)
+_GROUP: Final = re.compile(r"\bGP(\d)\s*+:", re.IGNORECASE)
 #: A field's name, its number and its unit; no number if what stands there is none with a unit.
-_FIELD: Final = re.compile(rf"\b([XYZWPR]|[JE]\d)\s*=[ \t]*(?:{_NUMBER}[ \t]*(mm|deg)\b)?", re.IGNORECASE)
+_FIELD: Final = re.compile(rf"\b([XYZWPR]|[JE]\d)\s*+=[ \t]*+(?:{_NUMBER}[ \t]*+(mm|deg)\b)?", re.IGNORECASE)
 
 
 def is_one(text: str) -> bool:
@@ -133,7 +132,7 @@ class LsFile:
         if wanted:
             raise InputError(
                 f"there is no section /{wanted[0]}",
-                where=f"{self.path}, line {self.line(len(self.text))}",
+                where=f"{self.path}, line {self.line(max(len(self.text) - 1, 0))}",
                 allowed="sections /PROG, /MN, /POS and /END, in this order",
                 cure="Is the file complete?",
             )
@@ -171,42 +170,32 @@ class LsFile:
         """Yield the positions of /POS; refuse what is none, and numbers that come twice."""
         seen: set[str] = set()
         place, stop = self.positions
-        while (place := _end_of_blank(self.text, place, stop)) < stop:
-            position = self._position(place, stop)
+        while position := self._position(place, stop):
             if position.number in seen:
-                raise InputError(f"P[{position.number}] is there twice", where=self.where(place))
+                raise InputError(f"P[{position.number}] is there twice", where=self.where(position.start))
             seen.add(position.number)
             yield position
             place = position.stop
+        rest = self.text[place:stop].lstrip(" \t\n;")
+        if rest:
+            raise InputError(
+                "this is no complete position",
+                where=self.where(stop - len(rest)),
+                came=rest[:40].partition("\n")[0],
+                allowed="P[number]{ data };",
+            )
 
-    def _position(self, place: int, stop: int) -> Position:
+    def _position(self, place: int, stop: int) -> Position | None:
         plain = _PLAIN.match(self.text, place, stop)
         if plain is not None:
             _, number, comment, frame, tool, config, *texts = plain.groups("")
             spans = plain.regs
-            return Position(
-                number,
-                _comment(comment),
-                place,
-                plain.end(),
-                spans[1],
-                frame,
-                tool,
-                config,
-                _POSE,
-                texts,
-                spans[7:],
-                _UNITS,
-            )
+            head = (number, comment and _comment(comment), spans[1][0], plain.end(), spans[1])
+            return Position(*head, frame, tool, config, _POSE, texts, spans[7:], _UNITS)
         found = _POSITION.match(self.text, place, stop)
         if found is None:
-            raise InputError(
-                "this is no complete position",
-                where=self.where(place),
-                came=self.text[place : place + 40].partition("\n")[0],
-                allowed="P[number]{ data };",
-            )
-        position = Position(found[2], _comment(found[3]), place, found.end(), found.span(1))
+            return None
+        position = Position(found[2], _comment(found[3] or ""), found.start(1), found.end(), found.span(1))
         start, end = found.span(4)
         groups = list(_GROUP.finditer(self.text, start, end))
         if groups:
@@ -234,6 +223,8 @@ class LsFile:
                 return position._replace(fault=fault)
             fields[name] = found
         joints = sum(name[0] == "J" for name in fields)
+        if joints and not fields.keys().isdisjoint(_POSE):
+            return position._replace(fault="has a pose and joints")
         names = tuple(f"J{i + 1}" for i in range(joints)) or _POSE
         missing = [name for name in names if name not in fields]
         if missing:
@@ -259,10 +250,5 @@ def _ends_of_lines(text: str) -> list[int]:
     return ends
 
 
-def _end_of_blank(text: str, start: int, stop: int) -> int:
-    blank = _BLANK.match(text, start, stop)
-    return blank.end() if blank else start
-
-
-def _comment(text: str | None) -> str:
-    return text.strip().strip('"') if text else ""
+def _comment(text: str) -> str:
+    return text.strip().strip('"')

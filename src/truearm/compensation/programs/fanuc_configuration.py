@@ -1,8 +1,8 @@
 """The CONFIG of FANUC positions, such as ``N U T, 0, 0, 0``.
 
 N (no flip) is J5 below zero and F (flip) J5 above: an R-2000iB/165F has J5 = -51.975 deg in NUT and +51.975 deg in
-FUT at the same place (J. Strybis, "The perils of six-axis robots", onerobotics.com, 2013), and the current positions
-that controllers save (CURPOS.DG) agree.
+FUT at the same place ("The perils of six-axis robots", onerobotics.com, 2013), and the current positions that
+controllers save (CURPOS.DG) agree.
 
 T (front) and B (back) is the wrist before or behind axis 1. U (up) and D (down) is the side to which the forearm
 bends from the upper arm, whether the wrist is before or behind: an arm that leans back until its wrist is behind axis
@@ -10,8 +10,9 @@ bends from the upper arm, whether the wrist is before or behind: an arm that lea
 :mod:`truearm.modeling.inverse.branches` change their word there, so U is `up` in T and `down` in B.
 
 The three numbers are turns of J1, J4 and J6: 0 from -179 to 179 deg, 1 from 180 to 539, -1 from -539 to -180. Which
-joints they count is a system variable ($TURN_AXIS); in taught programs the first is off zero where the arm points
-backwards and the second goes to -1, which J5 cannot.
+joints they count is a system variable ($TURN_AXIS), and J4, J5 and J6 are read of too. But in taught programs the first
+is off zero where the arm points backwards, and the second is -1, which J5 cannot reach. Where a controller counts
+others, no posture has the readings asked for, and the target is not corrected.
 
 All this holds for arms of six axes with a wrist in line. An L or R is not looked at.
 

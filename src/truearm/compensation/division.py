@@ -194,6 +194,8 @@ def _sound(correction: Correction, move: Move, before: int) -> bool:
     every = [before, move.target, *([] if move.via is None else [move.via])]
     end = targets[move.target]
     own = [targets[row] for row in every[1:]]
+    if move.kind == "circular" and move.via is None:
+        return False
     return (
         all(correction.corrected[row] for row in every)
         and all(t.form.kind == "pose" and t.form.orientation is not None and t.parent is None for t in own)

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from truearm.compensation.program_files import edited
 from truearm.compensation.program_poses import edits_of, numbers_of, pose_numbers, poses_of
 from truearm.compensation.programs import LANGUAGES
+from truearm.compensation.programs.lines import Lines
 from truearm.compensation.programs.numbers import NUMBER
 from truearm.compensation.programs.orientations import QUATERNION
 from truearm.compensation.programs.program import Division, Edit, Language, Program, ProgramTarget, Source
@@ -67,7 +68,9 @@ def test_places_hold_the_values(language: Language) -> None:
                     assert span[0] < span[1] or target.form.absent
                     assert (target.source, *span) not in taken or span[0] == span[1]
                     taken.add((target.source, *span))
-            assert text.count("\n", 0, next(s[0] for s in target.places if s)) + 1 == target.line or "\r" in text
+            # The line is where the target begins, its first number may be a few further down.
+            first = Lines(text).number(next(s[0] for s in target.places if s))
+            assert first - 6 <= target.line <= first
 
 
 @languages
@@ -145,7 +148,6 @@ def test_a_division_reads_back(language: Language) -> None:
             fit = target.form.kind == "pose" and target.form.orientation is not None and target.parent is None
             if move.kind == "joint" or move.target_text == (0, 0) or not fit:
                 continue
-            tried += 1
             pose = poses_of(program)[move.target][None].repeat(3, axis=0)
             pose[:, :3, 3] += np.array([[0.01], [0.02], [0.03]])
             near = np.tile(target.values, (3, 1))
@@ -153,6 +155,9 @@ def test_a_division_reads_back(language: Language) -> None:
             circle = move.via is not None
             cut = Division(index, ((one, two if circle else None),), three if circle else None)
             edits = language.divide(program, [cut])
+            if not edits:  # pieces of this one would mean something else
+                continue
+            tried += 1
             again = language.read(
                 [Source(s.path, t) for s, t in zip(program.sources, texts(program, edits), strict=True)]
             )

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from truearm.compensation.programs.fanuc_configuration import configuration
 from truearm.compensation.programs.fanuc_ls import FANUC_LS
+from truearm.compensation.programs.fanuc_ls.configuration import configuration
 from truearm.compensation.programs.program import Configuration, Division, Program, Skipped, Source
 from truearm.errors import InputError
 from truearm.modeling.inverse.branches import BRANCHES, branch_rule

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from truearm.compensation.programs.program import Language, Program, Source
-from truearm.compensation.programs.rapid.divide import divided
+from truearm.compensation.programs.rapid.division import divided
 from truearm.compensation.programs.rapid.moves import MOTIONS, QUIET
 from truearm.compensation.programs.rapid.syntax import listing_of
 from truearm.compensation.programs.rapid.targets import Finder

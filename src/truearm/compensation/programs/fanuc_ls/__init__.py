@@ -25,10 +25,10 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Final
 
-from truearm.compensation.programs.fanuc_configuration import configuration
-from truearm.compensation.programs.fanuc_division import divide
-from truearm.compensation.programs.fanuc_instructions import Instructions
-from truearm.compensation.programs.fanuc_text import LsFile, Position, is_one
+from truearm.compensation.programs.fanuc_ls.configuration import configuration
+from truearm.compensation.programs.fanuc_ls.division import divide
+from truearm.compensation.programs.fanuc_ls.instructions import Instructions
+from truearm.compensation.programs.fanuc_ls.text import LsFile, Position, is_one
 from truearm.compensation.programs.orientations import FIXED_XYZ_ANGLES
 from truearm.compensation.programs.program import (
     ANY_POSTURE,

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Final, NamedTuple
 
-from truearm.compensation.programs.fanuc_text import LsFile, Statement
+from truearm.compensation.programs.fanuc_ls.text import LsFile, Statement
 from truearm.compensation.programs.program import MoveKind, Skipped
 
 #: A reference: to a position by its number, such as P[3:approach]; or its word and what is between its brackets.

@@ -15,7 +15,7 @@ from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from typing import Final, NamedTuple
 
-from truearm.compensation.programs.fanuc_text import LsFile, Position
+from truearm.compensation.programs.fanuc_ls.text import LsFile, Position
 from truearm.compensation.programs.numbers import rewritten
 from truearm.compensation.programs.program import Division, Edit, Move, Program, ProgramTarget
 

@@ -33,9 +33,9 @@ from truearm.compensation.programs.program import (
     Skipped,
     Source,
 )
-from truearm.compensation.programs.val3_code import Routine, Words, routines_of
-from truearm.compensation.programs.val3_data import BOM, NUMBERS, Element, Variable, refuse, variables_of
-from truearm.compensation.programs.val3_frames import father_of, name_of, transforms
+from truearm.compensation.programs.val3.code import Routine, Words, routines_of
+from truearm.compensation.programs.val3.data import BOM, NUMBERS, Element, Variable, refuse, variables_of
+from truearm.compensation.programs.val3.frames import father_of, name_of, transforms
 from truearm.errors import InputError
 
 #: The root of a file; a document type, which could name other files, is not let pass before it.

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
-from truearm.compensation.programs.jbi_job import Job, Position, State, jobs_of
+from truearm.compensation.programs.jbi.job import Job, Position, State, jobs_of
 from truearm.compensation.programs.lines import Lines
 from truearm.compensation.programs.program import Division, Edit, Program, ProgramTarget
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from truearm.compensation.programs.orientations import MOVING_XYZ_ANGLES
 from truearm.compensation.programs.program import Source
-from truearm.compensation.programs.val3_data import Element, Variable, refuse
+from truearm.compensation.programs.val3.data import Element, Variable, refuse
 from truearm.errors import InputError
 from truearm.modeling.transform import IDENTITY, Transform
 

@@ -10,7 +10,7 @@ from typing import Final
 from truearm.compensation.programs.lines import Lines
 from truearm.compensation.programs.numbers import NUMBER
 from truearm.compensation.programs.program import MoveKind, Source
-from truearm.compensation.programs.val3_data import Attributes, parse, refuse
+from truearm.compensation.programs.val3.data import Attributes, parse, refuse
 
 _KINDS: Final[dict[str, MoveKind]] = {"movej": "joint", "movel": "linear", "movec": "circular"}
 #: Words of how many targets, the tool and the motion descriptor.

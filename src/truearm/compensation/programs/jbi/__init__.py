@@ -19,9 +19,9 @@ from functools import cache
 from math import radians
 from typing import Final
 
-from truearm.compensation.programs.jbi_division import divide
-from truearm.compensation.programs.jbi_job import JOB, Job, Key, Position, jobs_of
-from truearm.compensation.programs.jbi_steps import KINDS, NOWHERE, Step, Steps, arcs_of, steps_of
+from truearm.compensation.programs.jbi.division import divide
+from truearm.compensation.programs.jbi.job import JOB, Job, Key, Position, jobs_of
+from truearm.compensation.programs.jbi.steps import KINDS, NOWHERE, Step, Steps, arcs_of, steps_of
 from truearm.compensation.programs.lines import Lines
 from truearm.compensation.programs.orientations import FIXED_XYZ_ANGLES
 from truearm.compensation.programs.program import (

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-from truearm.compensation.programs.jbi_job import LINE, Job, Key, refuse
+from truearm.compensation.programs.jbi.job import LINE, Job, Key, refuse
 from truearm.compensation.programs.lines import Lines
 from truearm.compensation.programs.program import MoveKind, Source
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -65,7 +66,7 @@ def test_a_corrected_program_is_refused(tmp_path: Path) -> None:
 def test_a_program_changed_since_is_no_longer_what_its_record_says(tmp_path: Path) -> None:
     path = corrected(tmp_path)
     path.write_bytes(path.read_bytes() + b"! taught anew\r\n")
-    for ask in (lambda: program_files([path], again=True), lambda: restored([path])):
+    for ask in (partial(program_files, [path], again=True), partial(restored, [path])):
         with pytest.raises(InputError, match=r"changed after it was corrected.*remove m\.mod\.truearm\.json"):
             ask()
 

@@ -37,8 +37,8 @@ from truearm.compensation.programs.krl.reading import read
 from truearm.compensation.programs.program import Language
 
 _HEADER: Final = re.compile(
-    r"(?:\xef\xbb\xbf)?(?:\s*+(?:[;&][^\r\n]*+[\r\n]))*+\s*+"
-    r"(?:&ACCESS\b|DEFDAT\s+\$?\w|(?:GLOBAL\s+)?(?:DEF\s+\w+\s*\(|DEFFCT\s+\w))",
+    r"(?:\xef\xbb\xbf)?\s*+(?:&ACCESS\b|(?:[;&][^\r\n]*+\s*+)*+"
+    r"(?:DEFDAT\s+\$?\w|DEFFCT\s+\w|(?:GLOBAL\s+)?DEF\s+\w+\s*\([^()\r\n]*+\)[ \t]*+(?:[;\r\n]|\Z)))",
     re.ASCII | re.IGNORECASE,
 )
 

@@ -40,8 +40,17 @@ _OTHER_NAMES: Final = frozenset({"S", "T", "E1", "E2", "E3", "E4", "E5", "E6"})
 _EXTERNAL: Final = ("E1", "E2", "E3", "E4", "E5", "E6")
 _TYPE: Final = re.compile(r"\s*+\w++\s*+:", re.ASCII)
 _ITEM: Final = re.compile(rf"\s*+([A-Za-z_]\w*+)\s*+({NUMBER})?([^,{{}}]*+)[,}}]", re.ASCII)
+_TEXT_OF_NUMBER: Final = rf"\s++({NUMBER})\s*+"
+#: A position in the usual order, with external axes at zero.
+_USUAL: Final = re.compile(
+    r"\{(?:\s*+\w++\s*+:)?+\s*+"
+    + r",\s*+".join(name + _TEXT_OF_NUMBER for name in "XYZABC")
+    + r"(?:,\s*+S\s++(\d{1,9}+)\s*+,\s*+T\s++(\d{1,9}+)\s*+)?+(?:,\s*+E[1-6]\s++[+-]?0++(?:\.0*+)?+\s*+)*+\}",
+    re.ASCII | re.IGNORECASE,
+)
 _BITS: Final = re.compile(r"'\s*+([BH])\s*+([0-9A-F]++)\s*+'", re.ASCII | re.IGNORECASE)
 _MOST: Final = 1e6
+_SIX: Final = range(1, 7)
 
 Item = tuple[float | None, int, int]
 
@@ -72,6 +81,13 @@ def aggregate(text: Text, start: int, stop: int, *, offset: bool = False) -> Agg
     InputError
         If a number is out of all proportion.
     """
+    usual = None if offset else _USUAL.match(text.flat, start, stop)
+    if usual is not None and usual.end() == stop:
+        *numbers, status, turn = usual.groups()
+        written: tuple[float, ...] = tuple(map(float, numbers))
+        if max(written) <= _MOST and min(written) >= -_MOST:
+            spans = tuple(map(usual.span, _SIX))
+            return Aggregate(POSE, written, spans, int(status) if status else None, int(turn) if turn else None)
     items, problem = _items(text, start, stop)
     form = JOINTS if "A1" in items else POSE
     names: Sequence[str] = _JOINT_NAMES if form is JOINTS else _POSE_NAMES

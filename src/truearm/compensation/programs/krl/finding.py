@@ -48,6 +48,9 @@ class Finder:
     def __init__(self, names: Names) -> None:
         self._names = names
         self._skipped: dict[tuple[object, str], Skipped] = {}
+        self._held = Holding()
+        self._problem: str | None = None
+        self._pair = ("", "")
         self.written: list[Taught] = []
         self.pairs: set[tuple[str, str] | None] = set()
 
@@ -78,8 +81,10 @@ class Finder:
         first
             Whether the posture before it is not known.
         """
-        self._routine, self._held, self._current = routine, held, current
-        self._by_axes, self._first = by_axes, first
+        self._routine, self._current, self._by_axes, self._first = routine, current, by_axes, first
+        if held is not self._held:
+            self._held, self._problem = held, held.problem
+            self._pair = (held.tool.name if held.tool else "", held.base.name if held.base else "")
 
     def find(self, span: Span) -> Found:
         """Return the place that words mean."""
@@ -121,15 +126,18 @@ class Finder:
         if variable is None or reference is None:
             return None
         index = literal_index(reference[2]) if reference[2] is not None else None
-        for one in [variable.element(index)] if index is not None else [variable, *variable.elements.values()]:
+        for one in [variable.element(index)] if index is not None else [variable, *variable.listed]:
             one.offset = True
         return variable
 
     def _variable(self, span: Span) -> Variable | None:
         """Return what a name stands for, None if it is no place that the program writes out."""
         text, scopes = self._routine.text, self._routine.scopes
-        reference = REFERENCE.fullmatch(text.flat, *span)
         name = text.flat[span[0] : span[1]]
+        plain = self._names.find(name.upper(), scopes)
+        if plain is not None and not plain.shared:
+            return plain
+        reference = REFERENCE.fullmatch(text.flat, *span)
         key = reference[1].upper() if reference else ""
         if key in _PRESENT:
             return None
@@ -146,7 +154,7 @@ class Finder:
         if index is not None:
             return variable.element(index)
         # Which element it is does not matter: all of them have this tool and this base.
-        for element in variable.elements.values():
+        for element in variable.listed:
             for value in element.values if not element.computed else ():
                 self._use(value)
         if variable.computed or not variable.elements:
@@ -170,21 +178,23 @@ class Finder:
         return None
 
     def _use(self, taught: Taught) -> Taught:
-        held = self._held
+        problem, pair = self._problem, self._pair
         taught.by_axes = taught.by_axes or self._by_axes
         taught.first = taught.first or self._first
-        pair = (held.tool.name if held.tool else "", held.base.name if held.base else "")
         if taught.numbers.form is JOINTS:
-            if not taught.used and held.problem is None:
+            if not taught.used and problem is None:
                 taught.tool, taught.frame = pair
-        elif held.problem is not None:
+        elif problem is not None:
             self.pairs.add(None)
-            taught.problem = taught.problem or held.problem
+            taught.problem = taught.problem or problem
         else:
             self.pairs.add(pair)
-            same = (taught.tool.casefold(), taught.frame.casefold()) == (pair[0].casefold(), pair[1].casefold())
-            if taught.used and not same:
+            if taught.used and not _same(pair, (taught.tool, taught.frame)):
                 taught.problem = taught.problem or "it is used with different tools or bases"
             taught.tool, taught.frame = pair
         taught.used = True
         return taught
+
+
+def _same(one: tuple[str, str], other: tuple[str, str]) -> bool:
+    return (one[0].casefold(), one[1].casefold()) == (other[0].casefold(), other[1].casefold())

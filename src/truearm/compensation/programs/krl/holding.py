@@ -109,26 +109,27 @@ class Frames:
         self.bases: dict[str, Transform] = {}
         for data, found in ((TOOL_DATA, self.tools), (BASE_DATA, self.bases)):
             listed = names.find(data, ("",))
-            for index, variable in listed.elements.items() if listed else ():
+            for index, variable in listed.elements.items() if listed and listed.elements else ():
                 numbers = _single(variable)
                 if numbers is not None:
                     found[index] = transform(numbers)
 
     def set_by(self, text: Text, statement: Statement, scopes: Sequence[str]) -> Holding:
         """Return what a statement sets; its word is one of :data:`SETTERS`."""
-        flat, stop = text.flat, statement.stop
-        if statement.word == "BAS":
-            return self._bas(text, statement)
-        equals = _EQUALS.match(flat, statement.after, stop)
+        flat = text.flat
+        word, _, after, stop = statement
+        if word == "BAS":
+            return self._bas(text, after, stop)
+        equals = _EQUALS.match(flat, after, stop)
         if equals is None:  # of a component, such as $TOOL.X
-            unknown = Setting(problem=f"{statement.word} is changed in part")
-            both = statement.word == "FDAT_ACT"
+            unknown = Setting(problem=f"{word} is changed in part")
+            both = word == "FDAT_ACT"
             return Holding(
-                unknown if both or statement.word == "$TOOL" else None,
-                unknown if both or statement.word == "$BASE" else None,
+                unknown if both or word == "$TOOL" else None,
+                unknown if both or word == "$BASE" else None,
             )
-        if statement.word != "FDAT_ACT":
-            return self._assigned(text, statement.word, equals.end(), stop, scopes)
+        if word != "FDAT_ACT":
+            return self._assigned(text, word, equals.end(), stop, scopes)
         if flat[equals.end() : equals.end() + 1] == "{":
             return self._of(FrameData.read(flat, equals.end(), stop))
         return self._by_frame_data(flat[equals.end() : stop], scopes)
@@ -203,8 +204,8 @@ class Frames:
         found[variable.name] = transform(numbers_or_none)
         return Setting(variable.name)
 
-    def _bas(self, text: Text, statement: Statement) -> Holding:
-        call = _BAS.match(text.flat, statement.after, statement.stop)
+    def _bas(self, text: Text, after: int, stop: int) -> Holding:
+        call = _BAS.match(text.flat, after, stop)
         command = call[1].upper() if call else ""
         if command == "INITMOV":
             return _START
@@ -220,7 +221,8 @@ class Frames:
     def _numbered(self, data: str, name: str | None) -> Setting:
         what = "tool" if data == TOOL_DATA else "base"
         listed = self._names.find(data, ("",))
-        if name is None or (listed and name in listed.elements and _single(listed.elements[name]) is None):
+        element = listed.elements.get(name) if listed and listed.elements and name else None
+        if name is None or (element is not None and _single(element) is None):
             return Setting(problem=f"the {what} is computed")
         return Setting(name)
 

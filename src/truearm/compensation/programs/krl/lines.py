@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from bisect import bisect_left
 from collections.abc import Iterator
-from typing import Final, NamedTuple
+from typing import Final
 
 from truearm.compensation.programs.program import Source
 from truearm.errors import InputError
@@ -14,19 +14,13 @@ _BYTE_ORDER_MARK: Final = "\xef\xbb\xbf"
 _LONE_RETURN: Final = re.compile(r"\r(?!\n)")
 _NEWLINE: Final = re.compile("\n")
 #: Lines that are empty, a comment or a header (``&ACCESS``), and then one that is not.
-_LINE: Final = re.compile(r"(?:[ \t\r]*+(?:[;&][^\n]*+)?\n)*+[ \t\r]*+([^\n]*+)\n?")
-_WORD: Final = re.compile(r"\$?[A-Za-z_][\w$]*+", re.ASCII)
+_LINE: Final = re.compile(r"(?:[ \t\r]*+(?:[;&][^\n]*+)?\n)*+[ \t\r]*+((\$?[A-Za-z_][\w$]*+)?+[^\n]*+)\n?", re.ASCII)
 _CODE: Final = re.compile(r'(?:[^";\n]++|"[^"\n]*+")*+')
 _STRING: Final = re.compile(r'"[^"\n]*+"')
 
 
-class Statement(NamedTuple):
-    """A statement: its first word in capitals, and where it, its first word and its last character end."""
-
-    word: str
-    start: int
-    after: int
-    stop: int
+#: A statement: its first word in capitals, where it begins, and where its first word and itself end.
+Statement = tuple[str, int, int, int]
 
 
 class Text:
@@ -67,7 +61,7 @@ class Text:
         flat = self.flat
         for line in _LINE.finditer(flat):
             start, stop = line.span(1)
-            word = _WORD.match(flat, start, stop)
+            word = line[2]
             if word is None:
                 continue
             if flat.find('"', start, stop) >= 0:
@@ -85,7 +79,7 @@ class Text:
                 raise self.refusal(
                     "the curly brackets of this line do not close", start, flat[start:stop], cure="Is the file cut off?"
                 )
-            yield Statement(word[0].upper(), start, word.end(), stop)
+            yield word.upper(), start, start + len(word), stop
 
     def _end_of_code(self, start: int, stop: int) -> int:
         code = _CODE.match(self.flat, start, stop)

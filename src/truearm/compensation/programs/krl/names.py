@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Final
 
 from truearm.compensation.programs.krl.aggregates import Aggregate, aggregate
-from truearm.compensation.programs.krl.lines import Statement, Text
+from truearm.compensation.programs.krl.lines import Text
 
 #: Types of places that a robot is sent to; a frame may be one.
 TARGET_TYPES: Final = frozenset({"POS", "E3POS", "E6POS", "AXIS", "E3AXIS", "E6AXIS"})
@@ -22,9 +22,8 @@ _SHARED_MODULE: Final = "$CONFIG"
 #: A name, and its index or its component if there is one.
 REFERENCE: Final = re.compile(r"(\$?[A-Za-z_][\w$]*+)(?:\s*+\[([^\]\n]*+)\])?+((?:\s*+\.\s*+\w++)*+)", re.ASCII)
 _TYPE: Final = re.compile(
-    r"(?:DECL\s++)?+(?:(?:GLOBAL|CONST)\s++)*+(\w++)(?:\s*+\[[^\]\n]*+\])?+\s++", re.ASCII | re.IGNORECASE
+    r"(?:DECL\s++)?+((?:(?:GLOBAL|CONST)\s++)*+)(\w++)(?:\s*+\[[^\]\n]*+\])?+\s++", re.ASCII | re.IGNORECASE
 )
-_GLOBAL: Final = re.compile(r"(?:DECL\s++)?+(?:CONST\s++)?+GLOBAL\b", re.ASCII | re.IGNORECASE)
 _NEXT: Final = re.compile(r"\s*+,\s*+")
 _EQUALS: Final = re.compile(r"\s*+=(?!=)\s*+")
 _INDEX: Final = re.compile(r"[\d\s,]++", re.ASCII)
@@ -101,18 +100,25 @@ class Variable:
     name: str
     type: str | None
     module: str
-    values: list[Taught] = field(default_factory=list)
+    values: tuple[Taught, ...] = ()
     computed: int = 0
     offset: bool = False
-    elements: dict[str, Variable] = field(default_factory=dict)
+    elements: dict[str, Variable] | None = None
 
     @property
     def shared(self) -> bool:
         """Whether all programs of the controller share it."""
         return self.module == _SHARED_MODULE
 
+    @property
+    def listed(self) -> list[Variable]:
+        """The elements that have an index of their own."""
+        return list(self.elements.values()) if self.elements else []
+
     def element(self, index: str) -> Variable:
         """Return an element, whether it has a value or not."""
+        if self.elements is None:
+            self.elements = {}
         found = self.elements.get(index)
         if found is None:
             found = Variable(f"{self.name}[{index}]", self.type, self.module)
@@ -123,7 +129,7 @@ class Variable:
     def spoil(self, line: int) -> None:
         """Note that it gets a computed value."""
         self.computed = self.computed or line
-        for element in self.elements.values():
+        for element in self.listed:
             element.spoil(line)
 
 
@@ -143,6 +149,9 @@ class FrameData:
         return cls(tool, base, parts.get("IPO_FRAME") == "#TCP")
 
 
+Assigned = tuple[Variable, Taught | None]
+
+
 class Names:
     """All names of a program, by where they are known: a routine, a module, or everywhere."""
 
@@ -154,7 +163,7 @@ class Names:
     def variables(self) -> list[Variable]:
         """All names and all elements of lists that have an index of their own."""
         named = list(self._variables.values())
-        return named + [element for variable in named for element in variable.elements.values()]
+        return named + [element for variable in named for element in variable.listed]
 
     def find(self, name: str, scopes: Sequence[str]) -> Variable | None:
         """Return what a name means where `scopes` are known, the nearest first."""
@@ -172,14 +181,14 @@ class Names:
                 return found
         return None
 
-    def declare(self, text: Text, statement: Statement, scopes: Sequence[str]) -> None:
+    def declare(self, text: Text, start: int, stop: int, scopes: Sequence[str]) -> None:
         """Note what a declaration declares; it is known in the first of `scopes`, or everywhere if it says so."""
-        flat, stop = text.flat, statement.stop
-        head = _TYPE.match(flat, statement.start, stop)
+        flat = text.flat
+        head = _TYPE.match(flat, start, stop)
         if head is None:
             return
-        kind = head[1].upper()
-        scope = "" if _GLOBAL.match(flat, statement.start, stop) or text.module == _SHARED_MODULE else scopes[0]
+        kind = head[2].upper()
+        scope = "" if "GLOBAL" in head[1].upper() or text.module == _SHARED_MODULE else scopes[0]
         at = head.end()
         while kind == "FDAT" or kind in POSITION_TYPES:
             name = REFERENCE.match(flat, at, stop)
@@ -200,7 +209,7 @@ class Names:
                 variable = self._variables[key] = Variable(name[1], kind, text.module)
                 if begin != end:
                     self.assign(text, name.start(), variable, begin, end)
-            following = _NEXT.match(flat, at, stop)
+            following = _NEXT.match(flat, at, stop) if at < stop else None
             if following is None:
                 return
             at = following.end()
@@ -212,15 +221,13 @@ class Names:
             variable.spoil(text.line(place))
             return None
         taught = Taught(text.index, place, variable.name, aggregate(text, begin, end), variable.type)
-        variable.values.append(taught)
+        variable.values += (taught,)
         return taught
 
-    def assigned(
-        self, text: Text, statement: Statement, scopes: Sequence[str]
-    ) -> tuple[Variable, Taught | None] | None:
+    def assigned(self, text: Text, start: int, stop: int, scopes: Sequence[str]) -> Assigned | None:
         """Note an assignment, and return what got a value and which; None if it is no place of the robot."""
-        flat, stop = text.flat, statement.stop
-        name = REFERENCE.match(flat, statement.start, stop)
+        flat = text.flat
+        name = REFERENCE.match(flat, start, stop)
         equals = name and _EQUALS.match(flat, name.end(), stop)
         if not name or not equals:
             return None
@@ -238,14 +245,14 @@ class Names:
         if name[2] is not None:
             index = literal_index(name[2])
             if index is None:
-                variable.spoil(text.line(statement.start))
+                variable.spoil(text.line(start))
                 return variable, None
             variable = variable.element(index)
         if name[3]:
-            variable.spoil(text.line(statement.start))
+            variable.spoil(text.line(start))
             return variable, None
         begin = equals.end()
-        return variable, self.assign(text, statement.start, variable, begin, stop)
+        return variable, self.assign(text, start, variable, begin, stop)
 
 
 def literal_index(written: str) -> str | None:
@@ -262,6 +269,10 @@ def number_of(written: str) -> str | None:
 
 def closing(flat: str, begin: int, stop: int) -> int:
     """Return where a value ends: after the bracket that closes it, or at the comma that follows."""
+    if flat[begin : begin + 1] == "{":
+        end = flat.find("}", begin, stop)
+        if flat.find("{", begin + 1, end) < 0 <= end:
+            return end + 1
     depth = 0
     for mark in _MARK.finditer(flat, begin, stop):
         if mark[0] in "{[(":

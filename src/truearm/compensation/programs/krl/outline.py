@@ -6,31 +6,33 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Final, Literal, NamedTuple
+from typing import Final, Literal
 
 from truearm.compensation.programs.krl.holding import SETTERS
 from truearm.compensation.programs.krl.lines import Statement, Text
-from truearm.compensation.programs.krl.names import POSITION_TYPES, Names, Taught, Variable
+from truearm.compensation.programs.krl.names import POSITION_TYPES, Assigned, Names
+from truearm.errors import InputError
 
 StepKind = Literal["move", "lost", "set", "spline", "end of spline", "trigger", "assign", "call"]
 
 MOVES: Final = frozenset({"PTP", "SPTP", "LIN", "SLIN", "SPL", "CIRC", "SCIRC"})
 #: After these the place before the next move is not the one before them in the text.
-_LOSING: Final = frozenset(
+_LOSING: Final = (
     "LOOP ENDLOOP FOR ENDFOR WHILE ENDWHILE REPEAT UNTIL ELSE ENDIF SWITCH CASE DEFAULT ENDSWITCH GOTO RESUME "
-    "PTP_REL LIN_REL CIRC_REL SPTP_REL SLIN_REL SCIRC_REL SPL_REL".split()
+    "PTP_REL LIN_REL CIRC_REL SPTP_REL SLIN_REL SCIRC_REL SPL_REL"
 )
 #: Known, and of no meaning here.
-_QUIET: Final = frozenset(
+_QUIET_WORDS: Final = (
     "IF WAIT HALT CONTINUE EXIT RETURN INTERRUPT BRAKE PULSE ANIN ANOUT DIGIN CCLOSE COPEN CREAD CWRITE CIOCTL SREAD "
     "SWRITE EXT EXTFCT IMPORT SIGNAL STRUC ENUM INT REAL BOOL CHAR STRING CONST_VEL TIME_BLOCK STOP ASYPTP ASYCONT "
-    "ASYSTOP ASYCANCEL ON_ERROR_PROCEED CHANNEL THEN DO PRIO PDAT_ACT LDAT_ACT SET_CD_PARAMS RESET_CD_PARAMS".split()
+    "ASYSTOP ASYCANCEL ON_ERROR_PROCEED CHANNEL PDAT_ACT LDAT_ACT SET_CD_PARAMS RESET_CD_PARAMS"
 )
+_QUIET: Final = frozenset(_QUIET_WORDS.split())
 _OPENING: Final = frozenset({"DEF", "DEFFCT", "GLOBAL"})
 _DECLARING: Final = POSITION_TYPES | {"DECL", "GLOBAL", "CONST"}
 _KINDS: Final[dict[str, StepKind]] = {
     **dict.fromkeys(MOVES, "move"),
-    **dict.fromkeys(_LOSING, "lost"),
+    **dict.fromkeys(_LOSING.split(), "lost"),
     **dict.fromkeys(SETTERS, "set"),
     "SPLINE": "spline",
     "PTP_SPLINE": "spline",
@@ -41,17 +43,13 @@ _ROUTINE: Final = re.compile(
     r"(?:GLOBAL\s++)?+(?:DEF|DEFFCT\s++\w++(?:\s*+\[[^\]\n]*+\])?+)\s++(\w++)", re.ASCII | re.IGNORECASE
 )
 _NO_DECLARATION: Final = re.compile(r"GLOBAL\s++(?:INTERRUPT)\b", re.ASCII | re.IGNORECASE)
-_FOLLOWING: Final = re.compile(r"\s*+(.?)")
+_FOLLOWING: Final = re.compile(r"\S")
 _SETS_TOOL: Final = re.compile(r"\(\s*+#\s*+(?:INITMOV|TOOL)\b", re.ASCII | re.IGNORECASE)
 _SETS_BASE: Final = re.compile(r"\(\s*+#\s*+(?:INITMOV|BASE|EX_BASE)\b", re.ASCII | re.IGNORECASE)
 
 
-class Step(NamedTuple):
-    """A statement that matters: what it does, and for an assignment what got which value."""
-
-    kind: StepKind
-    statement: Statement
-    assigned: tuple[Variable, Taught | None] | None = None
+#: A statement that matters: what it does, and for an assignment what got which value.
+Step = tuple[StepKind, Statement, Assigned | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,10 +89,10 @@ class Outline:
             self._read(text)
         self.routines.sort(key=lambda routine: routine.text.index)
         self.unknown = Counter(
-            step.statement.word
+            statement[0]
             for routine in self.routines
-            for step in routine.steps
-            if step.kind == "call" and self.called(step.statement.word, routine) is None
+            for kind, statement, _ in routine.steps
+            if kind == "call" and self.called(statement[0], routine) is None
         )
 
     def called(self, name: str, caller: Routine) -> Routine | None:
@@ -106,13 +104,13 @@ class Outline:
         routine: Routine | None = None
         data_scopes = (text.module, "")
         for statement in text.statements():
-            word = statement.word
+            word, start, _, stop = statement
             if word in ("END", "ENDFCT", "ENDDAT"):
                 if opened is None or (word == "ENDDAT") != (routine is None):
-                    raise text.refusal(f"{word} ends what did not begin", statement.start)
+                    raise text.refusal(f"{word} ends what did not begin", start)
                 opened = routine = None
                 continue
-            named = _ROUTINE.match(text.flat, statement.start, statement.stop) if word in _OPENING else None
+            named = _ROUTINE.match(text.flat, start, stop) if word in _OPENING else None
             if named is not None or word == "DEFDAT":
                 if opened is not None:
                     raise self._not_ended(text, opened)
@@ -121,12 +119,12 @@ class Outline:
                     routine = self._begin(text, named[1].upper())
             elif opened is None:
                 if word in MOVES:
-                    raise text.refusal("a move stands outside of DEF and END", statement.start, word)
+                    raise text.refusal("a move stands outside of DEF and END", start, word)
             elif routine is None:
                 if word in _DECLARING:
-                    self.names.declare(text, statement, data_scopes)
+                    self.names.declare(text, start, stop, data_scopes)
                 elif word not in _QUIET:
-                    self.names.assigned(text, statement, data_scopes)
+                    self.names.assigned(text, start, stop, data_scopes)
             else:
                 self._step(text, routine, statement)
         if opened is not None:
@@ -139,42 +137,40 @@ class Outline:
         self.by_name.setdefault(("", name), routine)
         return routine
 
-    def _not_ended(self, text: Text, opened: Statement) -> Exception:
-        end = {"DEFDAT": "ENDDAT", "DEFFCT": "ENDFCT"}.get(opened.word, "END")
-        return text.refusal(
-            f"this has no {end}", opened.start, text.flat[opened.start : opened.stop], cure="Is the file cut off?"
-        )
+    def _not_ended(self, text: Text, opened: Statement) -> InputError:
+        word, start, _, stop = opened
+        end = {"DEFDAT": "ENDDAT", "DEFFCT": "ENDFCT"}.get(word, "END")
+        return text.refusal(f"this has no {end}", start, text.flat[start:stop], cure="Is the file cut off?")
 
     def _step(self, text: Text, routine: Routine, statement: Statement) -> None:
-        word = statement.word
+        word, start, after, stop = statement
+        flat = text.flat
         kind = _KINDS.get(word)
         if kind is not None:
-            if kind == "set":
-                self._note_setter(text, statement)
-            routine.steps.append(Step(kind, statement))
+            if kind != "set" or self._sets(text, word, after, stop):
+                routine.steps.append((kind, statement, None))
             return
         if word in _QUIET:
             return
         if word in _DECLARING:
-            if not _NO_DECLARATION.match(text.flat, statement.start, statement.stop):
-                self.names.declare(text, statement, routine.scopes)
+            if not _NO_DECLARATION.match(flat, start, stop):
+                self.names.declare(text, start, stop, routine.scopes)
             return
-        following = _FOLLOWING.match(text.flat, statement.after, statement.stop)
-        mark = following[1] if following else ""
-        if mark == ":":
-            routine.steps.append(Step("lost", statement))
-        elif mark and mark in "=[.":
-            assigned = None if word.startswith("$") else self.names.assigned(text, statement, routine.scopes)
+        mark = _FOLLOWING.search(flat, after, stop)
+        if mark is not None and mark[0] in "=[.":
+            assigned = None if word.startswith("$") else self.names.assigned(text, start, stop, routine.scopes)
             if assigned is not None:
-                routine.steps.append(Step("assign", statement, assigned))
+                routine.steps.append(("assign", statement, assigned))
         else:
-            routine.steps.append(Step("call", statement))
+            routine.steps.append(("lost" if mark is not None and mark[0] == ":" else "call", statement, None))
 
-    def _note_setter(self, text: Text, statement: Statement) -> None:
-        both = statement.word == "FDAT_ACT"
-        is_bas = statement.word == "BAS"
-        flat, after, stop = text.flat, statement.after, statement.stop
-        if both or statement.word == "$TOOL" or (is_bas and _SETS_TOOL.match(flat, after, stop)):
+    def _sets(self, text: Text, word: str, after: int, stop: int) -> bool:
+        """Return whether a statement sets the tool, the base or both, and note that the text does."""
+        both, is_bas = word == "FDAT_ACT", word == "BAS"
+        tool = both or word == "$TOOL" or (is_bas and _SETS_TOOL.match(text.flat, after, stop) is not None)
+        base = both or word == "$BASE" or (is_bas and _SETS_BASE.match(text.flat, after, stop) is not None)
+        if tool:
             self.sets_tool.add(text.index)
-        if both or statement.word == "$BASE" or (is_bas and _SETS_BASE.match(flat, after, stop)):
+        if base:
             self.sets_base.add(text.index)
+        return tool or base or word == "$IPO_MODE"

@@ -41,12 +41,12 @@ class Words(NamedTuple):
 
 def words_of(flat: str, statement: Statement) -> Words | None:
     """Return the words of a move, None if they are not understood."""
-    stop = statement.stop
-    first = _PLACE.match(flat, statement.after, stop)
+    word, _, after, stop = statement
+    first = _PLACE.match(flat, after, stop)
     if first is None:
         return None
     via, target = None, first
-    if statement.word in ("CIRC", "SCIRC"):
+    if word in ("CIRC", "SCIRC"):
         comma = _COMMA.match(flat, first.end(), stop)
         second = _PLACE.match(flat, comma.end(), stop) if comma else None
         if second is None:
@@ -54,6 +54,8 @@ def words_of(flat: str, statement: Statement) -> Words | None:
         via, target = first, second
     if not _AFTER.match(flat, target.end(), stop):
         return None
+    if target.end() == stop:
+        return Words(target.span(1), via.span(1) if via else None, False, None)
     settings = _WITH.search(flat, target.end(), stop)
     angle = via is not None and _CIRCLE_ANGLE.match(flat, target.end(), stop) is not None
     return Words(target.span(1), via.span(1) if via else None, angle, settings.end() if settings else None)
@@ -61,10 +63,13 @@ def words_of(flat: str, statement: Statement) -> Words | None:
 
 def operands(flat: str, place: Span) -> list[Span]:
     """Return the parts of a place between its colons."""
+    if flat.find(":", *place) < 0:
+        return [place]
     return [part.span() for part in _OPERAND.finditer(flat, *place)]
 
 
 def with_of(flat: str, statement: Statement) -> int | None:
     """Return where the text after the WITH of a spline begins, None if it has none."""
-    found = _WITH.search(flat, statement.after, statement.stop)
+    _, _, after, stop = statement
+    found = _WITH.search(flat, after, stop)
     return found.end() if found else None

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, NamedTuple
 
 from truearm.compensation.programs.krl.aggregates import JOINTS, configuration
 from truearm.compensation.programs.krl.finding import Finder
@@ -34,8 +33,7 @@ _KINDS: Final[dict[str, MoveKind]] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class _Pending:
+class _Pending(NamedTuple):
     """A move whose targets are known, but not yet whether they can be corrected."""
 
     kind: MoveKind
@@ -105,11 +103,11 @@ class _Reader:
         """Return what a routine leaves set; one that calls itself leaves what it sets besides."""
         if id(routine) not in self._left:
             self._left[id(routine)] = holding = Holding()
-            for step in routine.steps:
-                if step.kind == "set":
-                    holding = holding.then(self._frames.set_by(routine.text, step.statement, routine.scopes))
-                elif step.kind == "call":
-                    called = self._outline.called(step.statement.word, routine)
+            for kind, statement, _ in routine.steps:
+                if kind == "set":
+                    holding = holding.then(self._frames.set_by(routine.text, statement, routine.scopes))
+                elif kind == "call":
+                    called = self._outline.called(statement[0], routine)
                     holding = holding.then(self._left_by(called)) if called else holding
             self._left[id(routine)] = holding
         return self._left[id(routine)]
@@ -124,31 +122,30 @@ class _Reader:
         current: dict[int, Taught | None] = {}
         first, known, triggered = True, False, False
         outside: Holding | None = None  # of the spline that is being read
-        for step in routine.steps:
-            statement = step.statement
-            if step.kind == "move":
+        for kind, statement, assigned in routine.steps:
+            if kind == "move":
                 move, known = self._move(number, routine, statement, holding, current, first, known)
                 if move is not None:
                     undivided = triggered or outside is not None
-                    self._moves.append(replace(move, divisible=False) if undivided else move)
+                    self._moves.append(move._replace(divisible=False) if undivided else move)
                     first = False
                 triggered = False
-            elif step.kind == "set":
+            elif kind == "set":
                 holding = holding.then(self._frames.set_by(text, statement, scopes))
-            elif step.kind == "assign" and step.assigned is not None:
-                current[id(step.assigned[0])] = step.assigned[1]
-            elif step.kind == "trigger":
+            elif kind == "assign" and assigned is not None:
+                current[id(assigned[0])] = assigned[1]
+            elif kind == "trigger":
                 triggered = True
-            elif step.kind == "spline":
+            elif kind == "spline":
                 outside, at = outside or holding, with_of(text.flat, statement)
                 if at is not None:
-                    holding = holding.then(self._frames.set_with(text, at, statement.stop, scopes))
-            elif step.kind == "end of spline":
+                    holding = holding.then(self._frames.set_with(text, at, statement[3], scopes))
+            elif kind == "end of spline":
                 holding, outside = outside or holding, None
             else:
                 known = False
-                if step.kind == "call":
-                    holding = self._after_call(statement.word, routine, holding)
+                if kind == "call":
+                    holding = self._after_call(statement[0], routine, holding)
         return outside or holding
 
     def _move(
@@ -165,11 +162,11 @@ class _Reader:
         text = routine.text
         words = words_of(text.flat, statement)
         if words is None:
-            self._finder.skip(text, statement.start, "the words of this move are not understood")
+            self._finder.skip(text, statement[1], "the words of this move are not understood")
             return None, False
         if words.settings is not None:
-            holding = holding.then(self._frames.set_with(text, words.settings, statement.stop, routine.scopes))
-        kind = _KINDS[statement.word]
+            holding = holding.then(self._frames.set_with(text, words.settings, statement[3], routine.scopes))
+        kind = _KINDS[statement[0]]
         self._finder.enter(routine, holding, current, by_axes=kind == "joint", first=first)
         via = self._finder.find(words.via) if words.via else None
         end = self._finder.find(words.target)
@@ -256,16 +253,16 @@ class _Reader:
                 continue
             via = None if move.via is None or move.via.index < 0 else move.via.index
             divisible = move.divisible and move.follows and came and (via is None) == (move.via is None)
-            statement = move.statement
+            _, start, _, stop = move.statement
             moves.append(
                 Move(
                     move.kind,
                     move.target.index,
                     move.text.index,
-                    move.text.line(statement.start),
+                    move.text.line(start),
                     via,
                     move.routine,
-                    (statement.start, statement.stop),
+                    (start, stop),
                     move.target_text if divisible or move.kind == "joint" else (0, 0),
                     move.via_text if divisible else None,
                 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
+from truearm.compensation.programs.krl import KRL
 from truearm.compensation.programs.program import Language
 
-LANGUAGES: Final[tuple[Language, ...]] = ()
+LANGUAGES: Final[tuple[Language, ...]] = (KRL,)

@@ -156,7 +156,8 @@ class Move:
     statement
         Where the whole instruction stands in the text, ``(start, stop)``, from its first to after its last character.
     target_text, via_text
-        Where the words for the targets stand in the text, inside of `statement`.
+        Where the words for the targets stand in the text, inside of `statement`. A `target_text` of ``(0, 0)`` means
+        that the move cannot be divided.
     """
 
     kind: MoveKind

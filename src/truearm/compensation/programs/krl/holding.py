@@ -37,6 +37,8 @@ _FROM_FRAME_DATA: Final = re.compile(
     re.ASCII | re.IGNORECASE,
 )
 _WITH_PART: Final = re.compile(r"(\$TOOL|\$BASE|\$IPO_MODE)\s*+=\s*+", re.ASCII | re.IGNORECASE)
+#: How a move goes over into the next, at its end.
+_BLENDING: Final = re.compile(r"(?:\s++C_\w++)++\Z", re.ASCII | re.IGNORECASE)
 _EXTERNAL: Final = re.compile(r"(?:EK|EB|EB_ABS|LK)\s*+\(", re.ASCII | re.IGNORECASE)
 _OWN: Final = frozenset({"$NULLFRAME", "$WORLD", "$ROBROOT"})
 
@@ -137,6 +139,8 @@ class Frames:
     def set_with(self, text: Text, begin: int, stop: int, scopes: Sequence[str]) -> Holding:
         """Return what a WITH sets for one move or one spline."""
         holding = Holding()
+        blending = _BLENDING.search(text.flat, begin, stop)
+        stop = blending.start() if blending else stop
         for part in _WITH_PART.finditer(text.flat, begin, stop):
             end = closing(text.flat, part.end(), stop)
             holding = holding.then(self._assigned(text, part[1].upper(), part.end(), end, scopes))

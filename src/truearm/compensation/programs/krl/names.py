@@ -238,9 +238,10 @@ class Names:
                 if (scope, key) in self._frame_data:
                     self._frame_data[scope, key] = FrameData()
                     return None
-            if name[3] or flat[equals.end() : equals.end() + 1] != "{":
+            common = key in (TOOL_DATA, BASE_DATA)
+            if not common and (name[3] or flat[equals.end() : equals.end() + 1] != "{"):
                 return None
-            scope = "" if key in (TOOL_DATA, BASE_DATA) else text.module
+            scope = "" if common else text.module
             variable = self._variables[scope, key] = Variable(name[1], None, text.module)
         if name[2] is not None:
             index = literal_index(name[2])

@@ -44,8 +44,8 @@ _ROUTINE: Final = re.compile(
 )
 _NO_DECLARATION: Final = re.compile(r"GLOBAL\s++(?:INTERRUPT)\b", re.ASCII | re.IGNORECASE)
 _FOLLOWING: Final = re.compile(r"\S")
-_SETS_TOOL: Final = re.compile(r"\(\s*+#\s*+(?:INITMOV|TOOL)\b", re.ASCII | re.IGNORECASE)
-_SETS_BASE: Final = re.compile(r"\(\s*+#\s*+(?:INITMOV|BASE|EX_BASE)\b", re.ASCII | re.IGNORECASE)
+_SETS_TOOL: Final = re.compile(r"\s*+\(\s*+#\s*+(?:INITMOV|TOOL)\b", re.ASCII | re.IGNORECASE)
+_SETS_BASE: Final = re.compile(r"\s*+\(\s*+#\s*+(?:INITMOV|BASE|EX_BASE)\b", re.ASCII | re.IGNORECASE)
 
 
 #: A statement that matters: what it does, and for an assignment what got which value.

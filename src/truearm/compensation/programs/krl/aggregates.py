@@ -39,8 +39,8 @@ _JOINT_NAMES: Final = ("A1", "A2", "A3", "A4", "A5", "A6")
 _OTHER_NAMES: Final = frozenset({"S", "T", "E1", "E2", "E3", "E4", "E5", "E6"})
 _EXTERNAL: Final = ("E1", "E2", "E3", "E4", "E5", "E6")
 _TYPE: Final = re.compile(r"\s*+\w++\s*+:", re.ASCII)
-_ITEM: Final = re.compile(rf"\s*+([A-Za-z_]\w*+)\s*+({NUMBER})?([^,{{}}]*+)[,}}]", re.ASCII)
-_TEXT_OF_NUMBER: Final = rf"\s++({NUMBER})\s*+"
+_ITEM: Final = re.compile(rf"\s*+([A-Za-z_]\w*+)\s*+((?>{NUMBER}))?+([^,{{}}]*+)[,}}]", re.ASCII)
+_TEXT_OF_NUMBER: Final = rf"\s++((?>{NUMBER}))\s*+"
 #: A position in the usual order, with external axes at zero.
 _USUAL: Final = re.compile(
     r"\{(?:\s*+\w++\s*+:)?+\s*+"

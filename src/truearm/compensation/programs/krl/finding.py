@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 
 from truearm.compensation.programs.krl.aggregates import JOINTS, aggregate
 from truearm.compensation.programs.krl.holding import Holding
-from truearm.compensation.programs.krl.lines import Text
+from truearm.compensation.programs.krl.lines import Text, short
 from truearm.compensation.programs.krl.names import (
     REFERENCE,
     TARGET_TYPES,
@@ -21,6 +21,8 @@ from truearm.compensation.programs.program import Skipped
 
 #: Where the robot stands already: a move there changes nothing.
 _PRESENT: Final = frozenset({"$POS_ACT", "$AXIS_ACT", "$POS_ACT_MES", "$AXIS_ACT_MES"})
+#: More offsets than this at one place are a mistake.
+_MOST_OFFSETS: Final = 20
 
 
 class Found(NamedTuple):
@@ -48,6 +50,7 @@ class Finder:
     def __init__(self, names: Names) -> None:
         self._names = names
         self._skipped: dict[tuple[object, str], Skipped] = {}
+        self._lists: set[tuple[int, str | None, tuple[str, str], bool, bool]] = set()
         self._held = Holding()
         self._problem: str | None = None
         self._pair = ("", "")
@@ -95,6 +98,9 @@ class Finder:
                 self.skip(text, span[0], "the place is computed: it begins with an offset")
                 return _NOTHING
             return Found(self._write(first, None), True, True)
+        if len(others) > _MOST_OFFSETS:
+            self.skip(text, span[0], "the place has too many offsets")
+            return _NOTHING
         seconds = [self._offset(other) for other in others]
         variable = self._variable(first)
         taught = self._value(variable, first) if variable is not None else None
@@ -126,8 +132,11 @@ class Finder:
         if variable is None or reference is None:
             return None
         index = literal_index(reference[2]) if reference[2] is not None else None
-        for one in [variable.element(index)] if index is not None else [variable, *variable.listed]:
-            one.offset = True
+        if index is not None:
+            variable.element(index).offset = True
+        elif not variable.offset:
+            for one in (variable, *variable.listed):
+                one.offset = True
         return variable
 
     def _variable(self, span: Span) -> Variable | None:
@@ -143,10 +152,10 @@ class Finder:
             return None
         variable = None if reference is None or reference[3] else self._names.find(key, scopes)
         if variable is None or reference is None:
-            self.skip(text, span[0], f"{name} is not declared in this program", name.upper())
+            self.skip(text, span[0], f"{short(name)} is not declared in this program", name.upper())
             return None
         if variable.shared:
-            self.skip(text, span[0], f"{name} is in $config.dat, which other programs share", name.upper())
+            self.skip(text, span[0], f"{short(name)} is in $config.dat, which other programs share", name.upper())
             return None
         if reference[2] is None:
             return variable
@@ -154,27 +163,32 @@ class Finder:
         if index is not None:
             return variable.element(index)
         # Which element it is does not matter: all of them have this tool and this base.
-        for element in variable.listed:
-            for value in element.values if not element.computed else ():
-                self._use(value)
+        use = (id(variable), self._problem, self._pair, self._by_axes, self._first)
+        if use not in self._lists:
+            self._lists.add(use)
+            for element in variable.listed:
+                for value in element.values if not element.computed else ():
+                    self._use(value)
         if variable.computed or not variable.elements:
-            self.skip(text, span[0], f"{name} is not written out in this program", name.upper())
+            self.skip(text, span[0], f"{short(name)} is not written out in this program", name.upper())
         return None
 
     def _value(self, variable: Variable, span: Span) -> Taught | None:
         """Return the value that a name has here."""
         text, name = self._routine.text, variable.name
         if variable.computed:
-            self.skip(text, span[0], f"{name} is computed, in line {variable.computed}", name.upper())
+            self.skip(text, span[0], f"{short(name)} is computed, in line {variable.computed}", name.upper())
         elif not variable.values:
-            self.skip(text, span[0], f"{name} is declared without numbers", name.upper())
+            self.skip(text, span[0], f"{short(name)} is declared without numbers", name.upper())
         elif len(variable.values) == 1:
             return variable.values[0]
         else:
             here = self._current.get(id(variable))
             if here is not None:
                 return here
-            self.skip(text, span[0], f"{name} has several values, and which one holds here is not known", name.upper())
+            self.skip(
+                text, span[0], f"{short(name)} has several values, and which one holds here is not known", name.upper()
+            )
         return None
 
     def _use(self, taught: Taught) -> Taught:

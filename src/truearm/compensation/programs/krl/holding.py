@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from truearm.compensation.programs.krl.aggregates import POSE, Aggregate, aggregate
-from truearm.compensation.programs.krl.lines import Statement, Text
+from truearm.compensation.programs.krl.lines import Statement, Text, short
 from truearm.compensation.programs.krl.names import (
     BASE_DATA,
     REFERENCE,
@@ -38,7 +38,7 @@ _FROM_FRAME_DATA: Final = re.compile(
 )
 _WITH_PART: Final = re.compile(r"(\$TOOL|\$BASE|\$IPO_MODE)\s*+=\s*+", re.ASCII | re.IGNORECASE)
 #: How a move goes over into the next, at its end.
-_BLENDING: Final = re.compile(r"(?:\s++C_\w++)++\Z", re.ASCII | re.IGNORECASE)
+_BLENDING: Final = re.compile(r"(?<!\s)(?:\s++C_\w++)++\Z", re.ASCII | re.IGNORECASE)
 _EXTERNAL: Final = re.compile(r"(?:EK|EB|EB_ABS|LK)\s*+\(", re.ASCII | re.IGNORECASE)
 _OWN: Final = frozenset({"$NULLFRAME", "$WORLD", "$ROBROOT"})
 
@@ -75,12 +75,14 @@ class Holding:
 
     def then(self, later: Holding) -> Holding:
         """Return what holds after something else was set."""
+        if later.tool and later.base and later.stationary is not None:
+            return later
         stationary = self.stationary if later.stationary is None else later.stationary
         return Holding(later.tool or self.tool, later.base or self.base, stationary)
 
     def after_stranger(self, name: str) -> Holding:
         """Return what holds after a routine of another program was called."""
-        problem = f"{name}, which is not in this program, may set the %s"
+        problem = f"{short(name)}, which is not in this program, may set the %s"
         tool, base = self.tool, self.base
         if tool is not None and tool.default:
             tool = Setting(problem=problem % "tool")
@@ -107,6 +109,7 @@ class Frames:
 
     def __init__(self, names: Names) -> None:
         self._names = names
+        self._by_data: dict[FrameData, Holding] = {}
         self.tools: dict[str, Transform] = {}
         self.bases: dict[str, Transform] = {}
         for data, found in ((TOOL_DATA, self.tools), (BASE_DATA, self.bases)):
@@ -141,9 +144,11 @@ class Frames:
         holding = Holding()
         blending = _BLENDING.search(text.flat, begin, stop)
         stop = blending.start() if blending else stop
-        for part in _WITH_PART.finditer(text.flat, begin, stop):
+        part = _WITH_PART.search(text.flat, begin, stop)
+        while part is not None:
             end = closing(text.flat, part.end(), stop)
             holding = holding.then(self._assigned(text, part[1].upper(), part.end(), end, scopes))
+            part = _WITH_PART.search(text.flat, end, stop)
         return holding
 
     def of_inline_form(self, name: str, scopes: Sequence[str]) -> Holding | None:
@@ -169,12 +174,16 @@ class Frames:
         name = written.strip()
         found = self._names.find_frame_data(name.upper(), scopes)
         if found is None:
-            unknown = Setting(problem=f"{name}, which gives its tool and base, is not declared in this program")
+            unknown = Setting(problem=f"{short(name)}, which gives its tool and base, is not declared in this program")
             return Holding(unknown, unknown, False)
         return self._of(found)
 
     def _of(self, data: FrameData) -> Holding:
-        return Holding(self._numbered(TOOL_DATA, data.tool), self._numbered(BASE_DATA, data.base), data.stationary)
+        found = self._by_data.get(data)
+        if found is None:
+            tool, base = self._numbered(TOOL_DATA, data.tool), self._numbered(BASE_DATA, data.base)
+            found = self._by_data[data] = Holding(tool, base, data.stationary)
+        return found
 
     def _frame(self, text: Text, data: str, begin: int, end: int, scopes: Sequence[str]) -> Setting:
         what, found = ("tool", self.tools) if data == TOOL_DATA else ("base", self.bases)

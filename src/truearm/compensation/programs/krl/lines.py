@@ -23,6 +23,11 @@ _STRING: Final = re.compile(r'"[^"\n]*+"')
 Statement = tuple[str, int, int, int]
 
 
+def short(name: str) -> str:
+    """Return a name as it can be shown."""
+    return name if len(name) <= 60 else f"{name[:57]}..."
+
+
 class Text:
     """One source, read as lines.
 

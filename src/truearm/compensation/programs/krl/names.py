@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 from truearm.compensation.programs.krl.aggregates import Aggregate, aggregate
@@ -100,7 +100,7 @@ class Variable:
     name: str
     type: str | None
     module: str
-    values: tuple[Taught, ...] = ()
+    values: list[Taught] = field(default_factory=list)
     computed: int = 0
     offset: bool = False
     elements: dict[str, Variable] | None = None
@@ -128,9 +128,10 @@ class Variable:
 
     def spoil(self, line: int) -> None:
         """Note that it gets a computed value."""
-        self.computed = self.computed or line
-        for element in self.listed:
-            element.spoil(line)
+        if not self.computed:
+            self.computed = line
+            for element in self.listed:
+                element.spoil(line)
 
 
 @dataclass(frozen=True, slots=True)
@@ -221,7 +222,7 @@ class Names:
             variable.spoil(text.line(place))
             return None
         taught = Taught(text.index, place, variable.name, aggregate(text, begin, end), variable.type)
-        variable.values += (taught,)
+        variable.values.append(taught)
         return taught
 
     def assigned(self, text: Text, start: int, stop: int, scopes: Sequence[str]) -> Assigned | None:

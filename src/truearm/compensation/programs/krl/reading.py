@@ -31,6 +31,8 @@ _KINDS: Final[dict[str, MoveKind]] = {
     "CIRC": "circular",
     "SCIRC": "circular",
 }
+#: Routines that call each other are followed this far.
+_DEEPEST: Final = 100
 
 
 class _Pending(NamedTuple):
@@ -99,8 +101,11 @@ class _Reader:
             False,
         )
 
-    def _left_by(self, routine: Routine) -> Holding:
+    def _left_by(self, routine: Routine, depth: int = 0) -> Holding:
         """Return what a routine leaves set; one that calls itself leaves what it sets besides."""
+        if depth > _DEEPEST:
+            lost = Setting(problem="it is set in routines that call each other too deeply")
+            return Holding(lost, lost)
         if id(routine) not in self._left:
             self._left[id(routine)] = holding = Holding()
             for kind, statement, _ in routine.steps:
@@ -108,7 +113,7 @@ class _Reader:
                     holding = holding.then(self._frames.set_by(routine.text, statement, routine.scopes))
                 elif kind == "call":
                     called = self._outline.called(statement[0], routine)
-                    holding = holding.then(self._left_by(called)) if called else holding
+                    holding = holding.then(self._left_by(called, depth + 1)) if called else holding
             self._left[id(routine)] = holding
         return self._left[id(routine)]
 

@@ -294,6 +294,8 @@ def test_a_tool_that_is_set_too_late() -> None:
         ("LIN F1:XP1", f"DECL FRAME F1={FRAMES}\nDECL POS XP1={FRAMES}", "the place is computed from others"),
         ("PTP {A1 10,A2 -90}", "", "A3, A4, A5, A6 are not written and would stay as before"),
         ("LIN {X 1,Y 2,Z ZPOS,A 4,B 5,C 6}", "", "Z is not a number"),
+        ("LIN {X 1,Y 'B01',Z 3,A 4,B 5,C 6}", "", "Y is not a number"),
+        ("LIN XP1:{X 5,Y DY,Z 0}", f"DECL POS XP1={FRAMES}", "Y is not a number"),
         ("LIN {X 1,X 2,Y 2,Z 3,A 4,B 5,C 6}", "", "X is there twice"),
         ("LIN {X 1,Y 2,Z 3,A 4,B 5,C 6,Q 1}", "", "Q is no part of a position"),
         ("LIN {X 1,Y 2,Z 3,A 4,B 5,C 6,E2 5}", "", EXTERNAL),

@@ -135,12 +135,13 @@ def _items(text: Text, start: int, stop: int) -> tuple[dict[str, Item], str | No
                 raise text.refusal("a number is out of all proportion", item.start(2), item[2], f"up to {_MOST:g}")
             items[name] = value, *item.span(2)
         else:
-            items[name] = _bits(rest), *item.span(3)
+            items[name] = _bits(rest.strip()) if name in ("S", "T") else None, *item.span(3)
     return items, problem
 
 
 def _bits(written: str) -> float | None:
-    found = _BITS.match(written)
+    """Return a whole number that is written in bits or in hexadecimal digits, None if it is not."""
+    found = _BITS.fullmatch(written)
     if found is None or (found[1] in "Bb" and found[2].strip("01")) or len(found[2]) > 32:
         return None
     return float(int(found[2], 2 if found[1] in "Bb" else 16))

@@ -7,6 +7,7 @@ applied, and the original itself. A program with such a record has been correcte
 from __future__ import annotations
 
 import base64
+import gc
 import hashlib
 import json
 import zlib
@@ -130,7 +131,14 @@ def read_programs(files: Sequence[ProgramFile]) -> tuple[Program, ...]:
         )
     language = languages[0]
     sources = [Source(file.path, file.original.decode("latin-1")) for file in files]
-    return language.programs(sources)
+    # Hundreds of thousands of targets are made that all stay: the collector would look through them again and again.
+    collecting = gc.isenabled()
+    gc.disable()
+    try:
+        return language.programs(sources)
+    finally:
+        if collecting:
+            gc.enable()
 
 
 def language_called(name: str) -> Language:

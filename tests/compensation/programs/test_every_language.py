@@ -27,7 +27,7 @@ languages = pytest.mark.parametrize("language", LANGUAGES, ids=lambda one: one.n
 
 
 def folder(language: Language) -> Path:
-    return SAMPLES / language.read.__module__.rpartition(".")[2]
+    return SAMPLES / language.read.__module__.split("programs.")[1].split(".")[0]
 
 
 @cache

@@ -290,7 +290,7 @@ class Language:
     divide
         Return the edits that divide moves; None if the language's programs cannot be divided yet.
     together
-        Which files are one program: each for itself, those of one name but for the suffix, or all that are given.
+        Whether files that are given together are one program and share names; else each is one for itself.
     companions
         Pairs of suffixes: beside a file of the first may lie one of the second that belongs to it.
     """
@@ -301,13 +301,18 @@ class Language:
     is_one: Callable[[str], bool]
     read: Callable[[Sequence[Source]], Program]
     divide: Callable[[Program, Sequence[Division]], list[Edit]] | None = None
-    together: Literal["file", "stem", "all"] = "file"
+    together: bool = False
     companions: tuple[tuple[str, str], ...] = ()
 
     def programs(self, sources: Sequence[Source]) -> tuple[Program, ...]:
-        """Read files that may be of several programs."""
-        groups: dict[object, list[Source]] = {}
+        """Read files that may be of several programs.
+
+        Of a language whose programs have many files, all are one; but if two have the same name, each folder is one.
+        """
+        names = [source.path.name.lower() for source in sources]
+        several = len(set(names)) < len(names)
+        groups: dict[Path | None, list[Source]] = {}
         for source in sources:
-            keys = {"file": source.path, "stem": source.path.with_suffix(""), "all": None}
-            groups.setdefault(keys[self.together], []).append(source)
+            key = (source.path.parent if several else None) if self.together else source.path
+            groups.setdefault(key, []).append(source)
         return tuple(self.read(group) for group in groups.values())

@@ -41,5 +41,5 @@ RAPID: Final = Language(
     is_one=_is_one,
     read=_read,
     divide=divided,
-    together="all",
+    together=True,
 )

@@ -5,5 +5,6 @@ from __future__ import annotations
 from typing import Final
 
 from truearm.compensation.programs.program import Language
+from truearm.compensation.programs.urscript import URSCRIPT
 
-LANGUAGES: Final[tuple[Language, ...]] = ()
+LANGUAGES: Final[tuple[Language, ...]] = (URSCRIPT,)

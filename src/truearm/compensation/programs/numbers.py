@@ -6,7 +6,7 @@ import re
 from typing import Final
 
 #: A number in a program.
-NUMBER: Final = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+NUMBER: Final = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
 _PARTS: Final = re.compile(r"[+-]?\d*\.?(\d*)(?:[eE]([+-]?\d+))?")
 #: A number has more decimals only by mistake, and no float carries them.
 _MOST: Final = 15

@@ -112,32 +112,24 @@ class _File:
         """Return what a move says of its end, and of what it passes."""
         script = self.script
         if kind != "circular":
-            first = script.first(call.opened)
-            if first is not None:
-                return first, None
-        arguments = script.arguments(call.opened)
-        to = script.argument(arguments, 1 if kind == "circular" else 0, keyword)
-        via = script.argument(arguments, 0, "pose_via") if kind == "circular" else None
-        if kind == "circular":
-            mode = script.argument(arguments, 5, "mode")
+            to, via = script.first(call.opened, keyword), None
+        else:
+            to, via = script.argument(call.opened, 1, keyword), script.argument(call.opened, 0, "pose_via")
+            mode = script.argument(call.opened, 5, "mode")
             if mode is not None and script.code[mode.start : mode.stop] != "0":
                 self.skipped.append((call.start, "the orientation at its end follows from the circle (mode)"))
                 return None, None
         if to is None or (kind == "circular" and via is None):
             self.skipped.append((call.start, f"{call.name} does not say where to"))
             return None, None
-        return script.value(to.start, to.stop), None if via is None else script.value(via.start, via.stop)
+        return to, via
 
     def _tcp(self, call: Call) -> Tcp:
-        arguments = self.script.arguments(call.opened)
-        pose = self.script.argument(arguments, 0, "pose")
+        value, at = self.script.first(call.opened, "pose"), At(call.routine, call.start)
         named = _QUOTED.search(self.script.source.text, call.opened, self.script.partner[call.opened])
-        if pose is None:
-            return COMPUTED
-        value, at = self.script.value(pose.start, pose.stop), At(call.routine, call.start)
         plain = self.targets.plain(value, at)
         if plain is not None and plain[0].kind == "pose":
-            return self._tools.named((named and named[1]) or plain[1] or "tcp", plain[0].values)
+            return self._tools.named((named and named[1]) or plain[1] or "tcp", self.script.sized(plain[0]).values)
         undeclared = isinstance(value, Name) and self.targets.names.find(value.name, call.routine, call.start) is None
         return value.name if undeclared and isinstance(value, Name) else COMPUTED
 
@@ -161,7 +153,7 @@ class _File:
 
     def _use(self, value: Value, at: At) -> Use | str:
         if isinstance(value, Numbers):
-            spot = Spot(value)
+            spot = Spot(self.script.sized(value))
             self.targets.spots.append(spot)
             return Use(spot, (value.start, value.stop))
         return self.targets.reach(value, at)

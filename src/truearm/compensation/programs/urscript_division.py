@@ -16,7 +16,7 @@ from typing import Final
 
 from truearm.compensation.programs.numbers import NUMBER
 from truearm.compensation.programs.program import Division, Edit, Move, Program, ProgramTarget
-from truearm.compensation.programs.urscript_syntax import Argument, Text
+from truearm.compensation.programs.urscript_syntax import Text, Value
 
 #: Blend radius at the points on the way [m]; less where pieces are short.
 _RADIUS: Final = 0.001
@@ -47,13 +47,12 @@ class _Blends:
         self.text = text
         self._known: dict[str, float | None] = {}
 
-    def call(self, move: Move) -> tuple[str, list[Argument]]:
-        """Return the function of a move and its arguments."""
+    def call(self, move: Move) -> tuple[str, int]:
+        """Return the function of a move and its opening bracket."""
         word = _WORD.match(self.text.code, move.statement[0])
-        opened = self.text.code.index("(", move.statement[0])
-        return "" if word is None else word[0], self.text.arguments(opened)
+        return "" if word is None else word[0], self.text.code.index("(", move.statement[0])
 
-    def number(self, argument: Argument | None) -> float | None:
+    def number(self, argument: Value | None) -> float | None:
         """Return the number that an argument is, the largest that its variable gets, 0 for none; None if computed."""
         if argument is None:
             return 0.0
@@ -73,27 +72,27 @@ class _Blends:
 
     def radius(self, move: Move) -> float | None:
         """Return the blend radius of a move; None if it is computed."""
-        function, arguments = self.call(move)
+        function, opened = self.call(move)
         if function not in _BLEND:
             return 0.0
-        return self.number(self.text.argument(arguments, _BLEND[function], "r"))
+        return self.number(self.text.argument(opened, _BLEND[function], "r"))
 
 
 def _edits(program: Program, division: Division, blends: _Blends) -> list[Edit]:
     move, text = program.moves[division.move], blends.text
     target = program.targets[move.target]
-    function, arguments = blends.call(move)
-    if move.kind == "joint" or not division.points or not _replaceable(move.target_text, target, arguments, text):
+    function, opened = blends.call(move)
+    if move.kind == "joint" or not division.points or not _replaceable(move.target_text, target, opened, text):
         return []
-    if move.kind == "circular" and not _replaceable_via(program, division, arguments, text):
+    if move.kind == "circular" and not _replaceable_via(program, division, opened, text):
         return []
-    if function in _TIME and blends.number(text.argument(arguments, _TIME[function], "t")) != 0.0:
+    if function in _TIME and blends.number(text.argument(opened, _TIME[function], "t")) != 0.0:
         return []
     radius = _radius(program, division, blends)
     if radius is None:
         return []
     start, stop = move.statement
-    blend = text.argument(arguments, _BLEND[function], "r")
+    blend = text.argument(opened, _BLEND[function], "r")
     copies = []
     for numbers, via in division.points:
         parts = [(*move.target_text, _written(numbers, target))]
@@ -109,18 +108,19 @@ def _edits(program: Program, division: Division, blends: _Blends) -> list[Edit]:
     return edits
 
 
-def _replaceable_via(program: Program, division: Division, arguments: list[Argument], text: Text) -> bool:
+def _replaceable_via(program: Program, division: Division, opened: int, text: Text) -> bool:
     move = program.moves[division.move]
     if move.via is None or move.via_text is None or division.last_via is None:
         return False
-    return _replaceable(move.via_text, program.targets[move.via], arguments, text)
+    return _replaceable(move.via_text, program.targets[move.via], opened, text)
 
 
-def _replaceable(span: tuple[int, int], target: ProgramTarget, arguments: list[Argument], text: Text) -> bool:
+def _replaceable(span: tuple[int, int], target: ProgramTarget, opened: int, text: Text) -> bool:
     """Return whether numbers in the target's frame can stand in the place of words."""
     if span[0] == span[1]:
         return False
-    before = next((text.code[one.start : span[0]] for one in arguments if one.start <= span[0] < one.stop), "")
+    values = [argument.value for argument in text.arguments(opened)]
+    before = next((text.code[one.start : span[0]] for one in values if one.start <= span[0] < one.stop), "")
     return ("pose_trans" in before) == bool(target.frame)
 
 

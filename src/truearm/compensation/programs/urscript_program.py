@@ -65,7 +65,7 @@ def made_program(
         _note_shared(found)
         skips = list(left)
         kept: list[tuple[Spot, ProgramTarget]] = []
-        for spot in _with_unused(found, skips):
+        for spot in _with_unused(found, script, skips):
             trouble = _trouble(spot, found)
             if not spot.shared and trouble:
                 skips.append((spot.numbers.start, trouble))
@@ -129,23 +129,23 @@ def _final(spot: Spot) -> Spot:
     return spot
 
 
-def _with_unused(found: Targets, skips: list[tuple[int, str]]) -> list[Spot]:
+def _with_unused(found: Targets, script: Script, skips: list[tuple[int, str]]) -> list[Spot]:
     """Return the spots, and those that variables of moves are assigned without a move that is known to go there."""
     reached = {spot.numbers.start for spot in found.spots} | found.framed
     tcps = {tcp for spot in found.spots for tcp in spot.tcps or ()}
     frames = {spot.frame for spot in found.spots if spot.numbers.kind == "pose"}
     spots = list(found.spots)
     for series in found.names.series:
-        for definition in series.definitions if series.reached else ():
-            numbers = definition.numbers
+        for assignment in series.assignments if series.reached else ():
+            numbers = assignment.numbers
             if numbers is None or numbers.start in reached or (numbers.kind == "pose" and not any(numbers.values)):
                 continue
             several = len(tcps) > 1 or (len(frames) > 1 and numbers.kind == "pose")
             if several or series.last_computed >= 0:
-                skips.append((numbers.start, f"{definition.name} is assigned, and no move is known to go there"))
+                skips.append((numbers.start, f"{assignment.name} is assigned, and no move is known to go there"))
             else:
                 frame = next(iter(frames), "") if numbers.kind == "pose" else ""
-                spots.append(Spot(numbers, definition.name, frame, tcps=tcps))
+                spots.append(Spot(script.sized(numbers), assignment.name, frame, tcps=tcps))
     return spots
 
 

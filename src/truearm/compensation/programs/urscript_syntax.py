@@ -7,7 +7,7 @@ Source: Universal Robots, The URScript Programming Language (script manual, e-Se
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final, Literal, NamedTuple
 
 from truearm.compensation.programs.lines import Lines
@@ -34,11 +34,14 @@ _EVENT: Final = re.compile(
     re.ASCII | re.MULTILINE | re.VERBOSE,
 )
 _ASSIGNED: Final = re.compile(r"[ \t]*=(?!=)")
-_NO_CALLS: Final = frozenset(("return", "not", "and", "or", "xor"))
-_SIX: Final = re.compile(rf"(p?)\[\s*({NUMBER})" + rf"\s*,\s*({NUMBER})" * 5 + r"\s*\]", re.ASCII)
+_NO_CALLS: Final = frozenset(("if", "while", "elif", "return", "not", "and", "or", "xor"))
+_LITERAL: Final = rf"((p?)\[\s*({NUMBER})" + rf"\s*,\s*({NUMBER})" * 5 + r"\s*\])"
+_SIX: Final = re.compile(_LITERAL, re.ASCII)
+#: An argument: its keyword, where its value begins, and that if it is six numbers or begins with a name.
+_ITEM: Final = re.compile(rf"\s*(?:({_NAME})\s*=(?!=)\s*)?()(?:{_LITERAL}|({_NAME}))?\s*", re.ASCII)
 _WORD: Final = re.compile(rf"({_NAME})\s*", re.ASCII)
+_BLANK: Final = re.compile(r"[ \t]*")
 _SPACE: Final = re.compile(r"\s*", re.ASCII)
-_KEYWORD: Final = re.compile(rf"\s*(?:({_NAME})\s*=(?!=)\s*)?", re.ASCII)
 _ARGUMENT_END: Final = re.compile(r"[,()\[\]{}]")
 _STATEMENT_END: Final = re.compile(r"[\n;(\[{]")
 _ONE_NUMBER: Final = re.compile(rf"\s*{NUMBER}\s*", re.ASCII)
@@ -83,22 +86,73 @@ Value = Numbers | Name | Called | Other
 
 
 class Argument(NamedTuple):
-    """An argument of a call: its keyword, empty for none, and where its value stands."""
+    """An argument of a call, and its keyword, empty for none."""
 
     keyword: str
-    start: int
-    stop: int
+    value: Value
 
 
-class Assignment(NamedTuple):
-    """An assignment to a variable, or to one element of it, with the place of its value and its routine."""
+@dataclass(slots=True, eq=False)
+class Assignment:
+    """An assignment to a variable.
+
+    Attributes
+    ----------
+    start, routine
+        Where it stands.
+    value
+        What is assigned; None where it is to one of the variable's elements.
+    scope
+        ``global`` or ``local``, or empty if it does not say.
+    aimed
+        Whether a move goes there.
+    series
+        All assignments to the same variable.
+    """
 
     name: str
     start: int
-    value: int
+    value: Value | None
     routine: int
     scope: str
-    element: bool
+    aimed: bool = False
+    series: Series = field(init=False)
+
+    @property
+    def numbers(self) -> Numbers | None:
+        """Its six numbers, if that is what is assigned."""
+        return self.value if isinstance(self.value, Numbers) else None
+
+
+@dataclass(slots=True, eq=False)
+class Series:
+    """All assignments to one variable in the order of the text.
+
+    Attributes
+    ----------
+    last_computed
+        Where the last one stands that is not six numbers; -1 for none.
+    several
+        Whether they differ.
+    reached
+        Whether a move goes to one of them.
+    """
+
+    assignments: list[Assignment] = field(default_factory=list)
+    last_computed: int = -1
+    several: bool = False
+    reached: bool = False
+
+    def add(self, assignment: Assignment) -> None:
+        """Add the next assignment."""
+        numbers = assignment.numbers
+        if numbers is None:
+            self.last_computed = assignment.start
+        if self.assignments:
+            first = self.assignments[0].numbers
+            self.several |= first is None or numbers is None or first.values != numbers.values
+        self.assignments.append(assignment)
+        assignment.series = self
 
 
 class Call(NamedTuple):
@@ -146,6 +200,7 @@ class Text:
             raise self.refusal("a string is not closed", quote, "The file may be truncated.")
         #: From every opening bracket to its closing one.
         self.partner: dict[int, int] = {}
+        self._arguments: dict[int, list[Argument]] = {}
         waiting: list[int] = []
         for found in _BRACKET.finditer(self.code):
             place = found.start()
@@ -166,54 +221,50 @@ class Text:
 
     def arguments(self, opened: int) -> list[Argument]:
         """Return the arguments between a bracket and its partner."""
-        closed = self.partner[opened]
-        found: list[Argument] = []
-        start = place = opened + 1
-        while True:
-            place = self._next(_ARGUMENT_END, place)
-            keyword = _KEYWORD.match(self.code, start, place)
-            begin = start if keyword is None else keyword.end()
-            stop = begin + len(self.code[begin:place].rstrip())
-            if stop > begin or found or place < closed:
-                found.append(Argument("" if keyword is None else keyword[1] or "", begin, stop))
-            if place >= closed:
-                return found
-            place = start = place + 1
+        found = self._arguments.get(opened)
+        if found is None:
+            found = self._arguments[opened] = []
+            closed, place = self.partner[opened], opened
+            while place < closed:
+                argument, place = self._item(place + 1)
+                if found or place < closed or argument.value.start < argument.value.stop:
+                    found.append(argument)
+        return found
 
-    def argument(self, arguments: list[Argument], index: int, keyword: str) -> Argument | None:
-        """Return an argument by its keyword, or its place among those without one."""
+    def argument(self, opened: int, index: int, keyword: str) -> Value | None:
+        """Return an argument by its keyword, or its place among those without one; None if it is not there."""
+        arguments = self.arguments(opened)
         for one in arguments:
             if one.keyword == keyword:
-                return one
-        if index < len(arguments) and not arguments[index].keyword and arguments[index].stop > arguments[index].start:
-            return arguments[index]
+                return one.value
+        if index < len(arguments) and not arguments[index].keyword:
+            value = arguments[index].value
+            return value if value.start < value.stop else None
         return None
+
+    def first(self, opened: int, keyword: str) -> Value | None:
+        """Return the first argument of a call, as :meth:`argument` but without reading the others if need not be."""
+        argument, _ = self._item(opened + 1)
+        if not argument.keyword and argument.value.start < argument.value.stop:
+            return argument.value
+        return self.argument(opened, 0, keyword)
 
     def assigned(self, start: int) -> Value:
         """Return the value of an assignment that begins at a place."""
-        stop = start + len(self.code[start : self._next(_STATEMENT_END, start)].rstrip())
-        blank = _SPACE.match(self.code, start, stop)
-        return self.value(start if blank is None else blank.end(), stop)
-
-    def first(self, opened: int) -> Value | None:
-        """Return the first argument of a call if it is six numbers or a variable, quickly."""
-        code = self.code
-        blank = _SPACE.match(code, opened + 1)
-        start = opened + 1 if blank is None else blank.end()
-        six = _SIX.match(code, start)
-        if six is not None:
-            return self._numbers(six) if code[six.end()] in ",)" else None
-        word = _WORD.match(code, start)
-        if word is not None and code[word.end()] in ",)":
-            return Name(word[1], start, word.end(1))
-        return None
+        blank = _BLANK.match(self.code, start)
+        start = start if blank is None else blank.end()
+        six = _SIX.match(self.code, start)
+        if six is not None and self.code[six.end() : six.end() + 1] in ("\n", ""):
+            return _numbers(six, 1)
+        return self.value(start, self._next(_STATEMENT_END, start))
 
     def value(self, start: int, stop: int) -> Value:
-        """Return the value that stands between two places, without white space at either."""
+        """Return the value that stands between two places, with white space at the end or not."""
         code = self.code
+        stop = start + len(code[start:stop].rstrip())
         six = _SIX.match(code, start, stop)
         if six is not None and six.end() == stop:
-            return self._numbers(six)
+            return _numbers(six, 1)
         word = _WORD.match(code, start, stop)
         begin = start if word is None else word.end()
         if word is not None and begin == stop:
@@ -227,20 +278,41 @@ class Text:
             return Other("it is taken from a list", start, stop)
         return Other("it is computed", start, stop)
 
-    def _incomplete(self, opened: int) -> str:
-        items = self.arguments(opened)
-        if any(_ONE_NUMBER.fullmatch(self.code, item.start, item.stop) is None for item in items):
-            return "its numbers are computed"
-        return f"it has {len(items)} numbers, not six"
-
-    def _numbers(self, six: re.Match[str]) -> Numbers:
-        kind, *words = six.groups()
-        values = tuple(map(float, words))
+    def sized(self, numbers: Numbers) -> Numbers:
+        """Return numbers, or refuse them where one is too large for metres and radians."""
+        values = numbers.values
         if not -_MOST <= min(values) <= max(values) <= _MOST:
             worst = max(values, key=abs)
-            raise self.refusal("a number is out of all proportion for metres and radians", six.start(), came=worst)
-        places = (six.span(2), six.span(3), six.span(4), six.span(5), six.span(6), six.span(7))
-        return Numbers("pose" if kind else "joints", values, places, six.start(), six.end())
+            raise self.refusal("a number is out of all proportion for metres and radians", numbers.start, came=worst)
+        return numbers
+
+    def _item(self, place: int) -> tuple[Argument, int]:
+        """Return the argument that begins at a place, and where it ends: at a comma or at the closing bracket."""
+        code = self.code
+        found = _ITEM.match(code, place)
+        if found is None:  # it matches nothing at all
+            raise AssertionError
+        keyword, end = found[1] or "", found.end()
+        if code[end] in ",)]":
+            if found[3] is not None:
+                return Argument(keyword, _numbers(found, 3)), end
+            if found[11] is not None:
+                return Argument(keyword, Name(found[11], *found.span(11))), end
+        elif found[11] is not None and code[end] == "(":
+            closed = self.partner[end]
+            blank = _SPACE.match(code, closed + 1)
+            after = closed + 1 if blank is None else blank.end()
+            if code[after] in ",)]":
+                return Argument(keyword, Called(found[11], end, found.start(11), closed + 1)), after
+        start = found.start(2)
+        stop = self._next(_ARGUMENT_END, start)
+        return Argument(keyword, self.value(start, stop)), stop
+
+    def _incomplete(self, opened: int) -> str:
+        values = [argument.value for argument in self.arguments(opened)]
+        if any(_ONE_NUMBER.fullmatch(self.code, value.start, value.stop) is None for value in values):
+            return "its numbers are computed"
+        return f"it has {len(values)} numbers, not six"
 
     def _next(self, pattern: re.Pattern[str], place: int) -> int:
         """Return where a pattern is found next outside of the brackets that open on the way."""
@@ -250,6 +322,13 @@ class Text:
                 return found.start()
             place = closed + 1
         return len(self.code)
+
+
+def _numbers(found: re.Match[str], group: int) -> Numbers:
+    """Return the six numbers of a match, of which the group is the whole, the next ones its ``p`` and the numbers."""
+    spans: tuple[tuple[int, int], ...] = found.regs  # of all groups at once
+    kind, *words = found.groups()[group : group + 7]
+    return Numbers("pose" if kind else "joints", tuple(map(float, words)), spans[group + 2 : group + 8], *spans[group])
 
 
 class Script(Text):
@@ -273,45 +352,46 @@ class Script(Text):
         routine = inside = place = stretch = 0
         while (found := _EVENT.search(code, place)) is not None:
             place = found.end()
-            call, variable = found["call"], found["variable"]
-            if call in ("if", "while") or found["block"]:
-                blocks.append((found.start(), routine))
-                stretch += 1
-            elif call == "elif" or found["turn"]:
-                stretch += 1
-            elif call is not None:
+            event = found.lastgroup
+            if event == "call":
+                call = found["call"]
+                if call in ("if", "while"):
+                    blocks.append((found.start("call"), routine))
+                stretch += call in ("if", "while", "elif")
                 inside = max(inside, partner[place - 1])
                 if call not in _NO_CALLS:
                     first = found["first"] is not None
                     self.calls.append(Call(call, found.start("call"), place - 1, routine, first, stretch))
                     if call in whole:
                         place = partner[place - 1]
-            elif variable is not None:
-                element = found["element"] is not None
-                if element:
-                    assigned = _ASSIGNED.match(code, partner[place - 1] + 1)
-                    place = place if assigned is None else assigned.end()
-                    element = assigned is not None
-                    if assigned is None:
-                        continue
+            elif event == "variable":
                 if found.start() >= inside:
+                    value = self.assigned(place)
                     start, scope = found.start("variable"), found["scope"] or ""
-                    self.assignments.append(Assignment(variable, start, place, routine, scope, element))
-            elif found["end"]:
-                stretch += 1
-                if blocks:
-                    routine = blocks.pop()[1]
-            else:
+                    self.assignments.append(Assignment(found["variable"], start, value, routine, scope))
+                    place = value.stop if isinstance(value, Numbers) else place
+            elif event == "element":
+                assigned = _ASSIGNED.match(code, partner[place - 1] + 1)
+                if assigned is not None and found.start() >= inside:
+                    place, start = assigned.end(), found.start("variable")
+                    self.assignments.append(Assignment(found["variable"], start, None, routine, ""))
+            elif event == "header":
                 blocks.append((found.start(), routine))
                 names = (self._argument_name(one) for one in self.arguments(place - 1))
                 self.routines.append(Routine(found["header"], found.start(), routine, frozenset(names)))
                 routine = len(self.routines) - 1
                 stretch += 1
                 place = partner[place - 1]
+            else:
+                stretch += 1
+                if event == "block":
+                    blocks.append((found.start(), routine))
+                elif event == "end" and blocks:
+                    routine = blocks.pop()[1]
         if blocks:
             word = _WORD.search(code, blocks[-1][0])
             what = "routine or block" if word is None else word[1]
             raise self.refusal(f"this {what} has no end", blocks[-1][0], "The file may be truncated.")
 
     def _argument_name(self, argument: Argument) -> str:
-        return argument.keyword or self.code[argument.start : argument.stop]
+        return argument.keyword or self.code[argument.value.start : argument.value.stop]

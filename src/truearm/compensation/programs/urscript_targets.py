@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
-from truearm.compensation.programs.urscript_names import Definition, Names
-from truearm.compensation.programs.urscript_syntax import Called, Name, Numbers, Other, Script, Value
+from truearm.compensation.programs.urscript_names import Names
+from truearm.compensation.programs.urscript_syntax import Assignment, Called, Name, Numbers, Other, Script, Value
 from truearm.compensation.programs.urscript_tcp import Places, Tcp
 
 #: Variables are followed through this many assignments.
@@ -100,7 +100,7 @@ class Targets:
         """Note the variables that a move goes to, and not only into the axes of."""
         if isinstance(value, Name):
             found = self.names.find(value.name, at.routine, at.place)
-            if isinstance(found, Definition) and not found.aimed:
+            if isinstance(found, Assignment) and not found.aimed:
                 found.aimed = True
                 if found.value is not None and at.depth < _DEEPEST:
                     self.aim(found.value, At(found.routine, found.start, at.depth + 1))
@@ -140,7 +140,8 @@ class Targets:
             if isinstance(use, str):
                 return use
             found.series.reached |= found.numbers is not None
-            return use._replace(words=(words[0], words[1] if use.words[0] < use.words[1] else words[0]))
+            known = use.words[0] < use.words[1]
+            return Use(use.spot, words if known else (value.start, value.start), use.near)
         deeper = At(at.routine, at.place, at.depth + 1)
         if value.function == "get_inverse_kin":
             return "joints stand in no frame" if frame else self._solved(value, deeper, name)
@@ -156,36 +157,35 @@ class Targets:
         """Return six numbers and their name, if a value is that or a variable that was assigned that."""
         if isinstance(value, Name):
             found = self.names.find(value.name, at.routine, at.place)
-            if isinstance(found, Definition) and found.numbers is not None:
+            if isinstance(found, Assignment) and found.numbers is not None:
                 return found.numbers, value.name
         return (value, "") if isinstance(value, Numbers) else None
 
-    def _found(self, name: str, at: At) -> Definition | str:
+    def _found(self, name: str, at: At) -> Assignment | str:
         found = self.names.find(name, at.routine, at.place)
         if found is None:
             return f"{name} is not declared in this program"
         return f"{name} is an argument of its routine" if found == "argument" else found
 
     def _argument(self, called: Called, index: int, keyword: str) -> Value | None:
-        found = self._script.argument(self._script.arguments(called.opened), index, keyword)
-        return None if found is None else self._script.value(found.start, found.stop)
+        return self._script.argument(called.opened, index, keyword)
 
     def _comes_round(self, value: Value, at: At) -> bool:
         """Return whether a value has variables that are computed again behind it: a loop may sum it up."""
         if isinstance(value, Name):
             found = self.names.find(value.name, at.routine, at.place)
-            return isinstance(found, Definition) and found.series.last_computed >= at.place
+            return isinstance(found, Assignment) and found.series.last_computed >= at.place
         if isinstance(value, Called) and at.depth < _DEEPEST:
             deeper = At(at.routine, at.place, at.depth + 1)
             arguments = self._script.arguments(value.opened)
-            return any(self._comes_round(self._script.value(one.start, one.stop), deeper) for one in arguments)
+            return any(self._comes_round(one.value, deeper) for one in arguments)
         return False
 
     def _spot(self, numbers: Numbers, name: str, frame: str, parent: Spot | None, turned: bool) -> Spot:
         key = (numbers.start, 0 if parent is None else id(parent), frame)
         spot = self._known.get(key)
         if spot is None:
-            spot = self._known[key] = Spot(numbers, name, frame, parent, turned)
+            spot = self._known[key] = Spot(self._script.sized(numbers), name, frame, parent, turned)
             self.spots.append(spot)
         return spot
 
@@ -193,14 +193,18 @@ class Targets:
         pose = self._argument(called, 0, "x")
         if pose is None:
             return "it is computed"
-        tcp = self._script.argument(self._script.arguments(called.opened), 4, "tcp")
+        tcp = self._argument(called, 4, "tcp")
         if tcp is not None and tcp.start < tcp.stop:  # a name in quotes is blank: it is the active one
             return "get_inverse_kin has a TCP of its own"
         use = self.reach(pose, at, "", name)
         if isinstance(use, str):
             return use
         near = self.plain(self._argument(called, 1, "qnear"), at)
-        return use if near is None or near[0].kind == "pose" else use._replace(near=near[0].values)
+        return (
+            use
+            if near is None or near[0].kind == "pose"
+            else Use(use.spot, use.words, self._script.sized(near[0]).values)
+        )
 
     def _transformed(self, called: Called, at: At, frame: str, name: str) -> Use | str:
         of, pose = self._argument(called, 0, "p_from"), self._argument(called, 1, "p_from_to")
@@ -265,7 +269,7 @@ class Targets:
         if numbers.kind == "joints":
             return _Frame("", "its frame is given by joints")
         self.framed.add(numbers.start)
-        return _Frame(self._frames.named(name, numbers.values))
+        return _Frame(self._frames.named(name, self._script.sized(numbers).values))
 
 
 class _Frame(NamedTuple):

@@ -116,7 +116,7 @@ class _File:
         else:
             to, via = script.argument(call.opened, 1, keyword), script.argument(call.opened, 0, "pose_via")
             mode = script.argument(call.opened, 5, "mode")
-            if mode is not None and script.code[mode.start : mode.stop] != "0":
+            if mode is not None and script.code[mode.start : mode.stop] not in ("0", "0.0"):
                 self.skipped.append((call.start, "the orientation at its end follows from the circle (mode)"))
                 return None, None
         if to is None or (kind == "circular" and via is None):

@@ -103,7 +103,7 @@ def _note_tcps(goings: list[Going]) -> None:
                 elif spot.tcps is not tcps:
                     spot.tcps = spot.tcps | tcps
                 spot = spot.parent
-            if use is not None and use.near is not None:
+            if use is not None and use.near is not None and use.words[0] < use.words[1]:
                 use.spot.nears = (use.spot.nears or set()) | {use.near}
 
 

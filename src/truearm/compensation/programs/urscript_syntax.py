@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
-from typing import Final, Literal, NamedTuple
+from typing import Final, Literal, NamedTuple, cast
 
 from truearm.compensation.programs.lines import Lines
 from truearm.compensation.programs.numbers import NUMBER
@@ -272,10 +272,9 @@ class Text:
         if self.partner.get(begin) == stop - 1:
             if word is not None and code[begin] == "(":
                 return Called(word[1], begin, start, stop)
-            if code[begin] == "[" and (word is None or word[1] == "p"):
-                return Other(self._incomplete(begin), start, stop)
-        if word is not None and code[begin : begin + 1] == "[":
-            return Other("it is taken from a list", start, stop)
+            if code[begin] == "[":
+                literal = word is None or word[1] == "p"
+                return Other(self._incomplete(begin) if literal else "it is taken from a list", start, stop)
         return Other("it is computed", start, stop)
 
     def sized(self, numbers: Numbers) -> Numbers:
@@ -289,9 +288,7 @@ class Text:
     def _item(self, place: int) -> tuple[Argument, int]:
         """Return the argument that begins at a place, and where it ends: at a comma or at the closing bracket."""
         code = self.code
-        found = _ITEM.match(code, place)
-        if found is None:  # it matches nothing at all
-            raise AssertionError
+        found = cast("re.Match[str]", _ITEM.match(code, place))  # it matches nothing, too
         keyword, end = found[1] or "", found.end()
         if code[end] in ",)]":
             if found[3] is not None:

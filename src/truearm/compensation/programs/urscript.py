@@ -31,9 +31,10 @@ from typing import Final
 from truearm.compensation.programs.program import Language, MoveKind, Program, Source
 from truearm.compensation.programs.urscript_division import divide
 from truearm.compensation.programs.urscript_program import Going, made_program
-from truearm.compensation.programs.urscript_syntax import Call, Name, Numbers, Script, Value
+from truearm.compensation.programs.urscript_script import Call, Script
 from truearm.compensation.programs.urscript_targets import At, Spot, Targets, Use
 from truearm.compensation.programs.urscript_tcp import COMPUTED, Places, Stretch, Tcp, TcpFlow
+from truearm.compensation.programs.urscript_text import Name, Numbers, Value
 
 _LOOKS: Final = re.compile(
     r"^[ \t]*(?:def|thread|sec)[ \t]+\w+[ \t]*\([^)\n]*\)[ \t]*:"

@@ -16,7 +16,7 @@ from typing import Final
 
 from truearm.compensation.programs.numbers import NUMBER
 from truearm.compensation.programs.program import Division, Edit, Move, Program, ProgramTarget
-from truearm.compensation.programs.urscript_syntax import Text, Value
+from truearm.compensation.programs.urscript_text import Text, Value
 
 #: Blend radius at the points on the way [m]; less where pieces are short.
 _RADIUS: Final = 0.001
@@ -101,7 +101,7 @@ def _edits(program: Program, division: Division, blends: _Blends) -> list[Edit]:
         place = (stop - 1, stop - 1) if blend is None else (blend.start, blend.stop)
         parts.append((*place, f", r={radius}" if blend is None else radius))
         copies.append(_replaced(text.source.text, start, stop, parts))
-    between = _between(text.source.text, start)
+    between = _between(text, start)
     edits = [Edit(move.source, start, start, "".join(copy + between for copy in copies))]
     if move.via_text is not None and division.last_via is not None:
         edits.append(Edit(move.source, *move.via_text, _written(division.last_via, target)))
@@ -164,9 +164,8 @@ def _replaced(text: str, start: int, stop: int, parts: list[tuple[int, int, str]
     return "".join((*made, text[place:stop]))
 
 
-def _between(text: str, start: int) -> str:
+def _between(text: Text, start: int) -> str:
     """Return the line end and the indentation of the line that a place is on."""
-    line = max(text.rfind("\n", 0, start), text.rfind("\r", 0, start)) + 1
-    indent = text[line:start]
-    found = _LINE_END.search(text)
+    indent = text.code[text.code.rfind("\n", 0, start) + 1 : start]
+    found = _LINE_END.search(text.source.text)
     return (found[0] if found else "\n") + indent[: len(indent) - len(indent.lstrip(" \t"))]

@@ -19,7 +19,7 @@ from truearm.compensation.programs.program import (
     Skipped,
     Source,
 )
-from truearm.compensation.programs.urscript_syntax import Call, Script
+from truearm.compensation.programs.urscript_script import Call, Script
 from truearm.compensation.programs.urscript_targets import Spot, Targets, Use
 from truearm.compensation.programs.urscript_tcp import COMPUTED, Places, Stretch, Tcp
 

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from truearm.compensation.programs.urscript_names import Names
-from truearm.compensation.programs.urscript_syntax import Assignment, Called, Name, Numbers, Other, Script, Value
+from truearm.compensation.programs.urscript_script import Assignment, Script
 from truearm.compensation.programs.urscript_tcp import Places, Tcp
+from truearm.compensation.programs.urscript_text import Called, Name, Numbers, Other, Value
 
 #: Variables are followed through this many assignments.
 _DEEPEST: Final = 20

@@ -135,12 +135,16 @@ class Targets:
                 return found
             if found.value is None:
                 return f"the numbers of {value.name} are changed one by one"
-            if found.numbers is None and self._comes_round(found.value, At(found.routine, found.start)):
+            numbers = found.numbers
+            if numbers is not None:
+                found.series.reached = True
+                use = self.reach(numbers, at, frame, value.name)
+                return use if isinstance(use, str) else Use(use.spot, words)
+            if self._comes_round(found.value, At(found.routine, found.start)):
                 return f"{value.name} is computed from what changes later"
             use = self.reach(found.value, At(found.routine, found.start, at.depth + 1), frame, value.name)
             if isinstance(use, str):
                 return use
-            found.series.reached |= found.numbers is not None
             known = use.words[0] < use.words[1]
             return Use(use.spot, words if known else (value.start, value.start), use.near)
         deeper = At(at.routine, at.place, at.depth + 1)

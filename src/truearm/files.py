@@ -207,7 +207,10 @@ def refuse_overwriting(out: Path, inputs: Iterable[Path]) -> None:
 
 
 def write_files(folder: Path, files: Mapping[str, str | bytes]) -> None:
-    """Write several files into a folder; they are put in place only once all of them are on disk."""
+    """Write several files into a folder; they are put in place only once all of them are on disk.
+
+    Their names may begin with folders in that folder.
+    """
     for name in files:
         writable_file(folder / name)
     staged: list[tuple[Path, Path]] = []
@@ -215,6 +218,7 @@ def write_files(folder: Path, files: Mapping[str, str | bytes]) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in files.items():
             target = folder / name
+            target.parent.mkdir(parents=True, exist_ok=True)
             handle, temporary = tempfile.mkstemp(prefix=".truearm.", dir=folder)
             staged.append((Path(temporary), target))
             with os.fdopen(handle, "wb") as stream:

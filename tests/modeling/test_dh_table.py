@@ -13,7 +13,8 @@ from numpy.testing import assert_allclose
 from truearm.errors import InputError
 from truearm.modeling.chain import Array
 from truearm.modeling.conventions import JointKind
-from truearm.modeling.formats.dh_table import DHConvention, DHTable, dh_csv, dh_table, read_dh_csv
+from truearm.modeling.formats.dh_csv import dh_csv, read_dh_csv
+from truearm.modeling.formats.dh_table import DHConvention, DHTable, dh_table
 from truearm.modeling.parts import Joint
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform

@@ -12,9 +12,11 @@ import typer
 from truearm.cli.axes import axes
 from truearm.cli.calibrate import calibrate
 from truearm.cli.check import check
+from truearm.cli.compensate import compensate
 from truearm.cli.convert import convert
 from truearm.cli.devices import devices
 from truearm.cli.distances import distances
+from truearm.cli.export import export
 from truearm.cli.hexapod import app as hexapod
 from truearm.cli.ik import ik
 from truearm.cli.importing import app as importing
@@ -62,6 +64,7 @@ app.command()(check)
 app.command()(calibrate)
 app.command()(validate)
 app.command()(distances)
+app.command()(compensate)
 app.command()(ik)
 app.command()(plan)
 app.command()(axes)
@@ -74,6 +77,7 @@ app.add_typer(hexapod, name="hexapod")
 app.command()(robots)
 app.command()(show)
 app.command()(convert)
+app.command()(export)
 app.command("new-robot")(new_robot)
 app.command(help=HELP)(study)
 app.command()(example)

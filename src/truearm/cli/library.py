@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -55,6 +56,10 @@ def show(
         typer.echo(f"Payload: {content['payload']['mass_kg']:g} kg at x {x:g}  y {y:g}  z {z:g} mm of the flange")
     if loaded.gravity != GRAVITY:
         typer.echo("Free fall: {:g}, {:g}, {:g} m/s^2 in the base frame".format(*loaded.gravity))
+    if content["controller"]:
+        typer.echo(f"Controller: {content['controller'].get('source', 'as its file says')}")
+        for line in _controller_lines(content["controller"], content["joints"]):
+            typer.echo(f"  {line}")
     for key, label in (("effects", "Joint effects"), ("truths", "Truths for simulation"), ("targets", "Targets")):
         if content[key]:
             typer.echo(f"{label}: {', '.join(content[key])}")
@@ -62,10 +67,40 @@ def show(
         typer.echo(f"History: {line}")
 
 
+def _controller_lines(entry: dict[str, Any], joints: list[dict[str, Any]]) -> Iterator[str]:
+    """Say what of a controller differs from the model; `entry` is what a robot file would say of it."""
+    units = {joint["name"]: "deg" if joint["type"] == "revolute" else "mm" for joint in joints}
+    for row in entry.get("joints", []):
+        counted = [row["joint"], *(_share(value, name) for name, value in row.get("coupling", {}).items())]
+        text = " + ".join(counted).replace("+ -", "- ")
+        if "sign" in row:
+            text = f"-({text})" if len(counted) > 1 else f"-{text}"
+        if "zero" in row:
+            text += f" {'-' if row['zero'] < 0 else '+'} {abs(row['zero']):g} {units[row['joint']]}"
+        text += "".join(
+            f", {row[f'pulses_per_{unit}']:.9g} pulses per {unit}"
+            for unit in ("degree", "mm")
+            if f"pulses_per_{unit}" in row
+        )
+        yield f"reading of {row['joint']} = {text}"
+    for name in ("base", "flange"):
+        if name in entry:
+            x, y, z = entry[name]["translation"]
+            quaternion = " ".join(f"{v:g}" for v in entry[name]["quaternion"])
+            yield f"{name} frame at x {x:g}  y {y:g}  z {z:g} mm of the model's, quaternion {quaternion}"
+    if entry.keys() <= {"source"}:
+        yield "joints and frames are the model's"
+
+
+def _share(value: float, name: str) -> str:
+    return {1.0: name, -1.0: f"-{name}"}.get(value, f"{value:g} {name}")
+
+
 def _content(robot: Robot) -> dict[str, Any]:
     import numpy as np
 
     from truearm.measurement.truths import truth_names
+    from truearm.modeling.formats.controller_entry import controller_entry
     from truearm.units import SHOWN_AS, from_si, written
 
     shown = SHOWN_AS
@@ -99,6 +134,7 @@ def _content(robot: Robot) -> dict[str, Any]:
             "cog_mm": [written(v, "mm") for v in robot.payload.cog],
         },
         "gravity": list(robot.gravity),
+        "controller": controller_entry(robot.controller, robot.joints),
         "tools": list(robot.tools),
         "truths": list(truth_names(robot)),
         "targets": [target.name for target in robot.targets],

@@ -13,16 +13,20 @@ def demo(
         "truearm-demo"
     ),
 ) -> None:
-    """Run the main job on a built-in digital twin of an ABB IRB 120."""
+    """Run the main job on a built-in digital twin of an ABB IRB 120: calibrate it and correct a program."""
     from truearm.cli.calibrate import exit_unless_finished, print_calibration
+    from truearm.cli.compensate import print_checked, print_correction
     from truearm.cli.output import progress
     from truearm.demonstration import demonstration
 
     with progress() as say:
-        calibration = demonstration(out, say)
-    print_calibration(calibration)
+        shown = demonstration(out, say)
+    print_calibration(shown.calibration)
     typer.echo(f"The report is {out / 'report.html'}; open it in a browser.")
-    exit_unless_finished(calibration)
+    exit_unless_finished(shown.calibration)
+    print_correction(shown.correction)
+    print_checked(shown.correction)
+    typer.echo(f"The corrected program and its report are in {out / 'corrected'}.")
 
 
 def example(folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder to write into.")]) -> None:

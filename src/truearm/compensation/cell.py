@@ -131,6 +131,10 @@ class Cell:
     frames: dict[str, Placed]
 
 
+#: No tool and no frame was given.
+NOTHING_GIVEN: Final = Cell({}, {})
+
+
 def matrix(place: Transform) -> Array:
     """Return a transform as a matrix ``(4, 4)``."""
     made = np.eye(4)

@@ -15,7 +15,7 @@ from truearm.errors import InputError
 from truearm.modeling.chain import Array
 from truearm.modeling.inverse.branches import BRANCHES, branch_rule
 from truearm.modeling.inverse.kinematics import inverse
-from truearm.modeling.inverse.solutions import JointSolutions
+from truearm.modeling.inverse.solutions import JointSolutions, PoseStatus
 from truearm.modeling.robot import Robot
 
 
@@ -93,33 +93,79 @@ def fake_targets(robot: Robot, flange: Array, near: Array) -> FakeTargets:
     if rule is None:
         found = inverse(robot, position, rotation, seed=near)
         return FakeTargets(matrices(nominal, found.joints), found)
-    number = rule.numbers(nominal.sweep(near))
+    # The controller's branch is that of the nominal arm. Next to a singular posture the calibrated arm may call the
+    # same joints by another name: it is asked for its own name first, and for all its branches where that misses.
+    meant = rule.numbers(nominal.sweep(near))
+    found = _on_branches(robot, flange, near, rule.numbers(robot.sweep(near)))
+    there = rule.numbers(nominal.sweep(found.joints)) == meant
+    missed = np.flatnonzero(~there | ~_usable(found))
+    if len(missed):
+        every = inverse(robot, position[missed], rotation[missed], branch="all", seed=near[missed])
+        agrees = rule.numbers(nominal.sweep(every.joints)) == meant[missed][every.pose]
+        away = np.abs(every.joints - near[missed][every.pose]).max(axis=1)
+        cost = away + np.where(_usable(every), 0.0, 1e3) + np.where(agrees, 0.0, 1e6)
+        order = np.lexsort((cost, every.pose))
+        first = order[np.unique(every.pose[order], return_index=True)[1]]
+        # Where none is on the branch what was found stays, which is near to what was meant.
+        better = agrees[first] & (_usable(every)[first] | ~there[missed])
+        found = _merged([(np.arange(len(near)), found), (missed[better], _on_rows(every, first[better]))], len(near))
+        there = rule.numbers(nominal.sweep(found.joints)) == meant
+    status = [
+        s if same or not s.usable else PoseStatus.BRANCH_LOST for s, same in zip(found.status, there, strict=True)
+    ]
+    branch = tuple(BRANCHES[number] for number in rule.numbers(nominal.sweep(found.joints)).tolist())
+    return FakeTargets(matrices(nominal, found.joints), replace(found, status=tuple(status), branch=branch))
+
+
+def _on_branches(robot: Robot, flange: Array, near: Array, number: NDArray[np.intp]) -> JointSolutions:
+    """Return solutions for poses, each on a branch of its own."""
     parts = []
     for branch in np.unique(number).tolist():
         rows = np.flatnonzero(number == branch)
-        parts.append((rows, inverse(robot, position[rows], rotation[rows], branch=BRANCHES[branch], seed=near[rows])))
-    found = _merged(parts, len(flange))
-    return FakeTargets(matrices(nominal, found.joints), found)
+        position, rotation = flange[rows, :3, 3], flange[rows, :3, :3]
+        parts.append((rows, inverse(robot, position, rotation, branch=BRANCHES[branch], seed=near[rows])))
+    return _merged(parts, len(flange))
+
+
+def _on_rows(found: JointSolutions, rows: NDArray[np.intp]) -> JointSolutions:
+    return replace(
+        found,
+        poses=len(rows),
+        pose=np.arange(len(rows)),
+        joints=found.joints[rows],
+        status=tuple(found.status[row] for row in rows.tolist()),
+        branch=tuple(found.branch[row] for row in rows.tolist()),
+        position_error=found.position_error[rows],
+        orientation_error=found.orientation_error[rows],
+        beyond=found.beyond[rows],
+        singular_value=found.singular_value[rows],
+    )
+
+
+def _usable(found: JointSolutions) -> NDArray[np.bool_]:
+    return np.array([status.usable for status in found.status], dtype=bool)
 
 
 def _merged(parts: list[tuple[NDArray[np.intp], JointSolutions]], count: int) -> JointSolutions:
-    """Return solutions of parts of the poses, one row each, as those of all poses in their order."""
-    rows = np.concatenate([rows for rows, _ in parts]) if parts else np.zeros(0, int)
-    order = np.argsort(rows)
+    """Return solutions ``(rows, solution of each)`` as those of all poses in their order; a later part counts more."""
+    place, offset = np.zeros(count, dtype=int), 0
+    for rows, _ in parts:
+        place[rows] = offset + np.arange(len(rows))
+        offset += len(rows)
+    every = [found for _, found in parts]
 
     def joined(arrays: list[Array]) -> Array:
-        return np.asarray(np.concatenate(arrays)[order])
+        return np.asarray(np.concatenate(arrays)[place])
 
-    every = [found for _, found in parts]
     return JointSolutions(
         poses=count,
         pose=np.arange(count),
         joints=joined([s.joints for s in every]),
-        status=tuple(np.concatenate([np.array(s.status, object) for s in every])[order].tolist()),
-        branch=tuple(np.concatenate([np.array(s.branch, object) for s in every])[order].tolist()),
+        status=tuple(np.concatenate([np.array(s.status, object) for s in every])[place].tolist()),
+        branch=tuple(np.concatenate([np.array(s.branch, object) for s in every])[place].tolist()),
         position_error=joined([s.position_error for s in every]),
         orientation_error=joined([s.orientation_error for s in every]),
-        beyond=np.concatenate([s.beyond for s in every])[order],
+        beyond=np.concatenate([s.beyond for s in every])[place],
         singular_value=joined([s.singular_value for s in every]),
         joint_names=every[0].joint_names,
     )

@@ -23,8 +23,11 @@ from truearm.modeling.inverse.turns import beyond_limits, limits, nearest_turns
 from truearm.modeling.robot import Robot
 
 _TURN: Final = 2.0 * np.pi
-#: A reading may be this far [rad] beyond a bound of the configuration: programs round, and joints often stand at 0.
-_ROUNDING: Final = float(np.radians(0.01))
+#: Turns that a joint may have made.
+_TURNS: Final = np.arange(-2.0, 3.0)
+#: A reading may be this far [rad] beyond a bound of the configuration. Joints often stand at a bound, as at 0, and
+#: controllers then take the posture at hand: KUKA's ignore the turn of a joint within 2 deg of zero.
+ON_EDGE: Final = float(np.radians(2.0))
 #: A posture may be this far [rad] beyond a limit: the numbers of the program are rounded.
 _SLACK: Final = 0.02
 #: What a branch's number says, by word and bit.
@@ -55,14 +58,31 @@ class MeantPostures:
     guessed: int | None
 
 
-def agrees(robot: Robot, joints: Array, configuration: Configuration, slack: float = _ROUNDING) -> NDArray[np.bool_]:
+def agrees(robot: Robot, joints: Array, configuration: Configuration, slack: float = ON_EDGE) -> NDArray[np.bool_]:
     """Return whether joints ``(n, joints)`` of a robot lie within the readings of a configuration, ``(n,)``."""
     shown = robot.controller.readings(joints)
     inside = np.ones(len(joints), dtype=bool)
-    for joint, low, high in configuration.readings:
-        reading = shown[:, joint - 1]
-        inside &= (reading >= low - slack) & (reading < high + slack)
+    for joint in _bound(configuration):
+        inside &= _allowed(configuration, joint, shown[:, joint - 1], slack)
     return inside
+
+
+def _bound(configuration: Configuration) -> tuple[int, ...]:
+    """Return the joints, from 1, whose readings a configuration says something of."""
+    return tuple(dict.fromkeys(joint for joint, _, _ in (*configuration.readings, *configuration.outside)))
+
+
+def _allowed(configuration: Configuration, joint: int, reading: Array, slack: float) -> NDArray[np.bool_]:
+    """Return which readings of a joint a configuration allows, in the shape of `reading`."""
+    allowed = np.ones(reading.shape, dtype=bool)
+    with np.errstate(invalid="ignore"):
+        for number, low, high in configuration.readings:
+            if number == joint:
+                allowed &= (reading >= low - slack) & (reading < high + slack)
+        for number, low, high in configuration.outside:
+            if number == joint:
+                allowed &= (reading < low + slack) | (reading >= high - slack)
+    return allowed
 
 
 def meant_postures(
@@ -150,20 +170,16 @@ def _confine(
             said = getattr(configuration, word)
             if said is not None:
                 possible[rows] &= (number[rows] & bit) == values[said]
-        for joint, low, high in configuration.readings:
+        for joint in _bound(configuration):
             shown = nominal.controller.readings(candidates[rows].reshape(-1, candidates.shape[2]))
-            reading = shown[:, joint - 1].reshape(len(rows), SLOTS)
-            with np.errstate(invalid="ignore"):
-                # Unbounded intervals say a side: the turn nearest to zero on that side.
-                if np.isfinite(low):
-                    turns = np.ceil((low - _ROUNDING - reading) / _TURN)
-                else:
-                    turns = np.floor((high + _ROUNDING - reading) / _TURN)
-                moved = reading + turns * _TURN
-                inside = (moved >= low - _ROUNDING) & (moved < high + _ROUNDING)
-            candidates[rows, :, joint - 1] += np.where(inside, signs[joint - 1] * turns * _TURN, 0.0)
+            reading = shown[:, joint - 1].reshape(len(rows), SLOTS, 1) + _TURNS * _TURN
+            allowed = _allowed(configuration, joint, reading, ON_EDGE)
+            # Of the turns that are allowed the one nearest to zero.
+            turn = np.argmin(np.where(allowed, np.abs(reading), np.inf), axis=2)
+            turns = np.where(allowed.any(axis=2), _TURNS[turn], 0.0)
+            candidates[rows, :, joint - 1] += signs[joint - 1] * turns * _TURN
             fixed[rows, :, joint - 1] = True
-            possible[rows] &= inside
+            possible[rows] &= allowed.any(axis=2)
 
 
 class _Walk:
@@ -193,7 +209,7 @@ class _Walk:
         #: Whether there is a choice.
         self.open: NDArray[np.bool_] = np.asarray((self._possible.sum(axis=1) > 1) | turning)
         self._only = np.argmax(self._possible, axis=1)
-        self._any = self._possible.any(axis=1)
+        self._any: NDArray[np.bool_] = np.asarray(self._possible.any(axis=1))
         self._turned, self._several = turned, several
 
     def chosen(self, row: int, reference: Array | None) -> Array | None:

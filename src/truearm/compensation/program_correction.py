@@ -6,20 +6,20 @@ see :mod:`truearm.compensation.cell` for how to say it and :mod:`truearm.compens
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.compensation.cell import Cell, Placed, matrix
+from truearm.compensation.cell import NOTHING_GIVEN, Cell, Placed, matrix
 from truearm.compensation.fake_targets import FakeTargets, fake_targets, matrices, nominal_robot
 from truearm.compensation.gauge import base_shift, best_agreement, turns_between
 from truearm.compensation.meant_postures import MeantPostures, agrees, meant_postures
 from truearm.compensation.program_poses import edits_of, joint_numbers, joints_of, place, pose_numbers, poses_of
-from truearm.compensation.programs.program import Edit, Program, Skipped
+from truearm.compensation.programs.program import Configuration, Edit, Program, Skipped
 from truearm.errors import InputError, nearest_names
 from truearm.modeling.chain import Array
 from truearm.modeling.inverse.solutions import PoseStatus
@@ -28,8 +28,13 @@ from truearm.modeling.transform import IDENTITY
 
 #: The base that nobody measured is found with this many targets, evenly along the programs.
 _TARGETS_FOR_BASE: Final = 2000
+#: A joint within this of a bound [rad] is on it: the numbers of programs are rounded.
+_ROUNDING: Final = float(np.radians(0.01))
 
 Told = Literal["identified", "assumed"]
+#: For targets ``(m,)``, poses ``(m, 4, 4)`` of their tools in their frames and joints ``(m, joints)`` near the answer:
+#: fake targets ``(m, 4, 4)``, and whether each was found ``(m,)``.
+Between = Callable[[NDArray[np.intp], Array, Array], tuple[Array, NDArray[np.bool_]]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +57,8 @@ class Correction:
         Tips that the targets mean in the controller's base frame, ``(n, 4, 4)`` [m].
     joints
         Readings of the model with which the real robot is there [rad or m], ``(n, joints)``.
+    on_edge
+        Corrected targets with a joint that leaves the readings of its configuration, by less than controllers mind.
     """
 
     program: Program
@@ -62,6 +69,7 @@ class Correction:
     after: Array
     tips: Array
     joints: Array
+    on_edge: tuple[int, ...]
 
     @cached_property
     def moved(self) -> Array:
@@ -104,11 +112,14 @@ class CorrectedPrograms:
         What they refer to.
     guessed
         Where the posture of a first pose was guessed, in words; empty if nowhere.
+    between
+        One a program: how poses between its targets are put right.
     """
 
     corrections: tuple[Correction, ...]
     frames: Frames
     guessed: tuple[str, ...]
+    between: tuple[Between, ...]
 
 
 def corrected_programs(
@@ -153,7 +164,16 @@ def corrected_programs(
         tuple(one.correction(base, flange) for one in meant),
         Frames(tools, frames, base, flange),
         tuple(one.guess for one in meant if one.guess),
+        tuple(partial(one.between, base, flange) for one in meant),
     )
+
+
+def commanded(robot: Robot, program: Program, cell: Cell = NOTHING_GIVEN) -> Array:
+    """Return the readings of the model to which the controller sends the robot, ``(n, joints)`` [rad or m].
+
+    It believes in the nominal robot. NaN where it finds none; `cell` is asked for what the program does not define.
+    """
+    return _Meant(robot, nominal_robot(robot), program, cell).joints
 
 
 def _told(programs: Sequence[Program], cell: Cell, kind: Literal["tool", "frame"]) -> Told:
@@ -204,6 +224,7 @@ class _Meant:
         self._postures: MeantPostures = meant_postures(nominal, flange, configurations, known, order)
         found = self._postures
         self.guess = "" if found.guessed is None else place(program, targets[found.guessed])
+        self.joints = found.joints
         self._usable: NDArray[np.bool_] = np.asarray(~np.isnan(found.joints).any(axis=1))
 
     def some(self, count: int) -> NDArray[np.intp]:
@@ -214,8 +235,10 @@ class _Meant:
 
     def tips_with(self, rows: NDArray[np.intp], base: Array, flange: Array) -> tuple[Array, Array]:
         """Return tips of targets in the controller's base frame, as meant and as corrected, without those not found."""
+        if not len(rows):
+            return np.zeros((0, 4, 4)), np.zeros((0, 4, 4))
         found = self._found(rows, base, flange)
-        good = np.array([status.usable for status in found.solutions.status], dtype=bool)
+        good = _usable(found)
         meant = self._base.shown[rows] @ self._poses[rows]
         return meant[good], (found.flange @ self._tool.shown[rows])[good]
 
@@ -225,6 +248,7 @@ class _Meant:
         rows = np.flatnonzero(self._usable)
         after, joints = self._poses.copy(), self._postures.joints.copy()
         reasons: dict[int, str] = {}
+        on_edge: tuple[int, ...] = ()
         for row in np.flatnonzero(~self._usable).tolist():
             reasons[row] = (
                 "the nominal robot reaches it in no posture of the configuration that the program states"
@@ -238,6 +262,7 @@ class _Meant:
                 if not found.solutions.status[at].usable:
                     reasons[row] = _reason(found, at)
             reasons |= self._changed_turns(rows, joints, reasons)
+            on_edge = self._on_edge(rows, joints, reasons)
             after[rows] = np.linalg.inv(self._base.shown[rows]) @ found.flange @ self._tool.shown[rows]
         corrected = np.ones(count, dtype=bool)
         corrected[list(reasons)] = False
@@ -255,32 +280,54 @@ class _Meant:
             after=after,
             tips=self._base.shown @ self._poses,
             joints=joints,
+            on_edge=on_edge,
         )
+
+    def between(
+        self, base: Array, flange: Array, rows: NDArray[np.intp], poses: Array, near: Array
+    ) -> tuple[Array, NDArray[np.bool_]]:
+        """Return fake targets for poses in the frames, and with the tools, of targets; see :data:`Between`."""
+        wanted = self._base.real(rows, base) @ poses @ np.linalg.inv(self._tool.real(rows, flange))
+        found = fake_targets(self._robot, wanted, near)
+        fakes = np.linalg.inv(self._base.shown[rows]) @ found.flange @ self._tool.shown[rows]
+        return fakes, _usable(found)
 
     def _found(self, rows: NDArray[np.intp], base: Array, flange: Array) -> FakeTargets:
         wanted = self._base.real(rows, base) @ self._poses[rows] @ np.linalg.inv(self._tool.real(rows, flange))
         return fake_targets(self._robot, wanted, self._postures.joints[rows])
 
-    def _changed_turns(self, rows: NDArray[np.intp], joints: Array, reasons: dict[int, str]) -> dict[int, str]:
-        """Return the targets that were in their configuration and would be no more, with the reason."""
-        groups: dict[object, list[int]] = {}
+    def _changed_turns(self, rows: NDArray[np.intp], joints: Array, reasons: Mapping[int, str]) -> dict[int, str]:
+        """Return the targets that would leave the readings of their configuration, with the reason."""
+        changed: dict[int, str] = {}
+        for configuration, members in self._configured(rows, reasons):
+            for row in members[~agrees(self._robot, joints[members], configuration)].tolist():
+                shown = np.degrees(self._robot.controller.readings(joints[row][None])[0])
+                words = ", ".join(f"{v:.2f}" for v in shown)
+                changed[row] = (
+                    f"it would leave the configuration in the program: the joints would have to read {words} deg"
+                )
+        return changed
+
+    def _on_edge(self, rows: NDArray[np.intp], joints: Array, reasons: Mapping[int, str]) -> tuple[int, ...]:
+        """Return the targets that leave the readings of their configuration and did not before."""
+        found: list[int] = []
+        for configuration, members in self._configured(rows, reasons):
+            before = agrees(self._robot, self._postures.joints[members], configuration, _ROUNDING)
+            after = agrees(self._robot, joints[members], configuration, _ROUNDING)
+            found += members[before & ~after].tolist()
+        return tuple(sorted(found))
+
+    def _configured(
+        self, rows: NDArray[np.intp], reasons: Mapping[int, str]
+    ) -> Iterator[tuple[Configuration, NDArray[np.intp]]]:
+        """Return the targets without a reason against them by their configuration, where it says readings."""
+        groups: dict[Configuration, list[int]] = {}
         for row in rows.tolist():
             configuration = self._program.targets[row].configuration
-            if row not in reasons and configuration.readings:
+            if row not in reasons and (configuration.readings or configuration.outside):
                 groups.setdefault(configuration, []).append(row)
-        changed: dict[int, str] = {}
-        for members in groups.values():
-            configuration = self._program.targets[members[0]].configuration
-            for bound in configuration.readings:
-                one = type(configuration)(readings=(bound,))
-                for row in np.array(members)[~agrees(self._robot, joints[members], one)].tolist():
-                    name = self._robot.joints[bound[0] - 1].name
-                    reading = self._robot.controller.readings(joints[row][None])[0, bound[0] - 1]
-                    changed[row] = (
-                        f"{name} would have to read {np.degrees(reading):.3f} deg, which is beyond what the "
-                        "configuration in the program says"
-                    )
-        return changed
+        for configuration, members in groups.items():
+            yield configuration, np.array(members)
 
 
 class _Places:
@@ -328,6 +375,10 @@ def _undefined(program: Program, name: str, names: list[str], kind: str, known: 
         cure=(f"Did you mean {' or '.join(near)}? " if near else "")
         + f"Give the file that defines it along with the program, or what the controller has with --{kind} FILE.",
     )
+
+
+def _usable(found: FakeTargets) -> NDArray[np.bool_]:
+    return np.array([status.usable for status in found.solutions.status], dtype=bool)
 
 
 def _reason(found: FakeTargets, at: int) -> str:

@@ -124,12 +124,15 @@ def edits_of(program: Program, numbers: dict[int, Array]) -> list[Edit]:
         target = program.targets[index]
         text, (lengths, others) = program.sources[target.source].text, target.form.decimals
         fewest = [lengths] * 3 + [others] * (len(new) - 3) if target.form.kind == "pose" else [others] * len(new)
-        for span, value, decimals in zip(target.places, new.tolist(), fewest, strict=True):
+        for number, (span, value, decimals) in enumerate(zip(target.places, new.tolist(), fewest, strict=True)):
             if span is not None:
-                old = text[span[0] : span[1]]
+                old = text[span[0] : span[1]] or "0"
                 made = rewritten(old, value, decimals)
                 if made != old:
-                    edits.append(Edit(target.source, *span, made))
+                    absent = span[0] == span[1]
+                    edits.append(
+                        Edit(target.source, *span, target.form.absent[number].format(made) if absent else made)
+                    )
     return edits
 
 

@@ -19,11 +19,9 @@ from truearm.modeling.transform import IDENTITY, Transform
 
 @dataclass(frozen=True)
 class Controller:
-    """What a robot's controller shows of the joints and the frames of the model.
+    """What a robot's controller shows of the joints, and where its frames stand in those of the model.
 
-    ::
-
-        reading_i = zero_i + sign_i * (joint_i + sum_j coupling_ij * joint_j)
+    ``reading_i = zero_i + sign_i * (joint_i + sum_j coupling_ij * joint_j)``
 
     Attributes
     ----------
@@ -41,6 +39,8 @@ class Controller:
         ``T_base_controllerbase``: the controller's base frame in the robot's.
     flange
         ``T_flange_controllerflange``: the controller's flange frame in the robot's.
+    source
+        Where this is known from.
     """
 
     signs: tuple[int, ...] = ()
@@ -49,6 +49,7 @@ class Controller:
     pulses: tuple[float | None, ...] = ()
     base: Transform = IDENTITY
     flange: Transform = IDENTITY
+    source: str = ""
 
     def coupling(self, count: int) -> Array:
         """Return what readings of `count` joints count, before signs and zeros: a matrix ``(count, count)``."""
@@ -70,7 +71,7 @@ class Controller:
         counted = turned * self.signs if self.signs else turned
         if not self.couplings:
             return counted
-        return np.asarray(np.linalg.solve(self.coupling(readings.shape[1]), counted.T).T)
+        return np.asarray(np.linalg.solve(self.coupling(readings.shape[1]), counted.T).T, float)
 
     def pulses_of(self, readings: Array) -> Array:
         """Return the pulses ``(n, joints)`` of the motors at readings ``(n, joints)`` of the controller [rad or m].
@@ -93,15 +94,15 @@ class Controller:
         return pulses / self._known_pulses(pulses.shape[1])
 
     def _known_pulses(self, count: int) -> Array:
-        known = [pulses for pulses in self.pulses or (None,) * count if pulses is not None]
-        if len(known) < count:
-            missing = [i for i, pulses in enumerate(self.pulses or (None,) * count, 1) if pulses is None]
+        pulses = self.pulses or (None,) * count
+        missing = [number for number, per_unit in enumerate(pulses, 1) if per_unit is None]
+        if missing:
             raise InputError(
-                "the motor pulses of a joint are not known",
+                "nobody knows how many motor pulses make a degree or a mm",
                 where=f"joint {', '.join(map(str, missing))}",
-                cure="Say in the robot file how many make a degree or a mm, under controller, joints.",
+                cure="Give pulses_per_degree or pulses_per_mm in the robot file, under controller, joints.",
             )
-        return np.array(known)
+        return np.array(pulses, dtype=float)
 
 
 #: A controller that counts joints and has its frames as the model does.

@@ -35,7 +35,7 @@ _BINS: Final = 40
 _LOGARITHMIC: Final = 12.0
 
 
-def histogram(before: Array, after: Array, unit: str, what: str) -> Figure:
+def histogram(before: Array, after: Array, unit: str, what: str, of: str = "readings") -> Figure:
     """Show how errors are spread before and after, in the same bins.
 
     Parameters
@@ -44,6 +44,8 @@ def histogram(before: Array, after: Array, unit: str, what: str) -> Figure:
         Error norms in `unit`.
     what
         The quantity, for the axis: ``position error``.
+    of
+        What is counted.
     """
     both = np.concatenate([before, after])
     top = max(float(both.max()), 1e-9)
@@ -64,14 +66,14 @@ def histogram(before: Array, after: Array, unit: str, what: str) -> Figure:
             "customdata": ranges,
             "marker": {"color": colour, "line": {"width": 0}},
             "opacity": 0.75,
-            "hovertemplate": f"{name}<br>%{{customdata}}: %{{y}} readings<extra></extra>",
+            "hovertemplate": f"{name}<br>%{{customdata}}: %{{y}} {of}<extra></extra>",
         }
         for name, errors, colour in (("before", before, BEFORE), ("after", after, AFTER))
     ]
     x = axis(f"{what} [{unit}]")
     if logarithmic:
         x = logarithmic_axis(f"{what} [{unit}]", float(edges[0]), float(edges[-1]))
-    return figure(traces, 330, xaxis=x, yaxis=axis("readings"), barmode="overlay", bargap=0)
+    return figure(traces, 330, xaxis=x, yaxis=axis(of), barmode="overlay", bargap=0)
 
 
 def workspace(part: Dataset, tips: Array, before: Array, after: Array) -> Figure:

@@ -58,6 +58,9 @@ class Form:
         How a pose is turned; None if its numbers are a position alone.
     decimals
         Fewest decimals of a number that is written: of lengths, and of angles or of a quaternion's numbers.
+    absent
+        For languages that do not write zeros: what to put into the text for a number that is not written, with ``{}``
+        where the number goes, one for each number. Such a number is 0 and its place is empty, where the text belongs.
     """
 
     name: str
@@ -66,6 +69,7 @@ class Form:
     angle: float = 1.0
     orientation: Orientation | None = None
     decimals: tuple[int, int] = (3, 4)
+    absent: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -79,6 +83,8 @@ class Configuration:
     readings
         ``(joint, low, high)``: the joint, from 1, reads `low` or more and less than `high` [rad], as the controller
         shows it.
+    outside
+        ``(joint, low, high)``: the joint reads less than `low`, or `high` or more [rad].
     near
         Readings [rad or m], as the controller shows them, that the posture is nearest to; if None, and the rest leaves
         a choice, nearest to where the robot comes from.
@@ -88,6 +94,7 @@ class Configuration:
     elbow: Literal["up", "down"] | None = None
     wrist: Literal["noflip", "flip"] | None = None
     readings: tuple[tuple[int, float, float], ...] = ()
+    outside: tuple[tuple[int, float, float], ...] = ()
     near: tuple[float, ...] | None = None
 
 
@@ -111,7 +118,8 @@ class ProgramTarget:
     values
         Its numbers, in the file's units.
     places
-        Where each of `values` stands in the text: ``(start, stop)``, or None for a number that is not written.
+        Where each of `values` stands in the text: ``(start, stop)``; ``(place, place)`` for a number that is not
+        written and can be put in there, see :attr:`Form.absent`; None for one that cannot.
     tool, frame
         Names of the tool and of the work object, base or user frame that hold; empty for the flange and the robot's
         own base.
@@ -152,11 +160,13 @@ class Move:
     via
         Index of the target that a circle passes.
     routine
-        Which routine of the program, from 0: what stands before a routine's first move is not known.
+        Which stretch of the program, from 0: the moves of a stretch follow each other in the text, and nothing between
+        them jumps, calls or moves the robot. Where the robot is before the first of them is not known.
     statement
         Where the whole instruction stands in the text, ``(start, stop)``, from its first to after its last character.
     target_text, via_text
-        Where the words for the targets stand in the text, inside of `statement`.
+        Where the words for the targets stand in the text, inside of `statement`. ``(0, 0)`` for a move that cannot be
+        divided.
     """
 
     kind: MoveKind
@@ -279,6 +289,10 @@ class Language:
         Read the files of one program, given together.
     divide
         Return the edits that divide moves; None if the language's programs cannot be divided yet.
+    together
+        Which files are one program: each for itself, those of one name but for the suffix, or all that are given.
+    companions
+        Pairs of suffixes: beside a file of the first may lie one of the second that belongs to it.
     """
 
     name: str
@@ -287,3 +301,13 @@ class Language:
     is_one: Callable[[str], bool]
     read: Callable[[Sequence[Source]], Program]
     divide: Callable[[Program, Sequence[Division]], list[Edit]] | None = None
+    together: Literal["file", "stem", "all"] = "file"
+    companions: tuple[tuple[str, str], ...] = ()
+
+    def programs(self, sources: Sequence[Source]) -> tuple[Program, ...]:
+        """Read files that may be of several programs."""
+        groups: dict[object, list[Source]] = {}
+        for source in sources:
+            keys = {"file": source.path, "stem": source.path.with_suffix(""), "all": None}
+            groups.setdefault(keys[self.together], []).append(source)
+        return tuple(self.read(group) for group in groups.values())

@@ -55,9 +55,10 @@ def converted(robot: Robot, convention_name: str) -> Robot:
 
     Targets, limits, joint effects, tools and payload stay. Link masses move with their links' frames. The base frame
     stays where the convention can start from it; one that starts on the first axis (DH, Hayati, S-model, CPC, MCPC)
-    gets the frame on that axis which is nearest to the base, and gravity is given in it. If that turns the base's z,
-    against which weights hang, by more than 1 deg, the masses are left out. Truths are left out too, because they are
-    values of parameters that are no more. The robot's history says whether the base moved and what was left out.
+    gets the frame on that axis which is nearest to the base, and gravity and the controller's base frame are given in
+    it. If that turns the base's z, against which weights hang, by more than 1 deg, the masses are left out. Truths are
+    left out too, because they are values of parameters that are no more. The robot's history says whether the base
+    moved and what was left out.
 
     Raises
     ------
@@ -96,7 +97,9 @@ def converted(robot: Robot, convention_name: str) -> Robot:
     )
     if moved and links.base is not None:
         x, y, z = (round(float(v), _DECIMALS) + 0.0 for v in links.base[:3, :3].T @ base[:3, :3] @ robot.gravity)
-        made = replace(_based(made, links.base), gravity=(x, y, z))
+        its = np.linalg.inv(links.base) @ base @ _matrix(robot.controller.base)
+        controller = replace(robot.controller, base=_transform(its))
+        made = replace(_based(made, links.base), gravity=(x, y, z), controller=controller)
     behind = np.linalg.inv(at_zero(made, made.rigid.trunk.elements)) @ flange
     if np.abs(behind - np.eye(4)).max() > _SAME:
         made = replace(made, flange=_transform(behind))
@@ -121,6 +124,12 @@ def _based(robot: Robot, base: Array) -> Robot:
     turned = replace(robot, base_quaternion=place.quaternion)
     slides = zip(("base_x", "base_y", "base_z"), place.translation, strict=True)
     return turned.with_parameters(turned.parameters[name].restarted(value) for name, value in slides if value != 0.0)
+
+
+def _matrix(place: Transform) -> Array:
+    made = np.eye(4)
+    made[:3, :3], made[:3, 3] = place.rotation, place.translation
+    return made
 
 
 def _transform(frame: Array) -> Transform:

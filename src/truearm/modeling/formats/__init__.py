@@ -1,1 +1,1 @@
-"""Files that hold robots: truearm's own YAML, URDF, DH tables."""
+"""Files that hold robots: truearm's own YAML, URDF, DH tables, JSON, Python."""

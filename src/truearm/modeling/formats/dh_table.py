@@ -14,21 +14,17 @@ sliding joint is free to move sideways, so that it can always be laid through on
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from pathlib import Path
 from typing import Final, Literal
 
 import numpy as np
 
 from truearm.errors import InputError
-from truearm.files import read_text
 from truearm.modeling.chain import Array
-from truearm.modeling.conventions import JOINT, JointKind
+from truearm.modeling.conventions import JointKind, convention
 from truearm.modeling.lines import (
     PARALLEL,
     JointAxis,
@@ -44,16 +40,15 @@ from truearm.modeling.lines import (
 from truearm.modeling.parts import Joint
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
-from truearm.units import ANGLE_UNITS, LENGTH_UNITS, SHOWN_AS, as_number, checked_unit, sized_si, written
 
 DHConvention = Literal["standard-dh", "modified-dh"]
+#: With Hayati's beta a table can hold nearly parallel axes too.
+TableConvention = Literal["standard-dh", "modified-dh", "hayati"]
 
 #: Below this angle [rad] the common normal of two axes that are not parallel runs away.
 _NEARLY_PARALLEL: Final = math.radians(0.5)
 #: Below this rest [m, rad] what lies behind the last axis is a DH link's own a and alpha.
 _REST: Final = 1e-12
-
-_COLUMNS: Final = {"a": "m", "alpha": "rad", "d": "m", JOINT: "rad"}
 
 
 @dataclass(frozen=True)
@@ -68,8 +63,8 @@ class DHRow:
         ``revolute`` or ``prismatic``.
     a, d
         [m].
-    alpha, theta_offset
-        [rad].
+    alpha, theta_offset, beta
+        [rad]; beta is that of a Hayati table.
     """
 
     joint: str
@@ -78,6 +73,7 @@ class DHRow:
     alpha: float
     d: float
     theta_offset: float
+    beta: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -87,7 +83,7 @@ class DHTable:
     Attributes
     ----------
     convention_name
-        ``standard-dh`` or ``modified-dh``: the order in which a row's transforms stand.
+        ``standard-dh``, ``modified-dh`` or ``hayati``: the order in which a row's transforms stand.
     rows
         From base to flange.
     base
@@ -96,14 +92,15 @@ class DHTable:
         From the last row to the flange.
     """
 
-    convention_name: DHConvention
+    convention_name: TableConvention
     rows: tuple[DHRow, ...]
     base: Transform
     flange: Transform
 
     def joints(self) -> tuple[Joint, ...]:
         """Return the rows as joints of a robot of this convention."""
-        return tuple(Joint(r.joint, r.kind, {c: getattr(r, c) for c in _COLUMNS}) for r in self.rows)
+        columns = convention(self.convention_name).row_units("revolute")
+        return tuple(Joint(r.joint, r.kind, {c: getattr(r, c) for c in columns}) for r in self.rows)
 
 
 def dh_table(robot: Robot, convention_name: DHConvention) -> DHTable:
@@ -162,8 +159,8 @@ def _axes(robot: Robot) -> list[JointAxis]:
                 came=f"{axis.joint.name} and {following.joint.name}, "
                 f"{math.degrees(axis.angle(following)):.3g} deg apart",
                 allowed=f"parallel to 1e-9 rad, or at least {math.degrees(_NEARLY_PARALLEL):g} deg apart",
-                cure="What describes such axes is Hayati's beta: keep the robot file (convention hayati or "
-                "modified-hayati), or write a URDF.",
+                cure="What describes such axes is Hayati's beta: take the convention hayati (as with truearm export "
+                "--format hayati), keep the robot file, or write a URDF.",
             )
     return axes
 
@@ -194,88 +191,3 @@ def _links_at_zero(table: DHTable) -> Array:
     """Return the product of a table's rows with the joint variables at zero, ``(4, 4)``."""
     robot = Robot("table", "", "", table.convention_name, table.joints())
     return at_zero(robot, (element for link in robot.link_elements for element in link))
-
-
-# -- as CSV -------------------------------------------------------------------------------------------------
-
-
-def dh_csv(table: DHTable) -> str:
-    """Return the rows of a table as CSV, in mm and degrees; base and flange are not part of it."""
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(["joint", "type", *(f"{column} [{SHOWN_AS[unit]}]" for column, unit in _COLUMNS.items())])
-    for row in table.rows:
-        shown = (written(getattr(row, column), SHOWN_AS[unit]) for column, unit in _COLUMNS.items())
-        writer.writerow([row.joint, row.kind, *map(repr, shown)])
-    return stream.getvalue()
-
-
-def read_dh_csv(path: Path, convention_name: DHConvention) -> DHTable:
-    """Read a DH table from a CSV file; its base and flange are the identity.
-
-    The columns are ``joint``, ``a [mm]``, ``alpha [deg]``, ``d [mm]`` and ``theta_offset [deg]``, in any
-    order and unit, and ``type`` where a joint slides.
-
-    Parameters
-    ----------
-    convention_name
-        The form the numbers are in; no table says it of itself.
-    """
-    lines = [
-        (f"{path}, line {number}", [cell.strip() for cell in cells])
-        for number, cells in enumerate(csv.reader(io.StringIO(read_text(path))), 1)
-        if any(cell.strip() for cell in cells)
-    ]
-    columns = _header(lines[0][1], lines[0][0])
-    if len(lines) == 1:
-        raise InputError("the table has no rows", where=str(path))
-    rows = []
-    for where, cells in lines[1:]:
-        if len(cells) != len(columns):
-            raise InputError(
-                "the row has not as many cells as the header",
-                where=where,
-                came=len(cells),
-                allowed=str(len(columns)),
-            )
-        entry = dict(zip((name for name, _ in columns), cells, strict=True))
-        kind: JointKind = "prismatic" if entry.get("type") == "prismatic" else "revolute"
-        if entry.get("type", kind) != kind:
-            raise InputError(
-                "a joint has no such type",
-                where=f"{where}, type",
-                came=entry["type"],
-                allowed="revolute, prismatic",
-            )
-        si = {name: _si(entry[name], unit, f"{where}, {name}") for name, unit in columns if unit}
-        rows.append(DHRow(entry["joint"], kind, **si))
-    return DHTable(convention_name, tuple(rows), Transform(), Transform())
-
-
-def _header(cells: Sequence[str], where: str) -> list[tuple[str, str]]:
-    """Return name and unit of each column; names without a unit have an empty one."""
-    columns = []
-    for cell in cells:
-        name, _, rest = cell.strip().partition("[")
-        name, unit = name.strip(), rest.removesuffix("]").strip()
-        if name in _COLUMNS:
-            unit = checked_unit(unit, LENGTH_UNITS if _COLUMNS[name] == "m" else ANGLE_UNITS, f"{where}, column {name}")
-        columns.append((name, unit))
-    names = [name for name, _ in columns]
-    needed = ["joint", *_COLUMNS]
-    if sorted(set(names) - {"type"}) != sorted(needed) or len(set(names)) < len(names):
-        raise InputError(
-            "these are not the columns of a DH table",
-            where=where,
-            came=", ".join(names),
-            allowed=f"{', '.join(needed)}, each once, with their units in brackets; and type",
-            cure="Separate the columns by commas.",
-        )
-    return columns
-
-
-def _si(text: str, unit: str, where: str) -> float:
-    value = as_number(text)
-    if value is None:
-        raise InputError("a number belongs here", where=where, came=text)
-    return sized_si(value, unit, where, came=text)

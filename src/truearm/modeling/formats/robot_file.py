@@ -19,9 +19,23 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstra
 
 from truearm.errors import InputError, nearest_names
 from truearm.files import is_one_line, read_yaml
+from truearm.modeling.controller import AS_THE_MODEL
 from truearm.modeling.conventions import convention
 from truearm.modeling.effects import EFFECTS
 from truearm.modeling.fixtures import Fixture, FixtureKind
+from truearm.modeling.formats.controller_entry import ControllerEntry, controller_entry
+from truearm.modeling.formats.entries import (
+    NAME,
+    STRICT,
+    Name,
+    NotNegative,
+    Number,
+    Place,
+    Positive,
+    Quaternion,
+    Triple,
+    place_entry,
+)
 from truearm.modeling.parameters import Parameter
 from truearm.modeling.parts import (
     GRAVITY,
@@ -43,19 +57,6 @@ SCHEMA = "truearm-robot/1"
 #: Groups of parameters that cannot be negative. An identified value may come out so, and the next calibration starts
 #: from it; what somebody states may not, and a file that somebody wrote has no history.
 _POSITIVE: Final = ("compliance", "bearing-compliance", "backlash", "clearance", "clearance-linear-contact")
-#: What a robot and a joint may be called.
-NAME: Final = r"[A-Za-z0-9][A-Za-z0-9_.-]*"
-
-Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=True)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False, strict=True)]
-Triple = tuple[Number, Number, Number]
-
-
-def _unit_length(q: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
-    if abs(math.hypot(*q) - 1.0) > 1e-6:
-        raise ValueError(f"a quaternion (w, x, y, z) must have length 1, this one has {math.hypot(*q):.6g}")
-    return q
 
 
 def _of_a_body(inertia: Inertia) -> Inertia:
@@ -70,9 +71,7 @@ def _of_a_body(inertia: Inertia) -> Inertia:
     return inertia
 
 
-Quaternion = Annotated[tuple[Number, Number, Number, Number], AfterValidator(_unit_length)]
 Moments = Annotated[tuple[Number, Number, Number, Number, Number, Number], AfterValidator(_of_a_body)]
-Name = Annotated[str, StringConstraints(pattern=f"^{NAME}$", strict=True)]
 
 
 def _one_line(name: str) -> str:
@@ -86,7 +85,7 @@ TargetName = Annotated[str, StringConstraints(strict=True), AfterValidator(_one_
 
 
 class _Entry(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = STRICT
 
 
 class _Units(_Entry):
@@ -102,11 +101,6 @@ class _Joint(BaseModel):
     type: Literal["revolute", "prismatic"] = "revolute"
     limits: tuple[Number, Number] | None = None
     transmission_periods: Annotated[int, Field(strict=True, ge=1, le=10_000)] | None = None
-
-
-class _Place(_Entry):
-    translation: Triple = (0.0, 0.0, 0.0)
-    quaternion: Quaternion | None = None
 
 
 class _Mass(_Entry):
@@ -187,7 +181,8 @@ class RobotFile(_Entry):
         "urdf",
     ]
     joints: list[_Joint] = Field(min_length=1)
-    flange: _Place = _Place()
+    flange: Place = Place()
+    controller: ControllerEntry = ControllerEntry()
     masses: list[_Mass] = []
     payload: _Payload | None = None
     gravity: Annotated[Triple, AfterValidator(_falls)] = GRAVITY
@@ -254,9 +249,8 @@ def robot_from_file(content: RobotFile, where: str) -> Robot:
         source=content.source,
         convention_name=content.convention,
         joints=joints,
-        flange=Transform(
-            metres(content.flange.translation, "flange.translation"), content.flange.quaternion or (1.0, 0.0, 0.0, 0.0)
-        ),
+        flange=content.flange.transform(length, f"{where}, flange"),
+        controller=content.controller.controller(joints, length, angle, f"{where}, controller"),
         masses=tuple(
             LinkMass(
                 m.link,
@@ -436,6 +430,14 @@ def robot_text(robot: Robot) -> str:
         made.fa.set_flow_style()
         return made
 
+    def flowing(content: Any) -> Any:
+        """Return an entry with its lists of numbers, and the rows of its tables, on one line each."""
+        if isinstance(content, dict):
+            return {key: flowing(part) for key, part in content.items()}
+        if isinstance(content, list):
+            return [flow(row) for row in content] if isinstance(content[0], dict) else listed(content)
+        return content
+
     def mm(values: tuple[float, float, float]) -> CommentedSeq:
         return listed([written(v, "mm") for v in values])
 
@@ -466,10 +468,9 @@ def robot_text(robot: Robot) -> str:
         "joints": [joint(j) for j in robot.joints],
     }
     if robot.flange != Transform():
-        content["flange"] = {
-            "translation": mm(robot.flange.translation),
-            "quaternion": listed(list(robot.flange.quaternion)),
-        }
+        content["flange"] = flowing(place_entry(robot.flange))
+    if robot.controller != AS_THE_MODEL:
+        content["controller"] = flowing(controller_entry(robot.controller, robot.joints))
     if robot.masses:
         content["masses"] = [
             flow(

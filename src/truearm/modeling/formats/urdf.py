@@ -24,9 +24,11 @@ import numpy as np
 
 from truearm.errors import InputError
 from truearm.files import read_bytes
-from truearm.modeling.chain import Array, Element
+from truearm.modeling.chain import Array
 from truearm.modeling.conventions import JointKind
-from truearm.modeling.formats.robot_file import NAME
+from truearm.modeling.formats.collapsed import collapsed
+from truearm.modeling.formats.entries import NAME
+from truearm.modeling.formats.remarks import left_out
 from truearm.modeling.formats.urdf_tree import (
     KIND,
     ZERO,
@@ -110,7 +112,7 @@ def calibrated_urdf(source: bytes, robot: Robot) -> tuple[bytes, list[str]]:
         edits += _origin_edits(source, link.joint, xyz if False in changed else None, rpy if True in changed else None)
     for start, end, text in sorted(edits, reverse=True):
         source = source[:start] + text + source[end:]
-    return source, _left_out(robot)
+    return source, left_out(robot, "A URDF")
 
 
 def urdf_text(robot: Robot) -> tuple[str, list[str]]:
@@ -128,8 +130,8 @@ def urdf_text(robot: Robot) -> tuple[str, list[str]]:
     for name in names:
         if names.count(name) > 1:
             raise InputError("a URDF cannot have two joints of one name", where=robot.name, came=name)
-    origins, behind = _collapsed(robot)
-    left_out = _left_out(robot)
+    origins, behind = collapsed(robot)
+    said = left_out(robot, "A URDF")
     lines = [
         '<?xml version="1.0" encoding="UTF-8"?>',
         f"<robot name={quoteattr(robot.name)}>",
@@ -143,10 +145,10 @@ def urdf_text(robot: Robot) -> tuple[str, list[str]]:
     lines += ['  <link name="tool0"/>']
     lines += _joint_lines(None, f"link_{len(robot.joints)}", "tool0", origins[-1], [])
     if any(joint.limits for joint in robot.joints):
-        left_out.append("Effort and velocity limits are not known and stand as 0.")
+        said.append("Effort and velocity limits are not known and stand as 0.")
     if robot.masses:
-        left_out.append("Inertia tensors are not written and stand as 0.")
-    return "\n".join([*lines, "</robot>", ""]), left_out
+        said.append("Inertia tensors are not written and stand as 0.")
+    return "\n".join([*lines, "</robot>", ""]), said
 
 
 def roll_pitch_yaw(R: Array, near: Triple = ZERO) -> Triple:
@@ -407,48 +409,7 @@ def _respelled(old: bytes, values: Triple) -> bytes:
     return re.sub(rb"\S+", respell, old)
 
 
-def _left_out(robot: Robot) -> list[str]:
-    """Say what of this robot a URDF cannot hold."""
-    said = []
-    for effect in robot.effects:
-        names = [plain.name for plain in effect.parameters if robot.values[plain.name] != plain.value]
-        if names:
-            said.append(f"A URDF cannot hold the joint effect {effect.name}; left out: {', '.join(names)}.")
-    base = [name for name, p in robot.parameters.items() if p.group == "base" and p.value != 0.0]
-    if base or robot.base_quaternion != Transform().quaternion:
-        names = [*(["base_quaternion"] if robot.base_quaternion != Transform().quaternion else []), *base]
-        said.append(
-            f"A URDF cannot hold where the base stands in the instrument's frame; left out: {', '.join(names)}."
-        )
-    if robot.targets:
-        names = [target.name for target in robot.targets]
-        said.append(f"A URDF cannot hold the targets on the flange; left out: {', '.join(names)}.")
-    return said
-
-
 # -- a new file ---------------------------------------------------------------------------------------------
-
-
-def _collapsed(robot: Robot) -> tuple[list[Array], list[Array]]:
-    """Return the constant transforms around the joint variables of `robot`, each ``(4, 4)``.
-
-    Returns
-    -------
-    origins
-        From one joint variable to the next, from the base on and to the flange at last. A joint's own value
-        (its zero) belongs to the one before it, because the joint turns about that very axis.
-    behind
-        From each joint variable to the end of its link, in whose frame its centre of gravity is given.
-    """
-    origins, behind = [], []
-    pending: list[Element] = []
-    for link in robot.link_elements:
-        moving = next(i for i, element in enumerate(link) if element.variable is not None)
-        own_zero = replace(link[moving], variable=None)
-        origins.append(product([*pending, *link[:moving], own_zero], robot.values))
-        pending = list(link[moving + 1 :])
-        behind.append(product(pending, robot.values))
-    return [*origins, product([*pending, *robot.flange_elements], robot.values)], behind
 
 
 def _joint_lines(

@@ -19,9 +19,9 @@ from truearm.compensation.programs.program import (
     Skipped,
     Source,
 )
-from truearm.compensation.programs.urscript_script import Call, Script
-from truearm.compensation.programs.urscript_targets import Spot, Targets, Use
-from truearm.compensation.programs.urscript_tcp import COMPUTED, Places, Stretch, Tcp
+from truearm.compensation.programs.urscript.script import Call, Script
+from truearm.compensation.programs.urscript.targets import Spot, Targets, Use
+from truearm.compensation.programs.urscript.tcp import COMPUTED, Places, Stretch, Tcp
 
 #: A pose, and joints; 1e-6 m are 0.001 mm, and 1e-6 rad less than 0.0001 deg.
 POSE: Final = Form("p[x, y, z, rx, ry, rz]", "pose", 1.0, 1.0, ROTATION_VECTOR, (6, 6))

@@ -10,10 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
-from truearm.compensation.programs.urscript_names import Names
-from truearm.compensation.programs.urscript_script import Assignment, Script
-from truearm.compensation.programs.urscript_tcp import Places, Tcp
-from truearm.compensation.programs.urscript_text import Called, Name, Numbers, Other, Value
+from truearm.compensation.programs.urscript.names import Names
+from truearm.compensation.programs.urscript.script import Assignment, Script
+from truearm.compensation.programs.urscript.tcp import Places, Tcp
+from truearm.compensation.programs.urscript.text import Called, Name, Numbers, Other, Value
 
 #: Variables are followed through this many assignments.
 _DEEPEST: Final = 20

@@ -16,7 +16,7 @@ from typing import Final
 
 from truearm.compensation.programs.numbers import NUMBER
 from truearm.compensation.programs.program import Division, Edit, Move, Program, ProgramTarget
-from truearm.compensation.programs.urscript_text import Text, Value
+from truearm.compensation.programs.urscript.text import Text, Value
 
 #: Blend radius at the points on the way [m]; less where pieces are short.
 _RADIUS: Final = 0.001

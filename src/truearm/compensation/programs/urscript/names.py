@@ -11,7 +11,7 @@ from bisect import bisect_left
 from operator import attrgetter
 from typing import Final, Literal
 
-from truearm.compensation.programs.urscript_script import Assignment, Script, Series
+from truearm.compensation.programs.urscript.script import Assignment, Script, Series
 
 _GLOBAL: Final = -1
 _START: Final = attrgetter("start")

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
 from truearm.compensation.programs.program import Source
-from truearm.compensation.programs.urscript_text import Argument, Numbers, Text, Value
+from truearm.compensation.programs.urscript.text import Argument, Numbers, Text, Value
 
 _NAME: Final = r"[A-Za-z_]\w*"
 _EVENT: Final = re.compile(

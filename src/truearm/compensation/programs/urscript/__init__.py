@@ -13,8 +13,8 @@ What is read:
   of the robot's installation holds, which no script tells: the tool ``tcp`` (``tcp before set_tcp`` where the script
   sets one elsewhere) is left for the user to define.
 
-Variables and TCPs are followed in the order of the text; see :mod:`truearm.compensation.programs.urscript_names` and
-:mod:`truearm.compensation.programs.urscript_tcp`. Every file is a program of its own.
+Variables and TCPs are followed in the order of the text; see :mod:`truearm.compensation.programs.urscript.names` and
+:mod:`truearm.compensation.programs.urscript.tcp`. Every file is a program of its own.
 
 Source: Universal Robots, The URScript Programming Language (script manual, e-Series, SW 5.x), "Module motion", "Module
 internals", "Module urmath", "Scoping rules", "Program Label". Exports of PolyScope define two variables a waypoint,
@@ -29,12 +29,12 @@ from collections.abc import Sequence
 from typing import Final
 
 from truearm.compensation.programs.program import Language, MoveKind, Program, Source
-from truearm.compensation.programs.urscript_division import divide
-from truearm.compensation.programs.urscript_program import Going, made_program
-from truearm.compensation.programs.urscript_script import Call, Script
-from truearm.compensation.programs.urscript_targets import At, Spot, Targets, Use
-from truearm.compensation.programs.urscript_tcp import COMPUTED, Places, Stretch, Tcp, TcpFlow
-from truearm.compensation.programs.urscript_text import Name, Numbers, Value
+from truearm.compensation.programs.urscript.division import divide
+from truearm.compensation.programs.urscript.program import Going, made_program
+from truearm.compensation.programs.urscript.script import Call, Script
+from truearm.compensation.programs.urscript.targets import At, Spot, Targets, Use
+from truearm.compensation.programs.urscript.tcp import COMPUTED, Places, Stretch, Tcp, TcpFlow
+from truearm.compensation.programs.urscript.text import Name, Numbers, Value
 
 _LOOKS: Final = re.compile(
     r"^[ \t]*(?:def|thread|sec)[ \t]+\w+[ \t]*\([^)\n]*\)[ \t]*:"

@@ -1,0 +1,311 @@
+"""Program files: read, put right, written beside a record of what was done, and restored from it.
+
+Beside every program that is written stands ``NAME.truearm.json``: hashes of the program before and after, what was
+applied, and the original itself. A program with such a record has been corrected already.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from truearm.compensation.programs import LANGUAGES
+from truearm.compensation.programs.program import Edit, Language, Program, Source
+from truearm.errors import InputError
+from truearm.files import exists, read_bytes, refuse_overwriting, validated, write_files
+
+SCHEMA: Final = "truearm-corrected/1"
+#: A text of this size [bytes] and all that is made of it fit into the memory of a small computer.
+LARGEST: Final = 200_000_000
+
+Hash = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+
+
+class Record(BaseModel):
+    """Schema ``truearm-corrected/1``: what was done to a program."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    truearm: Literal["truearm-corrected/1"]
+    program: str
+    language: str
+    original_sha256: Hash
+    corrected_sha256: Hash
+    applied: dict[str, Any]
+    original: str
+
+
+@dataclass(frozen=True)
+class ProgramFile:
+    """A program file as it was found.
+
+    Attributes
+    ----------
+    path
+        Where it was found.
+    name
+        What it is called in the folder of results: its name, with folders where two would have the same.
+    original
+        Its bytes before any correction.
+    """
+
+    path: Path
+    name: str
+    original: bytes
+
+
+def record_path(program: Path) -> Path:
+    """Return the path of the record beside a program."""
+    return program.with_name(f"{program.name}.truearm.json")
+
+
+def program_files(paths: Sequence[Path], *, again: bool = False) -> tuple[ProgramFile, ...]:
+    """Read program files, and those that belong to them.
+
+    Parameters
+    ----------
+    again
+        Take the original of a program that was corrected already, out of its record.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be read, is no text or too large, is given twice, or was corrected already.
+    """
+    every = [*paths]
+    for path in paths:
+        every += [near for near in _companions(path) if not any(_same(near, other) for other in every)]
+    for number, path in enumerate(every):
+        if any(_same(path, other) for other in every[:number]):
+            raise InputError("this program is given twice", where=str(path))
+    names = _names(every)
+    return tuple(ProgramFile(path, name, _original(path, again)) for path, name in zip(every, names, strict=True))
+
+
+def restored(paths: Sequence[Path]) -> tuple[ProgramFile, ...]:
+    """Return the originals of corrected programs, out of their records.
+
+    Raises
+    ------
+    InputError
+        If a program has no record, or was changed after it was written.
+    """
+    made = []
+    for path, name in zip(paths, _names(paths), strict=True):
+        record = _record(path)
+        if record is None:
+            raise InputError(
+                "there is no record beside this program, so nothing to restore it from",
+                where=str(path),
+                allowed=str(record_path(path)),
+            )
+        made.append(ProgramFile(path, name, _unchanged_original(path, record)))
+    return tuple(made)
+
+
+def read_programs(files: Sequence[ProgramFile]) -> tuple[Program, ...]:
+    """Find targets and moves in program files of one language.
+
+    Raises
+    ------
+    InputError
+        If the files are of several languages or of none, or one of them is malformed.
+    """
+    languages = [_language(file) for file in files]
+    other = next((i for i, language in enumerate(languages) if language is not languages[0]), None)
+    if other is not None:
+        raise InputError(
+            "the programs are in different languages, and a robot speaks one",
+            where=str(files[other].path),
+            came=languages[other].name,
+            allowed=f"{languages[0].name}, as {files[0].path}",
+            cure="Correct them one after the other, each with its own robot.",
+        )
+    language = languages[0]
+    sources = [Source(file.path, file.original.decode("latin-1")) for file in files]
+    return language.programs(sources)
+
+
+def language_called(name: str) -> Language:
+    """Return the language of a program by its name."""
+    return next(language for language in LANGUAGES if language.name == name)
+
+
+def edited(text: str, edits: Sequence[Edit]) -> str:
+    """Return a text with edits made that do not overlap."""
+    parts, at = [], 0
+    for edit in sorted(edits, key=lambda e: (e.start, e.stop)):
+        if edit.start < at:
+            raise ValueError(f"edits overlap at {edit.start}")
+        parts += [text[at : edit.start], edit.text]
+        at = edit.stop
+    return "".join((*parts, text[at:]))
+
+
+def recorded(file: ProgramFile, corrected: bytes, language: str, applied: Mapping[str, Any]) -> str:
+    """Return the text of the record of a corrected program."""
+    content = Record(
+        truearm=SCHEMA,
+        program=Path(file.name).name,
+        language=language,
+        original_sha256=_hash(file.original),
+        corrected_sha256=_hash(corrected),
+        applied=dict(applied),
+        original=base64.b64encode(zlib.compress(file.original, 9)).decode(),
+    )
+    return json.dumps(content.model_dump(), indent=1) + "\n"
+
+
+def write_programs(folder: Path, inputs: Sequence[Path], files: Mapping[str, str | bytes]) -> None:
+    """Write results into a folder, all of them or none.
+
+    Raises
+    ------
+    InputError
+        If a file would be overwritten that was read, or that truearm has not written itself.
+    """
+    for name, content in files.items():
+        path = folder / name
+        refuse_overwriting(path, inputs)
+        if not exists(path) or name.endswith((".truearm.json", ".html")):
+            continue
+        here = read_bytes(path)
+        record = _record(path)
+        new = content if isinstance(content, bytes) else content.encode()
+        if here != new and (record is None or record.corrected_sha256 != _hash(here)):
+            raise InputError(
+                "this file exists already, was not written by truearm or was changed since, and is not overwritten",
+                where=str(path),
+                cure="Choose another --out.",
+            )
+    write_files(folder, files)
+
+
+# -- reading ----------------------------------------------------------------------------------------------
+
+
+def _original(path: Path, again: bool) -> bytes:
+    record = _record(path)
+    if record is None:
+        return _text_bytes(path)
+    if not again:
+        raise InputError(
+            "this program was corrected already",
+            where=str(path),
+            came=f"the record {record_path(path).name}",
+            cure="Give the original; or correct that original anew with --again, or restore it with --revert.",
+        )
+    return _unchanged_original(path, record)
+
+
+def _unchanged_original(path: Path, record: Record) -> bytes:
+    if _hash(_text_bytes(path)) != record.corrected_sha256:
+        raise InputError(
+            "this program was changed after it was corrected, so its record is no longer about it",
+            where=str(path),
+            cure=f"To take it as an original, remove {record_path(path).name}.",
+        )
+    try:
+        original = zlib.decompress(base64.b64decode(record.original, validate=True))
+    except (ValueError, zlib.error):
+        original = b""
+    if _hash(original) != record.original_sha256:
+        raise InputError("the original in this record is damaged", where=str(record_path(path)))
+    return original
+
+
+def _record(path: Path) -> Record | None:
+    beside = record_path(path)
+    if not exists(beside):
+        return None
+    try:
+        content = json.loads(read_bytes(beside))
+    except (ValueError, RecursionError) as error:
+        raise InputError("this record cannot be read", where=str(beside), cure="Remove it, or restore it.") from error
+    return validated(content, Record, str(beside))
+
+
+def _text_bytes(path: Path) -> bytes:
+    content = read_bytes(path)
+    if not content.strip():
+        raise InputError("the file is empty", where=str(path))
+    if len(content) > LARGEST:
+        raise InputError(
+            "the program is too large to be corrected at once",
+            where=str(path),
+            came=f"{len(content) / 1e6:.0f} MB",
+            allowed=f"{LARGEST / 1e6:.0f} MB, about two million targets",
+            cure="Divide it.",
+        )
+    if b"\0" in content:
+        wide = content[:2] in (b"\xff\xfe", b"\xfe\xff")
+        raise InputError(
+            "this is no program text: it is UTF-16" if wide else "this is no program text: it has zero bytes",
+            where=str(path),
+            cure="Save it as UTF-8." if wide else "Export the program as text from the controller or its software.",
+        )
+    return content
+
+
+def _language(file: ProgramFile) -> Language:
+    suffix = file.path.suffix.lower()
+    text = file.original.decode("latin-1")
+    for language in LANGUAGES:
+        if suffix in language.suffixes:
+            if language.is_one(text):
+                return language
+            others = [other.name for other in LANGUAGES if other is not language and other.is_one(text)]
+            raise InputError(
+                f"the file is called as a program in {language.name} and is none",
+                where=str(file.path),
+                came=f"what looks like {' or '.join(others)}" if others else None,
+                cure="Check what was exported.",
+            )
+    raise InputError(
+        "no robot language has files of this kind",
+        where=str(file.path),
+        came=suffix or "no suffix",
+        allowed="; ".join(f"{one.name} ({', '.join(one.suffixes)})" for one in LANGUAGES),
+    )
+
+
+def _companions(path: Path) -> list[Path]:
+    """Return files beside a program that belong to it by their name."""
+    suffix = path.suffix.lower()
+    pairs = [pair for language in LANGUAGES for pair in language.companions if suffix == pair[0]]
+    try:
+        siblings = [p for p in path.parent.iterdir() if p.stem.lower() == path.stem.lower()] if pairs else []
+    except OSError:
+        siblings = []
+    return [p for _, other in pairs for p in siblings if p.suffix.lower() == other]
+
+
+def _same(one: Path, other: Path) -> bool:
+    try:
+        return one.samefile(other)
+    except (OSError, ValueError):
+        return one == other
+
+
+def _names(paths: Sequence[Path]) -> list[str]:
+    """Return the names of results: of paths with one name as much of their folders as tells them apart."""
+    parts = [path.absolute().parts[1:] for path in paths]
+    names = []
+    for own in parts:
+        alike = [other for other in parts if other != own and other[-1].lower() == own[-1].lower()]
+        depth = 2 if alike else 1
+        while any(other[-depth:] == own[-depth:] for other in alike):
+            depth += 1
+        names.append("/".join(own[-depth:]))
+    return names
+
+
+def _hash(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()

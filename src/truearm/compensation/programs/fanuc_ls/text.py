@@ -1,0 +1,254 @@
+"""The parts of a FANUC program in ASCII: sections, instructions, positions, and where each stands in the text."""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from truearm.compensation.programs.program import Source
+from truearm.errors import InputError
+
+_FIRST: Final = re.compile(r"(?:\xef\xbb\xbf)?\s*+/PROG\b", re.IGNORECASE)
+_SECTION: Final = re.compile(r"\n/(MN|POS|END)\b", re.IGNORECASE)
+_LINE: Final = re.compile(r"^[ \t]*+(?:(\d{0,9})[ \t]*+:)?(.*)$", re.MULTILINE)
+_NUMBER: Final = r"([+-]?(?:\d+(?:\.\d*)?|\.\d+))"
+#: Name, number, comment.
+_HEAD: Final = r"[ \t\n;]*+(P\[[ \t]*+0*(\d{1,9})[ \t]*+(?::([^\n]*?))?\])\s*+\{"
+#: User frame, tool, configuration.
+_FRAMES: Final = r"\s*+UF\s*+:\s*+(F|\d{1,3})\s*+,\s*+UT\s*+:\s*+(F|\d{1,3})\b(?:\s*+,\s*+CONFIG\s*+:\s*+'([^'\n]*)')?"
+_POSE: Final = ("X", "Y", "Z", "W", "P", "R")
+_UNITS: Final = ("mm", "mm", "mm", "deg", "deg", "deg")
+#: A position of motion group 1 alone, with a pose and no external axes, as controllers write it.
+_PLAIN: Final = re.compile(
+    rf"{_HEAD}\s*+GP1\s*+:{_FRAMES}\s*+,\s*+"
+    + r"\s*+,\s*+".join(rf"{name}\s*+=[ \t]*+{_NUMBER}[ \t]*+{unit}" for name, unit in zip(_POSE, _UNITS, strict=True))
+    + r"\s*+\}[ \t]*+;?",
+    re.IGNORECASE,
+)
+#: Any position: its head, the data of all motion groups.
+_POSITION: Final = re.compile(rf"{_HEAD}([^{{}}]*)\}}[ \t]*+;?", re.IGNORECASE)
+_ANY_FRAMES: Final = re.compile(_FRAMES, re.IGNORECASE)
+_GROUP: Final = re.compile(r"\bGP(\d)\s*+:", re.IGNORECASE)
+#: A field's name, its number and its unit; no number if what stands there is none with a unit.
+_FIELD: Final = re.compile(rf"\b([XYZWPR]|[JE]\d)\s*+=[ \t]*+(?:{_NUMBER}[ \t]*+(mm|deg)\b)?", re.IGNORECASE)
+
+
+def is_one(text: str) -> bool:
+    """Return whether a text is a FANUC program in ASCII."""
+    return _FIRST.match(text) is not None
+
+
+class Statement(NamedTuple):
+    """An instruction: on one line, or on several of which the first alone has a number.
+
+    Attributes
+    ----------
+    number
+        Where its line number stands in the text, ``(start, stop)``; empty if it has none.
+    start, stop
+        From after the colon to after the last character, a semicolon if it is complete.
+    """
+
+    number: tuple[int, int]
+    start: int
+    stop: int
+
+
+class Position(NamedTuple):
+    """A position of the section /POS.
+
+    Attributes
+    ----------
+    number
+        Its number, without leading zeros.
+    comment
+        Its comment, without quotes.
+    start, stop
+        Where it stands.
+    name
+        Where its name stands, such as ``P[3:"approach"]``.
+    frame, tool, configuration
+        UF, UT and CONFIG as they are written, of the first motion group.
+    names, texts, places, units
+        Its numbers: their names, x to r or J1 to the last joint, as they are written, where, and in mm or deg.
+    external
+        Where external axes of the first motion group are: name and number as it is written.
+    alone
+        Whether it has no other motion group.
+    fault
+        Why its data are not complete; empty if they are.
+    """
+
+    number: str
+    comment: str
+    start: int
+    stop: int
+    name: tuple[int, int]
+    frame: str = ""
+    tool: str = ""
+    configuration: str = ""
+    names: Sequence[str] = ()
+    texts: Sequence[str] = ()
+    places: Sequence[tuple[int, int]] = ()
+    units: Sequence[str] = ()
+    external: Sequence[tuple[str, str]] = ()
+    alone: bool = True
+    fault: str = ""
+
+
+class LsFile:
+    """A FANUC program in ASCII.
+
+    Attributes
+    ----------
+    path
+        Its name, for messages.
+    text
+        Its text with every line end as line feeds, so that all places stay what they are.
+    instructions, positions
+        Where the sections /MN and /POS begin and end.
+
+    Raises
+    ------
+    InputError
+        If a section is missing.
+    """
+
+    def __init__(self, source: Source) -> None:
+        self.path = str(source.path)
+        self.text = source.text.replace("\r", "\n")
+        self._lines = _ends_of_lines(source.text)
+        if not is_one(self.text):
+            raise InputError("there is no section /PROG", where=f"{self.path}, line 1", cure="Is this an LS file?")
+        places: dict[str, tuple[int, int]] = {}
+        wanted = ["MN", "POS", "END"]
+        for found in _SECTION.finditer(self.text):
+            if wanted and found[1].upper() == wanted[0]:
+                places[wanted.pop(0)] = (found.start() + 1, found.end())
+        if wanted:
+            raise InputError(
+                f"there is no section /{wanted[0]}",
+                where=f"{self.path}, line {self.line(max(len(self.text) - 1, 0))}",
+                allowed="sections /PROG, /MN, /POS and /END, in this order",
+                cure="Is the file complete?",
+            )
+        self.instructions = (places["MN"][1], places["POS"][0])
+        self.positions = (places["POS"][1], places["END"][0])
+
+    def line(self, place: int) -> int:
+        """Return the number of the line that a place in the text is on, from 1."""
+        return bisect_right(self._lines, place) + 1
+
+    def where(self, place: int) -> str:
+        """Return file and line of a place, for a message."""
+        return f"{self.path}, line {self.line(place)}"
+
+    def statements(self) -> Iterator[Statement]:
+        """Yield the instructions of /MN."""
+        number, start, stop = (0, 0), -1, -1
+        for found in _LINE.finditer(self.text, *self.instructions):
+            digits, words = found[1], found[2].rstrip()
+            if start >= 0 and digits:
+                yield Statement(number, start, stop)
+                start = -1
+            if start < 0:
+                if digits is None:
+                    continue
+                number, start = found.span(1), found.start(2)
+            stop = found.start(2) + len(words)
+            if words.endswith(";"):
+                yield Statement(number, start, stop)
+                start = -1
+        if start >= 0:
+            yield Statement(number, start, stop)
+
+    def taught(self) -> Iterator[Position]:
+        """Yield the positions of /POS; refuse what is none, and numbers that come twice."""
+        seen: set[str] = set()
+        place, stop = self.positions
+        while position := self._position(place, stop):
+            if position.number in seen:
+                raise InputError(f"P[{position.number}] is there twice", where=self.where(position.start))
+            seen.add(position.number)
+            yield position
+            place = position.stop
+        rest = self.text[place:stop].lstrip(" \t\n;")
+        if rest:
+            raise InputError(
+                "this is no complete position",
+                where=self.where(stop - len(rest)),
+                came=rest[:40].partition("\n")[0],
+                allowed="P[number]{ data };",
+            )
+
+    def _position(self, place: int, stop: int) -> Position | None:
+        plain = _PLAIN.match(self.text, place, stop)
+        if plain is not None:
+            _, number, comment, frame, tool, config, *texts = plain.groups("")
+            spans = plain.regs
+            head = (number, comment and _comment(comment), spans[1][0], plain.end(), spans[1])
+            return Position(*head, frame, tool, config, _POSE, texts, spans[7:], _UNITS)
+        found = _POSITION.match(self.text, place, stop)
+        if found is None:
+            return None
+        position = Position(found[2], _comment(found[3] or ""), found.start(1), found.end(), found.span(1))
+        start, end = found.span(4)
+        groups = list(_GROUP.finditer(self.text, start, end))
+        if groups:
+            ends = [group.start() for group in groups[1:]] + [end]
+            first = [(group.end(), end) for group, end in zip(groups, ends, strict=True) if group[1] == "1"]
+            if len(first) != 1:
+                return position._replace(fault="has two groups 1" if first else "has no data of motion group 1")
+            start, end = first[0]
+        frames = _ANY_FRAMES.match(self.text, start, end)
+        if frames is None:
+            return position._replace(fault="has no UF and UT")
+        frame, tool, config = frames.groups("")
+        position = position._replace(frame=frame, tool=tool, configuration=config, alone=len(groups) < 2)
+        return self._with_numbers(position, start, end)
+
+    def _with_numbers(self, position: Position, start: int, stop: int) -> Position:
+        fields: dict[str, re.Match[str]] = {}
+        for found in _FIELD.finditer(self.text, start, stop):
+            name = found[1].upper()
+            if name in fields:
+                return position._replace(fault=f"has {name} twice")
+            if found[2] is None:
+                untaught = self.text.startswith("*", found.end())
+                fault = f"is not taught: {name} is ****" if untaught else f"has a {name} without mm or deg"
+                return position._replace(fault=fault)
+            fields[name] = found
+        joints = sum(name[0] == "J" for name in fields)
+        if joints and not fields.keys().isdisjoint(_POSE):
+            return position._replace(fault="has a pose and joints")
+        names = tuple(f"J{i + 1}" for i in range(joints)) or _POSE
+        missing = [name for name in names if name not in fields]
+        if missing:
+            return position._replace(fault=f"has no {missing[0]}")
+        units = tuple(fields[name][3].lower() for name in names)
+        if not joints and units != _UNITS:
+            return position._replace(fault="is not in mm and deg")
+        return position._replace(
+            names=names,
+            texts=[fields[name][2] for name in names],
+            places=tuple(fields[name].span(2) for name in names),
+            units=units,
+            external=[(name, found[2]) for name, found in fields.items() if name[0] == "E"],
+        )
+
+
+def _ends_of_lines(text: str) -> list[int]:
+    """Return where each line of a text ends, after its line feed, carriage return or both."""
+    characters = np.frombuffer(text.encode("latin-1", "replace"), dtype=np.uint8)
+    is_end = (characters == 10) | (characters == 13)
+    is_end[:-1] &= (characters[:-1] != 13) | (characters[1:] != 10)
+    ends: list[int] = (np.flatnonzero(is_end) + 1).tolist()
+    return ends
+
+
+def _comment(text: str) -> str:
+    return text.strip().strip('"')

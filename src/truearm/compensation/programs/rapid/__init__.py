@@ -1,0 +1,45 @@
+"""ABB RAPID: task modules and program files.
+
+Sources: ABB, Technical reference manual, RAPID Instructions, Functions and Data types (3HAC050917-001): the sections of
+MoveAbsJ, MoveC, MoveJ, MoveL and their variants, the Trigg and Search instructions, Offs, RelTool and PDispOn; RAPID
+Kernel (3HAC050946-001) for the rest of the syntax; application manuals for the instructions of arc and spot welding,
+dispensing, painting and continuous processes, which all have the tool for their last argument.
+
+A tool that is not held by the robot, a work object that the robot holds or another unit moves, and displacements of the
+program (PDispOn, PDispSet) put targets where the file does not say; such targets are left as they are. ConfL and ConfJ
+are not looked at: the configuration data of a target hold whether they are on or off.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Final
+
+from truearm.compensation.programs.program import Language, Program, Source
+from truearm.compensation.programs.rapid.division import divided
+from truearm.compensation.programs.rapid.moves import MOTIONS, QUIET
+from truearm.compensation.programs.rapid.syntax import listing_of
+from truearm.compensation.programs.rapid.targets import Finder
+
+_MODULE: Final = re.compile(r"(?:\A(?:\xef\xbb\xbf)?|[\r\n])[ \t]*+MODULE[ \t]++[^\W\d]", re.I)
+
+
+def _is_one(text: str) -> bool:
+    return _MODULE.search(text) is not None
+
+
+def _read(sources: Sequence[Source]) -> Program:
+    listing = listing_of(sources, frozenset(MOTIONS), QUIET)
+    return Finder(listing).program(RAPID.name)
+
+
+RAPID: Final = Language(
+    name="RAPID",
+    maker="ABB",
+    suffixes=(".mod", ".prg", ".sys", ".modx", ".prgx", ".sysx"),
+    is_one=_is_one,
+    read=_read,
+    divide=divided,
+    together="all",
+)

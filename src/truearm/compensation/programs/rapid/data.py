@@ -1,0 +1,183 @@
+"""Data of RAPID written out: targets, their configuration data, tools and work objects.
+
+Sources: ABB, Technical reference manual, RAPID Instructions, Functions and Data types (3HAC050917-001), data types
+robtarget, jointtarget, confdata, orient, pose, tooldata and wobjdata, functions Offs and RelTool.
+
+cf1, cf4 and cf6 of confdata are quadrants: a joint in quadrant k reads k * 90 deg or more and less than
+(k + 1) * 90 deg. cfx numbers the eight postures of an arm that can bend over backwards:
+
+=== ============================== ================================ ========
+cfx wrist centre, seen from axis 1 wrist centre, seen from lower arm axis 5
+=== ============================== ================================ ========
+0   in front                       in front                         positive
+1   in front                       in front                         negative
+2   in front                       behind                           positive
+3   in front                       behind                           negative
+4   behind                         in front                         positive
+5   behind                         in front                         negative
+6   behind                         behind                           positive
+7   behind                         behind                           negative
+=== ============================== ================================ ========
+
+The quadrants hold for every arm, and that of joint 1 says front or back already, that of joint 4 to which side joint 5
+bends. Arms that cannot bend backwards have 0 for cfx, whatever they do. So cfx is asked for the elbow alone, which the
+quadrants leave open: in the words of :mod:`truearm.modeling.inverse.branches` the elbow is up where the wrist centre is
+in front of both or behind both. Of an arm with another number of joints the data mean other things.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from math import isfinite, pi
+from typing import Final, Literal
+
+import numpy as np
+
+from truearm.compensation.programs.numbers import NUMBER
+from truearm.compensation.programs.orientations import MOVING_XYZ_ANGLES, QUATERNION
+from truearm.compensation.programs.program import Configuration, Form
+from truearm.modeling.transform import Transform, rotation_from_quaternion
+
+_DEGREE: Final = pi / 180.0
+
+ROBTARGET: Final = Form("robtarget", "pose", orientation=QUATERNION, decimals=(3, 7))
+JOINTTARGET: Final = Form("jointtarget", "joints", angle=_DEGREE)
+OFFS: Final = Form("Offs", "pose")
+#: The turns of RelTool follow each other about x, the new y and the new z.
+RELTOOL: Final = Form("RelTool", "pose", angle=_DEGREE, orientation=MOVING_XYZ_ANGLES)
+
+#: No robot reaches further [mm], and no joint turns further [deg].
+_FARTHEST: Final = 1e6
+#: From here on a number says that there is no such axis; written 9E9.
+_ABSENT: Final = 9e8
+#: A joint in a quadrant beyond these has turned ten times: it is no quadrant.
+_QUADRANTS: Final = range(-40, 40)
+
+# The parts in (?>...) are not tried again, so that no text takes longer than its length.
+_NUMBER: Final = rf"\s*+(?>{NUMBER})\s*+"
+_CAUGHT: Final = rf"\s*+((?>{NUMBER}))\s*+"
+
+
+def _row(number: str, count: int) -> str:
+    return rf"\s*+\[{','.join([number] * count)}\]\s*+"
+
+
+_POSE: Final = rf"\s*+\[{_row(_CAUGHT, 3)},{_row(_CAUGHT, 4)}\]\s*+"
+_ROBTARGET: Final = rf"\[{_row(_CAUGHT, 3)},{_row(_CAUGHT, 4)},{_row(_CAUGHT, 4)},{_row(_NUMBER, 6)}\]"
+_JOINTTARGET: Final = rf"\[{_row(_CAUGHT, 6)},{_row(_NUMBER, 6)}\]"
+#: Groups 1 to 7 are the pose, 8 to 11 the configuration.
+ROBTARGET_TEXT: Final = re.compile(_ROBTARGET)
+#: Groups 1 to 6 are the joints of the robot.
+JOINTTARGET_TEXT: Final = re.compile(_JOINTTARGET)
+#: What stands after the numbers of a robtarget's pose.
+ROBTARGET_TAIL: Final = re.compile(rf"\s*+\]\s*+,{_row(_NUMBER, 4)},{_row(_NUMBER, 6)}\]")
+NUMBER_TEXT: Final = re.compile(_CAUGHT)
+_TOOL_TEXT: Final = re.compile(rf"\s*+\[\s*+(TRUE|FALSE)\s*+,{_POSE},", re.I)
+_FRAME_TEXT: Final = re.compile(
+    rf"\s*+\[\s*+(TRUE|FALSE)\s*+,\s*+(TRUE|FALSE)\s*+,\s*+\"[^\"]*+\"\s*+,{_POSE},{_POSE}\]", re.I
+)
+
+_NAMES: Final = re.compile(r"[^\W\d]\w*")
+
+
+@cache
+def configuration(cf1: str, cf4: str, cf6: str, cfx: str) -> Configuration:
+    """Return the postures that confdata allow, each number as it is written."""
+    readings = []
+    for joint, written in ((1, cf1), (4, cf4), (6, cf6)):
+        quadrant = float(written)
+        if quadrant in _QUADRANTS:
+            readings.append((joint, quadrant * pi / 2, (quadrant + 1) * pi / 2))
+    elbow: Literal["up", "down"] | None = None
+    if float(cfx) in range(8):
+        elbow = "up" if int(float(cfx)) in (0, 1, 6, 7) else "down"
+    return Configuration(elbow=elbow, readings=tuple(readings))
+
+
+def why_no_target(text: str) -> str:
+    """Return in plain words why an aggregate cannot be read as a target."""
+    name = _NAMES.search(re.sub(NUMBER, " ", text))
+    return f"has {name[0]} in place of numbers" if name else "has numbers that are missing or computed"
+
+
+def wrong_number(form: Form, values: tuple[float, ...]) -> tuple[str, str, str] | None:
+    """Return what is wrong with the numbers of a target, what came and what is allowed, or None."""
+    lengths = values[:3] if form.kind == "pose" else values
+    for value in lengths:
+        if not isfinite(value) or abs(value) > _FARTHEST:
+            return "a number of a target is out of all proportion", f"{value:g}", "1 000 000 at most"
+    return wrong_quaternion(values[3:]) if form.orientation is QUATERNION else None
+
+
+def wrong_quaternion(quaternion: tuple[float, ...]) -> tuple[str, str, str] | None:
+    """Return what is wrong with a quaternion, what came and what is allowed, or None."""
+    w, x, y, z = quaternion
+    squared = w * w + x * x + y * y + z * z
+    # The length is 1 within 1e-3, without the root.
+    if 0.998001 <= squared <= 1.002001:
+        return None
+    return "a quaternion does not have length 1", f"length {squared**0.5:.4g}", "1 within 0.001"
+
+
+def absent(values: tuple[float, ...]) -> bool:
+    """Return whether joints of the robot itself are said not to be there (9E9)."""
+    return any(value >= _ABSENT for value in values)
+
+
+class RefusedPoseError(Exception):
+    """A pose of a tool or work object that cannot be: what is wrong, what came, what is allowed."""
+
+    def __init__(self, what: str, came: str, allowed: str) -> None:
+        super().__init__(what)
+        self.what, self.came, self.allowed = what, came, allowed
+
+
+def _transform(numbers: tuple[str, ...]) -> Transform:
+    x, y, z, *q = (float(number) for number in numbers)
+    wrong = wrong_number(ROBTARGET, (x, y, z, *q))
+    if wrong is not None:
+        raise RefusedPoseError(*wrong)
+    w, i, j, k = (float(part) for part in np.array(q) / np.linalg.norm(q))
+    return Transform((x / 1000, y / 1000, z / 1000), (w, i, j, k))
+
+
+def tool_of(text: str, start: int, stop: int) -> tuple[Transform | None, str | None]:
+    """Return ``T_flange_tip`` of tooldata written out, None if they are not, and why targets with it are left alone.
+
+    Raises
+    ------
+    RefusedPoseError
+        If its pose cannot be.
+    """
+    found = _TOOL_TEXT.match(text, start, stop)
+    if found is None:
+        return None, None
+    if found[1].upper() == "FALSE":
+        return None, "is not held by the robot"
+    return _transform(found.groups()[1:]), None
+
+
+def frame_of(text: str, start: int, stop: int) -> tuple[Transform | None, str | None]:
+    """Return ``T_base_object`` of wobjdata written out, None if they are not, and why targets in it are left alone.
+
+    The object frame stands in the user frame, and that in the frame of the robot's base.
+
+    Raises
+    ------
+    RefusedPoseError
+        If one of its poses cannot be.
+    """
+    found = _FRAME_TEXT.match(text, start, stop)
+    if found is None:
+        return None, None
+    held, fixed, *numbers = found.groups()
+    if held.upper() == "TRUE":
+        return None, "is held by the robot"
+    if fixed.upper() == "FALSE":
+        return None, "is moved by another mechanical unit"
+    user, own = _transform(tuple(numbers[:7])), _transform(tuple(numbers[7:]))
+    R = user.rotation
+    return Transform.from_matrix(
+        R @ rotation_from_quaternion(np.array(own.quaternion)), np.array(user.translation) + R @ own.translation
+    ), None

@@ -1,0 +1,97 @@
+"""Extra moves put before the linear and circular moves of a RAPID program.
+
+A move is divided into several of the same instruction. Its target is written out in the added ones, with the
+configuration data and external axes of the move's own target; an offset stays one, with other numbers. A stop point
+(fine) becomes ``z1`` in the added moves, so that the robot does not stop on the way.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Final
+
+from truearm.compensation.programs.program import Division, Edit, Move, Program, ProgramTarget
+from truearm.compensation.programs.rapid.arguments import arguments_of
+from truearm.compensation.programs.rapid.data import RELTOOL, ROBTARGET_TAIL
+from truearm.compensation.programs.rapid.listing import code_of
+
+_INDENT: Final = re.compile(r"[ \t]*+")
+_LINE_END: Final = re.compile(r"\r\n?|\n")
+_WORD: Final = re.compile(r"\w++")
+
+
+def divided(program: Program, divisions: Sequence[Division]) -> list[Edit]:
+    r"""Return the edits that divide moves.
+
+    Moves without a known place of their statement are left whole: those with a time (``\T``), an identity for moves
+    of several robots (``\ID``), ``\Conc`` or ``\Inpos``; instructions that do something at the end of the path or at
+    points of it (MoveLDO, TriggL, SearchL, ArcLStart and their like); the instruction of an IF without THEN; and
+    offsets from targets without a name.
+    """
+    codes: dict[int, str] = {}
+    edits = []
+    for division in divisions:
+        move = program.moves[division.move]
+        if move.statement == (0, 0):
+            continue
+        for source in (move.source, program.targets[move.target].source):
+            if source not in codes:
+                codes[source] = code_of(program.sources[source].text)[0]
+        edits += _divided(program, codes, move, division)
+    return edits
+
+
+def _divided(program: Program, codes: dict[int, str], move: Move, division: Division) -> list[Edit]:
+    text, code = program.sources[move.source].text, codes[move.source]
+    start, stop = move.statement
+    word = _WORD.match(code, start)
+    zone = arguments_of(code, word.end() if word else start, stop - 1).needed[-2]
+    line_start = max(text.rfind("\n", 0, start), text.rfind("\r", 0, start)) + 1
+    indent = _INDENT.match(text, line_start)
+    end = _LINE_END.search(text, stop) or _LINE_END.search(text)
+    between = (end[0] if end else "\n") + (indent[0] if indent else "")
+    target = program.targets[move.target]
+    added = []
+    for numbers, via in division.points:
+        words = [(move.target_text, _written(program, codes, move, target, numbers))]
+        if via is not None and move.via_text is not None:
+            words.append((move.via_text, _written(program, codes, move, target, via)))
+        if code[slice(*zone)].lower() == "fine":
+            words.append((zone, "z1"))
+        added.append(_replaced(text, start, stop, words) + between)
+    edits = [Edit(move.source, start, start, "".join(added))] if added else []
+    if division.last_via is not None and move.via_text is not None:
+        edits.append(Edit(move.source, *move.via_text, _written(program, codes, move, target, division.last_via)))
+    return edits
+
+
+def _replaced(text: str, start: int, stop: int, words: list[tuple[tuple[int, int], str]]) -> str:
+    parts, place = [], start
+    for (begin, end), word in sorted(words):
+        parts += [text[place:begin], word]
+        place = end
+    return "".join([*parts, text[place:stop]])
+
+
+def _written(
+    program: Program, codes: dict[int, str], move: Move, target: ProgramTarget, numbers: tuple[float, ...]
+) -> str:
+    """Return the words for a target that has other numbers than the move's own, in the same form."""
+    position = ",".join(_number(value, 3) for value in numbers[:3])
+    if target.parent is None:
+        place = target.places[-1]
+        tail = ROBTARGET_TAIL.match(codes[target.source], place[1]) if place else None
+        rest = "".join(tail[0].split()) if tail else ""
+        return f"[[{position}],[{','.join(_number(value, 7) for value in numbers[3:])}{rest}"
+    first = target.places[0]
+    call = program.sources[move.source].text[move.target_text[0] : first[0] if first else None]
+    turns = ""
+    if target.form is RELTOOL:
+        turns = "".join(f"\\R{axis}:={_number(value, 4)}" for axis, value in zip("xyz", numbers[3:], strict=True))
+    return f"{call}{position}{turns})"
+
+
+def _number(value: float, decimals: int) -> str:
+    text = f"{value:.{decimals}f}"
+    return text if float(text) else text.lstrip("-")

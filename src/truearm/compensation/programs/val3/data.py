@@ -1,0 +1,231 @@
+"""Staubli VAL3: the variables of a data file (``.dtx``), with the places of their numbers.
+
+Two formats are in use. In that of VAL3 7 and later, ``Data`` names a variable and ``Value`` one of its elements;
+numbers that are zero need not be written. In that of VAL3 5 and 6 every type has a section, and the numbers of an
+element are in a tag of their own.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Final, NoReturn
+from xml.parsers import expat
+
+from truearm.compensation.programs.lines import Lines
+from truearm.compensation.programs.numbers import NUMBER
+from truearm.compensation.programs.program import Source
+from truearm.errors import InputError
+
+FRAME: Final = ("x", "y", "z", "rx", "ry", "rz")
+#: Numbers of an element of each type.
+NUMBERS: Final = {
+    **dict.fromkeys(("frame", "tool", "pointRx", "pointRs"), FRAME),
+    "jointRx": ("j1", "j2", "j3", "j4", "j5", "j6"),
+    "jointRs": ("j1", "j2", "j3", "j4"),
+}
+#: What the old format calls the types.
+_OLD_TYPES: Final = {
+    **{"frame": "frame", "tool": "tool", "point": "pointRx", "pointRs": "pointRs"},
+    **{"joint": "jointRx", "jointRs": "jointRs"},
+}
+_OLD_FATHERS: Final = frozenset(("fFather", "tFather", "pFather"))
+_OLD_NUMBERS: Final = frozenset(("tfValue", "ttValue", "tpValue", "jointValue", "jointRsValue"))
+_OLD_POSTURES: Final = frozenset(("cpValue",))
+
+BOM: Final = "\xef\xbb\xbf"
+_TAG: Final = re.compile(r"<[^\s/>]+(?:\s+[\w:.-]+\s*=\s*(?:\"[^\"]*\"|'[^']*'))*+")
+_NAME: Final = re.compile(r"<[^\s/>]+")
+_ATTRIBUTE: Final = re.compile(r"\s([\w:.-]+)\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
+#: Nearly every element of the new format, as the makers' tools write it.
+_VALUE: Final = re.compile(
+    rf'<Value key="([\d,]{{1,20}})" x="((?>{NUMBER}))" y="((?>{NUMBER}))" z="((?>{NUMBER}))"'
+    rf' rx="((?>{NUMBER}))" ry="((?>{NUMBER}))" rz="((?>{NUMBER}))"(?=[ />])'
+)
+_NUMBER: Final = re.compile(rf"\s*((?>{NUMBER}))\s*")
+#: No length or angle is larger, in any unit.
+_LARGEST: Final = 1e6
+
+Attributes = dict[str, str]
+
+
+@dataclass(slots=True)
+class Element:
+    """An element of a variable.
+
+    Attributes
+    ----------
+    key
+        Its index in the variable, as text without blanks.
+    line
+        In the file, from 1.
+    values, places
+        Its numbers in the order of :data:`NUMBERS`, and where they stand; an empty place is where one could stand.
+    father
+        Reference to the frame or tool that it is relative to, empty for none.
+    posture
+        Words for the shoulder, elbow and wrist, those that are written.
+    """
+
+    key: str
+    line: int
+    values: tuple[float, ...]
+    places: tuple[tuple[int, int], ...]
+    father: str
+    posture: tuple[str, ...] = ()
+
+
+@dataclass
+class Variable:
+    """A variable that the robot's positions depend on."""
+
+    name: str
+    type: str
+    source: int
+    line: int
+    elements: dict[str, Element] = field(default_factory=dict)
+
+
+def refuse(source: Source, line: int, what: str, *, came: object = None, allowed: str | None = None) -> NoReturn:
+    """Refuse a line of a file."""
+    raise InputError(what, where=f"{source.path}, line {line}", came=came, allowed=allowed)
+
+
+def parse(
+    source: Source,
+    started: Callable[[str, Attributes, int], None],
+    ended: Callable[[str, int], None],
+) -> None:
+    """Go through the tags of a file, or refuse it if it is not well-formed.
+
+    Parameters
+    ----------
+    started, ended
+        Called with the name of a tag, the attributes of a starting one, and the place where the tag begins.
+    """
+    text = source.text
+    skipped = len(BOM) if text.startswith(BOM) else 0
+    # Every character is a byte here, and markup is ASCII in every encoding that a file may have.
+    parser = expat.ParserCreate("iso-8859-1")
+    parser.StartElementHandler = lambda name, attributes: started(
+        name.rpartition(":")[2], attributes, parser.CurrentByteIndex + skipped
+    )
+    parser.EndElementHandler = lambda name: ended(name.rpartition(":")[2], parser.CurrentByteIndex + skipped)
+    try:
+        parser.Parse(text[skipped:].encode("latin-1"), True)
+    except expat.ExpatError as error:
+        reason = expat.errors.messages[error.code]
+        refuse(source, error.lineno, f"the file is not complete or not well-formed: {reason}")
+
+
+def variables_of(source: Source, index: int, lines: Lines) -> list[Variable]:
+    """Read the variables of a data file that matter here, in the order of the text."""
+    reader = _Reader(source, index, lines)
+    parse(source, reader.started, reader.ended)
+    return reader.variables
+
+
+class _Reader:
+    """Takes the tags of a data file, in either format."""
+
+    def __init__(self, source: Source, index: int, lines: Lines) -> None:
+        self.variables: list[Variable] = []
+        self._source, self._index, self._lines = source, index, lines
+        self._variable: Variable | None = None
+        self._father, self._key = "", "0"
+
+    def started(self, name: str, attributes: Attributes, place: int) -> None:
+        variable = self._variable
+        if name == "Value":
+            if variable is not None:
+                key = key_of(attributes.get("key", "0"))
+                self._add(variable, key, place, attributes.get("fatherId", ""), _posture(attributes))
+        elif name == "Data":
+            self._begin(attributes, attributes.get("type", ""), place)
+        elif variable is None:
+            if name in _OLD_TYPES and "name" in attributes:
+                self._begin(attributes, _OLD_TYPES[name], place)
+        elif name in _OLD_FATHERS:
+            self._father = _old_father(attributes)
+        elif name in _OLD_NUMBERS:
+            self._add(variable, self._key, place, self._father, ())
+        elif name in _OLD_POSTURES:
+            if variable.elements:
+                next(reversed(variable.elements.values())).posture = _posture(attributes)
+        elif "index" in attributes and name.startswith("value"):
+            self._key = key_of(attributes["index"])
+
+    def ended(self, name: str, place: int) -> None:
+        del place
+        if name == "Data" or name in _OLD_TYPES:
+            self._variable = None
+
+    def _begin(self, attributes: Attributes, type_: str, place: int) -> None:
+        self._father, self._key = "", "0"
+        self._variable = None
+        if type_ in NUMBERS and attributes.get("name"):
+            self._variable = Variable(attributes["name"], type_, self._index, self._lines.number(place))
+            self.variables.append(self._variable)
+
+    def _add(self, variable: Variable, key: str, place: int, father: str, posture: tuple[str, ...]) -> None:
+        line = self._lines.number(place)
+        if key in variable.elements:
+            refuse(self._source, line, f"{variable.name}[{key}] is given twice")
+        fast = _VALUE.match(self._source.text, place) if NUMBERS[variable.type] is FRAME else None
+        if fast is not None:
+            values, places = tuple(map(float, fast.groups()[1:])), fast.regs[2:]
+            if max(map(abs, values)) > _LARGEST:
+                refuse(self._source, line, f"{variable.name} has a number out of all proportion", came=values)
+        else:
+            values, places = self._numbers(variable, place, line)
+        variable.elements[key] = Element(key, line, values, places, father, posture)
+
+    def _numbers(
+        self, variable: Variable, place: int, line: int
+    ) -> tuple[tuple[float, ...], tuple[tuple[int, int], ...]]:
+        text = self._source.text
+        tag = _TAG.match(text, place)
+        stop = tag.end() if tag is not None else place
+        written: dict[str, tuple[str, int]] = {}
+        named = _NAME.match(text, place)
+        after = named.end() if named is not None else place
+        for found in _ATTRIBUTE.finditer(text, place, stop):
+            quoted = 2 if found[2] is not None else 3
+            written[found[1]] = found[quoted], found.start(quoted)
+        if "key" in written:
+            after = written["key"][1] + len(written["key"][0]) + 1
+        values: list[float] = []
+        places: list[tuple[int, int]] = []
+        for name in NUMBERS[variable.type]:
+            if name not in written:
+                values.append(0.0)
+                places.append((after, after))
+                continue
+            number, start = written[name]
+            found_number = _NUMBER.fullmatch(number)
+            if found_number is None:
+                refuse(self._source, line, f"{name} of {variable.name} is no number", came=number)
+            value = float(found_number[1])
+            if abs(value) > _LARGEST:
+                refuse(self._source, line, f"{name} of {variable.name} is out of all proportion", came=number)
+            values.append(value)
+            places.append((start + found_number.start(1), start + found_number.end(1)))
+            after = start + len(number) + 1
+        return tuple(values), tuple(places)
+
+
+def key_of(text: str) -> str:
+    """Return an index as it is compared: without blanks."""
+    return "".join(text.split())
+
+
+def _posture(attributes: Attributes) -> tuple[str, ...]:
+    return tuple([attributes[part] for part in ("shoulder", "elbow", "wrist") if part in attributes])
+
+
+def _old_father(attributes: Attributes) -> str:
+    name = attributes.get("name", "")
+    alias = attributes.get("alias", "")
+    index = key_of(attributes.get("fatherIndex", "0"))
+    return f"{alias}:{name}[{index}]" if alias else f"{name}[{index}]" if name else ""

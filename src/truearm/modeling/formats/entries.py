@@ -1,0 +1,50 @@
+"""What the entries of a robot file are made of: numbers, names, quaternions and places, checked."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Final
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
+
+from truearm.modeling.transform import IDENTITY, Transform
+from truearm.units import sized_si, written
+
+#: What a robot and a joint may be called.
+NAME: Final = r"[A-Za-z0-9][A-Za-z0-9_.-]*"
+
+#: Of an entry that has known keys only.
+STRICT: Final = ConfigDict(extra="forbid", frozen=True)
+
+Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=True)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False, strict=True)]
+Triple = tuple[Number, Number, Number]
+Name = Annotated[str, StringConstraints(pattern=f"^{NAME}$", strict=True)]
+
+
+def _unit_length(q: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
+    if abs(math.hypot(*q) - 1.0) > 1e-6:
+        raise ValueError(f"a quaternion (w, x, y, z) must have length 1, this one has {math.hypot(*q):.6g}")
+    return q
+
+
+Quaternion = Annotated[tuple[Number, Number, Number, Number], AfterValidator(_unit_length)]
+
+
+class Place(BaseModel):
+    """Where a frame stands in another one."""
+
+    model_config = STRICT
+    translation: Triple = (0.0, 0.0, 0.0)
+    quaternion: Quaternion | None = None
+
+    def transform(self, length: str, where: str) -> Transform:
+        """Return the transform; `length` is the file's unit, `where` names the entry in messages."""
+        x, y, z = (sized_si(v, length, f"{where}.translation") for v in self.translation)
+        return Transform((x, y, z), self.quaternion or IDENTITY.quaternion)
+
+
+def place_entry(place: Transform) -> dict[str, list[float]]:
+    """Return the entry of a place, in mm."""
+    return {"translation": [written(v, "mm") for v in place.translation], "quaternion": list(place.quaternion)}

@@ -1,0 +1,85 @@
+"""A robot as one JSON object with everything a program needs, in SI units: schema ``truearm-model/1``."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from typing import Any, Final
+
+from truearm.modeling.chain import Element
+from truearm.modeling.parameters import Parameter
+from truearm.modeling.robot import Robot
+
+SCHEMA: Final = "truearm-model/1"
+
+
+def model_json(robot: Robot, frames: str, left_out: Iterable[str]) -> str:
+    """Return the JSON text of a robot.
+
+    A frame is the product of its elements. An element turns (``R``) or slides (``T``) about or along x, y or z of the
+    moving frame (``Rx`` to ``Tz``) or its own ``axis``, by ``value``, and by the reading of ``joint`` (from 1) where it
+    has one. Numbers are written so that they read back exactly.
+    """
+    content = {
+        "truearm": SCHEMA,
+        "name": robot.name,
+        "title": robot.title,
+        "source": robot.source,
+        "units": {"length": "m", "angle": "rad", "force": "N", "mass": "kg"},
+        "frames": frames,
+        "left_out": list(left_out),
+        "convention": robot.convention_name,
+        "base": {"elements": _elements(robot, robot.base_elements)},
+        "joints": [
+            {
+                "name": joint.name,
+                "kind": joint.kind,
+                "limits": None if joint.limits is None else list(joint.limits),
+                "transmission_periods": joint.transmission_periods,
+                "elements": _elements(robot, link),
+            }
+            for joint, link in zip(robot.joints, robot.link_elements, strict=True)
+        ],
+        "flange": {"elements": _elements(robot, robot.flange_elements)},
+        "targets": [{"name": t.name, "elements": _elements(robot, t.chain.elements)} for t in robot.targets],
+        "fixtures": [
+            {"name": f.name, "kind": f.kind, "elements": _elements(robot, f.chain.elements)} for f in robot.fixtures
+        ],
+        "effects": [{"name": e.name, "parameters": [p.name for p in e.parameters]} for e in robot.effects],
+        "masses": [
+            {"link": m.joint, "mass": m.mass, "cog": list(m.cog), "inertia": list(m.inertia)} for m in robot.masses
+        ],
+        "payload": {"mass": robot.payload.mass, "cog": list(robot.payload.cog)},
+        "gravity": list(robot.gravity),
+        "parameters": [_parameter(p) for p in robot.parameters.values()],
+        "history": list(robot.history),
+    }
+    return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _elements(robot: Robot, elements: Iterable[Element]) -> list[dict[str, Any]]:
+    found = []
+    for element in elements:
+        value = element.value if element.parameter is None else robot.values[element.parameter]
+        entry: dict[str, Any] = {"motion": element.motion, "value": value}
+        if element.axis is not None:
+            entry["axis"] = list(element.axis)
+        if element.parameter is not None:
+            entry["parameter"] = element.parameter
+        if element.variable is not None:
+            entry["joint"] = element.variable + 1
+        found.append(entry)
+    return found
+
+
+def _parameter(p: Parameter) -> dict[str, Any]:
+    return {
+        "name": p.name,
+        "unit": p.unit,
+        "group": p.group,
+        "nominal": p.nominal,
+        "value": p.value,
+        "prior": p.prior,
+        "deviation": p.deviation,
+        "informed": p.informed,
+    }

@@ -1,0 +1,158 @@
+"""A robot as a Python file of its own that needs only NumPy.
+
+The file is :mod:`truearm.modeling.formats.python_template` with the constants of the robot in place of its own. All
+joint effects that depend on readings and weights alone are in it; approach, warm-up and thermal growth are not.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Sequence
+from importlib import resources
+from textwrap import wrap
+from typing import Final
+
+import numpy as np
+
+from truearm.modeling.chain import Array, across, axis_of
+from truearm.modeling.formats.collapsed import collapsed
+from truearm.modeling.formats.urdf import roll_pitch_yaw
+from truearm.modeling.robot import Robot
+
+#: Joint effects that the file computes.
+HELD: Final = (
+    "gain",
+    "fourier",
+    "transmission-error",
+    "compliance",
+    "hardening",
+    "backlash",
+    "bearing-compliance",
+    "clearance",
+    "clearance-linear-contact",
+)
+_WIDTH: Final = 118
+#: Stored poses for the file's own test.
+_STORED: Final = 3
+
+Row = tuple[float, ...]
+
+
+def python_text(robot: Robot, comments: Sequence[str]) -> str:
+    """Return a Python module with ``forward`` and ``inverse`` of a robot whose world is its base frame.
+
+    Parameters
+    ----------
+    comments
+        What the module says of itself, one line each.
+    """
+    source = resources.files("truearm.modeling.formats").joinpath("python_template.py").read_text("utf-8")
+    lines = source.split("\n")
+    constants = _constants(robot)
+    tree = ast.parse(source)
+    for node in reversed(tree.body):
+        if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name) and node.end_lineno is not None:
+            head = f"{node.target.id}: {ast.unparse(node.annotation)} = "
+            lines[node.lineno - 1 : node.end_lineno] = [head + constants[node.target.id]]
+    description = tree.body[0]
+    lines[: description.end_lineno] = [_description(robot, comments)]
+    return "\n".join(lines)
+
+
+def _description(robot: Robot, comments: Sequence[str]) -> str:
+    count = len(robot.joints)
+    said = [line for comment in comments for line in (*wrap(comment, _WIDTH), "")]
+    text = "\n".join(said).replace("\\", "\\\\").replace('"', '\\"')
+    return f'''"""{text}
+Only NumPy is needed, and nothing of truearm. Run as a program, the file compares itself with stored poses.
+
+    position, rotation = forward(q)  # readings (n, {count}) [rad, m] -> (n, 3) [m], (n, 3, 3)
+    q, within = inverse(position, rotation, seed)  # a seed ({count},) or (n, {count}) on the branch that is wanted
+
+For another payload change PAYLOAD; the stored poses then hold no longer.
+"""'''
+
+
+def _constants(robot: Robot) -> dict[str, str]:
+    """Return the text of every constant of the template."""
+    names = [joint.name for joint in robot.joints]
+    numbers = range(1, len(names) + 1)
+    values = {effect.name: robot.values for effect in robot.effects if effect.name in HELD}
+
+    def by_joint(effect: str, prefix: str, nothing: float = 0.0) -> tuple[float, ...]:
+        held = values.get(effect, {})
+        return tuple(held.get(f"{prefix}_{i}", nothing) for i in numbers)
+
+    series = zip(*(by_joint("fourier", f"fourier_{part}") for part in ("sin1", "cos1", "sin2", "cos2")), strict=True)
+    gear = zip(*(by_joint("transmission-error", f"transmission_{part}") for part in ("sin", "cos")), strict=True)
+    periods = [joint.transmission_periods or 0 for joint in robot.joints]
+    if "transmission-error" not in values:
+        periods = [0 for _ in numbers]
+    clearances = [name for name in ("clearance", "clearance-linear-contact") if name in values]
+    places, masses = _bodies(robot)
+    q = np.round(robot.random_configurations(_STORED, np.random.default_rng(0)), 4)
+    position, rotation = robot.poses(q)
+    return {
+        "JOINTS": repr(tuple(names)),
+        "SLIDING": repr(tuple(joint.kind == "prismatic" for joint in robot.joints)),
+        "LIMITS": _rows([joint.limits for joint in robot.joints], names),
+        "PLACES": _rows(places, [*names, "flange"]),
+        "GRAVITY": repr(robot.gravity),
+        "MASSES": _rows(masses, [names[joint] for joint, _, _ in masses]),
+        "PAYLOAD": repr((robot.payload.mass, robot.payload.cog)),
+        "GAIN": _rows(by_joint("gain", "gain", 1.0), names),
+        "FOURIER": _rows(list(series), names),
+        "TRANSMISSION": _rows([(n, *parts) for n, parts in zip(periods, gear, strict=True)], names),
+        "COMPLIANCE": _rows(by_joint("compliance", "compliance"), names),
+        "COMPLIANCE_QUADRATIC": _rows(by_joint("hardening", "compliance_quadratic"), names),
+        "COMPLIANCE_CUBIC": _rows(by_joint("hardening", "compliance_cubic"), names),
+        "BACKLASH": _rows(by_joint("backlash", "backlash"), names),
+        "BEARING_COMPLIANCE": _rows(by_joint("bearing-compliance", "bearing_compliance"), names),
+        "CLEARANCE": _rows(by_joint(clearances[0] if clearances else "", "clearance"), names),
+        "LINEAR_CONTACT": repr("clearance-linear-contact" in clearances),
+        "READINGS": _rows(_tuples(q)),
+        "POSITIONS": _rows(_tuples(position)),
+        "ROTATIONS": _rows([_tuples(R) for R in rotation]),
+    }
+
+
+def _bodies(robot: Robot) -> tuple[list[tuple[Row, Row]], list[tuple[int, float, Row]]]:
+    """Return the places of joints and flange, every joint along z, and the masses of the links in these frames."""
+    origins, behind = collapsed(robot)
+    turned = []  # from the axis and its own x and y to those of the convention
+    for link in robot.link_elements:
+        moving = next(element for element in link if element.variable is not None)
+        axes = np.eye(4)
+        axes[:3, :3] = np.transpose([*across(moving), axis_of(moving)])
+        turned.append(axes)
+    before = [np.eye(4), *(axes.T for axes in turned)]
+    places = [
+        _place(start @ origin @ end) for start, origin, end in zip(before, origins, [*turned, np.eye(4)], strict=True)
+    ]
+    masses = []
+    for mass in robot.masses:
+        if mass.mass:
+            cog = turned[mass.joint - 1].T @ behind[mass.joint - 1] @ [*mass.cog, 1.0]
+            masses.append((mass.joint - 1, mass.mass, _tidy(cog[:3])))
+    return places, masses
+
+
+def _place(frame: Array) -> tuple[Row, Row]:
+    return _tidy(frame[:3, 3]), _tidy(np.array(roll_pitch_yaw(frame[:3, :3])))
+
+
+def _tidy(values: Array) -> Row:
+    """Return plain numbers; the roundings of right angles are the zeros they stand for."""
+    return tuple(0.0 if abs(v) < 1e-15 else float(v) for v in values)
+
+
+def _tuples(matrix: Array) -> tuple[Row, ...]:
+    return tuple(tuple(row) for row in matrix.tolist())
+
+
+def _rows(rows: Sequence[object], names: Sequence[str] = ()) -> str:
+    """Return a tuple as text, one entry a line with its name; short where all of them are the same."""
+    if rows and names and all(row == rows[0] for row in rows):
+        return f"({rows[0]!r},) * {len(rows)}"
+    labels = [f"  # {name}" for name in names] or [""] * len(rows)
+    return "\n".join(["(", *(f"    {row!r},{label}" for row, label in zip(rows, labels, strict=True)), ")"])

@@ -1,0 +1,293 @@
+"""How far the targets of programs were moved: one HTML file."""
+
+from __future__ import annotations
+
+import html
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.compensation.division import Divided
+from truearm.compensation.gauge import turns_between
+from truearm.compensation.program_correction import Correction, Frames
+from truearm.modeling.chain import Array
+from truearm.notices import Notice
+from truearm.reporting.drawing import AFTER, BEFORE, CAMERA, COLOURS, Figure, axis, figure, scene_axis
+from truearm.reporting.figures import histogram
+from truearm.reporting.numbers import rounded, rounded_to
+from truearm.reporting.page import page
+
+#: Targets in a picture: more slow a browser down and show no more.
+_DRAWN: Final = 5000
+#: Rows in a table of targets that were skipped.
+_LISTED: Final = 500
+#: From far enough to see the axes of a tall picture.
+_CAMERA: Final = CAMERA | {"eye": {"x": 1.9, "y": 1.9, "z": 1.0}}
+#: How long the longest correction is drawn, as a share of the program's size.
+_ARROW: Final = 0.08
+
+
+@dataclass(frozen=True)
+class ReportedFile:
+    """What the summary says of a file: counts, what was skipped, mean and largest shift [mm]."""
+
+    file: str
+    language: str
+    targets: int
+    corrected: int
+    skipped: Sequence[Mapping[str, Any]]
+    shift_mm: Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Checked:
+    """What a simulated robot does with a program: its distance from where each target was meant to be [m], ``(n,)``.
+
+    Attributes
+    ----------
+    original, corrected
+        With the program as it was, and as it is now.
+    robot
+        Who went there, in words.
+    """
+
+    original: Array
+    corrected: Array
+    robot: str
+
+
+@dataclass(frozen=True, eq=False)
+class ProgramReport:
+    """What the report tells about.
+
+    Attributes
+    ----------
+    robot
+        Its title.
+    files
+        One row of the summary each.
+    corrections
+        One a program.
+    joint_names
+        Of the robot.
+    words
+        What was taken for the real base and flange, see :func:`frame_words`.
+    divisions
+        What was divided, one a program; empty if nothing was to be.
+    warnings
+        What to know about the result.
+    command
+        How to do it again.
+    checked
+        What a simulated robot does with it, where there is one.
+    """
+
+    robot: str
+    files: Sequence[ReportedFile]
+    corrections: Sequence[Correction]
+    joint_names: Sequence[str]
+    words: Sequence[str]
+    divisions: Sequence[Divided]
+    warnings: Sequence[Notice]
+    command: str
+    checked: Checked | None = None
+
+
+def frame_words(frames: Frames) -> list[str]:
+    """Return what was taken for the real base and flange, in words: first of the frames, then of the tools."""
+
+    def size(shift: Array) -> str:
+        turned = math.degrees(float(np.linalg.norm(turns_between(np.eye(4)[None], shift[None])[0])))
+        return f"{np.linalg.norm(shift[:3, 3]) * 1e3:.3f} mm and {turned:.4f} deg"
+
+    if frames.frames == "identified":
+        said = [
+            "The program's frames are where --frame says; targets are corrected in them, and may all move together."
+        ]
+    else:
+        said = [
+            "No --frame was given. Calibration cannot know where a program's frames really are, so the base was "
+            f"shifted by {size(frames.base)} until the mean correction of all targets is zero: targets are right to "
+            "each other, and the program as a whole stays where it was."
+        ]
+    if frames.tools == "identified":
+        said.append("The program's tools are where --tool says, on the identified flange.")
+    else:
+        said.append(
+            "No --tool was given. The program's tools were taken to sit on a flange that agrees best with the nominal "
+            f"one all over the workspace, {size(frames.flange)} from the identified one."
+        )
+    return said
+
+
+def program_html(report: ProgramReport) -> str:
+    """Return the page."""
+    shown = [c for c in report.corrections if c.corrected.any()]
+    figures: dict[str, Figure] = {}
+    if shown:
+        figures = {"path": path_figure(shown), "along": along_figure(shown)}
+    if report.checked is not None:
+        figures["checked"] = histogram(
+            report.checked.original * 1e3,
+            report.checked.corrected * 1e3,
+            "mm",
+            "distance from where it was meant",
+            "targets",
+        )
+    every = [(file.file, one) for file in report.files for one in file.skipped]
+    return page(
+        "program.html.jinja",
+        figures,
+        report=report,
+        joints=_joint_rows(report),
+        skipped=every[:_LISTED],
+        unlisted=max(len(every) - _LISTED, 0),
+        corrected=sum(file.corrected for file in report.files),
+        targets=sum(file.targets for file in report.files),
+        moved=_spread(np.concatenate([c.moved[c.corrected] for c in report.corrections]) * 1e3),
+        turned=_spread(np.degrees(np.concatenate([c.turned[c.corrected] for c in report.corrections]))),
+    )
+
+
+def path_figure(corrections: Sequence[Correction]) -> Figure:
+    """Show targets in space in the order of the program, and by how much and whereto each was moved."""
+    traces: list[Figure] = []
+    points = np.concatenate([c.tips[c.corrected][:, :3, 3] for c in corrections]) * 1e3
+    longest = max(max(float(c.moved.max(initial=0.0)) for c in corrections) * 1e3, 1e-9)
+    size = max(float(np.ptp(points, axis=0).max()), 1.0)
+    stretch = 10.0 ** math.floor(math.log10(max(_ARROW * size / longest, 1.0)))
+    for number, correction in enumerate(corrections):
+        rows = _evenly(np.flatnonzero(correction.corrected))
+        tips = correction.tips[rows]
+        frame = tips @ np.linalg.inv(correction.before[rows])
+        step = np.einsum("nij,nj->ni", frame[:, :3, :3], (correction.after - correction.before)[rows, :3, 3])
+        start = tips[:, :3, 3] * 1e3
+        way = _way(correction)
+        name = html.escape(correction.program.sources[0].path.stem)
+        traces.append(_line(way * 1e3, f"path of {name}", "#9aa0a6", 2))
+        arrows = np.stack([start, start + stretch * 1e3 * step, np.full_like(start, np.nan)], axis=1).reshape(-1, 3)
+        traces.append(_line(arrows, f"correction, {stretch:g} times as long", COLOURS[number % 3], 3))
+        texts = [
+            [html.escape(correction.program.targets[row].name or "inline"), correction.program.targets[row].line]
+            for row in rows.tolist()
+        ]
+        moved = rounded(correction.moved[rows] * 1e3, 3)
+        traces.append(
+            {
+                "type": "scatter3d",
+                "mode": "markers",
+                "name": "targets",
+                **{letter: rounded_to(column, 1) for letter, column in zip("xyz", start.T, strict=True)},
+                "customdata": [[*text, value] for text, value in zip(texts, moved, strict=True)],
+                "marker": {
+                    "size": 4,
+                    "color": moved,
+                    "colorscale": "Viridis",
+                    "reversescale": True,
+                    "cmin": 0,
+                    "cmax": longest,
+                    "colorbar": {"title": {"text": "moved [mm]"}, "thickness": 14, "len": 0.75, "outlinewidth": 0},
+                    "showscale": number == 0,
+                },
+                "hovertemplate": "%{customdata[0]}, line %{customdata[1]}: moved by %{customdata[2]} mm<br>"
+                "x %{x:.0f}, y %{y:.0f}, z %{z:.0f} mm<extra></extra>",
+                "showlegend": False,
+            }
+        )
+    axes = {f"{letter}axis": scene_axis(f"{letter} [mm]") for letter in "xyz"}
+    return figure(traces, 620, scene={**axes, "aspectmode": "data", "camera": _CAMERA})
+
+
+def along_figure(corrections: Sequence[Correction]) -> Figure:
+    """Show by how much each target was moved and turned, in the order in which the program goes to them."""
+    traces: list[Figure] = []
+    start = 1
+    for number, correction in enumerate(corrections):
+        order = _order(correction)
+        steps = _evenly(np.flatnonzero(correction.corrected[order]))
+        rows = order[steps]
+        targets = correction.program.targets
+        names = [f"{html.escape(targets[row].name or 'inline')}, line {targets[row].line}" for row in rows.tolist()]
+        program = html.escape(correction.program.sources[0].path.stem)
+        for what, values, unit, colour, axes in (
+            ("moved", correction.moved[rows] * 1e3, "mm", AFTER, "y"),
+            ("turned", np.degrees(correction.turned[rows]), "deg", BEFORE, "y2"),
+        ):
+            traces.append(
+                {
+                    "type": "scatter",
+                    "mode": "lines+markers" if len(rows) < 200 else "lines",
+                    "name": f"{what} [{unit}]",
+                    "legendgroup": what,
+                    "showlegend": number == 0,
+                    "x": (steps + start).tolist(),
+                    "y": rounded(values, 4),
+                    "yaxis": axes,
+                    "text": names,
+                    "line": {"color": colour, "width": 1.5},
+                    "marker": {"size": 5},
+                    "hovertemplate": f"{program}, %{{text}}: {what} by %{{y}} {unit}<extra></extra>",
+                }
+            )
+        start += len(order)
+    return figure(
+        traces,
+        380,
+        xaxis=axis("step of the program, in the order of its text"),
+        yaxis=axis("moved [mm]") | {"rangemode": "tozero"},
+        yaxis2=axis("turned [deg]") | {"rangemode": "tozero", "overlaying": "y", "side": "right", "showgrid": False},
+    )
+
+
+def _order(correction: Correction) -> NDArray[np.intp]:
+    """Return the targets in the order of the moves, vias too; in the order of the text where nothing moves to them."""
+    moves = [row for move in correction.program.moves for row in (move.via, move.target) if row is not None]
+    rest = sorted(set(range(len(correction.program.targets))) - set(moves))
+    return np.array([*moves, *rest], dtype=int)
+
+
+def _way(correction: Correction) -> Array:
+    """Return the tips ``(m, 3)`` [m] in the order of the moves, with gaps between routines."""
+    parts: list[Array] = []
+    routine = None
+    for move in correction.program.moves[:_DRAWN]:
+        if routine not in (None, move.routine):
+            parts.append(np.full(3, np.nan))
+        routine = move.routine
+        parts += [correction.tips[row, :3, 3] for row in (move.via, move.target) if row is not None]
+    return np.array(parts).reshape(-1, 3)
+
+
+def _line(points: Array, name: str, colour: str, width: float) -> Figure:
+    values = [[None if math.isnan(v) else round(v, 2) for v in column] for column in points.T.tolist()]
+    return {
+        "type": "scatter3d",
+        "mode": "lines",
+        "name": name,
+        **dict(zip("xyz", values, strict=True)),
+        "line": {"color": colour, "width": width},
+        "hoverinfo": "skip",
+    }
+
+
+def _evenly(rows: NDArray[np.intp]) -> NDArray[np.intp]:
+    if len(rows) <= _DRAWN:
+        return rows
+    return np.asarray(rows[np.linspace(0, len(rows) - 1, _DRAWN).astype(int)])
+
+
+def _joint_rows(report: ProgramReport) -> list[tuple[str, str, str]]:
+    """Return the range of each joint in the corrected programs, in deg or mm as the model counts."""
+    joints = np.concatenate([c.joints[c.corrected] for c in report.corrections])
+    if not len(joints):
+        return []
+    low, high = np.degrees(joints.min(axis=0)), np.degrees(joints.max(axis=0))
+    return [(n, f"{a:.2f}", f"{b:.2f}") for n, a, b in zip(report.joint_names, low, high, strict=True)]
+
+
+def _spread(values: Array) -> tuple[str, str]:
+    return (f"{values.mean():.3f}", f"{values.max():.3f}") if len(values) else ("–", "–")

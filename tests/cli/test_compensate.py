@@ -1,0 +1,230 @@
+"""``truearm compensate``: its contract, its files, its refusals."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from importlib.resources import files
+from pathlib import Path
+
+import pytest
+from tests.cli.conftest import Truearm
+
+from truearm.demonstration import demonstration
+from truearm.modeling.formats.robot_file import robot_text
+from truearm.modeling.parts import Payload
+from truearm.modeling.robot import Robot
+from truearm.robots import load_robot
+
+
+def worn() -> Robot:
+    """Return an IRB 120 as a calibration leaves it: errors, springy joints, a base in the instrument's frame."""
+    springy = load_robot("irb120").with_effects(["compliance"]).carrying(Payload(2.0, (0.0, 0.0, 0.1)))
+    errors = {"a_3": 0.2708, "theta_offset_3": 0.002, "alpha_4": -1.5695, "d_4": 0.3024, "compliance_3": 1.3e-4}
+    return springy.with_values(errors | {"base_x": 1.0, "base_rz": 0.5})
+
+
+@pytest.fixture
+def cell(tmp_path: Path) -> Path:
+    """A folder with a calibrated robot, the plate's program and a file of its tool and frame."""
+    (tmp_path / "calibrated.yaml").write_text(robot_text(worn()))
+    (tmp_path / "plate.mod").write_text((files("truearm.examples") / "plate.mod").read_text())
+    (tmp_path / "cell.yaml").write_text(
+        "truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\n"
+        "tools:\n  tProbe: {of: flange, translation: [0.2, 0, 125]}\n"
+        "frames:\n  wobjPlate: {of: base, translation: [310.5, -110, 60]}\n"
+    )
+    return tmp_path
+
+
+def run(truearm: Truearm, cell: Path, *words: object, program: str = "plate.mod", out: str = "out") -> tuple[int, str]:
+    done = truearm("compensate", cell / "calibrated.yaml", cell / program, "--out", cell / out, *words)
+    return done.code, done.out + done.err
+
+
+def test_the_contract(truearm: Truearm, cell: Path) -> None:
+    code, said = run(truearm, cell, "--json")
+    assert code == 0
+    told = json.loads(said)
+    assert set(told) == {"programs", "warnings"}
+    (program,) = told["programs"]
+    assert set(program) == {"file", "language", "targets", "corrected", "skipped", "shift_mm"}
+    assert (program["file"], program["language"]) == ("plate.mod", "RAPID")
+    assert program["targets"] == program["corrected"] == 44
+    assert 0.05 < program["shift_mm"]["mean"] < program["shift_mm"]["max"] < 3.0
+    assert {warning["code"] for warning in told["warnings"]} == {"frames-assumed", "tools-assumed"}
+    assert sorted(p.name for p in (cell / "out").iterdir()) == [
+        "compensation.html",
+        "plate.mod",
+        "plate.mod.truearm.json",
+    ]
+    record = json.loads((cell / "out" / "plate.mod.truearm.json").read_text())
+    assert record["applied"]["frames"] == "assumed"
+    assert record["applied"]["payload_kg"] == 2.0
+
+
+def test_with_tool_and_frame_nothing_is_assumed(truearm: Truearm, cell: Path) -> None:
+    code, said = run(truearm, cell, "--tool", cell / "cell.yaml", "--frame", cell / "cell.yaml", "--json")
+    assert code == 0
+    told = json.loads(said)
+    assert told["warnings"] == []
+    # The frame is half a millimetre beside what the controller has.
+    assert 0.5 < told["programs"][0]["shift_mm"]["mean"] < 3.0
+
+
+def test_the_payload_matters(truearm: Truearm, cell: Path) -> None:
+    shifts = []
+    for number, words in enumerate(([], ["--payload", "0kg,0mm,0mm,0mm"], ["--payload", "4kg,0mm,0mm,100mm"])):
+        options = ("--tool", cell / "cell.yaml", "--frame", cell / "cell.yaml", "--json")
+        code, said = run(truearm, cell, *options, *words, out=f"out{number}")
+        assert code == 0
+        shifts.append(json.loads(said)["programs"][0]["shift_mm"]["mean"])
+        assert ("no-payload" in said) == (number == 1)
+    assert len(set(shifts)) == 3
+
+
+def test_corrected_again_and_reverted(truearm: Truearm, cell: Path) -> None:
+    assert run(truearm, cell)[0] == 0
+    code, said = run(truearm, cell, program="out/plate.mod", out="twice")
+    assert code == 2
+    assert "corrected already" in said
+    assert not (cell / "twice").exists()
+    code, _ = run(truearm, cell, "--again", program="out/plate.mod", out="again")
+    assert code == 0
+    assert (cell / "again" / "plate.mod").read_bytes() == (cell / "out" / "plate.mod").read_bytes()
+    code, said = run(truearm, cell, "--revert", "--json", program="out/plate.mod", out="back")
+    assert code == 0
+    assert json.loads(said) == {"reverted": [str(cell / "back" / "plate.mod")]}
+    assert (cell / "back" / "plate.mod").read_bytes() == (cell / "plate.mod").read_bytes()
+    for other in ("--again", "--strict"):
+        code, said = run(truearm, cell, "--revert", other, program="out/plate.mod", out="back")
+        assert code == 2
+        assert "only one of them can hold" in said
+
+
+def test_what_cannot_be_corrected_is_listed_and_strict_writes_nothing(truearm: Truearm, cell: Path) -> None:
+    program = cell / "plate.mod"
+    program.write_text(program.read_text().replace("[[20.0,20.0,0.0]", "[[2000.0,20.0,0.0]"))
+    code, said = run(truearm, cell)
+    assert code == 0
+    assert "plate.mod, line 9: out of reach of the nominal robot" in said
+    assert "41 of 44 targets" in said
+    line = next(text for text in (cell / "out" / "plate.mod").read_text().splitlines() if "pHole1:" in text)
+    assert "[[2000.0,20.0,0.0]" in line
+    code, said = run(truearm, cell, "--strict", out="strict")
+    assert code == 2
+    assert "plate.mod, line 9: a target cannot be corrected, and 2 more" in said
+    assert not (cell / "strict").exists()
+
+
+def test_moves_are_divided(truearm: Truearm, cell: Path) -> None:
+    code, said = run(truearm, cell, "--split", "0.005")
+    assert code == 0
+    assert "moves divided by" in said
+    assert "moves-not-divided" in said
+    text = (cell / "out" / "plate.mod").read_text()
+    assert text.count("MoveC") > 2
+    for bad, words in (("0", "allowed: 0.001 to 100 mm"), ("-1", "no distance"), ("nan", "no distance")):
+        code, said = run(truearm, cell, "--split", bad, out="bad")
+        assert code == 2
+        assert words in said
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("tProbe:=[TRUE", "tOther:=[TRUE"), "line 7: this tool is used and never defined; got 'tProbe'"),
+        (("wobjPlate:=[FALSE", "wobjP:=[FALSE"), "this frame is used and never defined; got 'wobjPlate'. Did you mean"),
+        (("[-0.069237,", "[-0.169237,"), "plate.mod, line 8"),
+        (("ENDMODULE", ""), "plate.mod"),
+    ],
+)
+def test_a_faulty_program_is_refused(truearm: Truearm, cell: Path, change: tuple[str, str], said: str) -> None:
+    program = cell / "plate.mod"
+    program.write_text(program.read_text().replace(*change))
+    before = program.read_bytes()
+    code, words = run(truearm, cell)
+    assert code == 2
+    assert said in words
+    assert "Traceback" not in words
+    assert program.read_bytes() == before
+    assert not (cell / "out").exists()
+
+
+def test_a_frame_that_the_program_does_not_define_may_come_from_the_file(truearm: Truearm, cell: Path) -> None:
+    program = cell / "plate.mod"
+    program.write_text(program.read_text().replace("PERS wobjdata wobjPlate", "PERS wobjdata wobjElsewhere"))
+    (cell / "cell.yaml").write_text(
+        "truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\n"
+        "frames:\n  WOBJPLATE: {of: controller, translation: [310, -110, 60]}\n"
+    )
+    code, said = run(truearm, cell, "--frame", cell / "cell.yaml", "--json")
+    assert code == 0
+    assert "frames-assumed" in {warning["code"] for warning in json.loads(said)["warnings"]}
+
+
+def test_real_places_are_given_for_all_frames_or_for_none(truearm: Truearm, cell: Path) -> None:
+    program = cell / "plate.mod"
+    text = program.read_text().replace("pHole7,v20,fine,tProbe\\WObj:=wobjPlate", "pHole7,v20,fine,tProbe")
+    text = text.replace("Offs(pHole7,0,0,15),v200,z5,tProbe\\WObj:=wobjPlate", "Offs(pHole7,0,0,15),v200,z5,tProbe")
+    program.write_text(text)
+    code, said = run(truearm, cell, "--frame", cell / "cell.yaml")
+    assert code == 2
+    assert "line 15: only some of the frames in use have a real place in the file; got 'base'" in said
+
+
+def test_a_robot_that_is_not_calibrated_is_refused(truearm: Truearm, cell: Path) -> None:
+    done = truearm("compensate", "irb120", cell / "plate.mod", "--out", cell / "out")
+    assert done.code == 2
+    assert "not calibrated" in done.err
+
+
+def test_two_programs_of_one_name_keep_their_folders(truearm: Truearm, cell: Path) -> None:
+    paths = [cell / folder / "p.ls" for folder in ("one", "two")]
+    for path in paths:
+        path.parent.mkdir()
+        path.write_text(LS)
+    done = truearm("compensate", cell / "calibrated.yaml", *paths, "--out", cell / "out", "--json")
+    assert done.code == 0
+    assert [file["file"] for file in json.loads(done.out)["programs"]] == ["one/p.ls", "two/p.ls"]
+    assert (cell / "out" / "two" / "p.ls.truearm.json").exists()
+
+
+LS = """\
+/PROG  PLATE
+/ATTR
+/MN
+   1:J P[1] 20% FINE    ;
+   2:L P[2] 100mm/sec FINE    ;
+/POS
+P[1]{
+   GP1:
+\tUF : 0, UT : 0,\t\tCONFIG : 'N U T, 0, 0, 0',
+\tX =   400.000  mm,\tY =    20.000  mm,\tZ =   350.000  mm,
+\tW =   180.000 deg,\tP =   -60.000 deg,\tR =   180.000 deg
+};
+P[2]{
+   GP1:
+\tUF : 0, UT : 0,\t\tCONFIG : 'N U T, 0, 0, 0',
+\tX =   400.000  mm,\tY =    80.000  mm,\tZ =   330.000  mm,
+\tW =   180.000 deg,\tP =   -60.000 deg,\tR =   180.000 deg
+};
+/END
+"""
+
+
+def test_the_demo_ends_with_a_corrected_program(tmp_path: Path) -> None:
+    shown = demonstration(tmp_path)
+    checked = shown.correction.checked
+    assert checked is not None
+    assert shown.calibration.validation is not None
+    assert checked.corrected.mean() < 1.5 * shown.calibration.validation.position_norms.mean()
+    assert checked.original.mean() > 10 * checked.corrected.mean()
+    page = (tmp_path / "corrected" / "compensation.html").read_text()
+    assert f"{1e3 * checked.corrected.mean():.3f}" in page
+    assert "Before and after" in page
+    # What it wrote itself it writes again; another program of that name stays.
+    demonstration(tmp_path)
+    shutil.copy(tmp_path / "measurements.csv", tmp_path / "plate.mod")
+    with pytest.raises(ValueError, match="another file of that name"):
+        demonstration(tmp_path)

@@ -1,0 +1,255 @@
+"""What holds for every robot language: only the numbers of targets change, and nothing that is read makes it fall."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from truearm.compensation.program_files import edited
+from truearm.compensation.program_poses import edits_of, numbers_of, pose_numbers, poses_of
+from truearm.compensation.programs import LANGUAGES
+from truearm.compensation.programs.lines import Lines
+from truearm.compensation.programs.numbers import NUMBER
+from truearm.compensation.programs.orientations import QUATERNION
+from truearm.compensation.programs.program import Division, Edit, Language, Program, ProgramTarget, Source
+from truearm.errors import InputError
+
+SAMPLES = Path(__file__).parent / "samples"
+dividing = pytest.mark.parametrize("language", [one for one in LANGUAGES if one.divide], ids=lambda one: one.name)
+languages = pytest.mark.parametrize("language", LANGUAGES, ids=lambda one: one.name)
+
+
+def folder(language: Language) -> Path:
+    return SAMPLES / language.read.__module__.rpartition(".")[2]
+
+
+@cache
+def samples(language: Language) -> tuple[tuple[Source, ...], ...]:
+    """Return the programs of a language: a file, or the files of a folder, each."""
+    programs = []
+    for entry in sorted(folder(language).iterdir()):
+        files = sorted(entry.iterdir()) if entry.is_dir() else [entry]
+        programs.append(tuple(Source(file, file.read_bytes().decode("latin-1")) for file in files))
+    return tuple(programs)
+
+
+def texts(program: Program, edits: Sequence[Edit]) -> list[str]:
+    return [
+        edited(source.text, [e for e in edits if e.source == number]) for number, source in enumerate(program.sources)
+    ]
+
+
+@languages
+def test_there_are_samples_that_hold_poses_and_moves(language: Language) -> None:
+    read = [language.read(sources) for sources in samples(language)]
+    assert sum(len(program.targets) for program in read) >= 8
+    assert {move.kind for program in read for move in program.moves} >= {"joint", "linear", "circular"}
+    assert {target.form.kind for program in read for target in program.targets} >= {"pose"}
+
+
+@languages
+def test_places_hold_the_values(language: Language) -> None:
+    for sources in samples(language):
+        program = language.read(sources)
+        taken: set[tuple[int, int, int]] = set()
+        for target in program.targets:
+            text = program.sources[target.source].text
+            assert len(target.values) == len(target.places)
+            for value, span in zip(target.values, target.places, strict=True):
+                if span is not None:
+                    assert float(text[span[0] : span[1]] or "0") == value
+                    assert span[0] < span[1] or target.form.absent
+                    assert (target.source, *span) not in taken or span[0] == span[1]
+                    taken.add((target.source, *span))
+            # The line is where the target begins, its first number may be a few further down.
+            first = Lines(text).number(next(s[0] for s in target.places if s))
+            assert first - 6 <= target.line <= first
+
+
+@languages
+def test_a_correction_of_nothing_leaves_every_byte(language: Language) -> None:
+    for sources in samples(language):
+        program = language.read(sources)
+        poses = poses_of(program)
+        rows = np.array([i for i, t in enumerate(program.targets) if t.form.kind == "pose"], dtype=int)
+        # As if computed: off by less than a nanometre and a billionth of a turn.
+        noisy = poses.copy()
+        noisy[:, :3, 3] += 1e-10
+        assert edits_of(program, pose_numbers(program, poses, noisy, rows)) == []
+
+
+@languages
+def test_a_correction_changes_numbers_of_targets_and_nothing_else(language: Language) -> None:
+    for sources in samples(language):
+        program = language.read(sources)
+        numbers = {i: np.array(t.values) + shifted(t) for i, t in enumerate(program.targets)}
+        after = texts(program, edits_of(program, numbers))
+        places = [
+            [s for t in program.targets if t.source == n for s in t.places if s and s[0] < s[1]]
+            for n in range(len(after))
+        ]
+        for source, text, spans in zip(program.sources, after, places, strict=True):
+            assert without(source.text, spans) == skeleton(text, source.text, spans)
+        again = language.read([Source(s.path, text) for s, text in zip(program.sources, after, strict=True)])
+        assert [(t.name, t.tool, t.frame, t.configuration) for t in again.targets] == [
+            (t.name, t.tool, t.frame, t.configuration) for t in program.targets
+        ]
+        for index, target in enumerate(again.targets):
+            written = [i for i, span in enumerate(target.places) if span is not None and span[0] < span[1]]
+            np.testing.assert_allclose(
+                np.array(target.values)[written], numbers[index][written], atol=0.6 * 10.0 ** -min(target.form.decimals)
+            )
+
+
+def shifted(target: ProgramTarget) -> np.ndarray:
+    """Return a small change of every number that is written."""
+    size = 3.0 if target.form.kind == "pulses" else 2e-5 if target.form.length == 1.0 else 2e-2
+    sizes = [size] * len(target.places)
+    if target.form.orientation is QUATERNION:  # stays one of length 1
+        sizes[3:] = [1e-4] * 4
+    return np.array([0.0 if s is None or s[0] == s[1] else v for s, v in zip(target.places, sizes, strict=True)])
+
+
+def without(text: str, spans: Sequence[tuple[int, int]]) -> list[str]:
+    """Return what stands between numbers."""
+    ends = [0, *(stop for _, stop in sorted(spans))]
+    starts = [*(start for start, _ in sorted(spans)), len(text)]
+    return [text[a:b] for a, b in zip(ends, starts, strict=True)]
+
+
+def skeleton(text: str, before: str, spans: Sequence[tuple[int, int]]) -> list[str]:
+    """Return what stands between numbers in a text whose numbers differ from those of another one."""
+    parts, at = [], 0
+    for between in without(before, spans)[:-1]:
+        assert text.startswith(between, at)
+        parts.append(between)
+        number = re.compile(NUMBER).match(text, at + len(between))
+        assert number is not None
+        at = number.end()
+    return [*parts, text[at:]]
+
+
+@dividing
+def test_a_division_reads_back(language: Language) -> None:
+    """Moves divided at made-up places: the added targets come before the move's own, with the same tool and frame."""
+    assert language.divide is not None
+    tried = 0
+    for sources in samples(language):
+        program = language.read(sources)
+        for index, move in enumerate(program.moves):
+            target = program.targets[move.target]
+            fit = target.form.kind == "pose" and target.form.orientation is not None and target.parent is None
+            if move.kind == "joint" or move.target_text == (0, 0) or not fit:
+                continue
+            pose = poses_of(program)[move.target][None].repeat(3, axis=0)
+            pose[:, :3, 3] += np.array([[0.01], [0.02], [0.03]])
+            near = np.tile(target.values, (3, 1))
+            one, two, three = (tuple(row) for row in numbers_of(target.form, pose, near).tolist())
+            circle = move.via is not None
+            cut = Division(index, ((one, two if circle else None),), three if circle else None)
+            edits = language.divide(program, [cut])
+            if not edits:  # pieces of this one would mean something else
+                continue
+            tried += 1
+            again = language.read(
+                [Source(s.path, t) for s, t in zip(program.sources, texts(program, edits), strict=True)]
+            )
+            # Between two circles some languages want a step of no length.
+            count = len(again.moves) - len(program.moves)
+            assert count == 1 or circle
+            assert count >= 1
+            added, last = again.moves[index], again.moves[index + count]
+            if circle:
+                added = next(m for m in again.moves[index:] if m.kind == "circular")
+            assert added.kind == last.kind == move.kind
+            new, end = again.targets[added.target], again.targets[last.target]
+            assert (new.tool, new.frame, end.tool, end.frame) == (target.tool, target.frame, target.tool, target.frame)
+            assert end.values == target.values
+            np.testing.assert_allclose(new.values, one, atol=6e-4)
+            if circle:
+                assert added.via is not None
+                assert last.via is not None
+                np.testing.assert_allclose(again.targets[added.via].values, two, atol=6e-4)
+                np.testing.assert_allclose(again.targets[last.via].values, three, atol=6e-4)
+    assert tried
+
+
+@languages
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(data=st.data())
+def test_nothing_that_is_read_makes_it_fall(language: Language, data: st.DataObject) -> None:
+    """Programs cut off, with pieces swapped, doubled or replaced by anything: read, or refused in words."""
+    sources = list(data.draw(st.sampled_from(samples(language))))
+    which = data.draw(st.integers(0, len(sources) - 1))
+    text = sources[which].text
+    a, b = sorted(data.draw(st.tuples(st.integers(0, len(text)), st.integers(0, len(text)))))
+    piece = data.draw(
+        st.one_of(
+            st.just(""),
+            st.binary(max_size=40).map(lambda raw: raw.decode("latin-1")),
+            st.sampled_from([*"\"'{}[]();!\r\ne-<&", "9E9", "1e999"]),
+            st.just(text[a:b]),
+        )
+    )
+    b = data.draw(st.sampled_from([a, b, len(text), min(a + 1, len(text))]))
+    broken = text[:a] + piece + text[b:]
+    sources[which] = Source(sources[which].path, broken)
+    program = read_or_refused(language, sources)
+    if program is None:
+        return
+    assert [source.text for source in program.sources] == [source.text for source in sources]
+    for target in program.targets:
+        whole = program.sources[target.source].text
+        assert 0 <= target.source < len(sources)
+        for value, span in zip(target.values, target.places, strict=True):
+            assert np.isfinite(value)
+            assert span is None or float(whole[span[0] : span[1]] or "0") == value
+    poses_of(program)
+    language.is_one(broken)
+
+
+@languages
+@settings(max_examples=40, deadline=None)
+@given(raw=st.binary(max_size=400))
+def test_any_bytes_are_read_or_refused(language: Language, raw: bytes) -> None:
+    text = raw.decode("latin-1")
+    language.is_one(text)
+    program = read_or_refused(language, [Source(Path(f"any{language.suffixes[0]}"), text)])
+    assert program is None or program.sources[0].text == text
+
+
+def read_or_refused(language: Language, sources: Sequence[Source]) -> Program | None:
+    """Return the program, or None where it is refused with the place of the fault."""
+    try:
+        return language.read(sources)
+    except InputError as refusal:
+        if not refusal.where:
+            raise
+        return None
+
+
+@languages
+def test_languages_are_told_apart(language: Language) -> None:
+    for sources in samples(language):
+        for source in sources:
+            assert language.is_one(source.text), source.path
+            others = [one.name for one in LANGUAGES if one is not language and one.is_one(source.text)]
+            assert not others, source.path
+
+
+@languages
+def test_line_ends_do_not_matter(language: Language) -> None:
+    for sources in samples(language):
+        ends = [
+            language.read([Source(s.path, s.text.replace("\r\n", "\n").replace("\n", end)) for s in sources])
+            for end in ("\n", "\r\n")
+        ]
+        one, other = ([(t.line, t.name, t.values, t.tool, t.frame) for t in program.targets] for program in ends)
+        assert one == other

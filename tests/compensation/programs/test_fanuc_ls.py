@@ -1,0 +1,528 @@
+"""FANUC LS programs.
+
+Syntax from FANUC, R-30iB/R-30iB Mate controller, HandlingTool operator's manual (V9.40), sections 7.2.1 (motion
+instructions), 7.2.6 and 11.9 (positions), 7.2.9 (frame numbers), 11.21.2 (configuration) and 12.2.7 (ASCII programs).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from math import pi, radians
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from truearm.compensation.programs.fanuc_ls import FANUC_LS
+from truearm.compensation.programs.fanuc_ls.configuration import configuration
+from truearm.compensation.programs.program import Configuration, Division, Program, Skipped, Source
+from truearm.errors import InputError
+from truearm.modeling.inverse.branches import BRANCHES, branch_rule
+from truearm.robots import load_robot
+
+SAMPLES = Path(__file__).parent / "samples" / "fanuc_ls"
+HALF = (-pi, pi)
+NUT = Configuration("front", "up", readings=((1, *HALF), (4, *HALF), (5, -pi, 0.0), (6, *HALF)))
+
+
+def sample(name: str) -> Source:
+    path = SAMPLES / name
+    return Source(path, path.read_bytes().decode("latin-1"))
+
+
+def pose(
+    number: str | int, data: str = "", head: str = "UF : 1, UT : 1,\t\tCONFIG : 'N U T, 0, 0, 0',", more: str = ""
+) -> str:
+    data = data or (
+        "\tX =   500.000  mm,\tY =     0.000  mm,\tZ =   300.000  mm,\n"
+        "\tW =   180.000 deg,\tP =     0.000 deg,\tR =     0.000 deg"
+    )
+    return f"P[{number}]{{\n   GP1:\n\t{head}\n{data}{more}\n}};\n"
+
+
+def program(instructions: Sequence[str], positions: str, attributes: str = "") -> Source:
+    lines = "".join(f"{i:4d}:{words} ;\n" for i, words in enumerate(instructions, 1))
+    return Source(Path("P.LS"), f"/PROG  P\n/ATTR\n{attributes}/MN\n{lines}/POS\n{positions}/END\n")
+
+
+def program_of(count: int) -> list[Source]:
+    """Return a program with that many poses."""
+    rows = np.random.default_rng(8).uniform(-1.0, 1.0, (count, 6)) * [80, 300, 100, 20, 20, 20] + [
+        380,
+        0,
+        350,
+        180,
+        0,
+        0,
+    ]
+    positions = [
+        pose(
+            i,
+            f"\tX = {x:9.3f}  mm,\tY = {y:9.3f}  mm,\tZ = {z:9.3f}  mm,\n"
+            f"\tW = {w:9.3f} deg,\tP = {p:9.3f} deg,\tR = {r:9.3f} deg",
+            "UF : 0, UT : 1,\t\tCONFIG : 'N U T, 0, 0, 0',",
+        )
+        for i, (x, y, z, w, p, r) in enumerate(rows.tolist(), 1)
+    ]
+    return [program([f"L P[{i}] 250mm/sec CNT100   " for i in range(1, count + 1)], "".join(positions))]
+
+
+def edited(found: Program, divisions: Sequence[Division]) -> Source:
+    """Return a program with divided moves; edits have to come in order and apart."""
+    assert FANUC_LS.divide is not None
+    (source,) = found.sources
+    text, at = "", 0
+    for edit in FANUC_LS.divide(found, divisions):
+        assert edit.start >= at
+        text += source.text[at : edit.start] + edit.text
+        at = edit.stop
+    return replace(source, text=text + source.text[at:])
+
+
+def moves(found: Program) -> list[tuple[int, str, str, str | None]]:
+    """Return line, kind, target and via of each move."""
+    return [
+        (
+            move.line,
+            move.kind,
+            found.targets[move.target].name,
+            None if move.via is None else found.targets[move.via].name,
+        )
+        for move in found.moves
+    ]
+
+
+def test_a_file_of_windows_with_joints_poses_and_frames() -> None:
+    found = FANUC_LS.read([sample("bracket.ls")])
+    text = found.sources[0].text
+    assert [(t.line, t.name, t.frame, t.tool) for t in found.targets] == [
+        (61, "P[1:home]", "2", "3"),
+        (67, "P[2:approach]", "2", "3"),
+        (73, "P[3]", "2", "3"),
+        (79, "P[4]", "2", "3"),
+        (85, "P[5]", "2", "3"),
+        (91, "P[6]", "2", "3"),
+        (97, "P[7]", "2", "3"),
+        (109, "P[9]", "2", "3"),
+        (115, "P[10]", "", "3"),
+        (121, "P[11]", "2", ""),
+        (133, "P[13]", "2", "3"),
+    ]
+    home, approach, *_, last = found.targets
+    assert (home.form.kind, home.form.angle, home.values) == ("joints", radians(1), (0.0, -20.0, 15.5, 0.0, -75.5, 0.0))
+    assert (approach.form.kind, approach.values) == ("pose", (374.0, -12.25, 80.0, 180.0, -0.003, 30.0))
+    assert approach.form.orientation is not None
+    assert approach.configuration == NUT
+    written = [[text[slice(*place)] for place in target.places if place] for target in (home, approach, last)]
+    assert written == [
+        ["0.000", "-20.000", "15.500", ".000", "-75.500", ".000"],
+        ["374.000", "-12.250", "80.000", "180.000", "-.003", "30.000"],
+        ["430.5", "40", "+120.00000", "-179.500", "90.000", "-170.000"],
+    ]
+    assert all(
+        float(text[slice(*place)]) == value
+        for t in found.targets
+        for place, value in zip(t.places, t.values, strict=True)
+        if place
+    )
+    assert moves(found) == [
+        (30, "joint", "P[1:home]", None),
+        (33, "linear", "P[2:approach]", None),
+        (34, "linear", "P[3]", None),
+        (36, "linear", "P[4]", None),
+        (37, "circular", "P[6]", "P[5]"),
+        (39, "linear", "P[7]", None),
+        (41, "linear", "P[3]", None),
+        (48, "circular", "P[9]", None),
+        (49, "circular", "P[10]", None),
+        (50, "circular", "P[11]", None),
+        (55, "linear", "P[13]", None),
+        (59, "joint", "P[1:home]", None),
+    ]
+    circle = found.moves[4]
+    assert text[slice(*circle.statement)] == "C P[5]    \r\n    :  P[6] 80mm/sec CNT100    ;"
+    assert circle.via_text is not None
+    assert (text[slice(*circle.via_text)], text[slice(*circle.target_text)]) == ("P[5]", "P[6]")
+    assert found.skipped == (
+        Skipped(0, 46, "which position P[R[5]] is, is known only when the program runs"),
+        Skipped(0, 47, "PR[2:clear] is a position register, set elsewhere"),
+        Skipped(0, 57, "P[77] is not among the positions of this program"),
+        Skipped(0, 58, "PAL_1[A_1] is no position of this program"),
+        Skipped(0, 103, "P[8] is a step (INC) and no place"),
+        Skipped(0, 127, "P[12] is not taught: X is ****"),
+        Skipped(0, 140, "P[14] has E1 off zero, and that external axis may carry the robot"),
+    )
+    assert found.unknown == {"Touch": 1}
+    assert found.tools == found.frames == {}
+
+
+def test_a_file_with_motion_groups_carried_instructions_and_weaving() -> None:
+    found = FANUC_LS.read([sample("seam.ls")])
+    assert {t.name: (t.frame, t.tool) for t in found.targets if t.name in ("P[1]", "P[3]", "P[20:unused]")} == {
+        "P[1]": ("3", "1"),
+        "P[3]": ("1", "1"),
+        "P[20:unused]": ("1", "1"),
+    }
+    assert moves(found) == [
+        (20, "linear", "P[1]", None),
+        (23, "joint", "P[3]", None),
+        (28, "linear", "P[4]", None),
+        (31, "circular", "P[6]", "P[5]"),
+        (33, "circular", "P[8]", "P[7]"),
+        (38, "circular", "P[11]", None),
+        (39, "circular", "P[3]", None),
+        (41, "circular", "P[8]", None),
+    ]
+    assert [(entry.line, entry.reason) for entry in found.skipped] == [
+        (41, "PR[4] is a position register, set elsewhere"),
+        (43, "the circle has one position only"),
+        (58, "P[2] is for the active user frame, and the program does not say for certain which that is"),
+        (106, "P[9] is in a frame that another motion group moves (COORD)"),
+        (115, "P[10] is reached with a tool that stands still (RTCP)"),
+        (128, "P[12] has no data of motion group 1"),
+        (139, "P[21] is for the active user frame, and the program does not say for certain which that is"),
+    ]
+    assert found.unknown == {"TC_ONLINE": 1, "Weave": 1, "WELD": 1}
+
+
+def test_a_file_of_a_post_processor_with_a_byte_order_mark_and_carriage_returns() -> None:
+    found = FANUC_LS.read([sample("wipe.ls")])
+    assert FANUC_LS.is_one(found.sources[0].text)
+    assert [(t.line, t.name, t.frame, t.tool, t.values[1]) for t in found.targets] == [
+        (8, "P[1]", "", "1", 0.0),
+        (14, "P[2]", "", "1", 100.0),
+        (21, "P[3]", "", "1", 200.0),
+    ]
+    assert [t.configuration for t in found.targets] == [NUT, NUT, Configuration()]
+    assert [move.line for move in found.moves] == [4, 5, 6]
+
+
+def test_lines_are_the_same_whatever_ends_them() -> None:
+    text = sample("seam.ls").text
+    shown = [
+        ([t.line for t in found.targets], moves(found), found.skipped)
+        for end in ("\n", "\r\n", "\r")
+        for found in [FANUC_LS.read([Source(Path("P.LS"), text.replace("\n", end))])]
+    ]
+    assert shown[0] == shown[1] == shown[2]
+
+
+def test_files_are_programs_of_their_own() -> None:
+    one, other = (program(["J P[1] 10% FINE"], pose(1)) for _ in range(2))
+    found = FANUC_LS.read([one, other])
+    assert [(t.source, t.line) for t in found.targets] == [(0, 6), (1, 6)]
+    assert [(move.source, move.target) for move in found.moves] == [(0, 0), (1, 1)]
+    assert found.moves[0].routine != found.moves[1].routine
+
+
+@pytest.mark.parametrize(
+    ("between", "is_known"),
+    [
+        ("DO[1]=ON", True),
+        ("!L P[3] 10mm/sec FINE", True),
+        ("//CALL AWAY", True),
+        ("PR[1]=P[3]", True),
+        ("IF R[1]=1,JMP LBL[2]", True),
+        ("$SPEED=3", True),
+        ("CALL AWAY", False),
+        ("IF R[1]=1,CALL AWAY", False),
+        ("SELECT R[1]=1,CALL AWAY", False),
+        ("       =2,CALL AWAY", False),
+        ("LBL[2]", False),
+        ("ENDIF", False),
+        ("GO HOME", False),
+        ("J PR[3] 10% FINE", False),
+        ("J P[3] 10% FINE INC", False),
+        ("J P[9] 10% FINE", False),
+        ("L P[3] 10mm/sec FINE Offset,PR[2]", False),
+        ("L P[3] 10mm/sec FINE Skip,LBL[2]", False),
+    ],
+)
+def test_what_came_before_a_move_is_known_or_not(between: str, is_known: bool) -> None:
+    found = FANUC_LS.read(
+        [program(["L P[1] 10mm/sec FINE", between, "L P[2] 10mm/sec FINE"], pose(1) + pose(2) + pose(3))]
+    )
+    assert (found.moves[0].routine == found.moves[-1].routine) is is_known
+
+
+@pytest.mark.parametrize(
+    ("instructions", "frame"),
+    [
+        (["UFRAME_NUM=3", "UTOOL_NUM=2", "L P[1] 10mm/sec FINE"], "3"),
+        (["UFRAME_NUM=0", "UTOOL_NUM=2", "L P[1] 10mm/sec FINE"], ""),
+        (["UFRAME_NUM[GP1,2]=4", "UTOOL_NUM=2", "L P[1] 10mm/sec FINE"], "4"),
+        (["UTOOL_NUM=2", "UFRAME_NUM=3", "LBL[1]", "CALL X", "L P[1] 10mm/sec FINE", "JMP LBL[1]"], "3"),
+        (["UTOOL_NUM=2", "UFRAME_NUM=3", "!UFRAME_NUM=4", "LBL[1]", "L P[1] 10mm/sec FINE"], "3"),
+        (["UTOOL_NUM=2", "UFRAME_NUM=3", "PR[1]=P[1]"], "3"),
+        (["UTOOL_NUM=2", "L P[1] 10mm/sec FINE", "UFRAME_NUM=3"], None),
+        (["UTOOL_NUM=2", "UFRAME_NUM[GP2]=4", "L P[1] 10mm/sec FINE"], None),
+        (["UTOOL_NUM=2", "UFRAME_NUM=R[3]", "L P[1] 10mm/sec FINE"], None),
+        (["UTOOL_NUM=2", "UFRAME_NUM=3", "$MNUFRAMENUM[1]=R[2]", "L P[1] 10mm/sec FINE"], None),
+        (["UTOOL_NUM=2", "UFRAME_NUM=3", "IF (R[1]=1),UFRAME_NUM=4", "L P[1] 10mm/sec FINE"], None),
+        (["UTOOL_NUM=2", "UFRAME_NUM=3", "LBL[1]", "L P[1] 10mm/sec FINE", "UFRAME_NUM=4", "JMP LBL[1]"], None),
+        (["UTOOL_NUM=2", "UFRAME_NUM=3", "L P[1] 10mm/sec FINE", "UFRAME_NUM=4", "L P[1] 10mm/sec FINE"], None),
+        (["UTOOL_NUM=2", "UFRAME_NUM=3", "UFRAME_NUM=4", "PR[1]=P[1]"], None),
+    ],
+)
+def test_the_active_user_frame(instructions: list[str], frame: str | None) -> None:
+    found = FANUC_LS.read([program(instructions, pose(1, head="UF : F, UT : F,\t\tCONFIG : 'N U T, 0, 0, 0',"))])
+    assert [(t.frame, t.tool) for t in found.targets] == ([] if frame is None else [(frame, "2")])
+    assert len(found.skipped) == (frame is None)
+    assert all("active user frame" in entry.reason for entry in found.skipped)
+
+
+def test_joints_do_not_depend_on_the_active_frame() -> None:
+    data = "\tJ1=     0.000 deg,\tJ2=   -20.000 deg,\tJ3=   800.000  mm"
+    (target,) = FANUC_LS.read([program(["J P[1] 10% FINE"], pose(1, data, "UF : F, UT : F,"))]).targets
+    assert (target.values, target.frame, target.tool) == ((0.0, -20.0, 800.0), "", "")
+
+
+@pytest.mark.parametrize(
+    ("positions", "reason"),
+    [
+        (pose(1, "\tX =  1.000  mm,\tY =  2.000  mm"), "P[1] has no Z"),
+        (pose(1, more=",\n\tX =  1.000  mm"), "P[1] has X twice"),
+        (pose(1, more=",\n\tE1=  1.000"), "P[1] has a E1 without mm or deg"),
+        (pose(1, "\tX = R[1]"), "P[1] has a X without mm or deg"),
+        (pose(1).replace(" mm", "deg"), "P[1] is not in mm and deg"),
+        (pose(1, "\tJ1=  1.000 deg,\tJ3=  1.000 deg"), "P[1] has no J2"),
+        (pose(1, "\t"), "P[1] has no X"),
+        (pose(1, more=",\n\tJ1=  1.000 deg"), "P[1] has a pose and joints"),
+        (pose(1, head="CONFIG : 'N U T, 0, 0, 0',"), "P[1] has no UF and UT"),
+        (pose(1, head="UF : 1, UT : 1,\t\tCONFIG : 'N F T, 0, 0, 0',"), "P[1] has a CONFIG that cannot be read"),
+        (pose(1).replace("GP1", "GP2"), "P[1] has no data of motion group 1"),
+        (pose(1, more="\n   GP1:\n\tUF : 1, UT : 1,\n\tJ1= 0.000 deg"), "P[1] has two groups 1"),
+    ],
+)
+def test_positions_that_are_left(positions: str, reason: str) -> None:
+    found = FANUC_LS.read([program([], positions)])
+    assert (found.targets, found.skipped) == ((), (Skipped(0, 5, reason),))
+
+
+def test_positions_of_a_program_that_follows_a_conveyor_are_left() -> None:
+    joints = "\tJ1=     0.000 deg,\tJ2=   -20.000 deg"
+    attributes = "/APPL\nLINE_TRACK;\n  LINE_TRACK_SCHEDULE_NUMBER      : 2;\n"
+    found = FANUC_LS.read([program([], pose(1) + pose(2, joints), attributes)])
+    assert [t.name for t in found.targets] == ["P[2]"]
+    assert found.skipped == (Skipped(0, 8, "P[1] is in a frame that moves with a conveyor (LINE_TRACK)"),)
+
+
+def test_a_step_to_any_position_may_be_each_that_no_other_move_names() -> None:
+    found = FANUC_LS.read([program(["L P[1] 9mm/sec FINE", "L P[R[1]] 9mm/sec FINE INC"], pose(1) + pose(2))])
+    assert [t.name for t in found.targets] == ["P[1]"]
+    assert found.skipped[-1].reason == "P[2] is a step (INC) and no place"
+
+
+TEXT = program(["J P[1] 10% FINE"], pose(1) + pose(2)).text
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "what"),
+    [
+        ("", 1, "no section /PROG"),
+        (TEXT.replace("/PROG", "PROG"), 1, "no section /PROG"),
+        (TEXT.replace("/MN", ""), 18, "no section /MN"),
+        (TEXT.replace("/POS", ""), 18, "no section /POS"),
+        (TEXT.replace("/END", ""), 18, "no section /END"),
+        (TEXT[:-40], 16, "no section /END"),
+        (TEXT.replace("};\nP[2]", "\nP[2]"), 6, "no complete position"),
+        (TEXT.replace("};\n/END", "\n/END"), 12, "no complete position"),
+        (TEXT.replace("P[2]{", "Q[2]{"), 12, "no complete position"),
+        (TEXT.replace("P[2]{", "P[01]{"), 12, "P[1] is there twice"),
+        (TEXT.replace("500.000", "1000001.0"), 9, "out of all proportion"),
+        (TEXT.replace("500.000", "9" * 400), 9, "out of all proportion"),
+    ],
+)
+def test_what_is_refused(text: str, line: int, what: str) -> None:
+    with pytest.raises(InputError) as refused:
+        FANUC_LS.read([Source(Path("P.LS"), text)])
+    assert what in refused.value.what
+    assert refused.value.where == f"P.LS, line {line}"
+
+
+@pytest.mark.parametrize(
+    ("text", "shoulder", "elbow", "readings"),
+    [
+        ("N U T, 0, 0, 0", "front", "up", {1: HALF, 4: HALF, 5: (-pi, 0), 6: HALF}),
+        ("FUT,1,-1,0", "front", "up", {1: (pi, 3 * pi), 4: (-3 * pi, -pi), 5: (0, pi), 6: HALF}),
+        ("n d t, 0, 0, -2", "front", "down", {1: HALF, 4: HALF, 5: (-pi, 0), 6: (-5 * pi, -3 * pi)}),
+        ("F L U B, 0, 0, 0", "back", "down", {1: HALF, 4: HALF, 5: (0, pi), 6: HALF}),
+        ("N D B, 0, 0, 0", "back", "up", {1: HALF, 4: HALF, 5: (-pi, 0), 6: HALF}),
+        ("N U T", "front", "up", {5: (-pi, 0)}),
+        ("R, 0, 0, 0", None, None, {}),
+        ("", None, None, {}),
+    ],
+)
+def test_configurations(
+    text: str, shoulder: str | None, elbow: str | None, readings: dict[int, tuple[float, float]]
+) -> None:
+    found = configuration(text)
+    assert found is not None
+    assert (found.shoulder, found.elbow, found.wrist, found.near) == (shoulder, elbow, None, None)
+    assert {joint: pytest.approx((low, high)) for joint, low, high in found.readings} == readings
+
+
+@pytest.mark.parametrize(
+    "text", ["N N T, 0, 0, 0", "U D T, 0, 0, 0", "X U T, 0, 0, 0", "N U T, 0, a, 0", "N U T, 0, 0.5, 0"]
+)
+def test_configurations_that_cannot_be_read(text: str) -> None:
+    assert configuration(text) is None
+
+
+#: J1, J4, J5 and J6 [deg] that controllers show with a configuration: "The perils of six-axis robots", onerobotics.com
+#: (R-2000iB/165F), and CURPOS.DG files.
+SHOWN = [
+    ("N U T, 0, 0, 0", (7.962, 77.661, -51.975, -79.273)),
+    ("F U T, 0, 0, 0", (7.962, -102.339, 51.975, 100.727)),
+    ("F U T, 0, 0, 0", (-8.01, 95.18, 54.12, -4.79)),
+    ("N U T, 0, 0, 0", (-70.39, -0.15, -89.38, -19.65)),
+    ("N U T, 0, 0, 0", (86.75, 56.19, -81.55, -94.01)),
+]
+
+
+@pytest.mark.parametrize(("text", "joints"), SHOWN)
+def test_configurations_that_controllers_show(text: str, joints: tuple[float, ...]) -> None:
+    found, other = configuration(text), configuration(text.translate(str.maketrans("NF", "FN")))
+    assert found is not None
+    assert other is not None
+    shown = dict(zip((1, 4, 5, 6), map(radians, joints), strict=True))
+    assert all(low <= shown[joint] < high for joint, low, high in found.readings)
+    assert not all(low <= shown[joint] < high for joint, low, high in other.readings)
+
+
+def test_up_stays_up_when_the_arm_leans_back_over_its_first_axis() -> None:
+    robot = load_robot("lrmate200ic")
+    rule = branch_rule(robot)
+    assert rule is not None
+    # Joint 3 is the angle between upper arm and forearm, which bends forward from 0 to 142 deg and a little before.
+    leaning = np.deg2rad([[0, 30, 0, 0, 40, 0], [0, -55, -40, 0, 40, 0]])
+    straight = np.deg2rad([[0, 30, -100, 0, 40, 0], [0, -55, -130, 0, 40, 0]])
+    for postures, side in ((leaning, "U"), (straight, "D")):
+        names = [BRANCHES[number] for number in rule.numbers(robot.sweep(postures))]
+        for name, place in zip(names, "TB", strict=True):
+            found = configuration(f"N {side} {place}, 0, 0, 0")
+            assert found is not None
+            assert name.startswith(f"{found.shoulder}-{found.elbow}-")
+
+
+LINE = (374.0, -12.25, -1.0, 180.0, 0.0, 30.0)
+
+
+def test_a_line_and_a_circle_are_divided() -> None:
+    found = FANUC_LS.read([sample("bracket.ls")])
+    first, second = (382.5, -12.25, 39.5, 180.0, -0.0015, 30.0), (390.0, -12.25, 20.0, 180.0, 0.0, 30.0)
+    via, end, last_via = (
+        (431.0, -11.0, -1.0, 180.0, 0.0, 37.0),
+        (440.0, -6.0, -1.0, 180.0, 0.0, 47.0),
+        (451.0, 9.0, -1.0, 180.0, 0.0, 66.0),
+    )
+    source = edited(found, [Division(4, ((end, via),), last_via), Division(2, ((first, None), (second, None)))])
+    lines = source.text.split("\r\n")
+    assert lines[32:43] == [
+        "  10:L P[2:approach] 250mm/sec CNT50    ;",
+        "  11:L P[100] R[4:speed]mm/sec CNT100    ;",
+        "  12:L P[101] R[4:speed]mm/sec CNT100    ;",
+        "  13:L P[3] R[4:speed]mm/sec FINE    ;",
+        "  14:  DO[5:spindle]=ON ;",
+        "  15:L P[4] 80mm/sec CNT100 ACC80 TB    .10sec,DO[6]=ON    ;",
+        "  16:C P[102]    ",
+        "    :  P[103] 80mm/sec CNT100    ;",
+        "  17:C P[104]    ",
+        "    :  P[6] 80mm/sec CNT100    ;",
+        "  18:L P[7] 80mm/sec FINE    ;",
+    ]
+    assert "LINE_COUNT\t= 37;" in lines
+    assert "\n" not in source.text.replace("\r\n", "")
+    added = FANUC_LS.read([source])
+    assert added.targets[: len(found.targets)] == tuple(
+        replace(new, line=old.line + 4, places=new.places, name=old.name)
+        for old, new in zip(found.targets, added.targets, strict=False)
+    )
+    values = {t.name: t.values for t in added.targets}
+    assert values["P[100]"] == (382.5, -12.25, 39.5, 180.0, -0.0015, 30.0)
+    assert (values["P[101]"], values["P[102]"], values["P[103]"], values["P[104]"]) == (second, via, end, last_via)
+    assert {(t.frame, t.tool, t.configuration) for t in added.targets[-5:]} == {("2", "3", NUT)}
+    assert [names for _, *names in moves(added)][2:7] == [
+        ["linear", "P[100]", None],
+        ["linear", "P[101]", None],
+        ["linear", "P[3]", None],
+        ["linear", "P[4]", None],
+        ["circular", "P[103]", "P[102]"],
+    ]
+
+
+def test_what_is_to_happen_once_is_not_said_in_pieces() -> None:
+    found = FANUC_LS.read([sample("bracket.ls")])
+    lines = edited(found, [Division(3, ((LINE, None),))]).text.split("\r\n")
+    assert lines[35:37] == [
+        "  13:L P[100] 80mm/sec CNT100 ACC80    ;",
+        "  14:L P[4] 80mm/sec CNT100 ACC80 TB    .10sec,DO[6]=ON    ;",
+    ]
+
+
+def test_instructions_that_a_move_carries_keep_their_numbers() -> None:
+    words = [f"J P[{i}] 100% FINE" for i in (1, 2, 1)]
+    source = program(["L P[1] 9mm/sec FINE", *words], pose(1) + pose(2))
+    carried = "      1:  TC_ONLINE (ON) ;\n      2:  DO[1]=ON ;\n      3:  DO[2]=ON ;\n       ------ ;\n"
+    source = replace(source, text=source.text.replace("   3:", carried + "   3:"))
+    text = edited(FANUC_LS.read([source]), [Division(0, ((LINE, None),))]).text
+    assert carried in text
+    assert f"   2:L P[1] 9mm/sec FINE ;\n   3:J P[1] 100% FINE ;\n{carried}   4:J P[2] 100% FINE ;\n" in text
+    assert "\n   5:J P[1] 100% FINE ;\n/POS" in text
+
+
+def test_lines_without_numbers_stay_without() -> None:
+    found = FANUC_LS.read([sample("wipe.ls")])
+    lines = edited(found, [Division(2, ((LINE, None),))]).text.split("\r")
+    assert lines[4:7] == [":L P[2] 100mm/sec CNT50 ;", ": L P[4] 100mm/sec CNT100    ;", ": L P[3] 100mm/sec FINE ;"]
+    assert lines[-7:-1] == ["P[4]{", "GP1:", "UF : 0, UT : F,", *lines[-4:-2], "}"]
+    assert lines[-4] == "X = 374.000 mm, Y = -12.250 mm, Z = -1.000 mm,"
+    assert lines[-3] == "W = 180.0000 deg, P = 0.0000 deg, R = 30.0000 deg"
+
+
+def test_numbers_of_lines_grow_into_the_blanks_before_them() -> None:
+    source = program(["L P[1] 9mm/sec FINE"] * 9 + ["END"], pose(1), "LINE_COUNT = 10;\n")
+    found = FANUC_LS.read([source])
+    text = edited(found, [Division(k, ((LINE, None),)) for k in range(9)]).text
+    assert "\n   9:L P[6] 9mm/sec CNT100    ;\n  10:L P[1] 9mm/sec FINE ;\n" in text
+    assert text.count("\n  19:END ;\n") == 1
+    assert "LINE_COUNT = 19;" in text
+
+
+JOINTS = "\tJ1=     0.000 deg,\tJ2=   -20.000 deg"
+
+
+@pytest.mark.parametrize(
+    ("words", "change"),
+    [
+        ("L P[1] 2.5sec FINE", str),
+        ("L P[1] 500msec FINE", str),
+        ("L P[1] R[3]sec CNT100", str),
+        ("L P[1] 9mm/sec FINE Wjnt", str),
+        ("L P[1] 9mm/sec FINE Offset,PR[1]", str),
+        ("L P[1] 9mm/sec FINE Skip,LBL[1]", str),
+        ("L P[1] 9mm/sec FINE\n    :  Arc Start[1]", str),
+        ("A P[1] 9mm/sec FINE", str),
+        ("C P[2] Tool_Offset,PR[1]\n    :  P[1] 9mm/sec FINE", str),
+        ("L P[1] 9mm/sec FINE", lambda text: text.replace("deg\n}", "deg,\n\tE1=   0.000  mm\n}", 1)),
+        (
+            "L P[1] 9mm/sec FINE",
+            lambda text: text.replace("deg\n}", "deg\n   GP2:\n\tUF : 0, UT : 1,\n\tJ1= 1.000 deg\n}", 1),
+        ),
+    ],
+)
+def test_moves_that_are_left_whole(words: str, change: Callable[[str], str]) -> None:
+    source = program([words], pose(1) + pose(2))
+    source = replace(source, text=change(source.text))
+    found = FANUC_LS.read([source])
+    is_circle = found.moves[0].kind == "circular"
+    division = Division(0, ((LINE, LINE if is_circle else None),), LINE if is_circle else None)
+    assert edited(found, [division]) == source
+
+
+def test_many_positions() -> None:
+    found = FANUC_LS.read(program_of(500))
+    assert (len(found.targets), len(found.moves), found.skipped, found.unknown) == (500, 500, (), {})
+    assert [move.target for move in found.moves] == list(range(500))
+    assert {move.routine for move in found.moves} == {0}

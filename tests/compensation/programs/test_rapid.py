@@ -1,0 +1,629 @@
+"""RAPID: every target of programs in the syntax of ABB's manuals, found where it stands, and nothing else.
+
+The sample programs are ours. Their syntax is that of the sections on MoveAbsJ, MoveC, MoveExtJ, MoveJ, MoveL, MoveLDO,
+SearchL, TriggL, Offs, RelTool, confdata, jointtarget, robtarget, tooldata and wobjdata of ABB's "Technical reference
+manual, RAPID Instructions, Functions and Data types" (3HAC050917-001), of "RAPID Kernel" (3HAC050946-001), and of the
+application manual "Arc and Arc Sensor" for ArcL, ArcLStart and ArcCEnd.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from math import pi
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+from truearm.compensation.programs.numbers import rewritten
+from truearm.compensation.programs.program import Division, Edit, Program, Source
+from truearm.compensation.programs.rapid import RAPID
+from truearm.compensation.programs.rapid.data import configuration
+from truearm.errors import InputError
+from truearm.modeling.inverse.branches import BRANCHES, branch_rule
+from truearm.modeling.transform import Transform
+from truearm.robots import load_robot
+
+SAMPLES = Path(__file__).parent / "samples" / "rapid"
+NO_AXES = "[9E+09,9E+09,9E+09,9E+09,9E+09,9E+09]"
+DOWN = (0.0, 0.7071068, 0.7071068, 0.0)
+PEN = "PERS tooldata tPen:=[TRUE,[[0,0,100],[1,0,0,0]],[1,[0,0,1],[1,0,0,0],0,0,0]];"
+TABLE = 'PERS wobjdata wTable:=[FALSE,TRUE,"",[[300,0,50],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];'
+
+
+def pose(x: float = 300, y: float = 0, z: float = 200, rest: str = f"[0,0,1,0],[0,0,0,0],{NO_AXES}") -> str:
+    return f"[[{x},{y},{z}],{rest}]"
+
+
+def program_of(count: int) -> list[Source]:
+    """Return a program with so many pose targets, half of them declared and half inline."""
+    declared = count // 2
+
+    def target(i: int) -> str:
+        x, y, z = 300 + i % 200 + 0.125, i % 150 - 75.5, 200 + i % 100 + 0.25
+        return f"[[{x},{y},{z}],[0,0.7071068,0.7071068,0],[0,-1,1,0],{NO_AXES}]"
+
+    lines = ["MODULE Long", f"  {PEN}", f"  {TABLE}"]
+    lines += [f"  CONST robtarget p{i}:={target(i)};" for i in range(declared)]
+    lines += ["  PROC main()"]
+    lines += [f"    MoveL p{i},v100,z10,tPen\\WObj:=wTable;" for i in range(declared)]
+    lines += [f"    MoveL {target(i)},v100,z10,tPen\\WObj:=wTable; ! {i}" for i in range(declared, count)]
+    lines += ["  ENDPROC", "ENDMODULE", ""]
+    return [Source(Path("long.mod"), "\n".join(lines))]
+
+
+def sources(*names: str) -> list[Source]:
+    return [Source(SAMPLES / name, (SAMPLES / name).read_bytes().decode("latin-1")) for name in names]
+
+
+def read(body: str, data: str = "") -> Program:
+    """Read a module with one routine, in which the first line of `body` is line 6."""
+    text = f"MODULE One\n{PEN}\n{TABLE}\n{' '.join(data.splitlines())}\nPROC main()\n{body}\nENDPROC\nENDMODULE\n"
+    return RAPID.read([Source(Path("one.mod"), text)])
+
+
+def edited(program: Program, edits: Sequence[Edit]) -> list[Source]:
+    texts = [source.text for source in program.sources]
+    for edit in sorted(edits, key=lambda edit: (edit.start, edit.stop), reverse=True):
+        texts[edit.source] = texts[edit.source][: edit.start] + edit.text + texts[edit.source][edit.stop :]
+    return [replace(source, text=text) for source, text in zip(program.sources, texts, strict=True)]
+
+
+def in_places(program: Program) -> None:
+    """Check that every number is where its place says, and that a place is None only for one that is not there."""
+    for target in program.targets:
+        text = program.sources[target.source].text
+        assert len(target.values) == len(target.places)
+        for value, place in zip(target.values, target.places, strict=True):
+            if place is None:
+                assert value == 0.0
+                assert target.form.name == "RelTool"
+            else:
+                assert float(text[slice(*place)]) == value
+                assert re.fullmatch(r"[-+.\deE]+", text[slice(*place)])
+
+
+def quadrants(*numbers: int) -> tuple[tuple[int, float, float], ...]:
+    return tuple((joint, k * pi / 2, (k + 1) * pi / 2) for joint, k in zip((1, 4, 6), numbers, strict=True))
+
+
+@pytest.fixture(scope="module")
+def polish() -> Program:
+    return RAPID.read(sources("polish.mod"))
+
+
+def test_every_target_of_a_program_is_found(polish: Program) -> None:
+    in_places(polish)
+    found = [(t.line, t.name, t.form.name, t.values, t.tool, t.frame, t.parent, t.turned) for t in polish.targets]
+    disc = ("tDisc", "wCover")
+    assert found == [
+        (19, "jHome", "jointtarget", (0.0, -20.5, 25.0, 0.0, 60.0, -15.0), "tDisc", "", None, False),
+        (21, "p10", "robtarget", (60.125, -14.0, 12.0, *DOWN), *disc, None, False),
+        (22, "p20", "robtarget", (61.5, 4.75, 12.0, 0.0087265, 0.7071068, 0.7070529, 0.0), *disc, None, False),
+        (26, "pRow{1}", "robtarget", (0.0, 0.0, 5.0, 0.0, 1.0, 0.0, 0.0), *disc, None, False),
+        (27, "pRow{2}", "robtarget", (0.0, 10.0, 5.0, 0.0, 1.0, 0.0, 0.0), *disc, None, False),
+        (28, "pRow{3}", "robtarget", (0.0, 20.0, 5.0, 0.0, 1.0, 0.0, 0.0), *disc, None, False),
+        (31, "pGrid{2,1}", "robtarget", (0.0, 5.0, 40.0, 0.0, 1.0, 0.0, 0.0), *disc, None, False),
+        (47, "", "robtarget", (62.0, 10.0, 12.0, *DOWN), *disc, None, False),
+        (50, "", "Offs", (0.0, 0.0, -2.5), *disc, 1, False),
+        (51, "", "RelTool", (0.0, 0.5, -30.0, 0.0, 0.0, 12.5), *disc, 2, True),
+        (52, "", "Offs", (1.0, 2.0, 3.0), *disc, 1, False),
+        (52, "", "RelTool", (4.0, 5.0, 6.0, 1.0, -2.0, 0.0), *disc, 10, True),
+        (54, "", "robtarget", (300.0, 0.0, 400.0, 0.0, 0.0, 1.0, 0.0), "", "", None, False),
+        (73, "", "jointtarget", (10.0, 0.0, 0.0, 0.0, 30.0, -720.25), "tDisc", "", None, False),
+        (86, "p10", "robtarget", (1.5, 2.5, 3.5, 1.0, 0.0, 0.0, 0.0), *disc, None, False),
+    ]
+
+
+def test_the_configuration_data_say_which_postures_are_meant(polish: Program) -> None:
+    assert polish.targets[1].configuration.readings == quadrants(0, -1, -2)
+    assert polish.targets[1].configuration.elbow == "up"
+    assert polish.targets[2].configuration.readings == quadrants(-1, 0, 1)
+    assert polish.targets[2].configuration.elbow == "down"
+    assert polish.targets[0].configuration.readings == ()
+    assert {t.configuration.wrist or t.configuration.shoulder for t in polish.targets} == {None}
+
+
+def test_every_move_is_found(polish: Program) -> None:
+    text = polish.sources[0].text
+    moves = [(m.kind, m.line, m.target, m.via, text[slice(*m.target_text)]) for m in polish.moves]
+    assert moves == [
+        ("joint", 44, 0, None, ""),
+        ("joint", 45, 1, None, ""),
+        ("linear", 46, 2, None, "p20"),
+        ("circular", 47, 1, 7, "p10"),
+        ("linear", 50, 8, None, "Offs(p10,0,0,-2.5)"),
+        ("linear", 51, 9, None, "RelTool (p20, 0, 0.5, -30 \\Rz:=12.5)"),
+        ("linear", 52, 11, None, ""),
+        ("linear", 53, 1, None, ""),
+        ("linear", 54, 12, None, ""),
+        ("linear", 55, 1, None, ""),
+        ("linear", 59, 6, None, "pGrid{2,1}"),
+        ("linear", 62, 2, None, ""),
+        ("linear", 64, 2, None, ""),
+        ("joint", 73, 13, None, ""),
+        ("joint", 81, 1, None, ""),
+        ("linear", 87, 14, None, ""),
+    ]
+    circle = polish.moves[3]
+    assert circle.via_text is not None
+    assert text[slice(*circle.via_text)].startswith("[[62,10,12],")
+    assert text[slice(*circle.statement)].startswith("MoveC [[62,10,12],")
+    assert text[slice(*circle.statement)].endswith("\\WObj:=wCover;")
+
+
+def test_what_stands_before_a_move_is_known_only_where_nothing_comes_between(polish: Program) -> None:
+    # A call, an offset that is computed (line 53), an IF, a loop, a TEST, an instruction that is not known.
+    assert [m.routine for m in polish.moves] == [0, 0, 0, 0, 1, 1, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10]
+
+
+def test_tools_and_frames_of_the_program_are_known(polish: Program) -> None:
+    # tStand is not held by the robot, wTable and wPart move. The user frame of wCover is turned by 90 deg about z.
+    assert list(polish.tools) == ["tDisc"]
+    assert polish.tools["tDisc"].translation == (-0.0125, 0.00025, 0.11875)
+    assert_allclose(polish.tools["tDisc"].quaternion, (np.cos(pi / 12), 0, np.sin(pi / 12), 0), rtol=0, atol=1e-7)
+    assert list(polish.frames) == ["wCover"]
+    cover = polish.frames["wCover"]
+    assert_allclose(cover.translation, (0.330, -0.050, 0.0805), rtol=0, atol=1e-15)
+    assert_allclose(cover.rotation, [[0, -1, 0], [1, 0, 0], [0, 0, 1]], rtol=0, atol=1e-15)
+
+
+def test_what_is_left_as_it_is_says_why(polish: Program) -> None:
+    reasons = {skip.line: skip.reason for skip in polish.skipped}
+    parts = {
+        20: "jTrack does not say where all joints",
+        29: "pGrid{1,1} is used by no move",
+        30: "pGrid{1,2} is used by no move",
+        32: "pGrid{2,2} is used by no move",
+        33: "pFound has no numbers in the program",
+        34: "pShift gets its numbers while the program runs, in line 89",
+        35: "pMixed has nX in place of numbers",
+        36: "pBoth is used with more than one tool or work object",
+        37: "tStand, which is not held by the robot",
+        38: "wTable, which is moved by another mechanical unit",
+        39: "pSpare is used by no move",
+        71: "not declared in this program: pElsewhere",
+        72: "is computed",
+        94: "is a parameter of the routine: pGiven",
+    }
+    assert len(polish.skipped) == len(reasons)
+    assert reasons.keys() == parts.keys()
+    assert [line for line, part in parts.items() if part not in reasons[line]] == []
+    assert polish.unknown == {"GlueOn": 2}
+
+
+def test_several_modules_are_one_program() -> None:
+    program = RAPID.read(sources("cell/MainModule.mod", "cell/Data.sys"))
+    in_places(program)
+    assert [(t.source, t.line, t.name) for t in program.targets] == [
+        (0, 2, "pUp"), (1, 4, "pSeam10"), (1, 5, "pSeam20"), (1, 6, "pSeam30"), (1, 7, "pSeam40"), (1, 8, "pUp"),
+    ]  # fmt: skip
+    assert {(t.tool, t.frame) for t in program.targets} == {("tTorch", "wFixture")}
+    assert [(m.kind, m.source, m.line, m.target, m.via, m.routine) for m in program.moves] == [
+        ("joint", 0, 5, 0, None, 0), ("linear", 0, 6, 1, None, 0), ("linear", 0, 7, 2, None, 0),
+        ("circular", 0, 8, 4, 3, 0), ("linear", 0, 11, 0, None, 1), ("joint", 1, 16, 5, None, 2),
+    ]  # fmt: skip
+    assert program.frames["wFixture"] == Transform((0.28, -0.15, 0.0725))
+    assert not program.skipped
+    assert not program.unknown
+
+
+def test_a_file_alone_does_not_know_the_names_of_the_other() -> None:
+    program = RAPID.read(sources("cell/MainModule.mod"))
+    assert [t.name for t in program.targets] == ["pUp"]
+    assert program.targets[0].tool == "tTorch"
+    assert not program.tools
+    assert [skip.line for skip in program.skipped] == [6, 7, 8, 8]
+
+
+@pytest.mark.parametrize("name", ["polish.mod", "press_crlf.prg"])
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_line_ends_and_a_byte_order_mark_do_not_matter(name: str, end: str) -> None:
+    (source,) = sources(name)
+    other = Source(source.path, "\xef\xbb\xbf" + re.sub(r"\r\n|\n", end, source.text))
+    assert RAPID.is_one(other.text)
+    one, two = RAPID.read([source]), RAPID.read([other])
+    in_places(two)
+    assert [replace(t, places=()) for t in one.targets] == [replace(t, places=()) for t in two.targets]
+    assert [(m.line, m.target, m.routine) for m in one.moves] == [(m.line, m.target, m.routine) for m in two.moves]
+    assert one.skipped == two.skipped
+
+
+def test_names_do_not_depend_on_their_case() -> None:
+    program = read(
+        f"movej P1,v100,fine,TPEN\\wobj:=WTABLE;\nMoveL {pose()},v100,fine,Tool0\\WObj:=WOBJ0;",
+        f"const Robtarget p1:={pose()};",
+    )
+    assert [(t.name, t.tool, t.frame) for t in program.targets] == [("p1", "tPen", "wTable"), ("", "", "")]
+
+
+def test_a_tool_that_is_declared_elsewhere_keeps_its_name() -> None:
+    program = read(f"MoveL {pose()},v100,fine,tFar\\WObj:=wFar;\nMoveL {pose()},v100,fine,TFAR\\WObj:=WFAR;")
+    assert {(t.tool, t.frame) for t in program.targets} == {("tFar", "wFar")}
+
+
+@pytest.mark.parametrize(
+    ("instruction", "kind"),
+    [
+        ("MoveJ {},v100,fine,tPen;", "joint"),
+        ('MoveJSync {},v100,z5,tPen,"act";', "joint"),
+        ("MoveLDO {},v100,z5,tPen\\WObj:=wTable,do1,1;", "linear"),
+        ("TriggJ {},v100,tr1\\T2:=tr2,z5,tPen;", "joint"),
+        ("TriggLIOs {},v100\\TriggData1:=a{*},z5,tPen;", "linear"),
+        ("TriggC {},{},v100,tr1,z5,tPen;", "circular"),
+        ("SearchL \\Stop,di1\\Flanks,pHit,{},v100,tPen;", "linear"),
+        ("SearchC di1,pHit,{},{},v100,tPen;", "circular"),
+        ("ArcL {},v100,sm1,wd1,wv1,z1,tPen;", "linear"),
+        ("ArcC1 {},{},v100,sm1,wd1\\Weave:=wv1,z1,tPen\\Track:=tr1;", "circular"),
+        ("SpotL {},vmax,gun1,spot10,tPen;", "linear"),
+        ("PaintL {},v800,z50,tPen;", "linear"),
+        ("DispL \\On,{},v250,bead1,z30,tPen;", "linear"),
+        ("CapL {},v100,cd1,ws1,wv1,z1,tPen;", "linear"),
+    ],
+)
+def test_each_instruction_has_its_arguments_in_its_own_places(instruction: str, kind: str) -> None:
+    program = read(instruction.replace("{}", pose(7), 1).replace("{}", pose(9)))
+    (move,) = program.moves
+    assert move.kind == kind
+    assert program.targets[move.target].values[0] == (9 if kind == "circular" else 7)
+    assert (move.via is None) == (kind != "circular")
+    assert {t.tool for t in program.targets} == {"tPen"}
+    assert not program.skipped
+    assert not program.unknown
+
+
+@pytest.mark.parametrize(
+    ("body", "data", "line", "part"),
+    [
+        ("MoveL p1,v1,fine,tPen;", "", 6, "not declared in this program: p1"),
+        ("MoveL *,v1,fine,tPen;", "", 6, "not written in the text"),
+        ("MoveL p1,v1,fine,tPen;", "CONST jointtarget p1:=[[0,0,0,0,0,0],[0,0,0,0,0,0]];", 6, "is no robtarget: p1"),
+        ("MoveL p1,v1,fine,tPen;", f"CONST robtarget p1{{1}}:=[{pose()}];", 6, "p1 is an array"),
+        ("MoveL p1{1},v1,fine,tPen;", f"CONST robtarget p1:={pose()};", 6, "p1 is no array"),
+        (
+            "MoveL p1{2},v1,fine,tPen;",
+            f"CONST robtarget p1{{1}}:=[{pose()}];",
+            6,
+            "not declared in this program: p1{",
+        ),
+        ("MoveL p1,v1,fine,tPen;", f"CONST robtarget p1:={pose()}; CONST robtarget P1:={pose()};", 4, "more than once"),
+        ("MoveL p1,v1,fine,tPen;", "CONST robtarget p1:=[[1,2,3],[1,0,0,0],[0,0,0,0]];", 4, "missing or computed"),
+        ("MoveL p1,v1,fine,tPen;", f"CONST robtarget p1:={pose(rest='[-q,0,0,0],[0,0,0,0],x')};", 4, "has q in place"),
+        ("MoveL p1{1},v1,fine,tPen;", f"CONST robtarget p1{{3}}:=[{pose()}];", 4, "missing or computed"),
+        (
+            "p1.trans.x:=3; MoveL p1,v1,fine,tPen;",
+            f"PERS robtarget p1:={pose()};",
+            4,
+            "program runs, in line 6",
+        ),
+        ("IF a p1:=b; MoveL p1,v1,fine,tPen;", f"PERS robtarget p1:={pose()};", 4, "program runs, in line 6"),
+        ("Incr p1.trans.x; MoveL p1,v1,fine,tPen;", f"PERS robtarget p1:={pose()};", 4, "while the program runs"),
+        ("SearchL d,p1,p1,v1,tPen;", f"PERS robtarget p1:={pose()};", 4, "while the program runs"),
+        (f"MoveL {pose()},v1,fine,tools{{i}};", "", 6, "a tool that is computed"),
+        (f"MoveL {pose()},v1,fine,tPen\\WObj:=Best();", "", 6, "a work object that is computed"),
+        (f"MoveL {pose()},v1,fine,wTable;", "", 6, "wTable, which is no tool"),
+        (f"MoveL {pose()},v1,fine,tA;", "PERS tooldata tA; LOCAL PERS tooldata tA;", 6, "declared more than once"),
+        (
+            f"MoveL {pose()},v1,fine,tPen\\WObj:=wHeld;",
+            'PERS wobjdata wHeld:=[TRUE,TRUE,"",[[0,0,0],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];',
+            6,
+            "wHeld, which is held by the robot",
+        ),
+        (
+            "MoveL Offs(p1,1,2,3),v1,fine,tPen; MoveL p1,v1,fine,tool0;",
+            f"CONST robtarget p1:={pose()};",
+            6,
+            "an offset",
+        ),
+        (f"MoveL {pose()},v1;", "", 6, "too few arguments"),
+        (
+            f"PDispSet f; MoveL {pose()},v1,fine,tPen;",
+            "",
+            6,
+            "may be displaced by the program, which",
+        ),
+        (f"CutL {pose()},v1,c1,fine,tPen;", "", 6, "CutL is an instruction that is not known"),
+        ("CutL p1,v1,c1,fine,tPen;", f"CONST robtarget p1:={pose()};", 4, "is used by CutL, which is not known"),
+        (f"main {pose()};", "", 6, "main is a routine of the program"),
+        ("", f"CONST station s1:=[{pose()},3];", 4, "s1 is of type station"),
+        ("", f"CONST robtarget p1:={pose()};", 4, "is used by no move of the program"),
+        (
+            f"MoveL {pose()},v1,fine,tPen; MoveL {pose()},v1,fine,tool0;",
+            f"CONST robtarget p1:={pose()};",
+            4,
+            "not known which tool and work object",
+        ),
+        (
+            "MoveAbsJ j1,v1,fine,tPen;",
+            f"CONST jointtarget j1:=[[0,0,0,0,0,9E9],{NO_AXES}];",
+            4,
+            "does not say where all joints",
+        ),
+        (f"MoveAbsJ [[0,0,0],{NO_AXES}],v1,fine,tPen;", "", 6, "missing or computed"),
+    ],
+)
+def test_what_cannot_be_corrected_is_skipped(body: str, data: str, line: int, part: str) -> None:
+    program = read(body, data)
+    skips = [skip for skip in program.skipped if part in skip.reason]
+    assert {skip.line for skip in skips} == {line}, program.skipped
+    moved = {program.targets[move.target].line for move in program.moves}
+    assert not moved or line not in moved or "tool0" in body
+
+
+def test_a_target_of_no_move_has_the_only_tool_and_work_object() -> None:
+    program = read(
+        f"MoveL {pose()},v1,fine,tPen\\WObj:=wTable; MoveAbsJ [[1,2,3,4,5,6],{NO_AXES}],v1,fine,tPen;",
+        f"CONST robtarget p1:={pose()};\nCONST jointtarget j1:=[[1,2,3,4,5,6],{NO_AXES}];",
+    )
+    assert [(t.name, t.tool, t.frame) for t in program.targets[:2]] == [("p1", "tPen", "wTable"), ("j1", "tPen", "")]
+    assert not program.skipped
+
+
+def test_offsets_by_expressions_are_left_alone_and_their_targets_corrected() -> None:
+    program = read(
+        "MoveL p1,v1,fine,tPen;\nMoveL Offs(p1,0,0,nUp+5),v1,fine,tPen;\nMoveL p1,v1,fine,tPen;",
+        f"CONST robtarget p1:={pose()};",
+    )
+    assert [t.name for t in program.targets] == ["p1"]
+    assert [(m.target, m.routine, m.statement == (0, 0)) for m in program.moves] == [
+        (0, 0, False), (0, 1, True), (0, 2, False),
+    ]  # fmt: skip
+    assert not program.skipped
+
+
+def test_an_own_function_of_the_name_is_not_the_controllers() -> None:
+    (source,) = program_of(0)
+    text = source.text.replace(
+        "PROC main()",
+        f"FUNC robtarget Offs(robtarget p,num x,num y,num z) RETURN p; ENDFUNC\n"
+        f"PROC main() MoveL Offs({pose()},1,2,3),v1,fine,tPen; ",
+    )
+    program = RAPID.read([Source(Path("own.mod"), text)])
+    assert not program.targets
+    assert [skip.reason for skip in program.skipped] == ["the target of MoveL is computed"]
+
+
+def test_a_tool_that_the_program_changes_is_not_known() -> None:
+    moved = f"MoveL {pose()},v1,fine,tPen\\WObj:=wTable;"
+    program = read(f"tPen.tframe.trans.z:=nLength; wTable.oframe:=pFound; {moved}")
+    assert not program.tools
+    assert not program.frames
+    assert (program.targets[0].tool, program.targets[0].frame) == ("tPen", "wTable")
+    assert list(read(f"tPen.tload.mass:=3; {moved}").tools) == ["tPen"]
+
+
+MOVED = "MoveL p1,v1,fine,tPen\\WObj:=wTable;"
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "part"),
+    [
+        ("", 1, "there is no MODULE"),
+        ("PROC main()\nENDPROC\n", 1, "there is no MODULE"),
+        ("MODULE A\nPROC main()\nENDPROC\n", 1, "a MODULE has no ENDMODULE"),
+        ("MODULE A\nENDMODULE\nMODULE B\nMODULE C\nENDMODULE\n", 3, "a MODULE has no ENDMODULE"),
+        ("MODULE A\nENDMODULE\nENDMODULE\n", 3, "an ENDMODULE closes no MODULE"),
+        ("MODULE A\nPROC main()\nENDMODULE\n", 2, "a routine has no ENDPROC"),
+        ("MODULE A\nPROC main()\nPROC b()\nENDPROC\nENDMODULE\n", 2, "a routine has no ENDPROC"),
+        ("MODULE A\nPROC main()\nENDFUNC\nENDMODULE\n", 3, "an ENDFUNC closes nothing"),
+        ("MODULE A\nPROC\n", 2, "the head of a PROC is incomplete"),
+        ("MODULE A\nVAR num x:=(1;\nENDMODULE\n", 2, "a bracket is not"),
+        ("MODULE A\nVAR num x;\nVAR num y:=1];\nENDMODULE\n", 3, "a bracket is not"),
+        ("MODULE A\nVAR num y{3}:=[1,(2],3);\nENDMODULE\n", 2, "a bracket is not"),
+        ('MODULE A\nVAR string s:="ab"";\nVAR string t:=";\nENDMODULE\n', 2, "a string is not closed"),
+    ],
+)
+def test_malformed_text_is_refused(text: str, line: int, part: str) -> None:
+    with pytest.raises(InputError, match=part) as refused:
+        RAPID.read([Source(Path("bad.mod"), text)])
+    assert refused.value.where == f"bad.mod, line {line}"
+
+
+@pytest.mark.parametrize(
+    ("data", "part"),
+    [
+        (f"CONST robtarget p1:={pose(rest=f'[0,0.7,0.7,0],[0,0,0,0],{NO_AXES}')};", "quaternion"),
+        (f"CONST robtarget p1:={pose(rest=f'[0,0,0,0],[0,0,0,0],{NO_AXES}')};", "quaternion"),
+        (f"CONST robtarget p1:={pose(1.1e6)};", "out of all proportion"),
+        (f"CONST robtarget p1:={pose(z=-1e400)};".replace("-inf", "-1e400"), "out of all proportion"),
+        (f"CONST robtarget p1:={pose()}; CONST jointtarget j1:=[[0,0,0,0,0,-2E6],{NO_AXES}];", "out of all proportion"),
+    ],
+)
+def test_numbers_that_cannot_be_are_refused(data: str, part: str) -> None:
+    with pytest.raises(InputError, match=part) as refused:
+        read(MOVED, data)
+    assert refused.value.where == "one.mod, line 4"
+
+
+@pytest.mark.parametrize(("old", "new"), [("[[0,0,100],[1,0,", "[[0,0,100],[1,0.1,"), ("[[300,0,50]", "[[3E7,0,50]")])
+def test_tools_and_frames_that_cannot_be_are_refused_if_they_are_used(old: str, new: str) -> None:
+    (source,) = program_of(1)
+    (unused,) = program_of(0)
+    with pytest.raises(InputError, match=r"quaternion|proportion") as refused:
+        RAPID.read([replace(source, text=source.text.replace(old, new, 1))])
+    assert refused.value.where in ("long.mod, line 2", "long.mod, line 3")
+    program = RAPID.read([replace(unused, text=unused.text.replace(old, new, 1))])
+    assert len(program.tools) + len(program.frames) == 1
+
+
+def test_a_quaternion_may_be_a_thousandth_off() -> None:
+    assert len(read(MOVED, f"CONST robtarget p1:={pose(rest=f'[0,1.0009,0,0],[0,0,0,0],{NO_AXES}')};").targets) == 1
+
+
+def test_a_truncated_program_is_refused_wherever_it_ends() -> None:
+    (source,) = sources("press_crlf.prg")
+    whole = source.text.rindex("ENDMODULE") + len("ENDMODULE")
+    for stop in range(whole):
+        with pytest.raises(InputError, match="complete"):
+            RAPID.read([replace(source, text=source.text[:stop])])
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.data())
+def test_no_text_breaks_the_reader(data: st.DataObject) -> None:
+    (source,) = sources("polish.mod")
+    start = data.draw(st.integers(0, len(source.text)))
+    stop = data.draw(st.integers(start, min(start + 60, len(source.text))))
+    marks = st.sampled_from(["[", "]", "(", ")", "{", "}", ";", '"', ",", "\\", ":="])
+    new = data.draw(st.text(st.characters(max_codepoint=255), max_size=8) | marks)
+    text = source.text[:start] + new + source.text[stop:]
+    try:
+        program = RAPID.read([replace(source, text=text)])
+    except InputError:
+        return
+    in_places(program)
+
+
+@pytest.mark.parametrize(
+    "text", ["[" * 50_000, " " * 200_000, "1" * 200_000, "IF " * 50_000, "Offs(" * 20_000, '"' * 99_999, "a:" * 50_000]
+)
+def test_strange_texts_are_read_or_refused_at_once(text: str) -> None:
+    for body in (text, f"MoveL {text},v1,fine,tPen;", f"MoveL Offs({text}p1,1,2,3){')' * text.count('(')},v1,z1,tPen;"):
+        try:
+            program = read(body)
+        except InputError:
+            continue
+        assert not program.targets
+
+
+def test_a_strange_head_of_a_routine_is_read_at_once() -> None:
+    text = f"MODULE A\nPROC main({'a' * 200_000}\n{'b ' * 50_000})\nENDPROC\nENDMODULE\n"
+    assert not RAPID.read([Source(Path("head.mod"), text)]).targets
+
+
+def test_other_languages_are_not_taken_for_it() -> None:
+    assert RAPID.is_one(program_of(2)[0].text)
+    assert RAPID.is_one("%%%\r\n  VERSION:1\r\n%%%\r\nMODULE a\r\nENDMODULE\r\n")
+    assert not RAPID.is_one("DEF main()\nPTP HOME\nEND\n")
+    assert not RAPID.is_one("/PROG  A\n/MN\n   1:J P[1] 100% FINE ;\n/END\n")
+    assert not RAPID.is_one("! the MODULE is elsewhere\n")
+
+
+def test_elbow_words_agree_with_the_arm() -> None:
+    """The manual's table, worked out with the drawing of the IRB 120 for random readings."""
+    robot = load_robot("irb120").rigid
+    rule = branch_rule(robot)
+    assert rule is not None
+    q = robot.random_configurations(2000, np.random.default_rng(3))
+    words = [BRANCHES[number].split("-") for number in rule.numbers(robot.sweep(q))]
+    tilt, bend = q[:, 1], q[:, 2]
+    behind_axis_1 = 270 * np.sin(tilt) + 302 * np.cos(tilt + bend) + 70 * np.sin(tilt + bend) < 0
+    behind_arm = 302 * np.cos(bend) + 70 * np.sin(bend) < 0
+    cfx = 4 * behind_axis_1 + 2 * behind_arm + (q[:, 4] < 0)
+    assert len(set(cfx.tolist())) == 8
+    for (shoulder, elbow, _), behind, number in zip(words, behind_axis_1, cfx, strict=True):
+        assert shoulder == ("back" if behind else "front")
+        assert configuration("0", "0", "0", str(number)).elbow == elbow
+
+
+@pytest.mark.parametrize("cfx", ["8", "-1", "1000", "0.5", "9E9"])
+def test_an_unknown_cfx_leaves_the_elbow_open(cfx: str) -> None:
+    assert configuration("0", "-4", "3", cfx).elbow is None
+    assert configuration("0", "-4", "3", cfx).readings == quadrants(0, -4, 3)
+
+
+def test_quadrants_that_are_none_are_left_open() -> None:
+    assert configuration("9E9", "0.5", "-1", "0").readings == ((6, -pi / 2, 0.0),)
+
+
+def division(program: Program, move: int, *points: tuple[float, ...]) -> list[Edit]:
+    assert RAPID.divide is not None
+    return RAPID.divide(program, [Division(move, tuple((point, None) for point in points))])
+
+
+def test_a_linear_move_is_divided_by_the_same_instruction() -> None:
+    down = pose(rest="[0,0,1,0],[0,-1,1,5],[12.5,9E9,9E9,9E9,9E9,9E9]")
+    program = read(
+        "  MoveJ p1,v1,z1,tPen;\n  MoveL p2, v100,fine\t,tPen\\WObj:=wobj0 ; ! down",
+        f"CONST robtarget p1:={pose()};\nCONST robtarget p2:={down};",
+    )
+    edits = division(program, 1, (1.0, 2.0, -0.0001, 0.6, 0.8, 0.0, 0.0), (1.5, 2.25, 3.0005, 0.0, 0.0, 1.0, 0.0))
+    (source,) = edited(program, edits)
+    assert source.text.splitlines()[5:9] == [
+        "  MoveJ p1,v1,z1,tPen;",
+        "  MoveL [[1.000,2.000,0.000],[0.6000000,0.8000000,0.0000000,0.0000000],[0,-1,1,5],"
+        "[12.5,9E9,9E9,9E9,9E9,9E9]], v100,z1\t,tPen\\WObj:=wobj0 ;",
+        "  MoveL [[1.500,2.250,3.001],[0.0000000,0.0000000,1.0000000,0.0000000],[0,-1,1,5],"
+        "[12.5,9E9,9E9,9E9,9E9,9E9]], v100,z1\t,tPen\\WObj:=wobj0 ;",
+        "  MoveL p2, v100,fine\t,tPen\\WObj:=wobj0 ; ! down",
+    ]
+    again = RAPID.read([source])
+    assert [m.kind for m in again.moves] == ["joint", "linear", "linear", "linear"]
+    assert [again.targets[m.target].values[0] for m in again.moves] == [300.0, 1.0, 1.5, 300.0]
+
+
+def test_a_circular_move_is_divided_with_its_via(polish: Program) -> None:
+    assert RAPID.divide is not None
+    half, mid, last = ((x, 3.0, 4.0, *DOWN) for x in (1.0, 2.0, 3.0))
+    edits = RAPID.divide(polish, [Division(3, ((mid, half),), last)])
+    (source,) = edited(polish, edits)
+    again = RAPID.read([source])
+    first, second = again.moves[3:5]
+    assert (first.kind, second.kind) == ("circular", "circular")
+    assert first.via is not None
+    assert second.via is not None
+    assert [again.targets[i].values[0] for i in (first.via, first.target, second.via)] == [1.0, 2.0, 3.0]
+    assert again.targets[second.target].name == "p10"
+    assert len(again.targets) == len(polish.targets) + 2
+    assert again.skipped[0] == polish.skipped[0]
+
+
+def test_offsets_stay_offsets(polish: Program) -> None:
+    (source,) = edited(
+        polish, division(polish, 4, (1.0, -2.0, 3.5)) + division(polish, 5, (1.0, 2.0, 3.0, 0.1, 0.2, 0.3))
+    )
+    lines = source.text.splitlines()
+    assert lines[49] == "    MoveL Offs(p10,1.000,-2.000,3.500),v100,z5,tDisc\\WObj:=wCover;"
+    assert lines[51] == (
+        "    MoveL RelTool (p20, 1.000,2.000,3.000\\Rx:=0.1000\\Ry:=0.2000\\Rz:=0.3000), v100, z5,"
+        " tDisc \\WObj:=wCover;"
+    )
+    assert len(RAPID.read([source]).targets) == len(polish.targets) + 2
+
+
+def test_line_ends_are_kept_by_a_division() -> None:
+    program = RAPID.read(sources("press_crlf.prg"))
+    (source,) = edited(program, division(program, 2, (450.0, 12.5, 260.0, 0.0, 0.0, 1.0, 0.0)))
+    assert "\tMoveL [[450.000,12.500,260.000]," in source.text
+    assert source.text.count("\r\n") == source.text.count("\n") == program.sources[0].text.count("\n") + 1
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        f"MoveL {pose()},v1\\T:=5,fine,tPen;",
+        f"MoveL {pose()}\\ID:=5,v1,fine,tPen;",
+        f"MoveL \\Conc,{pose()},v1,fine,tPen;",
+        f"MoveLDO {pose()},v1,fine,tPen,do1,1;",
+        f"TriggL {pose()},v1,t1,fine,tPen;",
+        f"SearchL di1,pHit,{pose()},v1,tPen;",
+        f"ArcLStart {pose()},v1,s1,w1,fine,tPen;",
+        f"IF a MoveL {pose()},v1,fine,tPen;",
+        f"MoveL Offs({pose()},1,2,3),v1,fine,tPen;",
+    ],
+)
+def test_moves_that_cannot_be_divided_are_left_whole(body: str) -> None:
+    program = read(body)
+    (move,) = program.moves
+    assert move.statement == (0, 0)
+    count = len(program.targets[move.target].values)
+    assert division(program, 0, (1.0,) * count) == []
+
+
+def test_a_zero_correction_changes_nothing_and_a_correction_only_numbers() -> None:
+    (source,) = program_of(6)
+    program = RAPID.read([source])
+    assert len(program.targets) == 6
+    edits = [
+        Edit(t.source, *place, rewritten(source.text[slice(*place)], value + 0.5, t.form.decimals[0]))
+        for t in program.targets
+        for value, place in zip(t.values[:3], t.places[:3], strict=True)
+        if place is not None
+    ]
+    again = RAPID.read(edited(program, edits))
+    assert [t.values[:3] for t in again.targets] == [tuple(v + 0.5 for v in t.values[:3]) for t in program.targets]

@@ -1,0 +1,92 @@
+"""Files that say where tools and frames really are."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from truearm.compensation.cell import Cell, matrix, read_cell
+from truearm.errors import InputError
+from truearm.modeling.robot import Robot
+from truearm.modeling.transform import Transform
+from truearm.robots import load_robot
+
+HEAD = "truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\n"
+
+
+def robot() -> Robot:
+    """Return a robot that stands a quarter turn about z from the instrument, with a reflector on its flange."""
+    half = math.sqrt(0.5)
+    base = Transform((1.0, 2.0, 0.5), (half, 0.0, 0.0, half))
+    return load_robot("irb120").with_frames(base, {"1": (0.01, 0.02, 0.125)})
+
+
+def read(tmp_path: Path, text: str) -> Cell:
+    file = tmp_path / "cell.yaml"
+    file.write_text(HEAD + text)
+    return read_cell(robot(), file if "tools" in text else None, file if "frames" in text else None)
+
+
+def test_a_frame_in_the_world_is_seen_from_the_base(tmp_path: Path) -> None:
+    cell = read(tmp_path, "frames:\n  wobjTable: {of: world, translation: [1000, 2300, 500]}\n")
+    placed = cell.frames["wobjtable"]
+    assert placed.controller is None
+    assert placed.identified is not None
+    # 300 mm along the world's y are 300 mm along the x of a base that is turned to the left.
+    np.testing.assert_allclose(placed.identified.translation, [0.3, 0.0, 0.0], atol=1e-15)
+    np.testing.assert_allclose(placed.identified.rotation @ [0, 1, 0], [1, 0, 0], atol=1e-15)
+
+
+def test_own_base_and_flange_are_the_frames_without_a_name(tmp_path: Path) -> None:
+    cell = read(tmp_path, "tools:\n  flange: {of: flange}\nframes:\n  Base: {of: base, translation: [1, 2, 3]}\n")
+    assert cell.tools[""].identified == Transform()
+    assert cell.frames[""].identified == Transform((0.001, 0.002, 0.003))
+
+
+def test_a_tool_may_be_a_target_of_the_calibration(tmp_path: Path) -> None:
+    cell = read(tmp_path, 'tools:\n  tProbe: {of: flange, target: "1", controller: {translation: [0, 0, 125]}}\n')
+    assert cell.tools["tprobe"].identified == Transform((0.01, 0.02, 0.125))
+    assert cell.tools["tprobe"].controller == Transform((0.0, 0.0, 0.125))
+
+
+@pytest.mark.parametrize(
+    ("entry", "column"),
+    [
+        ("quaternion: [0, 1, 0, 0]", [0, 0, -1]),
+        ("wpr: [180, 0, 0]", [0, 0, -1]),
+        ("abc: [0, 90, 0]", [1, 0, 0]),
+        ("rxryrz: [90, 0, 90]", [0, -1, 0]),
+        ("rotation_vector: [0, 180, 0]", [0, 0, -1]),
+    ],
+)
+def test_orientations_as_each_maker_writes_them(tmp_path: Path, entry: str, column: list[int]) -> None:
+    cell = read(tmp_path, f"tools:\n  t: {{of: controller, translation: [0, 0, 100], {entry}}}\n")
+    placed = cell.tools["t"]
+    assert placed.identified is None
+    assert placed.controller is not None
+    np.testing.assert_allclose(matrix(placed.controller)[:3, 2], column, atol=1e-12)
+    np.testing.assert_allclose(matrix(placed.controller)[:3, 3], [0, 0, 0.1])
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("frames: {}\n", "has no frames"),
+        ("tools:\n  t: {of: world}\n", "'flange' or 'controller'"),
+        ("frames:\n  f: {of: flange}\n", "'world', 'base' or 'controller'"),
+        ("frames:\n  f: {of: base, wpr: [0, 0, 0], abc: [0, 0, 0]}\n", "one orientation belongs here"),
+        ("frames:\n  f: {of: base, quaternion: [1, 1, 0, 0]}\n", "must have length 1"),
+        ("frames:\n  f: {of: base, translation: [1, 2]}\n", "f.translation"),
+        ("frames:\n  f: {of: base, translation: [1.0e+10, 2, 3]}\n", "f.translation"),
+        ("frames:\n  f: {of: base, turn: 3}\n", "not known here"),
+        ('tools:\n  t: {of: flange, target: "7"}\n', "no target of this name"),
+        ('tools:\n  t: {of: controller, target: "1"}\n', "a target is on the identified flange"),
+        ("tools:\n  t: {of: controller, controller: {translation: [0, 0, 1]}}\n", "says what the controller has"),
+    ],
+)
+def test_what_is_wrong_is_said(tmp_path: Path, text: str, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        read(tmp_path, text)

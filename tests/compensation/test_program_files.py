@@ -1,0 +1,212 @@
+"""Program files: what is refused, what is written, and how the original comes back."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from truearm.compensation import program_files as files_module
+from truearm.compensation.program_files import (
+    ProgramFile,
+    edited,
+    program_files,
+    read_programs,
+    record_path,
+    recorded,
+    restored,
+    write_programs,
+)
+from truearm.compensation.programs.program import Edit
+from truearm.errors import InputError
+
+POINT = b"  CONST robtarget p1:=[[1,2,3],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\r\n"
+MODULE = b"MODULE m\r\n  ! gr\xfc\xdfe\r\n" + POINT + b"ENDMODULE\r\n"
+
+
+def write(folder: Path, name: str, content: bytes = MODULE) -> Path:
+    path = folder / name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(content)
+    return path
+
+
+def corrected(folder: Path, name: str = "m.mod") -> Path:
+    """Return a program that was corrected, with its record beside it."""
+    source = write(folder / "source", name)
+    (file,) = program_files([source])
+    new = MODULE.replace(b"[1,2,3]", b"[1.5,2,3]")
+    write_programs(
+        folder / "out", [source], {name: new, f"{name}.truearm.json": recorded(file, new, "RAPID", {"a": 1})}
+    )
+    return folder / "out" / name
+
+
+def test_a_record_holds_the_original_byte_for_byte(tmp_path: Path) -> None:
+    path = corrected(tmp_path)
+    record = json.loads(record_path(path).read_text())
+    assert record["truearm"] == "truearm-corrected/1"
+    assert record["applied"] == {"a": 1}
+    (file,) = restored([path])
+    assert file.original == MODULE
+    (again,) = program_files([path], again=True)
+    assert again.original == MODULE
+
+
+def test_a_corrected_program_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"corrected already.*--again.*--revert"):
+        program_files([corrected(tmp_path)])
+
+
+def test_a_program_changed_since_is_no_longer_what_its_record_says(tmp_path: Path) -> None:
+    path = corrected(tmp_path)
+    path.write_bytes(path.read_bytes() + b"! taught anew\r\n")
+    for ask in (partial(program_files, [path], again=True), partial(restored, [path])):
+        with pytest.raises(InputError, match=r"changed after it was corrected.*remove m\.mod\.truearm\.json"):
+            ask()
+
+
+def damaged() -> Iterator[tuple[str, str]]:
+    yield '{"truearm": "truearm-corrected/1"}', "is missing"
+    yield "{", "this record cannot be read"
+    yield "[" * 100_000, "this record cannot be read"
+    yield "[]", "must hold named entries"
+
+
+@pytest.mark.parametrize(("text", "said"), list(damaged()), ids=["partial", "cut", "deep", "list"])
+def test_a_damaged_record_is_refused(tmp_path: Path, text: str, said: str) -> None:
+    path = corrected(tmp_path)
+    record_path(path).write_text(text)
+    with pytest.raises(InputError, match=said):
+        restored([path])
+
+
+def test_a_damaged_original_is_refused(tmp_path: Path) -> None:
+    path = corrected(tmp_path)
+    record = json.loads(record_path(path).read_text())
+    for original in ("AAAA", "not base64!", record["original"][:-8]):
+        record_path(path).write_text(json.dumps({**record, "original": original}))
+        with pytest.raises(InputError, match="the original in this record is damaged"):
+            restored([path])
+
+
+def test_without_a_record_nothing_can_be_restored(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no record beside this program"):
+        restored([write(tmp_path, "m.mod")])
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        ("m.mod", b"", "the file is empty"),
+        ("m.mod", b"MODULE m\0\nENDMODULE", "zero bytes.*Export the program as text"),
+        ("m.mod", "MODULE m\nENDMODULE".encode("utf-16"), "UTF-16.*Save it as UTF-8"),
+        ("m.doc", MODULE, r"no robot language has files of this kind.*\.doc.*RAPID"),
+        ("m", MODULE, "no suffix"),
+        ("m.ls", MODULE, "called as a program in FANUC LS and is none; got 'what looks like RAPID'"),
+        ("m.mod", b"hello world", "called as a program in RAPID and is none"),
+    ],
+)
+def test_what_is_no_program_is_refused(tmp_path: Path, name: str, content: bytes, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        read_programs(program_files([write(tmp_path, name, content)]))
+
+
+def test_a_program_that_is_too_large_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(files_module, "LARGEST", 50)
+    with pytest.raises(InputError, match=r"too large to be corrected at once.*Divide it"):
+        program_files([write(tmp_path, "m.mod")])
+
+
+def test_a_program_given_twice_is_refused(tmp_path: Path) -> None:
+    path = write(tmp_path, "m.mod")
+    (tmp_path / "link.mod").symlink_to(path)
+    for other in (path, tmp_path / "link.mod"):
+        with pytest.raises(InputError, match="given twice"):
+            program_files([path, other])
+
+
+def test_programs_in_two_languages_are_refused(tmp_path: Path) -> None:
+    job = b"/JOB\r\n//NAME A\r\n//POS\r\n///NPOS 0,0,0,0,0,0\r\n//INST\r\n///DATE 2024/01/01 10:00\r\nNOP\r\nEND\r\n"
+    files = program_files([write(tmp_path, "m.mod"), write(tmp_path, "a.jbi", job)])
+    with pytest.raises(InputError, match=r"a\.jbi: the programs are in different languages.*INFORM.*RAPID"):
+        read_programs(files)
+
+
+def test_programs_of_the_same_name_keep_their_folders(tmp_path: Path) -> None:
+    paths = [
+        write(tmp_path / folder, name)
+        for folder, name in (
+            ("cell1", "m.mod"),
+            ("cell2", "m.mod"),
+            ("cell2", "n.mod"),
+            ("a/x", "k.mod"),
+            ("b/x", "k.mod"),
+        )
+    ]
+    assert [file.name for file in program_files(paths)] == [
+        "cell1/m.mod",
+        "cell2/m.mod",
+        "n.mod",
+        "a/x/k.mod",
+        "b/x/k.mod",
+    ]
+    write_programs(tmp_path / "out", paths, {file.name: file.original for file in program_files(paths)})
+    assert (tmp_path / "out" / "a" / "x" / "k.mod").read_bytes() == MODULE
+
+
+def test_a_source_is_never_overwritten(tmp_path: Path) -> None:
+    path = write(tmp_path, "m.mod")
+    with pytest.raises(InputError, match="would be overwritten"):
+        write_programs(tmp_path, [path], {"m.mod": b"new"})
+    assert path.read_bytes() == MODULE
+
+
+def test_a_file_that_somebody_else_wrote_is_not_overwritten(tmp_path: Path) -> None:
+    theirs = write(tmp_path / "out", "m.mod", b"theirs")
+    with pytest.raises(InputError, match="not written by truearm or was changed since"):
+        write_programs(tmp_path / "out", [], {"m.mod": b"new", "n.mod": b"other"})
+    assert theirs.read_bytes() == b"theirs"
+    assert not (tmp_path / "out" / "n.mod").exists()
+
+
+def test_what_truearm_wrote_may_be_written_again(tmp_path: Path) -> None:
+    path = corrected(tmp_path)
+    (file,) = program_files([tmp_path / "source" / "m.mod"])
+    write_programs(path.parent, [], {"m.mod": b"new", "m.mod.truearm.json": recorded(file, b"new", "RAPID", {})})
+    assert path.read_bytes() == b"new"
+    path.write_bytes(b"edited by hand")
+    with pytest.raises(InputError, match="changed since"):
+        write_programs(path.parent, [], {"m.mod": b"newer"})
+
+
+@given(
+    st.text(max_size=60), st.lists(st.tuples(st.integers(0, 60), st.integers(0, 6), st.text(max_size=5)), max_size=6)
+)
+def test_edits_change_what_they_name_and_nothing_else(text: str, wanted: list[tuple[int, int, str]]) -> None:
+    edits, at = [], 0
+    for start, length, new in sorted(wanted):
+        start = max(start, at)
+        if start + length > len(text):
+            break
+        edits.append(Edit(0, start, start + length, new))
+        at = start + length
+    done = list(text)
+    for edit in reversed(edits):
+        done[edit.start : edit.stop] = [edit.text]
+    assert edited(text, edits[::-1] if all(e.start < e.stop for e in edits) else edits) == "".join(done)
+
+
+def test_edits_that_overlap_are_a_fault_of_ours() -> None:
+    with pytest.raises(ValueError, match="overlap"):
+        edited("abcdef", [Edit(0, 0, 3, "x"), Edit(0, 2, 4, "y")])
+
+
+def test_files_keep_what_they_are(tmp_path: Path) -> None:
+    path = write(tmp_path, "m.mod")
+    assert program_files([path]) == (ProgramFile(path, "m.mod", MODULE),)

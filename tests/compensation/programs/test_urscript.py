@@ -447,9 +447,12 @@ def test_with_a_computed_offset_the_target_itself_is_corrected() -> None:
     assert len(program.targets) == 1
     assert program.skipped == ()
     assert [m.target for m in program.moves] == [0, 0, 0]
-    # Where it really goes is not known: no words to replace, and what follows has no start.
-    assert program.moves[1].target_text[0] == program.moves[1].target_text[1]
+    # Where it really goes is not known: it cannot be divided, and what follows has no start.
+    assert program.moves[1].target_text == (0, 0)
     assert [m.routine for m in program.moves] == [0, 0, 1]
+    beyond = read(f"{TCP}a = p[.1,.2,.3,0,0,0]\nmovel(a)\nmovel(pose_trans(pose_trans(a, x()), p[0,0,.1,0,0,0]))\n")
+    assert len(beyond.targets) == 1
+    assert [m.target for m in beyond.moves] == [0, 0]
 
 
 def test_moves_follow_each_other_only_where_nothing_comes_between() -> None:
@@ -628,7 +631,7 @@ def test_named_targets_joints_and_offsets_are_divided() -> None:
         "movel(p[0.2,0,0.3,0,3,0], r=0.05)",
         "movel(p[0.2,0,0.3,0,3,0], r=radius())",
         "movep(p[0.2,0,0.3,0,3,0], 1, 1, wide)",
-        "movel(pose_trans(p[0.1,0,0.3,0,3,0], p[0,0,h,0,0,0]))",
+        "a = p[0.1,0,0.3,0,3,0]\nmovel(a)\nmovel(pose_trans(a, p[0,0,h,0,0,0]))",
         "b = pose_trans(table, p[0.2,0,0.3,0,3,0])\nmovel(b)",
         "movec(x, p[0.2,0,0.3,0,3,0])",
         "movep(p[0.1,0,0.3,0,3,0], r=0.05)\nmovel(p[0.2,0,0.3,0,3,0])",
@@ -636,10 +639,9 @@ def test_named_targets_joints_and_offsets_are_divided() -> None:
 )
 def test_moves_that_cannot_be_divided_stay(move: str) -> None:
     program = read(f"{TCP}wide = 0.04\n{move}\n")
-    if program.moves:
-        points = tuple(((x, 0.0, 0.3, 0.0, 3.0, 0.0), None) for x in (0.16, 0.18))
-        last = len(program.moves) - 1
-        assert divided(program, Division(last, points)) == program.sources[0].text
+    points = tuple(((x, 0.0, 0.3, 0.0, 3.0, 0.0), None) for x in (0.16, 0.18))
+    last = len(program.moves) - 1
+    assert divided(program, Division(last, points)) == program.sources[0].text
 
 
 def test_variables_tell_times_and_radii() -> None:

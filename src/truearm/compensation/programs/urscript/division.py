@@ -82,9 +82,7 @@ def _edits(program: Program, division: Division, blends: _Blends) -> list[Edit]:
     move, text = program.moves[division.move], blends.text
     target = program.targets[move.target]
     function, opened = blends.call(move)
-    if move.kind == "joint" or not division.points or not _replaceable(move.target_text, target, opened, text):
-        return []
-    if move.kind == "circular" and not _replaceable_via(program, division, opened, text):
+    if move.kind == "joint" or move.target_text == (0, 0) or not division.points:
         return []
     if function in _TIME and blends.number(text.argument(opened, _TIME[function], "t")) != 0.0:
         return []
@@ -106,22 +104,6 @@ def _edits(program: Program, division: Division, blends: _Blends) -> list[Edit]:
     if move.via_text is not None and division.last_via is not None:
         edits.append(Edit(move.source, *move.via_text, _written(division.last_via, target)))
     return edits
-
-
-def _replaceable_via(program: Program, division: Division, opened: int, text: Text) -> bool:
-    move = program.moves[division.move]
-    if move.via is None or move.via_text is None or division.last_via is None:
-        return False
-    return _replaceable(move.via_text, program.targets[move.via], opened, text)
-
-
-def _replaceable(span: tuple[int, int], target: ProgramTarget, opened: int, text: Text) -> bool:
-    """Return whether numbers in the target's frame can stand in the place of words."""
-    if span[0] == span[1]:
-        return False
-    values = [argument.value for argument in text.arguments(opened)]
-    before = next((text.code[one.start : span[0]] for one in values if one.start <= span[0] < one.stop), "")
-    return ("pose_trans" in before) == bool(target.frame)
 
 
 def _radius(program: Program, division: Division, blends: _Blends) -> str | None:

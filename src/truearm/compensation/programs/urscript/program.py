@@ -26,6 +26,7 @@ from truearm.compensation.programs.urscript.tcp import COMPUTED, Places, Stretch
 #: A pose, and joints; 1e-6 m are 0.001 mm, and 1e-6 rad less than 0.0001 deg.
 POSE: Final = Form("p[x, y, z, rx, ry, rz]", "pose", 1.0, 1.0, ROTATION_VECTOR, (6, 6))
 JOINTS: Final = Form("[q1, q2, q3, q4, q5, q6]", "joints", 1.0, 1.0, None, (6, 6))
+_NOWHERE: Final = (0, 0)
 
 
 class Going(NamedTuple):
@@ -103,7 +104,7 @@ def _note_tcps(goings: list[Going]) -> None:
                 elif spot.tcps is not tcps:
                     spot.tcps = spot.tcps | tcps
                 spot = spot.parent
-            if use is not None and use.near is not None and use.words[0] < use.words[1]:
+            if use is not None and use.near is not None and use.there:
                 use.spot.nears = (use.spot.nears or set()) | {use.near}
 
 
@@ -221,6 +222,8 @@ def _moves(goings: list[Going], source: int, script: Script, routines: int) -> l
             lost += 1
             continue
         via = -1 if passed is None else _final(passed.spot).index
+        passes = None if passed is None or via < 0 else _words(passed)
+        divides = _words(end) if kind != "circular" or passes not in (None, _NOWHERE) else _NOWHERE
         moves.append(
             Move(
                 kind=kind,
@@ -230,14 +233,13 @@ def _moves(goings: list[Going], source: int, script: Script, routines: int) -> l
                 via=via if via >= 0 else None,
                 routine=routines + number + lost,
                 statement=(call.start, script.partner[call.opened] + 1),
-                target_text=_words(end),
-                via_text=_words(passed) if passed is not None and via >= 0 else None,
+                target_text=divides,
+                via_text=passes,
             )
         )
-        lost += end.words[0] == end.words[1] or end.spot.shared
+        lost += not end.there or end.spot.shared
     return moves
 
 
 def _words(use: Use) -> tuple[int, int]:
-    start, stop = use.words
-    return (start, start) if use.spot.shared else (start, stop)
+    return _NOWHERE if use.spot.shared else use.words

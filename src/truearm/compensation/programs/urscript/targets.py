@@ -60,14 +60,22 @@ class Spot:
 
 
 class Use(NamedTuple):
-    """A spot as a move names it: with which words, and near to which joints.
+    """A spot as a move names it.
 
-    The words are none, ``(place, place)``, where the move goes by an offset beyond the spot that only the robot knows.
+    Attributes
+    ----------
+    words
+        In whose place other numbers could stand; ``(0, 0)`` if none could.
+    near
+        The joints that it is named to be near to.
+    there
+        Whether the move ends at the spot, and not at an offset beyond it that only the robot knows.
     """
 
     spot: Spot
     words: tuple[int, int]
     near: tuple[float, ...] | None = None
+    there: bool = True
 
 
 class At(NamedTuple):
@@ -145,8 +153,7 @@ class Targets:
             use = self.reach(found.value, At(found.routine, found.start, at.depth + 1), frame, value.name)
             if isinstance(use, str):
                 return use
-            known = use.words[0] < use.words[1]
-            return Use(use.spot, words if known else (value.start, value.start), use.near)
+            return Use(use.spot, _in_frame(use, frame, words), use.near, use.there)
         deeper = At(at.routine, at.place, at.depth + 1)
         if value.function == "get_inverse_kin":
             return "joints stand in no frame" if frame else self._solved(value, deeper, name)
@@ -218,7 +225,7 @@ class Targets:
         place = self._frame(of, at)
         if place is None:
             use = self.reach(of, at, frame)
-            return use if isinstance(use, str) else self._child(use, called, pose, at, name, turned=True)
+            return use if isinstance(use, str) else self._child(use, called, pose, at, frame, name, turned=True)
         if place.why:
             return place.why
         if frame:
@@ -234,21 +241,23 @@ class Targets:
             return use
         if use.spot.frame != frame:
             return "it is an offset in the axes of the base from a target in another frame"
-        return self._child(use, called, offset, at, name, turned=False)
+        return self._child(use, called, offset, at, frame, name, turned=False)
 
-    def _child(self, use: Use, called: Called, offset: Value, at: At, name: str, *, turned: bool) -> Use | str:
+    def _child(
+        self, use: Use, called: Called, offset: Value, at: At, frame: str, name: str, *, turned: bool
+    ) -> Use | str:
         """Return a spot that is an offset; with an offset that is computed, the one it is an offset from."""
         parent = use.spot
         if parent.numbers.kind == "joints" or use.near is not None:
             return "it is an offset from joints"
         plain = self.plain(offset, at)
-        if plain is None:
-            return Use(parent, (called.start, called.start))
+        if plain is None or not use.there:
+            return Use(parent, (0, 0), there=False)
         numbers, variable = plain
         if numbers.kind == "joints":
             return "it is an offset by joints"
         spot = self._spot(numbers, variable or name, parent.frame, parent, turned)
-        return Use(spot, (called.start, called.stop if use.words[0] < use.words[1] else called.start))
+        return Use(spot, _in_frame(use, frame, (called.start, called.stop)))
 
     def _frame(self, value: Value, at: At) -> _Frame | None:
         """Return the frame that the first pose of ``pose_trans`` is; None if it is a target that moves go to."""
@@ -282,3 +291,8 @@ class _Frame(NamedTuple):
 
     name: str
     why: str = ""
+
+
+def _in_frame(use: Use, frame: str, words: tuple[int, int]) -> tuple[int, int]:
+    """Return words for a spot if they stand in its frame, so that numbers in that frame can stand there."""
+    return words if use.there and use.spot.frame == frame else (0, 0)

@@ -143,6 +143,10 @@ class Text:
 
     def first(self, opened: int, keyword: str) -> Value | None:
         """Return the first argument of a call, as :meth:`argument` but without reading the others if need not be."""
+        blank = cast("re.Match[str]", _SPACE.match(self.code, opened + 1))
+        six = _SIX.match(self.code, blank.end())
+        if six is not None and self.code[six.end()] in ",)":
+            return _numbers(six, 1)
         argument, _ = self._item(opened + 1)
         if not argument.keyword and argument.value.start < argument.value.stop:
             return argument.value
@@ -196,8 +200,7 @@ class Text:
                 return Argument(keyword, Name(found[11], *found.span(11))), end
         elif found[11] is not None and code[end] == "(":
             closed = self.partner[end]
-            blank = _SPACE.match(code, closed + 1)
-            after = closed + 1 if blank is None else blank.end()
+            after = cast("re.Match[str]", _SPACE.match(code, closed + 1)).end()
             if code[after] in ",)]":
                 return Argument(keyword, Called(found[11], end, found.start(11), closed + 1)), after
         start = found.start(2)

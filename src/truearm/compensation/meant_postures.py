@@ -7,7 +7,7 @@ where they leave a choice, or there are none, it is the posture nearest to where
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -162,7 +162,10 @@ def _confine(
     """Leave of the candidates ``(m, 8, 6)`` those of the configurations, in the turns that these say."""
     groups: dict[Configuration, list[int]] = {}
     for row, configuration in enumerate(configurations):
-        groups.setdefault(configuration, []).append(row)
+        if configuration.near is None:
+            groups.setdefault(configuration, []).append(row)
+        else:  # of its own for every target, and of no meaning here
+            groups.setdefault(replace(configuration, near=None), []).append(row)
     signs = np.array(nominal.controller.signs or (1,) * len(nominal.joints))
     for configuration, members in groups.items():
         rows = np.array(members)

@@ -9,6 +9,7 @@ from truearm.compensation.programs.jbi import JBI
 from truearm.compensation.programs.krl import KRL
 from truearm.compensation.programs.program import Language
 from truearm.compensation.programs.rapid import RAPID
+from truearm.compensation.programs.urscript import URSCRIPT
 from truearm.compensation.programs.val3 import VAL3
 
-LANGUAGES: Final[tuple[Language, ...]] = (RAPID, KRL, FANUC_LS, JBI, VAL3)
+LANGUAGES: Final[tuple[Language, ...]] = (RAPID, KRL, FANUC_LS, URSCRIPT, JBI, VAL3)

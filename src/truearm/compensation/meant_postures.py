@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.compensation.programs.program import Configuration
-from truearm.errors import InputError
 from truearm.modeling.chain import Array
 from truearm.modeling.inverse.branches import branch_rule
 from truearm.modeling.inverse.closed_form import SLOTS, ClosedForm
 from truearm.modeling.inverse.kinematics import inverse
+from truearm.modeling.inverse.solutions import PoseStatus
 from truearm.modeling.inverse.turns import beyond_limits, limits, nearest_turns
 from truearm.modeling.robot import Robot
 
@@ -93,7 +93,7 @@ def meant_postures(
     Parameters
     ----------
     nominal
-        The robot that its controller believes in.
+        The robot that its controller believes in, of six joints or more.
     flange
         Poses of the flange in its base frame, ``(n, 4, 4)`` [m].
     configurations
@@ -102,24 +102,12 @@ def meant_postures(
         Readings ``(n, joints)`` [rad or m] of the model where the program gives joints, else NaN.
     order
         Indices in the order in which the robot goes from one to the next; none of them need be there.
-
-    Raises
-    ------
-    InputError
-        If there are poses and the arm has fewer than six joints.
     """
     joints = known.copy()
     reachable: NDArray[np.bool_] = np.asarray(~np.isnan(known).any(axis=1))
     wanted = [int(i) for i in np.flatnonzero(~reachable)]
     if not wanted:
         return MeantPostures(joints, reachable, None)
-    if len(nominal.joints) < 6:
-        raise InputError(
-            "a program with poses needs an arm of six joints or more",
-            where=nominal.name,
-            came=f"{len(nominal.joints)} joints",
-            cure="Programs of joint targets alone can be corrected.",
-        )
     rule = branch_rule(nominal)
     form = ClosedForm(nominal, None) if rule is not None else None
     if rule is None or form is None or not form.known:
@@ -242,7 +230,7 @@ def _by_seeds(
     zero = (0.0,) * len(nominal.joints)
     seeds = nominal.controller.joints(np.array([configurations[i].near or zero for i in wanted]))
     found = inverse(nominal, flange[wanted, :3, 3], flange[wanted, :3, :3], seed=seeds)
-    reached = np.array([status.value != "unreachable" for status in found.status])
+    reached = np.array([status is not PoseStatus.UNREACHABLE for status in found.status])
     joints[np.array(wanted)[reached]] = found.joints[reached]
     reachable: NDArray[np.bool_] = np.asarray(~np.isnan(joints).any(axis=1))
     untold = [i for i in wanted if configurations[i].near is None]

@@ -6,6 +6,7 @@ see :mod:`truearm.compensation.cell` for how to say it and :mod:`truearm.compens
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -28,6 +29,7 @@ from truearm.modeling.transform import IDENTITY
 
 #: The base that nobody measured is found with this many targets, evenly along the programs.
 _TARGETS_FOR_BASE: Final = 2000
+_JOINTS: Final = 6
 #: A joint within this of a bound [rad] is on it: the numbers of programs are rounded.
 _ROUNDING: Final = float(np.radians(0.01))
 
@@ -91,7 +93,8 @@ class Frames:
     tools, frames
         Whether the places of tools and frames were given, or assumed.
     base, flange
-        ``T_base_nominalbase`` and ``T_flange_nominalflange`` ``(4, 4)``, where they were assumed.
+        ``T_base_nominalbase`` and ``T_flange_nominalflange``, ``(4, 4)`` each [m], as assumed; where frames are
+        identified, `base` is that of the first of them.
     """
 
     tools: Told
@@ -141,8 +144,16 @@ def corrected_programs(
     Raises
     ------
     InputError
-        If the robot is not calibrated, a tool or frame is not defined, or only some of them have a real place.
+        If the robot is not calibrated or has fewer than six joints, a tool or frame is not defined, or only some of
+        them have a real place.
     """
+    if len(robot.joints) < _JOINTS:
+        raise InputError(
+            "correcting programs needs an arm of six joints or more",
+            where=robot.name,
+            came=f"{len(robot.joints)} joints",
+            cure="An arm of fewer cannot go where its errors have to be made good.",
+        )
     nominal = nominal_robot(robot)
     tools, frames = _told(programs, cell, "tool"), _told(programs, cell, "frame")
     base, flange = np.eye(4), np.eye(4)
@@ -150,7 +161,10 @@ def corrected_programs(
         base, flange = best_agreement(robot)
     progress("finding the postures that the programs mean")
     meant = [_Meant(robot, nominal, program, cell) for program in programs]
-    if frames == "assumed":
+    if frames == "identified":
+        # What is given by joints stays where it is to the first frame that was measured.
+        base = next(one.measured_base for one in meant if one.measured_base is not None)
+    else:
         progress("finding where the base is")
         parts = [(one, one.some(_TARGETS_FOR_BASE // len(meant) + 1)) for one in meant]
 
@@ -179,14 +193,16 @@ def commanded(robot: Robot, program: Program, cell: Cell = NOTHING_GIVEN) -> Arr
 def _told(programs: Sequence[Program], cell: Cell, kind: Literal["tool", "frame"]) -> Told:
     """Return whether the real places of all tools or frames in use were given, or of none."""
     given = cell.tools if kind == "tool" else cell.frames
-    used = {
-        (target.tool if kind == "tool" else target.frame): place(program, target)
-        for program in programs
-        for target in reversed(program.targets)
-        if kind == "tool" or target.form.kind == "pose"
-    }
+    used: dict[str, str] = {}
+    needed: set[str] = set()
+    for program in programs:
+        for target in program.targets:
+            name = target.tool if kind == "tool" else target.frame
+            used.setdefault(name, place(program, target))
+            if kind == "tool" or target.form.kind == "pose":
+                needed.add(name)
     known = [name for name in used if given.get(name.lower(), Placed(None, None)).identified is not None]
-    missing = [name for name in used if name not in known]
+    missing = [name for name in used if name in needed and name not in known]
     if known and missing:
         own = {"tool": "flange", "frame": "base"}[kind]
         raise InputError(
@@ -226,6 +242,11 @@ class _Meant:
         self.guess = "" if found.guessed is None else place(program, targets[found.guessed])
         self.joints = found.joints
         self._usable: NDArray[np.bool_] = np.asarray(~np.isnan(found.joints).any(axis=1))
+
+    @property
+    def measured_base(self) -> Array | None:
+        """``T_base_nominalbase`` by the first frame that was measured; None if none was."""
+        return self._base.measured
 
     def some(self, count: int) -> NDArray[np.intp]:
         """Return up to `count` usable targets, evenly along the program."""
@@ -301,11 +322,12 @@ class _Meant:
         changed: dict[int, str] = {}
         for configuration, members in self._configured(rows, reasons):
             for row in members[~agrees(self._robot, joints[members], configuration)].tolist():
-                shown = np.degrees(self._robot.controller.readings(joints[row][None])[0])
-                words = ", ".join(f"{v:.2f}" for v in shown)
-                changed[row] = (
-                    f"it would leave the configuration in the program: the joints would have to read {words} deg"
+                shown = self._robot.controller.readings(joints[row][None])[0]
+                words = ", ".join(
+                    f"{math.degrees(value):.2f} deg" if joint.kind == "revolute" else f"{value * 1e3:.2f} mm"
+                    for value, joint in zip(shown.tolist(), self._robot.joints, strict=True)
                 )
+                changed[row] = f"it would leave the configuration in the program: the joints would have to read {words}"
         return changed
 
     def _on_edge(self, rows: NDArray[np.intp], joints: Array, reasons: Mapping[int, str]) -> tuple[int, ...]:
@@ -355,13 +377,15 @@ class _Places:
         """In the base or flange of the nominal robot."""
         return np.asarray(self._shown[self._index])
 
+    @property
+    def measured(self) -> Array | None:
+        """Where the nominal base or flange is in the identified one by the first place that was measured."""
+        pairs = zip(self._shown, self._real, strict=True)
+        return next((real @ np.linalg.inv(shown) for shown, real in pairs if real is not None), None)
+
     def real(self, rows: NDArray[np.intp], shift: Array) -> Array:
         """Return them in the identified base or flange; where nobody measured, with the shift that is assumed."""
-        pairs = list(zip(self._shown, self._real, strict=True))
-        # What is given by joints stays where it is to the first frame that was measured.
-        shifts = [real @ np.linalg.inv(shown) for shown, real in pairs if real is not None]
-        assumed = shifts[0] if shifts else shift
-        every = [assumed @ shown if real is None else real for shown, real in pairs]
+        every = [shift @ shown if real is None else real for shown, real in zip(self._shown, self._real, strict=True)]
         return np.asarray(np.reshape(every, (-1, 4, 4))[self._index[rows]])
 
 

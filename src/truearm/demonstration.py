@@ -12,7 +12,6 @@ from typing import Final
 import numpy as np
 
 from truearm.calibration import Calibration, calibrate
-from truearm.compensation.cell import matrix
 from truearm.compensation.gauge import best_agreement
 from truearm.compensation.program_correction import commanded
 from truearm.correction import ProgramCorrection, correct
@@ -85,7 +84,7 @@ def _corrected_plate(
 ) -> ProgramCorrection:
     """Correct a program for a plate that the tracker measured, and send the twin there with both programs."""
     # The thesis counts the height of axis 1 to the base: the base plate is where the nominal robot agrees best.
-    place = matrix(twin.robot.base) @ best_agreement(twin.robot)[0] @ matrix(_PLATE_FRAME)
+    place = twin.robot.base.matrix @ best_agreement(twin.robot)[0] @ _PLATE_FRAME.matrix
     x, y, z = (f"{1e3 * v:.3f}" for v in place[:3, 3] + rng.normal(0.0, 0.03e-3, 3))
     quaternion = ", ".join(f"{v:.7f}" for v in Transform.from_matrix(place[:3, :3], place[:3, 3]).quaternion)
     cell = _CELL.format(place=f"{x}, {y}, {z}", quaternion=quaternion)

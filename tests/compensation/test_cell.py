@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from truearm.compensation.cell import Cell, matrix, read_cell
+from truearm.compensation.cell import Cell, read_cell
 from truearm.errors import InputError
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
@@ -67,8 +67,8 @@ def test_orientations_as_each_maker_writes_them(tmp_path: Path, entry: str, colu
     placed = cell.tools["t"]
     assert placed.identified is None
     assert placed.controller is not None
-    np.testing.assert_allclose(matrix(placed.controller)[:3, 2], column, atol=1e-12)
-    np.testing.assert_allclose(matrix(placed.controller)[:3, 3], [0, 0, 0.1])
+    np.testing.assert_allclose(placed.controller.matrix[:3, 2], column, atol=1e-12)
+    np.testing.assert_allclose(placed.controller.matrix[:3, 3], [0, 0, 0.1])
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from truearm.calibration import Calibration, calibrate
-from truearm.compensation.cell import Cell, Placed, matrix
+from truearm.compensation.cell import Cell, Placed
 from truearm.compensation.fake_targets import matrices
 from truearm.compensation.gauge import best_agreement
 from truearm.compensation.program_correction import Correction, commanded, corrected_programs
@@ -95,10 +95,10 @@ def all_over_the_workspace(count: int, rng: np.random.Generator) -> str:
 
 def given(twin: Twin, calibration: Calibration, program: Program) -> tuple[np.ndarray, Cell]:
     """Return where the plate truly is in the world, and tool and plate as a tracker finds them from nine points."""
-    stands = matrix(twin.robot.base) @ best_agreement(twin.robot)[0] @ matrix(program.frames["wobjPlate"])
+    stands = twin.robot.base.matrix @ best_agreement(twin.robot)[0] @ program.frames["wobjPlate"].matrix
     seen = stands.copy()
     seen[:3, 3] += NOISE / 3.0 * np.random.default_rng(6).standard_normal(3)
-    in_base = np.linalg.inv(matrix(calibration.robot.base)) @ seen
+    in_base = np.linalg.inv(calibration.robot.base.matrix) @ seen
     x, y, z = (calibration.robot.values[f"target_1_{axis}"] for axis in "xyz")
     return stands, Cell(
         {"tprobe": Placed(None, Transform((x, y, z)))},

@@ -36,7 +36,6 @@ from truearm.compensation.programs.orientations import (
 )
 from truearm.errors import InputError
 from truearm.files import read_yaml
-from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 from truearm.units import sized_si
@@ -135,13 +134,6 @@ class Cell:
 NOTHING_GIVEN: Final = Cell({}, {})
 
 
-def matrix(place: Transform) -> Array:
-    """Return a transform as a matrix ``(4, 4)``."""
-    made = np.eye(4)
-    made[:3, :3], made[:3, 3] = place.rotation, place.translation
-    return made
-
-
 def read_cell(robot: Robot, tools: Path | None, frames: Path | None) -> Cell:
     """Read which tools, and which frames, a program's are.
 
@@ -190,7 +182,7 @@ def _frames(robot: Robot, path: Path, content: CellFile) -> dict[str, Placed]:
         where = f"{path}, frames.{name}"
         place = _transform(entry, content.units, where)
         if entry.of == "world":
-            in_base = np.linalg.inv(matrix(robot.base)) @ matrix(place)
+            in_base = np.linalg.inv(robot.base.matrix) @ place.matrix
             place = Transform.from_matrix(in_base[:3, :3], in_base[:3, 3])
         made[_key(name, "base")] = _placed(entry.of, place, entry.controller, content.units, where)
     return made

@@ -14,7 +14,6 @@ from typing import Final
 
 import numpy as np
 
-from truearm.compensation.cell import matrix
 from truearm.compensation.fake_targets import matrices, nominal_robot
 from truearm.compensation.programs.orientations import ROTATION_VECTOR
 from truearm.modeling.chain import Array
@@ -47,7 +46,7 @@ def best_agreement(robot: Robot) -> tuple[Array, Array]:
     """
     nominal = nominal_robot(robot)
     joints = robot.random_configurations(_CONFIGURATIONS, np.random.default_rng(0))
-    meant, real = matrices(nominal, joints), np.linalg.inv(matrix(robot.base)) @ matrices(robot, joints)
+    meant, real = matrices(nominal, joints), np.linalg.inv(robot.base.matrix) @ matrices(robot, joints)
     weight = np.repeat([1.0, reach(nominal, None)], 3)
     base, before_flange = np.eye(4), np.eye(4)
     for _ in range(_ROUNDS):

@@ -15,7 +15,7 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.compensation.cell import NOTHING_GIVEN, Cell, Placed, matrix
+from truearm.compensation.cell import NOTHING_GIVEN, Cell, Placed
 from truearm.compensation.fake_targets import FakeTargets, fake_targets, matrices, nominal_robot
 from truearm.compensation.gauge import base_shift, best_agreement, turns_between
 from truearm.compensation.meant_postures import MeantPostures, agrees, meant_postures
@@ -221,8 +221,8 @@ class _Meant:
         self._robot, self._nominal, self._program = robot, nominal, program
         controller = robot.controller
         targets = program.targets
-        self._base = _Places(program, cell.frames, "frame", matrix(controller.base))
-        self._tool = _Places(program, cell.tools, "tool", matrix(controller.flange))
+        self._base = _Places(program, cell.frames, "frame", controller.base.matrix)
+        self._tool = _Places(program, cell.tools, "tool", controller.flange.matrix)
         known = joints_of(nominal, program)
         self._joints_given: NDArray[np.bool_] = np.asarray(~np.isnan(known).any(axis=1))
         poses = poses_of(program)
@@ -367,8 +367,8 @@ class _Places:
             here = defined.get(name, IDENTITY if name == "" else entry.controller or entry.identified)
             if here is None:
                 raise _undefined(program, name, names, kind, [*defined, *given])
-            shown.append(own @ matrix(here))
-            real.append(None if entry.identified is None else matrix(entry.identified))
+            shown.append(own @ here.matrix)
+            real.append(None if entry.identified is None else entry.identified.matrix)
         self._shown = np.array(shown).reshape(-1, 4, 4)
         self._real: list[Array | None] = real
 

@@ -102,5 +102,12 @@ class Transform:
         """Rotation matrix ``(3, 3)``."""
         return rotation_from_quaternion(np.array(self.quaternion))
 
+    @property
+    def matrix(self) -> Array:
+        """Homogeneous matrix ``(4, 4)`` [m]."""
+        made = np.eye(4)
+        made[:3, :3], made[:3, 3] = self.rotation, self.translation
+        return made
+
 
 IDENTITY: Final = Transform()

@@ -9,9 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, NoReturn
 
 from truearm.compensation.programs.orientations import Orientation
+from truearm.errors import InputError
 from truearm.modeling.transform import Transform
 
 MoveKind = Literal["joint", "linear", "circular"]
@@ -32,9 +33,13 @@ class Source:
     path: Path
     text: str
 
-    def line(self, place: int) -> int:
-        """Return the number of the line that a place in the text is on, from 1."""
-        return self.text.count("\n", 0, place) + 1
+    def where(self, line: int) -> str:
+        """Return file and line, for a message."""
+        return f"{self.path}, line {line}"
+
+    def refuse(self, line: int, what: str, *, came: object = None, allowed: str | None = None) -> NoReturn:
+        """Refuse a line."""
+        raise InputError(what, where=self.where(line), came=came, allowed=allowed)
 
 
 @dataclass(frozen=True)

@@ -97,7 +97,7 @@ def converted(robot: Robot, convention_name: str) -> Robot:
     )
     if moved and links.base is not None:
         x, y, z = (round(float(v), _DECIMALS) + 0.0 for v in links.base[:3, :3].T @ base[:3, :3] @ robot.gravity)
-        its = np.linalg.inv(links.base) @ base @ _matrix(robot.controller.base)
+        its = np.linalg.inv(links.base) @ base @ robot.controller.base.matrix
         controller = replace(robot.controller, base=_transform(its))
         made = replace(_based(made, links.base), gravity=(x, y, z), controller=controller)
     behind = np.linalg.inv(at_zero(made, made.rigid.trunk.elements)) @ flange
@@ -124,12 +124,6 @@ def _based(robot: Robot, base: Array) -> Robot:
     turned = replace(robot, base_quaternion=place.quaternion)
     slides = zip(("base_x", "base_y", "base_z"), place.translation, strict=True)
     return turned.with_parameters(turned.parameters[name].restarted(value) for name, value in slides if value != 0.0)
-
-
-def _matrix(place: Transform) -> Array:
-    made = np.eye(4)
-    made[:3, :3], made[:3, 3] = place.rotation, place.translation
-    return made
 
 
 def _transform(frame: Array) -> Transform:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Final, NoReturn
+from typing import Final
 
 from truearm.compensation.programs.lines import Lines
 from truearm.compensation.programs.numbers import NUMBER
@@ -104,11 +104,6 @@ def jobs_of(source: Source, lines: Lines) -> Iterator[Job]:
         yield _job(source, lines, start, stop)
 
 
-def refuse(source: Source, line: int, what: str, *, came: object = None, allowed: str | None = None) -> NoReturn:
-    """Refuse a line of a file."""
-    raise InputError(what, where=f"{source.path}, line {line}", came=came, allowed=allowed)
-
-
 def _job(source: Source, lines: Lines, start: int, stop: int) -> Job:
     text = source.text
     state = State()
@@ -139,7 +134,7 @@ def _job(source: Source, lines: Lines, start: int, stop: int) -> Job:
                 if said[1] == "NPOS":
                     digits = _COUNT.match(text, said.end(), end)
                     if digits is None:
-                        refuse(source, lines.number(begin), "the number of positions is missing", came=line)
+                        source.refuse(lines.number(begin), "the number of positions is missing", came=line)
                     count = digits.span()
                 else:
                     state = _said(source, lines.number(begin), state, said[1], value)
@@ -148,7 +143,7 @@ def _job(source: Source, lines: Lines, start: int, stop: int) -> Job:
                 continue
             named = _NAME.match(text, begin, end)
             if named is None:
-                refuse(source, lines.number(begin), "this is no line of a table of positions", came=line)
+                source.refuse(lines.number(begin), "this is no line of a table of positions", came=line)
             table, number, name = named[1], int(named[2]), named[1] + named[2]
             carried = carried or table in ("BC", "BP")
             if table not in ("C", "P"):
@@ -156,25 +151,25 @@ def _job(source: Source, lines: Lines, start: int, stop: int) -> Job:
             values, places = _numbers(source, lines.number(begin), named.end(), end)
         line_number = lines.number(begin)
         if not state.postype:
-            refuse(source, line_number, f"{name} stands before any ///POSTYPE", allowed=", ".join(_POSTYPES))
+            source.refuse(line_number, f"{name} stands before any ///POSTYPE", allowed=", ".join(_POSTYPES))
         if max(map(abs, values)) > _LARGEST.get(state.postype, 1e6):
-            refuse(source, line_number, f"{name} has a number out of all proportion", came=max(values, key=abs))
+            source.refuse(line_number, f"{name} has a number out of all proportion", came=max(values, key=abs))
         if state.postype == "PULSE" and not all(value.is_integer() for value in values):
-            refuse(source, line_number, f"{name} has a part of a pulse", came=values, allowed="whole pulses")
+            source.refuse(line_number, f"{name} has a part of a pulse", came=values, allowed="whole pulses")
         if (table, number) in positions:
-            refuse(source, line_number, f"{name} is given twice")
+            source.refuse(line_number, f"{name} is given twice")
         positions[table, number] = Position(table, number, name, line_number, end, values, places, state)
     else:
-        refuse(source, lines.number(stop), "the job is not complete: it has no line //INST")
+        source.refuse(lines.number(stop), "the job is not complete: it has no line //INST")
     instructions = end
     if count is None:
         if positions:
-            refuse(source, lines.number(start), "the job does not say how many positions it has", allowed="///NPOS")
+            source.refuse(lines.number(start), "the job does not say how many positions it has", allowed="///NPOS")
         count = (instructions, instructions)
     steps = sum(table == "C" for table, _ in positions)
     if positions and int(text[slice(*count)]) != steps:
         said_count = text[slice(*count)]
-        refuse(source, lines.number(count[0]), f"the job has {steps} positions C and says {said_count}")
+        source.refuse(lines.number(count[0]), f"the job has {steps} positions C and says {said_count}")
     return Job(start, stop, instructions, count, tuple(positions.values()), carried)
 
 
@@ -183,10 +178,10 @@ def _said(source: Source, line: int, state: State, word: str, value: str) -> Sta
         return replace(state, rconf=value)
     if word == "POSTYPE":
         if value not in _POSTYPES:
-            refuse(source, line, "there are no such positions", came=value, allowed=", ".join(_POSTYPES))
+            source.refuse(line, "there are no such positions", came=value, allowed=", ".join(_POSTYPES))
         return replace(state, postype=value)
     if _COUNT.fullmatch(value) is None:
-        refuse(source, line, f"///{word} needs a number", came=value)
+        source.refuse(line, f"///{word} needs a number", came=value)
     number = str(int(value))
     return replace(state, tool=number) if word == "TOOL" else replace(state, user=number)
 
@@ -198,12 +193,12 @@ def _numbers(source: Source, line: int, start: int, stop: int) -> tuple[tuple[fl
     while True:
         one = _ONE.match(source.text, start, stop)
         if one is None:
-            refuse(source, line, "a number is missing or malformed", came=source.text[start:stop])
+            source.refuse(line, "a number is missing or malformed", came=source.text[start:stop])
         values.append(float(one[1]))
         places.append(one.span(1))
         start = one.end()
         if start == stop:
             return tuple(values), tuple(places)
         if source.text[start] != ",":
-            refuse(source, line, "a number is missing or malformed", came=source.text[start:stop])
+            source.refuse(line, "a number is missing or malformed", came=source.text[start:stop])
         start += 1

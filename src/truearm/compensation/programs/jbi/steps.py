@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-from truearm.compensation.programs.jbi.job import LINE, Job, Key, refuse
+from truearm.compensation.programs.jbi.job import LINE, Job, Key
 from truearm.compensation.programs.lines import Lines
 from truearm.compensation.programs.program import MoveKind, Source
 
@@ -119,7 +119,7 @@ def steps_of(source: Source, lines: Lines, job: Job) -> Steps:
                     found.barred.setdefault(("P", int(used[1])), f"is also used by {word}")
                 found.all_variables_barred |= _ANY_USED.search(said) is not None
     if not ended:
-        refuse(source, lines.number(job.stop), "the job is not complete: it has no END")
+        source.refuse(lines.number(job.stop), "the job is not complete: it has no END")
     return found
 
 

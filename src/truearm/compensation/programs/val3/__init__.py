@@ -34,7 +34,7 @@ from truearm.compensation.programs.program import (
     Source,
 )
 from truearm.compensation.programs.val3.code import Routine, Words, routines_of
-from truearm.compensation.programs.val3.data import BOM, NUMBERS, Element, Variable, refuse, variables_of
+from truearm.compensation.programs.val3.data import BOM, NUMBERS, Element, Variable, variables_of
 from truearm.compensation.programs.val3.frames import father_of, name_of, transforms
 from truearm.errors import InputError
 
@@ -137,7 +137,7 @@ def _take(application: _Application, index: int, source: Source, lines: Lines) -
     if root[1] in ("Database", "dataList"):
         for variable in variables_of(source, index, lines):
             if variable.name in application.variables:
-                refuse(source, variable.line, f"{variable.name} is declared twice in one application")
+                source.refuse(variable.line, f"{variable.name} is declared twice in one application")
             application.variables[variable.name] = variable
     elif root[1] in ("Programs", "programList"):
         for routine in routines_of(source, lines):

@@ -10,7 +10,7 @@ from typing import Final
 from truearm.compensation.programs.lines import Lines
 from truearm.compensation.programs.numbers import NUMBER
 from truearm.compensation.programs.program import MoveKind, Source
-from truearm.compensation.programs.val3.data import Attributes, parse, refuse
+from truearm.compensation.programs.val3.data import Attributes, parse
 
 _KINDS: Final[dict[str, MoveKind]] = {"movej": "joint", "movel": "linear", "movec": "circular"}
 #: Words of how many targets, the tool and the motion descriptor.
@@ -185,7 +185,7 @@ def _read(source: Source, lines: Lines, routine: Routine, start: int, stop: int)
     if not code.strip():
         return
     if _BEGIN.match(code) is None or _END.search(code.rstrip()) is None:
-        refuse(source, lines.number(stop), "the code is not complete: it runs from begin to end")
+        source.refuse(lines.number(stop), "the code is not complete: it runs from begin to end")
     routine.changed.update(found[1] for found in _ASSIGNED.finditer(code))
     for found in _CALL.finditer(code):
         name = found[2]
@@ -220,7 +220,7 @@ def _arguments(source: Source, lines: Lines, code: str, place: int, start: int) 
         else:
             found.append((begin, bracket.start()))
             return found, bracket.start()
-    return refuse(source, lines.number(start + place), "a bracket is not closed")
+    return source.refuse(lines.number(start + place), "a bracket is not closed")
 
 
 def _move(source: Source, lines: Lines, code: str, call: re.Match[str], start: int) -> CodeMove | None:
@@ -235,7 +235,7 @@ def _move(source: Source, lines: Lines, code: str, call: re.Match[str], start: i
     arguments, last = _arguments(source, lines, code, call.end(), start)
     line = lines.number(start + call.start(2))
     if len(arguments) != _ARGUMENTS[kind]:
-        refuse(source, line, f"{call[2]} has {len(arguments)} arguments", allowed=str(_ARGUMENTS[kind]))
+        source.refuse(line, f"{call[2]} has {len(arguments)} arguments", allowed=str(_ARGUMENTS[kind]))
     *places, tool, _ = arguments
     targets = [_words(source, lines, code, place, start) for place in places]
     return CodeMove(
@@ -267,7 +267,7 @@ def _words(source: Source, lines: Lines, code: str, place: tuple[int, int], star
         words.offset = tuple(map(float, numbers.groups()))
         words.places = tuple((start + first, start + stop) for first, stop in numbers.regs[1:])
         if max(map(abs, words.offset)) > 1e6:
-            refuse(source, line, "an offset is out of all proportion", came=max(words.offset))
+            source.refuse(line, "an offset is out of all proportion", came=max(words.offset))
     return words
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Final, NoReturn
+from typing import Final
 from xml.parsers import expat
 
 from truearm.compensation.programs.lines import Lines
@@ -87,11 +87,6 @@ class Variable:
     elements: dict[str, Element] = field(default_factory=dict)
 
 
-def refuse(source: Source, line: int, what: str, *, came: object = None, allowed: str | None = None) -> NoReturn:
-    """Refuse a line of a file."""
-    raise InputError(what, where=f"{source.path}, line {line}", came=came, allowed=allowed)
-
-
 def parse(
     source: Source,
     started: Callable[[str, Attributes, int], None],
@@ -116,7 +111,7 @@ def parse(
         parser.Parse(text[skipped:].encode("latin-1"), True)
     except expat.ExpatError as error:
         reason = expat.errors.messages[error.code]
-        refuse(source, error.lineno, f"the file is not complete or not well-formed: {reason}")
+        source.refuse(error.lineno, f"the file is not complete or not well-formed: {reason}")
 
 
 def variables_of(source: Source, index: int, lines: Lines) -> list[Variable]:
@@ -171,12 +166,12 @@ class _Reader:
     def _add(self, variable: Variable, key: str, place: int, father: str, posture: tuple[str, ...]) -> None:
         line = self._lines.number(place)
         if key in variable.elements:
-            refuse(self._source, line, f"{variable.name}[{key}] is given twice")
+            self._source.refuse(line, f"{variable.name}[{key}] is given twice")
         fast = _VALUE.match(self._source.text, place) if NUMBERS[variable.type] is FRAME else None
         if fast is not None:
             values, places = tuple(map(float, fast.groups()[1:])), fast.regs[2:]
             if max(map(abs, values)) > _LARGEST:
-                refuse(self._source, line, f"{variable.name} has a number out of all proportion", came=values)
+                self._source.refuse(line, f"{variable.name} has a number out of all proportion", came=values)
         else:
             values, places = self._numbers(variable, place, line)
         variable.elements[key] = Element(key, line, values, places, father, posture)
@@ -205,10 +200,10 @@ class _Reader:
             number, start = written[name]
             found_number = _NUMBER.fullmatch(number)
             if found_number is None:
-                refuse(self._source, line, f"{name} of {variable.name} is no number", came=number)
+                self._source.refuse(line, f"{name} of {variable.name} is no number", came=number)
             value = float(found_number[1])
             if abs(value) > _LARGEST:
-                refuse(self._source, line, f"{name} of {variable.name} is out of all proportion", came=number)
+                self._source.refuse(line, f"{name} of {variable.name} is out of all proportion", came=number)
             values.append(value)
             places.append((start + found_number.start(1), start + found_number.end(1)))
             after = start + len(number) + 1

@@ -9,7 +9,7 @@ import numpy as np
 
 from truearm.compensation.programs.orientations import MOVING_XYZ_ANGLES
 from truearm.compensation.programs.program import Source
-from truearm.compensation.programs.val3.data import Element, Variable, refuse
+from truearm.compensation.programs.val3.data import Element, Variable
 from truearm.errors import InputError
 from truearm.modeling.transform import IDENTITY, Transform
 
@@ -66,7 +66,7 @@ def _chained(
         if variable is None or element is None or variable.type != type_ or not element.father or bare in changed:
             return None
         if name in seen:
-            refuse(sources[variable.source], element.line, f"{name} is its own father")
+            sources[variable.source].refuse(element.line, f"{name} is its own father")
         seen.add(name)
         chain.append(_transform(element, length))
         name = father_of(element, type_)

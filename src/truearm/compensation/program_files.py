@@ -19,6 +19,7 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from truearm.compensation.programs import LANGUAGES
+from truearm.compensation.programs.lines import replaced
 from truearm.compensation.programs.program import Edit, Language, Program, Source
 from truearm.errors import InputError
 from truearm.files import exists, read_bytes, refuse_overwriting, validated, write_files
@@ -148,13 +149,7 @@ def language_called(name: str) -> Language:
 
 def edited(text: str, edits: Sequence[Edit]) -> str:
     """Return a text with edits made that do not overlap."""
-    parts, at = [], 0
-    for edit in sorted(edits, key=lambda e: (e.start, e.stop)):
-        if edit.start < at:
-            raise ValueError(f"edits overlap at {edit.start}")
-        parts += [text[at : edit.start], edit.text]
-        at = edit.stop
-    return "".join((*parts, text[at:]))
+    return replaced(text, 0, len(text), [(edit.start, edit.stop, edit.text) for edit in edits])
 
 
 def recorded(file: ProgramFile, corrected: bytes, language: str, applied: Mapping[str, Any]) -> str:

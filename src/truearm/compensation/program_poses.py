@@ -63,7 +63,7 @@ def joints_of(robot: Robot, program: Program) -> Array:
 
 def place(program: Program, target: ProgramTarget) -> str:
     """Return where a target stands, for a message."""
-    return f"{program.sources[target.source].path}, line {target.line}"
+    return program.sources[target.source].where(target.line)
 
 
 def pose_numbers(program: Program, before: Array, after: Array, rows: NDArray[np.intp]) -> dict[int, Array]:

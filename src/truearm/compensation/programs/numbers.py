@@ -43,7 +43,11 @@ def rewritten(text: str, value: float, fewest: int) -> str:
     if abs(value - old) < 0.01 * 10.0**-fewest:
         return text
     decimals = max(decimals_of(text), fewest)
-    new = f"{value:.{decimals}f}"
-    if float(new) == round(old, decimals):
-        return text
-    return new if float(new) else new.lstrip("-")
+    new = written(value, decimals)
+    return text if float(new) == round(old, decimals) else new
+
+
+def written(value: float, decimals: int) -> str:
+    """Return the text of a number with so many decimals; zero has no sign."""
+    text = f"{value:.{decimals}f}"
+    return text if float(text) else text.lstrip("-")

@@ -16,6 +16,7 @@ from collections.abc import Mapping, Sequence
 from typing import Final, NamedTuple
 
 from truearm.compensation.programs.fanuc_ls.text import LsFile, Position
+from truearm.compensation.programs.lines import line_end, replaced
 from truearm.compensation.programs.numbers import rewritten
 from truearm.compensation.programs.program import Division, Edit, Move, Program, ProgramTarget
 
@@ -33,7 +34,6 @@ _REFERRED: Final = re.compile(r"\bP\[[ \t]*+(\d{1,9})", re.IGNORECASE)
 #: The end of instructions that a move carries along, which are numbered from 1.
 _CARRIED_END: Final = re.compile(r"^[ \t]*+-{4,}[ \t]*+;", re.MULTILINE)
 _BLANK: Final = re.compile(r"[ \t]*+")
-_LINE_END: Final = re.compile(r"\r\n?|\n")
 
 
 class _Piece(NamedTuple):
@@ -63,8 +63,7 @@ class _DividedFile:
         self._file = LsFile(program.sources[source])
         self._taught = {position.number: position for position in self._file.taught()}
         self._last = max(int(found[1]) for found in _REFERRED.finditer(self._raw))
-        ends = _LINE_END.search(self._raw)
-        self._line_end = ends[0] if ends else "\n"
+        self._line_end = line_end(self._raw)
         self._added: list[str] = []
 
     def edits(self, divisions: Sequence[Division]) -> list[Edit]:
@@ -109,14 +108,10 @@ class _DividedFile:
         """Add a position and return the reference to it."""
         self._last += 1
         name = f"P[{self._last}]"
-        cuts = [(like.name, name)]
+        cuts = [(*like.name, name)]
         for place, text, unit, value in zip(like.places, like.texts, like.units, numbers, strict=True):
-            cuts.append((place, rewritten(text, value, target.form.decimals[0 if unit == "mm" else 1])))
-        at = like.start
-        for (start, stop), words in sorted(cuts):
-            self._added += [self._raw[at:start], words]
-            at = stop
-        self._added += [self._raw[at : like.stop], self._line_end]
+            cuts.append((*place, rewritten(text, value, target.form.decimals[0 if unit == "mm" else 1])))
+        self._added += [replaced(self._raw, like.start, like.stop, cuts), self._line_end]
         return name
 
     def _numbered(self, inserted: Mapping[int, Sequence[str]]) -> list[Edit]:

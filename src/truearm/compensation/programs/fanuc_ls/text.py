@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import re
-from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from typing import Final, NamedTuple
 
-import numpy as np
-
+from truearm.compensation.programs.lines import BYTE_ORDER_MARK, Lines
 from truearm.compensation.programs.program import Source
 from truearm.errors import InputError
 
-_FIRST: Final = re.compile(r"(?:\xef\xbb\xbf)?\s*+/PROG\b", re.IGNORECASE)
+_FIRST: Final = re.compile(rf"(?:{BYTE_ORDER_MARK})?\s*+/PROG\b", re.IGNORECASE)
 _SECTION: Final = re.compile(r"\n/(MN|POS|END)\b", re.IGNORECASE)
 _LINE: Final = re.compile(r"^[ \t]*+(?:(\d{0,9})[ \t]*+:)?(.*)$", re.MULTILINE)
 _NUMBER: Final = r"([+-]?(?:\d+(?:\.\d*)?|\.\d+))"
@@ -105,8 +103,6 @@ class LsFile:
 
     Attributes
     ----------
-    path
-        Its name, for messages.
     text
         Its text with every line end as line feeds, so that all places stay what they are.
     instructions, positions
@@ -119,11 +115,11 @@ class LsFile:
     """
 
     def __init__(self, source: Source) -> None:
-        self.path = str(source.path)
+        self._source = source
         self.text = source.text.replace("\r", "\n")
-        self._lines = _ends_of_lines(source.text)
+        self._lines = Lines(source.text)
         if not is_one(self.text):
-            raise InputError("there is no section /PROG", where=f"{self.path}, line 1", cure="Is this an LS file?")
+            raise InputError("there is no section /PROG", where=source.where(1), cure="Is this an LS file?")
         places: dict[str, tuple[int, int]] = {}
         wanted = ["MN", "POS", "END"]
         for found in _SECTION.finditer(self.text):
@@ -132,7 +128,7 @@ class LsFile:
         if wanted:
             raise InputError(
                 f"there is no section /{wanted[0]}",
-                where=f"{self.path}, line {self.line(max(len(self.text) - 1, 0))}",
+                where=self.where(max(len(self.text) - 1, 0)),
                 allowed="sections /PROG, /MN, /POS and /END, in this order",
                 cure="Is the file complete?",
             )
@@ -141,11 +137,11 @@ class LsFile:
 
     def line(self, place: int) -> int:
         """Return the number of the line that a place in the text is on, from 1."""
-        return bisect_right(self._lines, place) + 1
+        return self._lines.number(place)
 
     def where(self, place: int) -> str:
         """Return file and line of a place, for a message."""
-        return f"{self.path}, line {self.line(place)}"
+        return self._source.where(self.line(place))
 
     def statements(self) -> Iterator[Statement]:
         """Yield the instructions of /MN."""
@@ -239,15 +235,6 @@ class LsFile:
             units=units,
             external=[(name, found[2]) for name, found in fields.items() if name[0] == "E"],
         )
-
-
-def _ends_of_lines(text: str) -> list[int]:
-    """Return where each line of a text ends, after its line feed, carriage return or both."""
-    characters = np.frombuffer(text.encode("latin-1", "replace"), dtype=np.uint8)
-    is_end = (characters == 10) | (characters == 13)
-    is_end[:-1] &= (characters[:-1] != 13) | (characters[1:] != 10)
-    ends: list[int] = (np.flatnonzero(is_end) + 1).tolist()
-    return ends
 
 
 def _comment(text: str) -> str:

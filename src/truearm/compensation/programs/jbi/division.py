@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Final
 
 from truearm.compensation.programs.jbi.job import Job, Position, State, jobs_of
-from truearm.compensation.programs.lines import Lines
+from truearm.compensation.programs.lines import Lines, indentation, line_end
+from truearm.compensation.programs.numbers import written
 from truearm.compensation.programs.program import Division, Edit, Program, ProgramTarget
-
-_END: Final = re.compile(r"\r\n?|\n")
 
 
 @dataclass
@@ -71,16 +68,16 @@ def _of_job(program: Program, source: int, job: Job, divisions: Sequence[Divisio
         target = program.targets[move.target]
         like = by_place[target.places[0] or (0, 0)]
         if move.via is None or move.via_text is None or division.last_via is None:
-            line = _indented(text, move.statement[0])
+            line = move.statement[0] - len(indentation(text, move.statement[0]))
             head = text[line : move.target_text[0]].upper().replace("MOVC", "MOVL")
-            tail = text[move.target_text[1] : move.statement[1]] + _line_end(text, move.statement[1])
+            tail = text[move.target_text[1] : move.statement[1]] + line_end(text, move.statement[1])
             names = [additions.position(numbers, like, target) for numbers, _ in division.points]
             yield Edit(source, line, line, "".join(f"{head}{name}{tail}" for name in names))
         else:
             circle = [(numbers, through) for numbers, through in division.points if through is not None]
             via = program.targets[move.via]
-            line = _indented(text, move.statement[0])
-            head, end = text[line : move.via_text[0]], _line_end(text, move.via_text[1])
+            line = move.statement[0] - len(indentation(text, move.statement[0]))
+            head, end = text[line : move.via_text[0]], line_end(text, move.via_text[1])
             tail = text[move.via_text[1] : text.index(end, move.via_text[1])] + end
             straight = head.upper().replace("MOVC", "MOVL")
             new = [
@@ -93,7 +90,7 @@ def _of_job(program: Program, source: int, job: Job, divisions: Sequence[Divisio
             yield Edit(source, places[0][0], places[-1][1], _listed(division.last_via, via))
     count = len(steps) + sum(not line.startswith("/") for line in additions.written)
     yield Edit(source, *job.count, str(count))
-    end = _line_end(text, last.stop)
+    end = line_end(text, last.stop)
     new = [*additions.written, *_changes(additions.state, last.state)]
     yield Edit(source, last.stop, last.stop, "".join(end + line for line in new))
 
@@ -102,8 +99,7 @@ def _listed(numbers: Sequence[float], like: ProgramTarget) -> str:
     """Write numbers as a line of the table has them."""
     lengths, angles = like.form.decimals
     decimals = [lengths] * 3 + [angles] * 3 if like.form.kind == "pose" else [angles] * len(numbers)
-    rounded = (round(number, digits) + 0.0 for number, digits in zip(numbers, decimals, strict=True))
-    return ",".join(f"{number:.{digits}f}" for number, digits in zip(rounded, decimals, strict=True))
+    return ",".join(written(number, digits) for number, digits in zip(numbers, decimals, strict=True))
 
 
 def _changes(old: State, new: State) -> list[str]:
@@ -119,16 +115,3 @@ def _changes(old: State, new: State) -> list[str]:
     if new.rconf and new.rconf != old.rconf:
         changes.append(f"///RCONF {new.rconf}")
     return changes
-
-
-def _indented(text: str, place: int) -> int:
-    """Return where the blanks before a place begin."""
-    while place and text[place - 1] in " \t":
-        place -= 1
-    return place
-
-
-def _line_end(text: str, place: int) -> str:
-    """Return what ends the line that a place is on."""
-    found = _END.search(text, place)
-    return found[0] if found is not None else "\n"

@@ -7,12 +7,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Final
 
-from truearm.compensation.programs.lines import Lines
+from truearm.compensation.programs.lines import BYTE_ORDER_MARK, Lines
 from truearm.compensation.programs.numbers import NUMBER
 from truearm.compensation.programs.program import Source
 from truearm.errors import InputError
 
-JOB: Final = re.compile(r"(?:\A(?:\xef\xbb\xbf)?|[\r\n])[ \t]*/JOB[ \t]*(?=[\r\n]|\Z)")
+JOB: Final = re.compile(rf"(?:\A(?:{BYTE_ORDER_MARK})?|[\r\n])[ \t]*/JOB[ \t]*(?=[\r\n]|\Z)")
 LINE: Final = re.compile(r"[^\r\n]+")
 
 _N: Final = rf"[ \t]*((?>{NUMBER}))[ \t]*"

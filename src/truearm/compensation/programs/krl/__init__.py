@@ -34,10 +34,11 @@ from typing import Final
 
 from truearm.compensation.programs.krl.division import divide
 from truearm.compensation.programs.krl.reading import read
+from truearm.compensation.programs.lines import BYTE_ORDER_MARK
 from truearm.compensation.programs.program import Language
 
 _HEADER: Final = re.compile(
-    r"(?:\xef\xbb\xbf)?\s*+(?:&ACCESS\b|(?:[;&][^\r\n]*+\s*+)*+"
+    rf"(?:{BYTE_ORDER_MARK})?\s*+(?:&ACCESS\b|(?:[;&][^\r\n]*+\s*+)*+"
     r"(?:DEFDAT\s+\$?\w|DEFFCT\s+\w|(?:GLOBAL\s+)?DEF\s+\w+\s*\([^()\r\n]*+\)[ \t]*+(?:[;\r\n]|\Z)))",
     re.ASCII | re.IGNORECASE,
 )

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import re
-from bisect import bisect_left
 from collections.abc import Iterator
 from typing import Final
 
+from truearm.compensation.programs.lines import Lines, without_mark
 from truearm.compensation.programs.program import Source
 from truearm.errors import InputError
 
-_BYTE_ORDER_MARK: Final = "\xef\xbb\xbf"
 _LONE_RETURN: Final = re.compile(r"\r(?!\n)")
-_NEWLINE: Final = re.compile("\n")
 #: Lines that are empty, a comment or a header (``&ACCESS``), and then one that is not.
 _LINE: Final = re.compile(r"(?:[ \t\r]*+(?:[;&][^\n]*+)?\n)*+[ \t\r]*+((\$?[A-Za-z_][\w$]*+)?+[^\n]*+)\n?", re.ASCII)
 _CODE: Final = re.compile(r'(?:[^";\n]++|"[^"\n]*+")*+')
@@ -43,23 +41,20 @@ class Text:
 
     def __init__(self, index: int, source: Source) -> None:
         self.index = index
-        self.path = source.path
+        self._source = source
         self.module = source.path.stem.upper()
-        flat = source.text
-        if flat.startswith(_BYTE_ORDER_MARK):
-            flat = " " * len(_BYTE_ORDER_MARK) + flat[len(_BYTE_ORDER_MARK) :]
-        self.flat = _LONE_RETURN.sub("\n", flat)
-        self._ends = [end.start() for end in _NEWLINE.finditer(self.flat)]
+        self.flat = _LONE_RETURN.sub("\n", without_mark(source.text))
+        self._lines = Lines(source.text)
 
     def line(self, place: int) -> int:
         """Return the number of the line that a place is on, from 1."""
-        return bisect_left(self._ends, place) + 1
+        return self._lines.number(place)
 
     def refusal(
         self, what: str, place: int, came: str | None = None, allowed: str | None = None, cure: str | None = None
     ) -> InputError:
         """Return the error that refuses what stands at a place."""
-        return InputError(what, where=f"{self.path}, line {self.line(place)}", came=came, allowed=allowed, cure=cure)
+        return InputError(what, where=self._source.where(self.line(place)), came=came, allowed=allowed, cure=cure)
 
     def statements(self) -> Iterator[Statement]:
         """Yield the statements that begin with a word, and refuse those that end in the middle."""

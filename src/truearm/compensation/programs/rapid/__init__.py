@@ -16,13 +16,14 @@ import re
 from collections.abc import Sequence
 from typing import Final
 
+from truearm.compensation.programs.lines import BYTE_ORDER_MARK
 from truearm.compensation.programs.program import Language, Program, Source
 from truearm.compensation.programs.rapid.division import divided
 from truearm.compensation.programs.rapid.moves import MOTIONS, QUIET
 from truearm.compensation.programs.rapid.syntax import listing_of
 from truearm.compensation.programs.rapid.targets import Finder
 
-_MODULE: Final = re.compile(r"(?:\A(?:\xef\xbb\xbf)?|[\r\n])[ \t]*+MODULE[ \t]++[^\W\d]", re.I)
+_MODULE: Final = re.compile(rf"(?:\A(?:{BYTE_ORDER_MARK})?|[\r\n])[ \t]*+MODULE[ \t]++[^\W\d]", re.I)
 
 
 def _is_one(text: str) -> bool:

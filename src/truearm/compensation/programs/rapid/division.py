@@ -11,13 +11,13 @@ import re
 from collections.abc import Sequence
 from typing import Final
 
+from truearm.compensation.programs.lines import indentation, line_end, replaced
+from truearm.compensation.programs.numbers import written
 from truearm.compensation.programs.program import Division, Edit, Move, Program, ProgramTarget
 from truearm.compensation.programs.rapid.arguments import arguments_of
 from truearm.compensation.programs.rapid.data import RELTOOL, ROBTARGET_TAIL
 from truearm.compensation.programs.rapid.listing import code_of
 
-_INDENT: Final = re.compile(r"[ \t]*+")
-_LINE_END: Final = re.compile(r"\r\n?|\n")
 _WORD: Final = re.compile(r"\w++")
 
 
@@ -47,51 +47,35 @@ def _divided(program: Program, codes: dict[int, str], move: Move, division: Divi
     start, stop = move.statement
     word = _WORD.match(code, start)
     zone = arguments_of(code, word.end() if word else start, stop - 1).needed[-2]
-    line_start = max(text.rfind("\n", 0, start), text.rfind("\r", 0, start)) + 1
-    indent = _INDENT.match(text, line_start)
-    end = _LINE_END.search(text, stop) or _LINE_END.search(text)
-    between = (end[0] if end else "\n") + (indent[0] if indent else "")
+    between = line_end(text, stop) + indentation(text, start)
     target = program.targets[move.target]
     added = []
     for numbers, via in division.points:
-        words = [(move.target_text, _written(program, codes, move, target, numbers))]
+        words = [(*move.target_text, _written(program, codes, move, target, numbers))]
         if via is not None and move.via_text is not None:
-            words.append((move.via_text, _written(program, codes, move, target, via)))
+            words.append((*move.via_text, _written(program, codes, move, target, via)))
         if code[slice(*zone)].lower() == "fine":
-            words.append((zone, "z1"))
-        added.append(_replaced(text, start, stop, words) + between)
+            words.append((*zone, "z1"))
+        added.append(replaced(text, start, stop, words) + between)
     edits = [Edit(move.source, start, start, "".join(added))] if added else []
     if division.last_via is not None and move.via_text is not None:
         edits.append(Edit(move.source, *move.via_text, _written(program, codes, move, target, division.last_via)))
     return edits
 
 
-def _replaced(text: str, start: int, stop: int, words: list[tuple[tuple[int, int], str]]) -> str:
-    parts, place = [], start
-    for (begin, end), word in sorted(words):
-        parts += [text[place:begin], word]
-        place = end
-    return "".join([*parts, text[place:stop]])
-
-
 def _written(
     program: Program, codes: dict[int, str], move: Move, target: ProgramTarget, numbers: tuple[float, ...]
 ) -> str:
     """Return the words for a target that has other numbers than the move's own, in the same form."""
-    position = ",".join(_number(value, 3) for value in numbers[:3])
+    position = ",".join(written(value, 3) for value in numbers[:3])
     if target.parent is None:
         place = target.places[-1]
         tail = ROBTARGET_TAIL.match(codes[target.source], place[1]) if place else None
         rest = "".join(tail[0].split()) if tail else ""
-        return f"[[{position}],[{','.join(_number(value, 7) for value in numbers[3:])}{rest}"
+        return f"[[{position}],[{','.join(written(value, 7) for value in numbers[3:])}{rest}"
     first = target.places[0]
     call = program.sources[move.source].text[move.target_text[0] : first[0] if first else None]
     turns = ""
     if target.form is RELTOOL:
-        turns = "".join(f"\\R{axis}:={_number(value, 4)}" for axis, value in zip("xyz", numbers[3:], strict=True))
+        turns = "".join(f"\\R{axis}:={written(value, 4)}" for axis, value in zip("xyz", numbers[3:], strict=True))
     return f"{call}{position}{turns})"
-
-
-def _number(value: float, decimals: int) -> str:
-    text = f"{value:.{decimals}f}"
-    return text if float(text) else text.lstrip("-")

@@ -6,18 +6,16 @@ Source: ABB, Technical reference manual, RAPID Kernel (3HAC050946-001): sections
 from __future__ import annotations
 
 import re
-from bisect import bisect_right
 from dataclasses import dataclass, field
 from itertools import islice
 from typing import Final, NamedTuple
 
+from truearm.compensation.programs.lines import Lines, without_mark
 from truearm.compensation.programs.program import Source
 from truearm.errors import InputError
 
 _OUTSIDE_CODE: Final = re.compile(r'![^\r\n]*+|"(?:[^"\r\n]|"")*+("?+)')
 _HEADER: Final = re.compile(r"\s*+%%%.*?%%%", re.S)
-_BOM: Final = "\xef\xbb\xbf"
-_LINE_END: Final = re.compile(r"\r\n?|\n")
 _NOT_BRACKETS: Final = bytes(set(range(256)) - set(b"[](){};"))
 _PAIRS: Final = {"]": "[", ")": "(", "}": "{"}
 
@@ -43,9 +41,7 @@ def code_of(text: str) -> tuple[str, int | None]:
             return " " * length
         return f'"{" " * (length - 2)}"'
 
-    code = _OUTSIDE_CODE.sub(blank, text)
-    if code.startswith(_BOM):
-        code = "   " + code[3:]
+    code = without_mark(_OUTSIDE_CODE.sub(blank, text))
     header = _HEADER.match(code)
     if header:
         code = " " * header.end() + code[header.end() :]
@@ -155,11 +151,11 @@ class Listing:
     routines: set[str] = field(default_factory=set)
     shared: Scope = field(default_factory=dict)
     writings: list[Writing] = field(default_factory=list)
-    _lines: list[list[int]] = field(default_factory=list)
+    _lines: list[Lines] = field(default_factory=list)
 
     def line(self, source: int, place: int) -> int:
         """Return the number of the line that a place is on, from 1."""
-        return bisect_right(self._lines[source], place) + 1
+        return self._lines[source].number(place)
 
     def find(self, name: str, at: Instruction | Writing) -> Datum | None:
         """Return what a name means at an instruction, None if it is declared nowhere in the program."""
@@ -170,14 +166,14 @@ class Listing:
         self, source: int, place: int, what: str, came: object = None, allowed: str | None = None
     ) -> InputError:
         """Return the refusal of what stands at a place."""
-        where = f"{self.sources[source].path}, line {self.line(source, place)}"
+        where = self.sources[source].where(self.line(source, place))
         cure = None if allowed else "Is the file complete?"
         return InputError(what, where=where, came=came, allowed=allowed, cure=cure)
 
     def take(self, source: int) -> None:
         """Take a file's text, and refuse it if strings or brackets are not closed."""
         text = self.sources[source].text
-        self._lines.append([end.end() for end in _LINE_END.finditer(text)])
+        self._lines.append(Lines(text))
         code, unclosed = code_of(text)
         if unclosed is not None:
             raise self.refusal(source, unclosed, "a string is not closed")

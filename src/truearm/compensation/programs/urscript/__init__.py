@@ -28,6 +28,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Final
 
+from truearm.compensation.programs.lines import BYTE_ORDER_MARK
 from truearm.compensation.programs.program import Language, MoveKind, Program, Source
 from truearm.compensation.programs.urscript.division import divide
 from truearm.compensation.programs.urscript.program import Going, made_program
@@ -62,7 +63,7 @@ _AT_REST: Final = re.compile(
 
 
 def _is_one(text: str) -> bool:
-    text = text.removeprefix("\xef\xbb\xbf")
+    text = text.removeprefix(BYTE_ORDER_MARK)
     return not text.lstrip().startswith("<") and _LOOKS.search(text.replace("\r", "\n")) is not None
 
 

@@ -14,7 +14,8 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import Final
 
-from truearm.compensation.programs.numbers import NUMBER
+from truearm.compensation.programs.lines import indentation, line_end, replaced
+from truearm.compensation.programs.numbers import NUMBER, written
 from truearm.compensation.programs.program import Division, Edit, Move, Program, ProgramTarget
 from truearm.compensation.programs.urscript.text import Text, Value
 
@@ -24,7 +25,6 @@ _RADIUS: Final = 0.001
 _TIME: Final = {"movej": 3, "movel": 3}
 _BLEND: Final = {"movej": 4, "movel": 4, "movec": 4, "movep": 3, "optimovej": 3, "optimovel": 3}
 _WORD: Final = re.compile(r"[A-Za-z_]\w*", re.ASCII)
-_LINE_END: Final = re.compile(r"\r\n?|\n")
 _DECIMALS: Final = 6
 
 
@@ -98,8 +98,8 @@ def _edits(program: Program, division: Division, blends: _Blends) -> list[Edit]:
             parts.append((*move.via_text, _written(via, target)))
         place = (stop - 1, stop - 1) if blend is None else (blend.start, blend.stop)
         parts.append((*place, f", r={radius}" if blend is None else radius))
-        copies.append(_replaced(text.source.text, start, stop, parts))
-    between = _between(text, start)
+        copies.append(replaced(text.source.text, start, stop, parts))
+    between = line_end(text.source.text, start) + indentation(text.source.text, start)
     edits = [Edit(move.source, start, start, "".join(copy + between for copy in copies))]
     if move.via_text is not None and division.last_via is not None:
         edits.append(Edit(move.source, *move.via_text, _written(division.last_via, target)))
@@ -126,28 +126,8 @@ def _radius(program: Program, division: Division, blends: _Blends) -> str | None
     room = shortest - radius if math.isfinite(shortest) else _RADIUS
     if max(own, coming) > room:
         return None
-    return _decimals(radius)
+    return written(radius, _DECIMALS)
 
 
 def _written(numbers: Sequence[float], target: ProgramTarget) -> str:
-    return f"{'p' if target.form.kind == 'pose' else ''}[{', '.join(_decimals(v) for v in numbers)}]"
-
-
-def _decimals(value: float) -> str:
-    written = f"{value:.{_DECIMALS}f}"
-    return written if float(written) else written.lstrip("-")
-
-
-def _replaced(text: str, start: int, stop: int, parts: list[tuple[int, int, str]]) -> str:
-    made, place = [], start
-    for begin, end, new in sorted(parts):
-        made += [text[place:begin], new]
-        place = end
-    return "".join((*made, text[place:stop]))
-
-
-def _between(text: Text, start: int) -> str:
-    """Return the line end and the indentation of the line that a place is on."""
-    indent = text.code[text.code.rfind("\n", 0, start) + 1 : start]
-    found = _LINE_END.search(text.source.text)
-    return (found[0] if found else "\n") + indent[: len(indent) - len(indent.lstrip(" \t"))]
+    return f"{'p' if target.form.kind == 'pose' else ''}[{', '.join(written(v, _DECIMALS) for v in numbers)}]"

@@ -8,14 +8,13 @@ from __future__ import annotations
 import re
 from typing import Final, Literal, NamedTuple, cast
 
-from truearm.compensation.programs.lines import Lines
+from truearm.compensation.programs.lines import Lines, without_mark
 from truearm.compensation.programs.numbers import NUMBER
 from truearm.compensation.programs.program import Source
 from truearm.errors import InputError
 
 #: Beyond this [m, rad] a number is no part of a pose.
 _MOST: Final = 1000.0
-_MARK: Final = "\xef\xbb\xbf"
 
 _NAME: Final = r"[A-Za-z_]\w*"
 _QUIET: Final = re.compile(r"#[^\n]*|\"(?:[^\"\\\n]|\\[^\n])*\"|\"[^\"\n]*\"|'[^'\n]*'")
@@ -90,9 +89,7 @@ class Text:
     def __init__(self, source: Source) -> None:
         self.source = source
         self.lines = Lines(source.text)
-        code = source.text.replace("\r", "\n")
-        if code.startswith(_MARK):
-            code = " " * len(_MARK) + code[len(_MARK) :]
+        code = without_mark(source.text).replace("\r", "\n")
         self.code = _QUIET.sub(lambda found: " " * (found.end() - found.start()), code)
         quote = self.code.find('"')
         if quote >= 0:
@@ -116,7 +113,7 @@ class Text:
 
     def refusal(self, what: str, place: int, cure: str | None = None, came: object = None) -> InputError:
         """Return the refusal of the file for what stands at a place."""
-        return InputError(what, where=f"{self.source.path}, line {self.lines.number(place)}", came=came, cure=cure)
+        return InputError(what, where=self.source.where(self.lines.number(place)), came=came, cure=cure)
 
     def arguments(self, opened: int) -> list[Argument]:
         """Return the arguments between a bracket and its partner."""

@@ -20,7 +20,7 @@ from math import inf, radians
 from pathlib import Path
 from typing import Final
 
-from truearm.compensation.programs.lines import Lines
+from truearm.compensation.programs.lines import BYTE_ORDER_MARK, Lines
 from truearm.compensation.programs.orientations import MOVING_XYZ_ANGLES
 from truearm.compensation.programs.program import (
     ANY_POSTURE,
@@ -34,13 +34,13 @@ from truearm.compensation.programs.program import (
     Source,
 )
 from truearm.compensation.programs.val3.code import Routine, Words, routines_of
-from truearm.compensation.programs.val3.data import BOM, NUMBERS, Element, Variable, variables_of
+from truearm.compensation.programs.val3.data import NUMBERS, Element, Variable, variables_of
 from truearm.compensation.programs.val3.frames import father_of, name_of, transforms
 from truearm.errors import InputError
 
 #: The root of a file; a document type, which could name other files, is not let pass before it.
 _ROOT: Final = re.compile(
-    rf"(?:{BOM})?\s*+(?>(?:<\?.*?\?>|<!--.*?-->)\s*)*+<(?:\w+:)?(Database|dataList|Programs|programList|[Pp]roject)\b"
+    rf"(?:{BYTE_ORDER_MARK})?\s*+(?>(?:<\?.*?\?>|<!--.*?-->)\s*)*+<(?:\w+:)?(Database|dataList|Programs|programList|[Pp]roject)\b"
     r"[^<>]*(?:VAL3|NameSpace)",
     re.DOTALL,
 )

@@ -13,10 +13,9 @@ from dataclasses import dataclass, field
 from typing import Final
 from xml.parsers import expat
 
-from truearm.compensation.programs.lines import Lines
+from truearm.compensation.programs.lines import BYTE_ORDER_MARK, Lines
 from truearm.compensation.programs.numbers import NUMBER
 from truearm.compensation.programs.program import Source
-from truearm.errors import InputError
 
 FRAME: Final = ("x", "y", "z", "rx", "ry", "rz")
 #: Numbers of an element of each type.
@@ -34,7 +33,6 @@ _OLD_FATHERS: Final = frozenset(("fFather", "tFather", "pFather"))
 _OLD_NUMBERS: Final = frozenset(("tfValue", "ttValue", "tpValue", "jointValue", "jointRsValue"))
 _OLD_POSTURES: Final = frozenset(("cpValue",))
 
-BOM: Final = "\xef\xbb\xbf"
 _TAG: Final = re.compile(r"<[^\s/>]+(?:\s+[\w:.-]+\s*=\s*(?:\"[^\"]*\"|'[^']*'))*+")
 _NAME: Final = re.compile(r"<[^\s/>]+")
 _ATTRIBUTE: Final = re.compile(r"\s([\w:.-]+)\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
@@ -100,7 +98,7 @@ def parse(
         Called with the name of a tag, the attributes of a starting one, and the place where the tag begins.
     """
     text = source.text
-    skipped = len(BOM) if text.startswith(BOM) else 0
+    skipped = len(BYTE_ORDER_MARK) if text.startswith(BYTE_ORDER_MARK) else 0
     # Every character is a byte here, and markup is ASCII in every encoding that a file may have.
     parser = expat.ParserCreate("iso-8859-1")
     parser.StartElementHandler = lambda name, attributes: started(

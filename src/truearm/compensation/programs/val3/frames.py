@@ -46,7 +46,7 @@ def transforms(
                 if transform is not None and found.setdefault(name, transform) != transform:
                     raise InputError(
                         f"{name} is not the same in two applications",
-                        where=f"{sources[variable.source].path}, line {element.line}",
+                        where=sources[variable.source].where(element.line),
                         cure="Correct the applications one by one.",
                     )
     return found

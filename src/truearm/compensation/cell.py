@@ -163,7 +163,7 @@ def _file(path: Path, part: str) -> CellFile:
 
 
 def _tools(robot: Robot, path: Path, content: CellFile) -> dict[str, Placed]:
-    made = {}
+    made: dict[str, Placed] = {}
     for name, entry in content.tools.items():
         where = f"{path}, tools.{name}"
         if entry.target is None:
@@ -171,25 +171,32 @@ def _tools(robot: Robot, path: Path, content: CellFile) -> dict[str, Placed]:
         else:
             if entry.of == "controller":
                 raise InputError("a target is on the identified flange", where=where, came="of: controller")
+            if entry.model_fields_set & {"translation", *_ORIENTATIONS}:
+                raise InputError("the target says where the tool is", where=where, cure="Leave its numbers out.")
             place = _of_target(robot, entry.target)
-        made[_key(name, "flange")] = _placed(entry.of, place, entry.controller, content.units, where)
+        _add(made, name, "flange", _placed(entry.of, place, entry.controller, content.units, where), where)
     return made
 
 
 def _frames(robot: Robot, path: Path, content: CellFile) -> dict[str, Placed]:
-    made = {}
+    made: dict[str, Placed] = {}
     for name, entry in content.frames.items():
         where = f"{path}, frames.{name}"
         place = _transform(entry, content.units, where)
         if entry.of == "world":
             in_base = np.linalg.inv(robot.base.matrix) @ place.matrix
             place = Transform.from_matrix(in_base[:3, :3], in_base[:3, 3])
-        made[_key(name, "base")] = _placed(entry.of, place, entry.controller, content.units, where)
+        _add(made, name, "base", _placed(entry.of, place, entry.controller, content.units, where), where)
     return made
 
 
-def _key(name: str, own: str) -> str:
-    return "" if name.lower() == own else name.lower()
+def _add(made: dict[str, Placed], name: str, own: str, placed: Placed, where: str) -> None:
+    key = "" if name.lower() == own else name.lower()
+    if key in made:
+        raise InputError("this name is given twice", where=where, cure="Large and small letters are the same here.")
+    if key == "" and placed.controller is not None:
+        raise InputError(f"the controller has its own {own} at zero, and nowhere else", where=where)
+    made[key] = placed
 
 
 def _placed(of: str, place: Transform, controller: _Place | None, units: _Units, where: str) -> Placed:

@@ -160,6 +160,14 @@ def test_programs_of_the_same_name_keep_their_folders(tmp_path: Path) -> None:
     assert (tmp_path / "out" / "a" / "x" / "k.mod").read_bytes() == MODULE
 
 
+def test_results_stay_in_their_folder(tmp_path: Path) -> None:
+    write(tmp_path / "cell1", "m.mod")
+    paths = [tmp_path / "cell2" / ".." / "m.mod", tmp_path / "cell1" / "m.mod"]
+    (tmp_path / "cell2").mkdir()
+    write(tmp_path, "m.mod")
+    assert [file.name for file in program_files(paths)] == [f"{tmp_path.name}/m.mod", "cell1/m.mod"]
+
+
 def test_a_source_is_never_overwritten(tmp_path: Path) -> None:
     path = write(tmp_path, "m.mod")
     with pytest.raises(InputError, match="would be overwritten"):

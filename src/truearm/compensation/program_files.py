@@ -10,6 +10,7 @@ import base64
 import gc
 import hashlib
 import json
+import os
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -299,7 +300,7 @@ def _same(one: Path, other: Path) -> bool:
 
 def _names(paths: Sequence[Path]) -> list[str]:
     """Return the names of results: of paths with one name as much of their folders as tells them apart."""
-    parts = [path.absolute().parts[1:] for path in paths]
+    parts = [Path(os.path.normpath(path.absolute())).parts[1:] for path in paths]  # without .. on the way
     names = []
     for own in parts:
         alike = [other for other in parts if other != own and other[-1].lower() == own[-1].lower()]

@@ -308,7 +308,7 @@ def calibrate(
     words += ["--redundancy", redundancy] if redundancy != "prior" else []
     words += ["--bounds", bounds_file] if bounds is not None else []
     if payload is not None:
-        words += ["--payload", ",".join([f"{payload.mass:.15g}kg", *(f"{v * 1e3:.15g}mm" for v in payload.cog)])]
+        words += ["--payload", payload.text]
     words += ["--gravity", ",".join(f"{v:.15g}" for v in gravity)] if gravity is not None else []
     history = (
         f"calibrated by truearm {__version__}: model {' + '.join([chosen.name, *effects])},"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections import Counter
+from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,6 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from truearm.compensation.advice import check_correction, frame_words
 from truearm.compensation.cell import read_cell
 from truearm.compensation.division import Divided, divided
 from truearm.compensation.gauge import turns_between
@@ -27,21 +28,16 @@ from truearm.compensation.program_files import (
     restored,
     write_programs,
 )
-from truearm.compensation.programs.program import Program, Source
+from truearm.compensation.programs.program import Edit, Program, Source
 from truearm.errors import InputError
 from truearm.files import writable_folder
-from truearm.modeling.parts import NO_PAYLOAD, Payload
+from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
-from truearm.reporting.program_report import Checked, ProgramReport, ReportedFile, frame_words, program_html
+from truearm.reporting.program_report import Checked, ProgramReport, ReportedFile, program_html
 from truearm.robots import load_robot
 
 REPORT: Final = "compensation.html"
-#: Corrections of calibration errors are smaller [m]; a larger mean comes of a wrong tool, frame or robot.
-_LARGE: Final = 0.02
-#: With so few targets and no frame, a correction without a mean is no correction.
-_FEW: Final = 3
-_LISTED: Final = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +147,7 @@ class ProgramCorrection:
             robot=self.robot.title,
             files=tuple(ReportedFile(**one.summary()) for one in self.files),
             corrections=self.result.corrections,
-            joint_names=tuple(joint.name for joint in self.robot.joints),
+            joints=self.robot.joints,
             words=tuple(frame_words(self.result.frames)),
             divisions=self.division,
             warnings=self.warnings,
@@ -234,18 +230,8 @@ def correct(
     progress("reading the programs")
     read = read_programs(files)
     result = corrected_programs(arm, read, cell, progress)
-    skipped = [
-        f"{correction.program.sources[one.source].path}, line {one.line}: {one.reason}"
-        for correction in result.corrections
-        for one in correction.skipped
-    ]
-    if strict and skipped:
-        more = f", and {len(skipped) - 1} more" if len(skipped) > 1 else ""
-        raise InputError(
-            f"a target cannot be corrected{more}, and --strict writes nothing then",
-            where=skipped[0].partition(": ")[0],
-            came=skipped[0].partition(": ")[2],
-        )
+    if strict:
+        _refuse_skipped(result)
     language = language_called(read[0].language)
     division: tuple[Divided, ...] = ()
     if split is not None:
@@ -256,35 +242,55 @@ def correct(
         )
     made = []
     for number, correction in enumerate(result.corrections):
-        cut = division[number].edits if division else ()
+        edits = _edits(correction, division[number] if division else None)
         for index, source in enumerate(correction.program.sources):
-            here = [edit for edit in cut if edit.source == index]
-            # The division has new text for some words that hold numbers of their own.
-            new = [
-                edit
-                for edit in correction.edits
-                if edit.source == index and not any(c.start <= edit.start < c.stop for c in here if c.stop > c.start)
-            ]
             file = next(file for file in files if file.path == source.path)
-            made.append(FileCorrection(file, correction, index, edited(source.text, [*here, *new]).encode("latin-1")))
+            text = edited(source.text, [edit for edit in edits if edit.source == index])
+            made.append(FileCorrection(file, correction, index, text.encode("latin-1")))
     made.sort(key=lambda one: files.index(one.file))
-    options = [
-        *(["--tool", str(tools)] if tools is not None else []),
-        *(["--frame", str(frames)] if frames is not None else []),
-        *(["--strict"] if strict else []),
-        *(["--split", f"{split * 1e3:g}"] if split is not None else []),
-        *(["--again"] if again else []),
-    ]
     name = robot.name if isinstance(robot, Robot) else str(robot)
-    command = ["truearm", "compensate", name, *map(str, programs), *options]
+    command = ["truearm", "compensate", name, *map(str, programs)]
+    for option, given in (("--tool", tools), ("--frame", frames)):
+        command += [option, str(given)] if given is not None else []
+    command += ["--payload", payload.text] if payload is not None else []
+    command += ["--strict"] if strict else []
+    command += ["--split", f"{split * 1e3:g}"] if split is not None else []
+    command += ["--again"] if again else []
     return ProgramCorrection(
         robot=arm,
         files=tuple(made),
         result=result,
         division=division,
-        warnings=tuple(_warnings(arm, result, division)),
+        warnings=check_correction(arm, result, division),
         command=shlex.join(command),
     )
+
+
+def _refuse_skipped(result: CorrectedPrograms) -> None:
+    skipped = [
+        (correction.program.sources[one.source].where(one.line), one.reason)
+        for correction in result.corrections
+        for one in correction.skipped
+    ]
+    if skipped:
+        more = f", and {len(skipped) - 1} more" if len(skipped) > 1 else ""
+        where, reason = skipped[0]
+        raise InputError(
+            f"a target cannot be corrected{more}, and --strict writes nothing then", where=where, came=reason
+        )
+
+
+def _edits(correction: Correction, division: Divided | None) -> list[Edit]:
+    """Return all edits of a program; where the division has new words, the numbers in the old ones are gone."""
+    if division is None:
+        return [*correction.edits]
+    cut = sorted((edit.source, edit.start, edit.stop) for edit in division.edits if edit.start < edit.stop)
+
+    def stays(edit: Edit) -> bool:
+        at = bisect_right(cut, (edit.source, edit.start, math.inf)) - 1
+        return at < 0 or cut[at][0] != edit.source or edit.start >= cut[at][2]
+
+    return [*division.edits, *filter(stays, correction.edits)]
 
 
 def revert(programs: Sequence[str | Path], folder: str | Path) -> tuple[Path, ...]:
@@ -303,78 +309,3 @@ def revert(programs: Sequence[str | Path], folder: str | Path) -> tuple[Path, ..
     files = restored(paths)
     write_programs(folder, paths, {file.name: file.original for file in files})
     return tuple(folder / file.name for file in files)
-
-
-def _warnings(robot: Robot, result: CorrectedPrograms, division: Sequence[Divided]) -> list[Notice]:
-    made = []
-    corrections, frames = result.corrections, result.frames
-    count = sum(int(one.corrected.sum()) for one in corrections)
-    if frames.frames == "assumed":
-        few = (
-            f" With {count} targets that leaves little or nothing of the correction: give the frame."
-            if count <= _FEW
-            else ""
-        )
-        made.append(Notice("frames-assumed", f"{frame_words(frames)[0]}{few}"))
-    if frames.tools == "assumed":
-        made.append(Notice("tools-assumed", frame_words(frames)[-1]))
-    skipped = sum(len(one.skipped) for one in corrections)
-    if skipped:
-        made.append(
-            Notice("targets-skipped", f"{skipped} targets were left as they are; each is listed with its reason.")
-        )
-    unknown: Counter[str] = sum((Counter(one.program.unknown) for one in corrections), Counter())
-    if unknown:
-        words = ", ".join(f"{word} ({number})" for word, number in unknown.most_common(_LISTED))
-        made.append(
-            Notice(
-                "instructions-unknown",
-                f"{sum(unknown.values())} instructions are not known and were left alone: {words}"
-                f"{', ..' if len(unknown) > _LISTED else ''}. If one of them moves the robot, its targets stay.",
-            )
-        )
-    edges = [(one, row) for one in corrections for row in one.on_edge]
-    if edges:
-        lines = ", ".join(str(one.program.targets[row].line) for one, row in edges[:_LISTED])
-        made.append(
-            Notice(
-                "configuration-on-edge",
-                f"{len(edges)} targets have a joint at the edge of a quadrant or turn of their configuration, as 0, "
-                f"and now a little beyond it: lines {lines}{', ..' if len(edges) > _LISTED else ''}. Controllers "
-                "take the nearest posture there, but step through these first.",
-            )
-        )
-    if result.guessed:
-        made.append(
-            Notice(
-                "posture-guessed",
-                f"Nothing says in which posture the robot reaches its first pose ({'; '.join(result.guessed)}): it was "
-                "taken as the first that can be reached of front-up-noflip and so on, and the next as near as can be.",
-            )
-        )
-    moved = np.concatenate([one.moved[one.corrected] for one in corrections]) if count else np.zeros(0)
-    if count and float(moved.mean()) > _LARGE:
-        made.append(
-            Notice(
-                "corrections-large",
-                f"Targets move by {moved.mean() * 1e3:.1f} mm on average, more than calibration errors do: check that "
-                "tools, frames and robot belong together, and the convention of their angles.",
-            )
-        )
-    left = sum(len(one.left) for one in division)
-    if left:
-        made.append(
-            Notice(
-                "moves-not-divided",
-                f"{left} straight or circular moves were not looked at for --split: where they start is not sure, or a "
-                "target of theirs was not corrected, is given by joints or is an offset.",
-            )
-        )
-    if robot.effect_names and robot.payload == NO_PAYLOAD:
-        made.append(
-            Notice(
-                "no-payload",
-                "The robot carries nothing in this correction. If its tool weighs something, say so with --payload.",
-            )
-        )
-    return made

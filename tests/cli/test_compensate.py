@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import shutil
 from importlib.resources import files
 from pathlib import Path
@@ -22,6 +23,11 @@ def worn() -> Robot:
     springy = load_robot("irb120").with_effects(["compliance"]).carrying(Payload(2.0, (0.0, 0.0, 0.1)))
     errors = {"a_3": 0.2708, "theta_offset_3": 0.002, "alpha_4": -1.5695, "d_4": 0.3024, "compliance_3": 1.3e-4}
     return springy.with_values(errors | {"base_x": 1.0, "base_rz": 0.5})
+
+
+def stiff() -> Robot:
+    """Return an IRB 120 whose gears err and whose joints do not bend."""
+    return load_robot("irb120").with_effects(["transmission-error"]).with_values({"a_3": 0.2708, "alpha_4": -1.5695})
 
 
 @pytest.fixture
@@ -72,6 +78,23 @@ def test_with_tool_and_frame_nothing_is_assumed(truearm: Truearm, cell: Path) ->
     assert 0.5 < told["programs"][0]["shift_mm"]["mean"] < 3.0
 
 
+def test_a_robot_without_a_payload_is_asked_for_one_if_it_bends(truearm: Truearm, cell: Path) -> None:
+    for robot, asked in ((worn().carrying(Payload()), True), (stiff(), False)):
+        (cell / "calibrated.yaml").write_text(robot_text(robot))
+        code, said = run(truearm, cell, "--json", out=f"out{asked}")
+        assert code == 0
+        assert ("no-payload" in {warning["code"] for warning in json.loads(said)["warnings"]}) == asked
+
+
+def test_the_report_says_how_to_do_it_again(truearm: Truearm, cell: Path) -> None:
+    options = ["--tool", str(cell / "cell.yaml"), "--payload", "1.5kg,0mm,0mm,80mm", "--split", "0.05"]
+    code, _ = run(truearm, cell, *options)
+    assert code == 0
+    page = (cell / "out" / "compensation.html").read_text()
+    command = page.partition("How to reproduce this")[2].partition("<pre>")[2].partition("</pre>")[0]
+    assert shlex.split(command)[4:] == options
+
+
 def test_the_payload_matters(truearm: Truearm, cell: Path) -> None:
     shifts = []
     for number, words in enumerate(([], ["--payload", "0kg,0mm,0mm,0mm"], ["--payload", "4kg,0mm,0mm,100mm"])):
@@ -96,8 +119,8 @@ def test_corrected_again_and_reverted(truearm: Truearm, cell: Path) -> None:
     assert code == 0
     assert json.loads(said) == {"reverted": [str(cell / "back" / "plate.mod")]}
     assert (cell / "back" / "plate.mod").read_bytes() == (cell / "plate.mod").read_bytes()
-    for other in ("--again", "--strict"):
-        code, said = run(truearm, cell, "--revert", other, program="out/plate.mod", out="back")
+    for other in (["--again"], ["--strict"], ["--split", "0"], ["--payload", "1kg,0mm,0mm,0mm"]):
+        code, said = run(truearm, cell, "--revert", *other, program="out/plate.mod", out="back")
         assert code == 2
         assert "only one of them can hold" in said
 

@@ -11,7 +11,6 @@ import pytest
 from truearm.compensation.fake_targets import matrices
 from truearm.compensation.meant_postures import ON_EDGE, agrees, meant_postures
 from truearm.compensation.programs.program import ANY_POSTURE, Configuration
-from truearm.errors import InputError
 from truearm.modeling.inverse.branches import BRANCHES, branch_rule
 from truearm.modeling.robot import Robot
 from truearm.robots import load_robot
@@ -120,9 +119,3 @@ def test_a_side_without_an_end_is_the_turn_next_to_zero() -> None:
     ]
     meant = meant_postures(robot, matrices(robot, joints), words, np.stack([UNKNOWN, UNKNOWN]), [])
     np.testing.assert_allclose(meant.joints, joints, atol=1e-8)
-
-
-def test_poses_for_an_arm_of_five_joints_are_refused() -> None:
-    robot = load_robot("katana450")
-    with pytest.raises(InputError, match="needs an arm of six joints"):
-        meant_postures(robot, np.eye(4)[None], [ANY_POSTURE], np.full((1, 5), np.nan), [])

@@ -62,9 +62,10 @@ def compensate(
 
     writable_folder(out)
     if revert:
-        others = {"--again": again, "--strict": strict, "--split": split, "--tool": tool, "--frame": frame}
-        for name, given in others.items():
-            if given:
+        others = {"--tool": tool, "--frame": frame, "--payload": payload, "--split": split}
+        flags = {"--strict": strict or None, "--again": again or None}
+        for name, given in (others | flags).items():
+            if given is not None:
                 raise InputError("only one of them can hold", where=f"--revert, {name}", cure="Leave one out.")
         paths = restore(programs, out)
         if json:

@@ -193,21 +193,21 @@ def commanded(robot: Robot, program: Program, cell: Cell = NOTHING_GIVEN) -> Arr
 def _told(programs: Sequence[Program], cell: Cell, kind: Literal["tool", "frame"]) -> Told:
     """Return whether the real places of all tools or frames in use were given, or of none."""
     given = cell.tools if kind == "tool" else cell.frames
-    used: dict[str, str] = {}
-    needed: set[str] = set()
+    used: set[str] = set()
+    needed: dict[str, str] = {}
     for program in programs:
         for target in program.targets:
             name = target.tool if kind == "tool" else target.frame
-            used.setdefault(name, place(program, target))
-            if kind == "tool" or target.form.kind == "pose":
-                needed.add(name)
-    known = [name for name in used if given.get(name.lower(), Placed(None, None)).identified is not None]
-    missing = [name for name in used if name in needed and name not in known]
+            used.add(name)
+            if name not in needed and (kind == "tool" or target.form.kind == "pose"):
+                needed[name] = place(program, target)
+    known = {name for name in used if given.get(name.lower(), Placed(None, None)).identified is not None}
+    missing = [name for name in needed if name not in known]
     if known and missing:
         own = {"tool": "flange", "frame": "base"}[kind]
         raise InputError(
             f"only some of the {kind}s in use have a real place in the file",
-            where=used[missing[0]],
+            where=needed[missing[0]],
             came=missing[0] or own,
             cure=f"Give it one too, or none of them: without, the {own} is shifted so that nothing moves on average.",
         )

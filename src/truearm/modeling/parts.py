@@ -83,6 +83,11 @@ class Payload:
     mass: float = 0.0
     cog: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
+    @property
+    def text(self) -> str:
+        """As the option ``--payload`` takes it."""
+        return ",".join([f"{self.mass:.15g}kg", *(f"{v * 1e3:.15g}mm" for v in self.cog)])
+
 
 NO_PAYLOAD: Final = Payload()
 

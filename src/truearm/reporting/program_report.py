@@ -12,14 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.compensation.division import Divided
-from truearm.compensation.gauge import turns_between
-from truearm.compensation.program_correction import Correction, Frames
+from truearm.compensation.program_correction import Correction
 from truearm.modeling.chain import Array
+from truearm.modeling.parts import Joint
 from truearm.notices import Notice
 from truearm.reporting.drawing import AFTER, BEFORE, CAMERA, COLOURS, Figure, axis, figure, scene_axis
 from truearm.reporting.figures import histogram
 from truearm.reporting.numbers import rounded, rounded_to
 from truearm.reporting.page import page
+from truearm.units import from_si
 
 #: Targets in a picture: more slow a browser down and show no more.
 _DRAWN: Final = 5000
@@ -72,10 +73,10 @@ class ProgramReport:
         One row of the summary each.
     corrections
         One a program.
-    joint_names
+    joints
         Of the robot.
     words
-        What was taken for the real base and flange, see :func:`frame_words`.
+        What was taken for the real base and flange, see :func:`truearm.compensation.advice.frame_words`.
     divisions
         What was divided, one a program; empty if nothing was to be.
     warnings
@@ -89,39 +90,12 @@ class ProgramReport:
     robot: str
     files: Sequence[ReportedFile]
     corrections: Sequence[Correction]
-    joint_names: Sequence[str]
+    joints: Sequence[Joint]
     words: Sequence[str]
     divisions: Sequence[Divided]
     warnings: Sequence[Notice]
     command: str
     checked: Checked | None = None
-
-
-def frame_words(frames: Frames) -> list[str]:
-    """Return what was taken for the real base and flange, in words: first of the frames, then of the tools."""
-
-    def size(shift: Array) -> str:
-        turned = math.degrees(float(np.linalg.norm(turns_between(np.eye(4)[None], shift[None])[0])))
-        return f"{np.linalg.norm(shift[:3, 3]) * 1e3:.3f} mm and {turned:.4f} deg"
-
-    if frames.frames == "identified":
-        said = [
-            "The program's frames are where --frame says; targets are corrected in them, and may all move together."
-        ]
-    else:
-        said = [
-            "No --frame was given. Calibration cannot know where a program's frames really are, so the base was "
-            f"shifted by {size(frames.base)} until the mean correction of all targets is zero: targets are right to "
-            "each other, and the program as a whole stays where it was."
-        ]
-    if frames.tools == "identified":
-        said.append("The program's tools are where --tool says, on the identified flange.")
-    else:
-        said.append(
-            "No --tool was given. The program's tools were taken to sit on a flange that agrees best with the nominal "
-            f"one all over the workspace, {size(frames.flange)} from the identified one."
-        )
-    return said
 
 
 def program_html(report: ProgramReport) -> str:
@@ -280,13 +254,16 @@ def _evenly(rows: NDArray[np.intp]) -> NDArray[np.intp]:
     return np.asarray(rows[np.linspace(0, len(rows) - 1, _DRAWN).astype(int)])
 
 
-def _joint_rows(report: ProgramReport) -> list[tuple[str, str, str]]:
+def _joint_rows(report: ProgramReport) -> list[tuple[str, str, str, str]]:
     """Return the range of each joint in the corrected programs, in deg or mm as the model counts."""
     joints = np.concatenate([c.joints[c.corrected] for c in report.corrections])
     if not len(joints):
         return []
-    low, high = np.degrees(joints.min(axis=0)), np.degrees(joints.max(axis=0))
-    return [(n, f"{a:.2f}", f"{b:.2f}") for n, a, b in zip(report.joint_names, low, high, strict=True)]
+    rows = []
+    for joint, low, high in zip(report.joints, joints.min(axis=0).tolist(), joints.max(axis=0).tolist(), strict=True):
+        unit = "deg" if joint.kind == "revolute" else "mm"
+        rows.append((joint.name, f"{from_si(low, unit):.2f}", f"{from_si(high, unit):.2f}", unit))
+    return rows
 
 
 def _spread(values: Array) -> tuple[str, str]:

@@ -1,0 +1,142 @@
+"""What to know about corrected programs before they run."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from truearm.compensation.division import Divided
+from truearm.compensation.gauge import turns_between
+from truearm.compensation.program_correction import CorrectedPrograms, Frames
+from truearm.modeling.chain import Array
+from truearm.modeling.parts import NO_PAYLOAD
+from truearm.modeling.robot import Robot
+from truearm.notices import Notice
+
+#: Corrections of calibration errors are smaller [m]; a larger mean comes of a wrong tool, frame or robot.
+_LARGE: Final = 0.02
+#: With so few targets and no frame, a correction without a mean is no correction.
+_FEW: Final = 3
+_LISTED: Final = 5
+
+
+def check_correction(robot: Robot, result: CorrectedPrograms, division: Sequence[Divided] = ()) -> tuple[Notice, ...]:
+    """Say what is to be known about corrected programs before they run.
+
+    Parameters
+    ----------
+    robot
+        Calibrated, with the payload that holds.
+    result
+        The programs put right.
+    division
+        What was divided, one a program; empty if nothing was to be.
+    """
+    corrections = result.corrections
+    count = sum(int(one.corrected.sum()) for one in corrections)
+    made = _assumed(result.frames, count)
+    skipped = sum(len(one.skipped) for one in corrections)
+    if skipped:
+        made.append(
+            Notice("targets-skipped", f"{skipped} targets were left as they are; each is listed with its reason.")
+        )
+    unknown: Counter[str] = sum((Counter(one.program.unknown) for one in corrections), Counter())
+    if unknown:
+        words = ", ".join(f"{word} ({number})" for word, number in unknown.most_common(_LISTED))
+        made.append(
+            Notice(
+                "instructions-unknown",
+                f"{sum(unknown.values())} instructions are not known and were left alone: {words}"
+                f"{', ..' if len(unknown) > _LISTED else ''}. If one of them moves the robot, its targets stay.",
+            )
+        )
+    edges = [(one, row) for one in corrections for row in one.on_edge]
+    if edges:
+        lines = ", ".join(str(one.program.targets[row].line) for one, row in edges[:_LISTED])
+        made.append(
+            Notice(
+                "configuration-on-edge",
+                f"{len(edges)} targets have a joint at the edge of a quadrant or turn of their configuration, as 0, "
+                f"and now a little beyond it: lines {lines}{', ..' if len(edges) > _LISTED else ''}. Controllers "
+                "take the nearest posture there, but step through these first.",
+            )
+        )
+    if result.guessed:
+        made.append(
+            Notice(
+                "posture-guessed",
+                f"Nothing says in which posture the robot reaches its first pose ({'; '.join(result.guessed)}): it was "
+                "taken as the first that can be reached of front-up-noflip and so on, and the next as near as can be.",
+            )
+        )
+    moved = np.concatenate([one.moved[one.corrected] for one in corrections]) if count else np.zeros(0)
+    if count and float(moved.mean()) > _LARGE:
+        made.append(
+            Notice(
+                "corrections-large",
+                f"Targets move by {moved.mean() * 1e3:.1f} mm on average, more than calibration errors do: check that "
+                "tools, frames and robot belong together, and the convention of their angles.",
+            )
+        )
+    left = sum(len(one.left) for one in division)
+    if left:
+        made.append(
+            Notice(
+                "moves-not-divided",
+                f"{left} straight or circular moves were not looked at for --split: where they start is not sure, or a "
+                "target of theirs was not corrected, is given by joints or is an offset.",
+            )
+        )
+    if robot.payload == NO_PAYLOAD and any(effect.loaded for effect in robot.effects):
+        made.append(
+            Notice(
+                "no-payload",
+                "The robot carries nothing in this correction. If its tool weighs something, say so with --payload.",
+            )
+        )
+    return tuple(made)
+
+
+def _assumed(frames: Frames, count: int) -> list[Notice]:
+    made = []
+    if frames.frames == "assumed":
+        few = (
+            f" With {count} targets that leaves little or nothing of the correction: give the frame."
+            if count <= _FEW
+            else ""
+        )
+        made.append(Notice("frames-assumed", f"{frame_words(frames)[0]}{few}"))
+    if frames.tools == "assumed":
+        made.append(Notice("tools-assumed", frame_words(frames)[-1]))
+    return made
+
+
+def frame_words(frames: Frames) -> list[str]:
+    """Return what was taken for the real base and flange, in words: first of the frames, then of the tools."""
+
+    def size(shift: Array) -> str:
+        turned = math.degrees(float(np.linalg.norm(turns_between(np.eye(4)[None], shift[None])[0])))
+        return f"{np.linalg.norm(shift[:3, 3]) * 1e3:.3f} mm and {turned:.4f} deg"
+
+    if frames.frames == "identified":
+        said = [
+            "The program's frames are where --frame says; targets are corrected in them, and may all move together."
+        ]
+    else:
+        said = [
+            "No --frame was given. Calibration cannot know where a program's frames really are, so the base was "
+            f"shifted by {size(frames.base)} until the mean correction of all targets is zero: targets are right to "
+            "each other, and the program as a whole stays where it was."
+        ]
+    if frames.tools == "identified":
+        said.append("The program's tools are where --tool says, on the identified flange.")
+    else:
+        said.append(
+            "No --tool was given. The program's tools were taken to sit on a flange that agrees best with the nominal "
+            f"one all over the workspace, {size(frames.flange)} from the identified one."
+        )
+    return said

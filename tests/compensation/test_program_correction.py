@@ -40,11 +40,11 @@ def joints(*values: str) -> str:
     return ",\n  ".join(f"J{i} = {value}" for i, value in enumerate(values, 1))
 
 
-def worn(robot: Robot, seed: int = 0) -> Robot:
-    """Return a robot with errors of its geometry."""
-    rng = np.random.default_rng(seed)
+def worn(robot: Robot, size: float = 0.3) -> Robot:
+    """Return a robot with errors of its geometry, drawn in a share of what is usual."""
+    rng = np.random.default_rng(0)
     inside = [p for p in robot.parameters.values() if p.group in ("geometry", "joint zero")]
-    return robot.with_values({p.name: p.value + 0.3 * p.prior * float(rng.standard_normal()) for p in inside})
+    return robot.with_values({p.name: p.value + size * p.prior * float(rng.standard_normal()) for p in inside})
 
 
 IRB120 = worn(load_robot("irb120"))

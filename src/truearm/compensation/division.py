@@ -225,11 +225,11 @@ class _Path:
 
 
 def _circle(a: Array, b: Array, c: Array) -> tuple[Array, Array, Array] | None:
-    """Return centre, rotation vector from the first to the last point, and first radius; None on a line."""
+    """Return centre, rotation vector from the first to the last point, and first radius; None for no circle."""
     u, v = b - a, c - a
     normal = np.cross(u, v)
     size = float(normal @ normal)
-    if size < 1e-12 * float(u @ u) * float(v @ v):
+    if size <= 1e-12 * float(u @ u) * float(v @ v):
         return None
     centre = a + (np.cross(normal, u) * (v @ v) + np.cross(v, normal) * (u @ u)) / (2.0 * size)
     axis = normal / math.sqrt(size)

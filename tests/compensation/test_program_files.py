@@ -183,6 +183,13 @@ def test_a_file_that_somebody_else_wrote_is_not_overwritten(tmp_path: Path) -> N
     assert not (tmp_path / "out" / "n.mod").exists()
 
 
+def test_an_original_is_not_written_beside_the_record_of_a_correction(tmp_path: Path) -> None:
+    path = corrected(tmp_path / "one")
+    corrected(tmp_path / "two")
+    with pytest.raises(InputError, match="a record of a correction stands here"):
+        write_programs(tmp_path / "two" / "out", [path], {"m.mod": MODULE})
+
+
 def test_what_truearm_wrote_may_be_written_again(tmp_path: Path) -> None:
     path = corrected(tmp_path)
     (file,) = program_files([tmp_path / "source" / "m.mod"])
@@ -190,7 +197,9 @@ def test_what_truearm_wrote_may_be_written_again(tmp_path: Path) -> None:
     assert path.read_bytes() == b"new"
     path.write_bytes(b"edited by hand")
     with pytest.raises(InputError, match="changed since"):
-        write_programs(path.parent, [], {"m.mod": b"newer"})
+        write_programs(
+            path.parent, [], {"m.mod": b"newer", "m.mod.truearm.json": recorded(file, b"newer", "RAPID", {})}
+        )
 
 
 @given(

@@ -77,7 +77,7 @@ def fake_targets(robot: Robot, flange: Array, near: Array) -> FakeTargets:
     robot
         The calibrated robot, with its joint effects and payload.
     flange
-        Wanted poses of the flange in the identified base frame, ``(n, 4, 4)`` [m].
+        Wanted poses of the flange in the identified base frame, ``(n, 4, 4)`` [m], at least one.
     near
         Readings of the nominal robot where the program meant it to be, ``(n, joints)`` [rad or m]: the answers are on
         the same branch and in the same turns.

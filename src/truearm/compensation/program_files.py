@@ -168,17 +168,26 @@ def recorded(file: ProgramFile, corrected: bytes, language: str, applied: Mappin
 
 
 def write_programs(folder: Path, inputs: Sequence[Path], files: Mapping[str, str | bytes]) -> None:
-    """Write results into a folder, all of them or none.
+    """Write results into a folder, all of them or none. Records and reports replace earlier ones.
 
     Raises
     ------
     InputError
-        If a file would be overwritten that was read, or that truearm has not written itself.
+        If a program would be overwritten that was read, or that truearm has not written itself, or one without a
+        record would be written beside the record of another.
     """
     for name, content in files.items():
         path = folder / name
         refuse_overwriting(path, inputs)
-        if not exists(path) or name.endswith((".truearm.json", ".html")):
+        if name.endswith((".truearm.json", ".html")):
+            continue
+        if exists(record_path(path)) and f"{name}.truearm.json" not in files:
+            raise InputError(
+                "a record of a correction stands here, and would be taken for one of this program",
+                where=str(record_path(path)),
+                cure="Choose another --out.",
+            )
+        if not exists(path):
             continue
         here = read_bytes(path)
         record = _record(path)

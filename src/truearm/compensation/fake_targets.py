@@ -98,16 +98,16 @@ def fake_targets(robot: Robot, flange: Array, near: Array) -> FakeTargets:
     meant = rule.numbers(nominal.sweep(near))
     found = _on_branches(robot, flange, near, rule.numbers(robot.sweep(near)))
     there = rule.numbers(nominal.sweep(found.joints)) == meant
-    missed = np.flatnonzero(~there | ~_usable(found))
+    missed = np.flatnonzero(~there | ~found.usable)
     if len(missed):
         every = inverse(robot, position[missed], rotation[missed], branch="all", seed=near[missed])
         agrees = rule.numbers(nominal.sweep(every.joints)) == meant[missed][every.pose]
         away = np.abs(every.joints - near[missed][every.pose]).max(axis=1)
-        cost = away + np.where(_usable(every), 0.0, 1e3) + np.where(agrees, 0.0, 1e6)
+        cost = away + np.where(every.usable, 0.0, 1e3) + np.where(agrees, 0.0, 1e6)
         order = np.lexsort((cost, every.pose))
         first = order[np.unique(every.pose[order], return_index=True)[1]]
         # Where none is on the branch what was found stays, which is near to what was meant.
-        better = agrees[first] & (_usable(every)[first] | ~there[missed])
+        better = agrees[first] & (every.usable[first] | ~there[missed])
         found = _merged([(np.arange(len(near)), found), (missed[better], _on_rows(every, first[better]))], len(near))
         there = rule.numbers(nominal.sweep(found.joints)) == meant
     status = [
@@ -140,10 +140,6 @@ def _on_rows(found: JointSolutions, rows: NDArray[np.intp]) -> JointSolutions:
         beyond=found.beyond[rows],
         singular_value=found.singular_value[rows],
     )
-
-
-def _usable(found: JointSolutions) -> NDArray[np.bool_]:
-    return np.array([status.usable for status in found.status], dtype=bool)
 
 
 def _merged(parts: list[tuple[NDArray[np.intp], JointSolutions]], count: int) -> JointSolutions:

@@ -10,22 +10,22 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.compensation.cell import NOTHING_GIVEN, Cell, Placed
+from truearm.compensation.cell import NOTHING_GIVEN, Cell
 from truearm.compensation.fake_targets import FakeTargets, fake_targets, matrices, nominal_robot
 from truearm.compensation.gauge import base_shift, best_agreement, turns_between
 from truearm.compensation.meant_postures import MeantPostures, agrees, meant_postures
+from truearm.compensation.program_places import Places, Told, told
 from truearm.compensation.program_poses import edits_of, joint_numbers, joints_of, place, pose_numbers, poses_of
 from truearm.compensation.programs.program import Configuration, Edit, Program, Skipped
-from truearm.errors import InputError, nearest_names
+from truearm.errors import InputError
 from truearm.modeling.chain import Array
 from truearm.modeling.inverse.solutions import PoseStatus
 from truearm.modeling.robot import Robot
-from truearm.modeling.transform import IDENTITY
 
 #: The base that nobody measured is found with this many targets, evenly along the programs.
 _TARGETS_FOR_BASE: Final = 2000
@@ -33,7 +33,6 @@ _JOINTS: Final = 6
 #: A joint within this of a bound [rad] is on it: the numbers of programs are rounded.
 _ROUNDING: Final = float(np.radians(0.01))
 
-Told = Literal["identified", "assumed"]
 #: For targets ``(m,)``, poses ``(m, 4, 4)`` of their tools in their frames and joints ``(m, joints)`` near the answer:
 #: fake targets ``(m, 4, 4)``, and whether each was found ``(m,)``.
 Between = Callable[[NDArray[np.intp], Array, Array], tuple[Array, NDArray[np.bool_]]]
@@ -155,7 +154,7 @@ def corrected_programs(
             cure="An arm of fewer cannot go where its errors have to be made good.",
         )
     nominal = nominal_robot(robot)
-    tools, frames = _told(programs, cell, "tool"), _told(programs, cell, "frame")
+    tools, frames = told(programs, cell, "tool"), told(programs, cell, "frame")
     base, flange = np.eye(4), np.eye(4)
     if "assumed" in (tools, frames):
         base, flange = best_agreement(robot)
@@ -190,30 +189,6 @@ def commanded(robot: Robot, program: Program, cell: Cell = NOTHING_GIVEN) -> Arr
     return _Meant(robot, nominal_robot(robot), program, cell).joints
 
 
-def _told(programs: Sequence[Program], cell: Cell, kind: Literal["tool", "frame"]) -> Told:
-    """Return whether the real places of all tools or frames in use were given, or of none."""
-    given = cell.tools if kind == "tool" else cell.frames
-    used: set[str] = set()
-    needed: dict[str, str] = {}
-    for program in programs:
-        for target in program.targets:
-            name = target.tool if kind == "tool" else target.frame
-            used.add(name)
-            if name not in needed and (kind == "tool" or target.form.kind == "pose"):
-                needed[name] = place(program, target)
-    known = {name for name in used if given.get(name.lower(), Placed(None, None)).identified is not None}
-    missing = [name for name in needed if name not in known]
-    if known and missing:
-        own = {"tool": "flange", "frame": "base"}[kind]
-        raise InputError(
-            f"only some of the {kind}s in use have a real place in the file",
-            where=needed[missing[0]],
-            came=missing[0] or own,
-            cure=f"Give it one too, or none of them: without, the {own} is shifted so that nothing moves on average.",
-        )
-    return "identified" if known else "assumed"
-
-
 class _Meant:
     """What one program means."""
 
@@ -221,8 +196,8 @@ class _Meant:
         self._robot, self._nominal, self._program = robot, nominal, program
         controller = robot.controller
         targets = program.targets
-        self._base = _Places(program, cell.frames, "frame", controller.base.matrix)
-        self._tool = _Places(program, cell.tools, "tool", controller.flange.matrix)
+        self._base = Places(program, cell.frames, "frame", controller.base.matrix)
+        self._tool = Places(program, cell.tools, "tool", controller.flange.matrix)
         known = joints_of(nominal, program)
         self._joints_given: NDArray[np.bool_] = np.asarray(~np.isnan(known).any(axis=1))
         poses = poses_of(program)
@@ -259,7 +234,7 @@ class _Meant:
         if not len(rows):
             return np.zeros((0, 4, 4)), np.zeros((0, 4, 4))
         found = self._found(rows, base, flange)
-        good = _usable(found)
+        good = found.solutions.usable
         meant = self._base.shown[rows] @ self._poses[rows]
         return meant[good], (found.flange @ self._tool.shown[rows])[good]
 
@@ -311,7 +286,7 @@ class _Meant:
         wanted = self._base.real(rows, base) @ poses @ np.linalg.inv(self._tool.real(rows, flange))
         found = fake_targets(self._robot, wanted, near)
         fakes = np.linalg.inv(self._base.shown[rows]) @ found.flange @ self._tool.shown[rows]
-        return fakes, _usable(found)
+        return fakes, found.solutions.usable
 
     def _found(self, rows: NDArray[np.intp], base: Array, flange: Array) -> FakeTargets:
         wanted = self._base.real(rows, base) @ self._poses[rows] @ np.linalg.inv(self._tool.real(rows, flange))
@@ -350,59 +325,6 @@ class _Meant:
                 groups.setdefault(configuration, []).append(row)
         for configuration, members in groups.items():
             yield configuration, np.array(members)
-
-
-class _Places:
-    """Where the frames, or the tools, of a program's targets are: ``(n, 4, 4)`` of the nominal and the real robot."""
-
-    def __init__(self, program: Program, given: dict[str, Placed], kind: Literal["tool", "frame"], own: Array) -> None:
-        defined = {name.lower(): t for name, t in (program.tools if kind == "tool" else program.frames).items()}
-        names = [(target.tool if kind == "tool" else target.frame).lower() for target in program.targets]
-        unique = list(dict.fromkeys(names))
-        self._kind = kind
-        self._index = np.array([unique.index(name) for name in names], dtype=int)
-        shown, real = [], []
-        for name in unique:
-            entry = given.get(name, Placed(None, None))
-            here = defined.get(name, IDENTITY if name == "" else entry.controller or entry.identified)
-            if here is None:
-                raise _undefined(program, name, names, kind, [*defined, *given])
-            shown.append(own @ here.matrix)
-            real.append(None if entry.identified is None else entry.identified.matrix)
-        self._shown = np.array(shown).reshape(-1, 4, 4)
-        self._real: list[Array | None] = real
-
-    @property
-    def shown(self) -> Array:
-        """In the base or flange of the nominal robot."""
-        return np.asarray(self._shown[self._index])
-
-    @property
-    def measured(self) -> Array | None:
-        """Where the nominal base or flange is in the identified one by the first place that was measured."""
-        pairs = zip(self._shown, self._real, strict=True)
-        return next((real @ np.linalg.inv(shown) for shown, real in pairs if real is not None), None)
-
-    def real(self, rows: NDArray[np.intp], shift: Array) -> Array:
-        """Return them in the identified base or flange; where nobody measured, with the shift that is assumed."""
-        every = [shift @ shown if real is None else real for shown, real in zip(self._shown, self._real, strict=True)]
-        return np.asarray(np.reshape(every, (-1, 4, 4))[self._index[rows]])
-
-
-def _undefined(program: Program, name: str, names: list[str], kind: str, known: list[str]) -> InputError:
-    target = program.targets[names.index(name)]
-    near = nearest_names(name, known)
-    return InputError(
-        f"this {kind} is used and never defined",
-        where=place(program, target),
-        came=target.tool if kind == "tool" else target.frame,
-        cure=(f"Did you mean {' or '.join(near)}? " if near else "")
-        + f"Give the file that defines it along with the program, or what the controller has with --{kind} FILE.",
-    )
-
-
-def _usable(found: FakeTargets) -> NDArray[np.bool_]:
-    return np.array([status.usable for status in found.solutions.status], dtype=bool)
 
 
 def _reason(found: FakeTargets, at: int) -> str:

@@ -83,10 +83,14 @@ class JointSolutions:
     joint_names: tuple[str, ...]
 
     @property
+    def usable(self) -> NDArray[np.bool_]:
+        """Which rows the robot can go to, ``(rows,)``."""
+        return np.array([status.usable for status in self.status], dtype=bool)
+
+    @property
     def complete(self) -> bool:
         """Whether every pose has a row the robot can go to."""
-        usable = [status.usable for status in self.status]
-        return len(set(self.pose[usable].tolist())) == self.poses
+        return len(set(self.pose[self.usable].tolist())) == self.poses
 
     def rows(self, *wanted: PoseStatus) -> NDArray[np.intp]:
         """Return the rows that have one of these statuses."""

@@ -1,0 +1,93 @@
+"""The tools and frames of a program's targets: where its controller has them, and where they really are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.compensation.cell import Cell, Placed
+from truearm.compensation.program_poses import place
+from truearm.compensation.programs.program import Program
+from truearm.errors import InputError, nearest_names
+from truearm.modeling.chain import Array
+from truearm.modeling.transform import IDENTITY
+
+Told = Literal["identified", "assumed"]
+
+
+def told(programs: Sequence[Program], cell: Cell, kind: Literal["tool", "frame"]) -> Told:
+    """Return whether the real places of all tools or frames in use were given, or of none."""
+    given = cell.tools if kind == "tool" else cell.frames
+    used: set[str] = set()
+    needed: dict[str, str] = {}
+    for program in programs:
+        for target in program.targets:
+            name = target.tool if kind == "tool" else target.frame
+            used.add(name)
+            if name not in needed and (kind == "tool" or target.form.kind == "pose"):
+                needed[name] = place(program, target)
+    known = {name for name in used if given.get(name.lower(), Placed(None, None)).identified is not None}
+    missing = [name for name in needed if name not in known]
+    if known and missing:
+        own, without = {
+            "tool": ("flange", "the flange is taken to be where it agrees best with the nominal one"),
+            "frame": ("base", "the base is shifted so that nothing moves on average"),
+        }[kind]
+        raise InputError(
+            f"only some of the {kind}s in use have a real place in the file",
+            where=needed[missing[0]],
+            came=missing[0] or own,
+            cure=f"Give it one too, or none of them: without, {without}.",
+        )
+    return "identified" if known else "assumed"
+
+
+class Places:
+    """Where the frames, or the tools, of a program's targets are: ``(n, 4, 4)`` of the nominal and the real robot."""
+
+    def __init__(self, program: Program, given: dict[str, Placed], kind: Literal["tool", "frame"], own: Array) -> None:
+        defined = {name.lower(): t for name, t in (program.tools if kind == "tool" else program.frames).items()}
+        names = [(target.tool if kind == "tool" else target.frame).lower() for target in program.targets]
+        unique = {name: number for number, name in enumerate(dict.fromkeys(names))}
+        self._index = np.array([unique[name] for name in names], dtype=int)
+        shown, real = [], []
+        for name in unique:
+            entry = given.get(name, Placed(None, None))
+            here = defined.get(name, IDENTITY if name == "" else entry.controller or entry.identified)
+            if here is None:
+                raise _undefined(program, name, names, kind, [*defined, *given])
+            shown.append(own @ here.matrix)
+            real.append(None if entry.identified is None else entry.identified.matrix)
+        self._shown = np.array(shown).reshape(-1, 4, 4)
+        self._real: list[Array | None] = real
+
+    @property
+    def shown(self) -> Array:
+        """In the base or flange of the nominal robot."""
+        return np.asarray(self._shown[self._index])
+
+    @property
+    def measured(self) -> Array | None:
+        """Where the nominal base or flange is in the identified one by the first place that was measured."""
+        pairs = zip(self._shown, self._real, strict=True)
+        return next((real @ np.linalg.inv(shown) for shown, real in pairs if real is not None), None)
+
+    def real(self, rows: NDArray[np.intp], shift: Array) -> Array:
+        """Return them in the identified base or flange; where nobody measured, with the shift that is assumed."""
+        every = [shift @ shown if real is None else real for shown, real in zip(self._shown, self._real, strict=True)]
+        return np.asarray(np.reshape(every, (-1, 4, 4))[self._index[rows]])
+
+
+def _undefined(program: Program, name: str, names: list[str], kind: str, known: list[str]) -> InputError:
+    target = program.targets[names.index(name)]
+    near = nearest_names(name, known)
+    return InputError(
+        f"this {kind} is used and never defined",
+        where=place(program, target),
+        came=target.tool if kind == "tool" else target.frame,
+        cure=(f"Did you mean {' or '.join(near)}? " if near else "")
+        + f"Give the file that defines it along with the program, or what the controller has with --{kind} FILE.",
+    )

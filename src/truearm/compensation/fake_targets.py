@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +19,6 @@ from truearm.modeling.inverse.kinematics import inverse
 from truearm.modeling.inverse.solutions import JointSolutions, PoseStatus
 from truearm.modeling.robot import Robot
 
-#: Poses that are looked for one by one, when a look at all branches only reached them on others.
-_MOST_LOST: Final = 100
 _There = Callable[[JointSolutions, NDArray[np.intp]], NDArray[np.bool_]]
 
 
@@ -113,10 +110,11 @@ def fake_targets(robot: Robot, flange: Array, near: Array) -> FakeTargets:
         again = inverse(robot, position[missed], rotation[missed], branch="all", seed=near[missed])
         found = _better(found, again, missed[again.pose], near, there)
     reached = np.array([status is not PoseStatus.UNREACHABLE for status in found.status], dtype=bool)
-    for row in np.flatnonzero(~there(found, everyone) & reached)[:_MOST_LOST]:
-        pose = np.array([row])
-        again = inverse(robot, position[pose], rotation[pose], branch=BRANCHES[meant[row]], seed=near[row])
-        found = _better(found, again, pose, near, there)
+    lost = np.flatnonzero(~there(found, everyone) & reached)
+    for number in np.unique(meant[lost]).tolist():
+        rows = lost[meant[lost] == number]
+        again = inverse(robot, position[rows], rotation[rows], branch=BRANCHES[number], seed=near[rows])
+        found = _better(found, again, rows, near, there)
     same = there(found, everyone)
     status = []
     for row, one in enumerate(found.status):

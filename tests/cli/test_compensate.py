@@ -215,6 +215,7 @@ P[2]{
 
 def test_the_demo_ends_with_a_corrected_program(tmp_path: Path) -> None:
     shown = demonstration(tmp_path)
+    assert shown.correction is not None
     checked = shown.correction.checked
     assert checked is not None
     assert shown.calibration.validation is not None

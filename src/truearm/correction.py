@@ -309,27 +309,23 @@ def _warnings(robot: Robot, result: CorrectedPrograms, division: Sequence[Divide
     made = []
     corrections, frames = result.corrections, result.frames
     count = sum(int(one.corrected.sum()) for one in corrections)
+    if not any(one.program.targets for one in corrections):
+        return [Notice("no-targets", "There is no target in the programs that could be corrected.")]
     if frames.frames == "assumed":
-        few = (
-            f" With {count} targets that leaves little or nothing of the correction: give the frame."
-            if count <= _FEW
-            else ""
-        )
-        made.append(Notice("frames-assumed", f"{frame_words(frames)[0]}{few}"))
+        few = f" With so few targets ({count}) little or nothing of the correction is left: give the frame."
+        made.append(Notice("frames-assumed", f"{frame_words(frames)[0]}{few if count <= _FEW else ''}"))
     if frames.tools == "assumed":
         made.append(Notice("tools-assumed", frame_words(frames)[-1]))
     skipped = sum(len(one.skipped) for one in corrections)
     if skipped:
-        made.append(
-            Notice("targets-skipped", f"{skipped} targets were left as they are; each is listed with its reason.")
-        )
+        made.append(Notice("targets-skipped", f"Targets left as they are: {skipped}; each is listed with its reason."))
     unknown: Counter[str] = sum((Counter(one.program.unknown) for one in corrections), Counter())
     if unknown:
         words = ", ".join(f"{word} ({number})" for word, number in unknown.most_common(_LISTED))
         made.append(
             Notice(
                 "instructions-unknown",
-                f"{sum(unknown.values())} instructions are not known and were left alone: {words}"
+                f"Instructions that are not known and were left alone: {words}"
                 f"{', ..' if len(unknown) > _LISTED else ''}. If one of them moves the robot, its targets stay.",
             )
         )
@@ -366,8 +362,8 @@ def _warnings(robot: Robot, result: CorrectedPrograms, division: Sequence[Divide
         made.append(
             Notice(
                 "moves-not-divided",
-                f"{left} straight or circular moves were not looked at for --split: where they start is not sure, or a "
-                "target of theirs was not corrected, is given by joints or is an offset.",
+                f"Straight and circular moves not looked at for --split: {left}. Where they start is not sure, or "
+                "a target of theirs was not corrected, is given by joints or is an offset.",
             )
         )
     if robot.effect_names and robot.payload == NO_PAYLOAD:

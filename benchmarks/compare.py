@@ -27,6 +27,7 @@ CONTENDERS = {
     "pinocchio_inverse": "pinocchio",
     "truearm_inverse": None,
     "pair_distances": None,
+    "programs": None,
 }
 Figures = dict[str, Any]
 
@@ -82,6 +83,13 @@ def machine() -> dict[str, str]:
     }
 
 
+PROGRAMS = """
+## Programs of 100 000 targets
+
+| language | targets | size | read | corrected by nothing | both, in passes of one regex for numbers |
+|---|---|---|---|---|---|
+{languages}
+"""
 DISTANCES = """
 ## Distances between all pairs of 9905 points
 
@@ -211,6 +219,16 @@ def page(record: dict[str, Any]) -> str:
             pdist=shown(over(all_pairs, lambda a: a["pdist_seconds"])),
             memory=f"{(over(all_pairs, lambda a: a['memory']) or 0.0) / 1e6:.0f} MB",
         )
+    programs = ""
+    if "programs" in rounds[0]:
+        languages = []
+        for name, first in rounds[0]["programs"]["figures"].items():
+            read, compared, regex = (
+                over(("programs",), lambda a, n=name, k=key: a[n][k]) or 0.0 for key in ("read", "compared", "regex")
+            )
+            cells = (name, f"{first['targets']}", f"{first['bytes'] / 1e6:.1f} MB", shown(read), shown(compared))
+            languages.append(f"| {' | '.join(cells)} | {(read + compared) / regex:.2g} |")
+        programs = PROGRAMS.format(languages="\n".join(languages))
     kilobytes, speed = f"{size / 1e3:.0f} kB", f"{bandwidth / 1e9:.0f} GB/s"
     fastest, fill = shown(size / bandwidth), shown(filled)
     own, other = "truearm_inverse", "pinocchio_inverse"
@@ -299,7 +317,7 @@ configurations.
 Solved: Pinocchio as documented {100 * (documented or 0):.1f} % (measured on the first 1000 poses), from near seeds
 {100 * (solved or 0):.2f} %; truearm solves them on the branch that is asked for, or says why not.
 Which ratio counts depends on what one has: without a seed near the answer the documented loop is what there is.
-{distances}"""
+{distances}{programs}"""
 
 
 def goal(what: str, least: float, reached: float | None) -> str:

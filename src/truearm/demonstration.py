@@ -17,6 +17,7 @@ from truearm.compensation.program_correction import commanded
 from truearm.correction import ProgramCorrection, correct
 from truearm.errors import InputError
 from truearm.files import exists, read_bytes, read_yaml, write_files, write_new_text
+from truearm.identification.fit import Status
 from truearm.measurement.readers.canonical import csv_text
 from truearm.measurement.truths import truth_twin
 from truearm.measurement.twin import Twin, measure
@@ -35,10 +36,10 @@ _REGION: Final = ((-90, 0, -80, -150, -90, -180), (90, 110, 70, 150, 90, 180))
 
 @dataclass(frozen=True, eq=False)
 class Demonstration:
-    """What the demonstration shows: a calibration, and a program corrected with it."""
+    """What the demonstration shows: a calibration, and a program corrected with it unless the fit came to no end."""
 
     calibration: Calibration
-    correction: ProgramCorrection
+    correction: ProgramCorrection | None
 
 
 def demonstration(folder: Path, progress: Callable[[str], None] = lambda _: None) -> Demonstration:
@@ -74,6 +75,8 @@ def demonstration(folder: Path, progress: Callable[[str], None] = lambda _: None
     write_files(folder, {path.name: text, _PLATE: plate})
     calibration = calibrate("irb120", path, model="elastic", payload=twin.robot.payload, progress=progress)
     calibration.save(folder, progress)
+    if calibration.status is not Status.CONVERGED:
+        return Demonstration(calibration, None)
     correction = _corrected_plate(calibration, twin, folder, rng, progress)
     correction.save(folder / "corrected", progress)
     return Demonstration(calibration, correction)

@@ -196,6 +196,27 @@ def test_real_places_are_given_for_all_frames_or_for_none(truearm: Truearm, cell
     assert "line 15: only some of the frames in use have a real place in the file; got 'base'" in said
 
 
+def test_a_program_without_targets_says_so(truearm: Truearm, cell: Path) -> None:
+    (cell / "plate.mod").write_text('MODULE m\n  PROC main()\n    TPWrite "nothing";\n  ENDPROC\nENDMODULE\n')
+    code, said = run(truearm, cell, "--json")
+    assert code == 0
+    told = json.loads(said)
+    assert [warning["code"] for warning in told["warnings"]] == ["no-targets"]
+    assert told["programs"][0]["shift_mm"] == {"mean": 0.0, "max": 0.0}
+    assert (cell / "out" / "plate.mod").read_bytes() == (cell / "plate.mod").read_bytes()
+
+
+def test_one_joint_target_alone_has_nothing_left_to_correct(truearm: Truearm, cell: Path) -> None:
+    (cell / "plate.mod").write_text(
+        "MODULE m\n  CONST jointtarget j:=[[0,0,0,0,30,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n"
+        "  PROC main()\n    MoveAbsJ j,v100,fine,tool0;\n  ENDPROC\nENDMODULE\n"
+    )
+    code, said = run(truearm, cell)
+    assert code == 0
+    assert "With so few targets (1) little or nothing of the correction is left" in said
+    assert (cell / "out" / "plate.mod").read_bytes() == (cell / "plate.mod").read_bytes()
+
+
 def test_a_robot_that_is_not_calibrated_is_refused(truearm: Truearm, cell: Path) -> None:
     done = truearm("compensate", "irb120", cell / "plate.mod", "--out", cell / "out")
     assert done.code == 2
@@ -238,6 +259,7 @@ P[2]{
 
 def test_the_demo_ends_with_a_corrected_program(tmp_path: Path) -> None:
     shown = demonstration(tmp_path)
+    assert shown.correction is not None
     checked = shown.correction.checked
     assert checked is not None
     assert shown.calibration.validation is not None

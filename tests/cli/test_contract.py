@@ -14,6 +14,7 @@ import pytest
 from tests.cli.conftest import Truearm
 
 import truearm as package
+from truearm.demonstration import Demonstration
 from truearm.measurement.readers.canonical import csv_text, read_csv
 from truearm.robots import load_robot
 
@@ -247,7 +248,7 @@ def test_a_demo_that_does_not_converge_ends_like_a_calibration(
     data = read_csv(small / "data.csv").of_configurations([0, 1])
     run = package.calibrate("irb120", data, train=1)
     assert run.status.value == "rank-loss"
-    monkeypatch.setattr("truearm.demonstration.demonstration", lambda *_: run)
+    monkeypatch.setattr("truearm.demonstration.demonstration", lambda *_: Demonstration(run, None))
     assert truearm("demo", "--out", tmp_path / "demo").code == 3
 
 

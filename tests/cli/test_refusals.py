@@ -250,7 +250,7 @@ def test_existing_files_are_not_overwritten(truearm: Truearm, tmp_path: Path) ->
 def test_a_demo_does_not_overwrite_measurements(truearm: Truearm, tmp_path: Path) -> None:
     (tmp_path / "measurements.csv").write_text("mine")
     message = refused(truearm, "demo", "--out", tmp_path)
-    assert "measurements.csv: these are other measurements, and they are not overwritten" in message
+    assert "measurements.csv: this is another file of that name, and it is not overwritten" in message
     assert (tmp_path / "measurements.csv").read_text() == "mine"
     assert len(list(tmp_path.iterdir())) == 1
 

@@ -39,7 +39,7 @@ def worn(robot: Robot, seed: int = 1) -> Robot:
 def test_the_calibrated_robot_goes_where_the_nominal_one_was_meant(name: str) -> None:
     nominal = load_robot(name)
     robot, rng = worn(nominal), np.random.default_rng(2)
-    meant = nominal.random_configurations(300, rng) * 0.8
+    meant = nominal.random_configurations(120, rng) * 0.8
     wanted = matrices(nominal, meant)
     found = fake_targets(robot, wanted, meant)
     usable = np.array([status.usable for status in found.solutions.status])

@@ -22,11 +22,12 @@ def demo(
     with progress() as say:
         shown = demonstration(out, say)
     print_calibration(shown.calibration)
+    if shown.correction is not None:
+        print_correction(shown.correction)
+        print_checked(shown.correction)
+        typer.echo(f"The corrected program is in {out / 'corrected'}, with a report of its own, compensation.html.")
     typer.echo(f"The report is {out / 'report.html'}; open it in a browser.")
     exit_unless_finished(shown.calibration)
-    print_correction(shown.correction)
-    print_checked(shown.correction)
-    typer.echo(f"The corrected program and its report are in {out / 'corrected'}.")
 
 
 def example(folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder to write into.")]) -> None:

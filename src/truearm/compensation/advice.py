@@ -38,19 +38,20 @@ def check_correction(robot: Robot, result: CorrectedPrograms, division: Sequence
     """
     corrections = result.corrections
     count = sum(int(one.corrected.sum()) for one in corrections)
-    made = _assumed(result.frames, count)
+    if any(one.program.targets for one in corrections):
+        made = _assumed(result.frames, count)
+    else:
+        made = [Notice("no-targets", "There is no target in the programs that could be corrected.")]
     skipped = sum(len(one.skipped) for one in corrections)
     if skipped:
-        made.append(
-            Notice("targets-skipped", f"{skipped} targets were left as they are; each is listed with its reason.")
-        )
+        made.append(Notice("targets-skipped", f"Targets left as they are: {skipped}; each is listed with its reason."))
     unknown: Counter[str] = sum((Counter(one.program.unknown) for one in corrections), Counter())
     if unknown:
         words = ", ".join(f"{word} ({number})" for word, number in unknown.most_common(_LISTED))
         made.append(
             Notice(
                 "instructions-unknown",
-                f"{sum(unknown.values())} instructions are not known and were left alone: {words}"
+                f"Instructions that are not known and were left alone: {words}"
                 f"{', ..' if len(unknown) > _LISTED else ''}. If one of them moves the robot, its targets stay.",
             )
         )
@@ -87,8 +88,8 @@ def check_correction(robot: Robot, result: CorrectedPrograms, division: Sequence
         made.append(
             Notice(
                 "moves-not-divided",
-                f"{left} straight or circular moves were not looked at for --split: where they start is not sure, or a "
-                "target of theirs was not corrected, is given by joints or is an offset.",
+                f"Straight and circular moves not looked at for --split: {left}. Where they start is not sure, or "
+                "a target of theirs was not corrected, is given by joints or is an offset.",
             )
         )
     if robot.payload == NO_PAYLOAD and any(effect.loaded for effect in robot.effects):
@@ -104,12 +105,8 @@ def check_correction(robot: Robot, result: CorrectedPrograms, division: Sequence
 def _assumed(frames: Frames, count: int) -> list[Notice]:
     made = []
     if frames.frames == "assumed":
-        few = (
-            f" With {count} targets that leaves little or nothing of the correction: give the frame."
-            if count <= _FEW
-            else ""
-        )
-        made.append(Notice("frames-assumed", f"{frame_words(frames)[0]}{few}"))
+        few = f" With so few targets ({count}) little or nothing of the correction is left: give the frame."
+        made.append(Notice("frames-assumed", f"{frame_words(frames)[0]}{few if count <= _FEW else ''}"))
     if frames.tools == "assumed":
         made.append(Notice("tools-assumed", frame_words(frames)[-1]))
     return made

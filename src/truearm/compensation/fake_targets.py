@@ -6,6 +6,7 @@ joint readings with which the calibrated robot is where it shall be.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +18,8 @@ from truearm.modeling.inverse.branches import BRANCHES, branch_rule
 from truearm.modeling.inverse.kinematics import inverse
 from truearm.modeling.inverse.solutions import JointSolutions, PoseStatus
 from truearm.modeling.robot import Robot
+
+_There = Callable[[JointSolutions, NDArray[np.intp]], NDArray[np.bool_]]
 
 
 def nominal_robot(robot: Robot) -> Robot:
@@ -90,44 +93,69 @@ def fake_targets(robot: Robot, flange: Array, near: Array) -> FakeTargets:
     nominal = nominal_robot(robot)
     rule = branch_rule(robot)
     position, rotation = flange[:, :3, 3], flange[:, :3, :3]
+    found = inverse(robot, position, rotation, seed=near)
     if rule is None:
-        found = inverse(robot, position, rotation, seed=near)
         return FakeTargets(matrices(nominal, found.joints), found)
-    # The controller's branch is that of the nominal arm. Next to a singular posture the calibrated arm may call the
-    # same joints by another name: it is asked for its own name first, and for all its branches where that misses.
+    # The branch that counts is the controller's, of the nominal arm: next to a singular posture the calibrated arm may
+    # call the same joints by another name. So the nearest joints are taken, and all branches looked through where they
+    # are on another one.
     meant = rule.numbers(nominal.sweep(near))
-    found = _on_branches(robot, flange, near, rule.numbers(robot.sweep(near)))
-    there = rule.numbers(nominal.sweep(found.joints)) == meant
-    missed = np.flatnonzero(~there | ~found.usable)
+
+    def there(solutions: JointSolutions, rows: NDArray[np.intp]) -> NDArray[np.bool_]:
+        return np.asarray(rule.numbers(nominal.sweep(solutions.joints)) == meant[rows])
+
+    everyone = np.arange(len(flange))
+    missed = np.flatnonzero(~there(found, everyone) | ~found.usable)
     if len(missed):
-        every = inverse(robot, position[missed], rotation[missed], branch="all", seed=near[missed])
-        agrees = rule.numbers(nominal.sweep(every.joints)) == meant[missed][every.pose]
-        away = np.abs(every.joints - near[missed][every.pose]).max(axis=1)
-        cost = away + np.where(every.usable, 0.0, 1e3) + np.where(agrees, 0.0, 1e6)
-        order = np.lexsort((cost, every.pose))
-        first = order[np.unique(every.pose[order], return_index=True)[1]]
-        # Where none is on the branch what was found stays, which is near to what was meant.
-        better = agrees[first] & (every.usable[first] | ~there[missed])
-        found = _merged([(np.arange(len(near)), found), (missed[better], _on_rows(every, first[better]))], len(near))
-        there = rule.numbers(nominal.sweep(found.joints)) == meant
-    status = [
-        s if same or not s.usable else PoseStatus.BRANCH_LOST for s, same in zip(found.status, there, strict=True)
-    ]
+        again = inverse(robot, position[missed], rotation[missed], branch="all", seed=near[missed])
+        found = _better(found, again, missed[again.pose], near, there)
+    reached = np.array([status is not PoseStatus.UNREACHABLE for status in found.status], dtype=bool)
+    lost = np.flatnonzero(~there(found, everyone) & reached)
+    for number in np.unique(meant[lost]).tolist():
+        rows = lost[meant[lost] == number]
+        again = inverse(robot, position[rows], rotation[rows], branch=BRANCHES[number], seed=near[rows])
+        found = _better(found, again, rows, near, there)
+    same = there(found, everyone)
+    status = []
+    for row, one in enumerate(found.status):
+        if one.usable and not same[row]:
+            status.append(PoseStatus.BRANCH_LOST)
+        elif one is PoseStatus.BRANCH_LOST and same[row]:  # only the calibrated arm calls it otherwise
+            status.append(PoseStatus.BEYOND_LIMIT if found.beyond[row].any() else PoseStatus.NEAR_SINGULAR)
+        else:
+            status.append(one)
     branch = tuple(BRANCHES[number] for number in rule.numbers(nominal.sweep(found.joints)).tolist())
     return FakeTargets(matrices(nominal, found.joints), replace(found, status=tuple(status), branch=branch))
 
 
-def _on_branches(robot: Robot, flange: Array, near: Array, number: NDArray[np.intp]) -> JointSolutions:
-    """Return solutions for poses, each on a branch of its own."""
-    parts = []
-    for branch in np.unique(number).tolist():
-        rows = np.flatnonzero(number == branch)
-        position, rotation = flange[rows, :3, 3], flange[rows, :3, :3]
-        parts.append((rows, inverse(robot, position, rotation, branch=BRANCHES[branch], seed=near[rows])))
-    return _merged(parts, len(flange))
+def _better(
+    found: JointSolutions, again: JointSolutions, rows: NDArray[np.intp], near: Array, there: _There
+) -> JointSolutions:
+    """Return solutions with others in their place that are on the branch where they are not, or can be used.
+
+    Parameters
+    ----------
+    found
+        One solution a pose.
+    again, rows
+        Others, and the pose of each.
+    near
+        Joints to be near to, of every pose.
+    there
+        Whether solutions of poses are on the branch of these.
+    """
+    agrees, usable = there(again, rows), again.usable
+    away = np.abs(again.joints - near[rows]).max(axis=1)
+    order = np.lexsort((away, ~usable, ~agrees, rows))
+    best = order[np.unique(rows[order], return_index=True)[1]]
+    now = _picked(found, rows[best])
+    known, worked = there(now, rows[best]), now.usable
+    best = best[agrees[best] & ~(known & worked) & (usable[best] | ~known)]
+    return _merged([(np.arange(len(near)), found), (rows[best], _picked(again, best))], len(near))
 
 
-def _on_rows(found: JointSolutions, rows: NDArray[np.intp]) -> JointSolutions:
+def _picked(found: JointSolutions, rows: NDArray[np.intp]) -> JointSolutions:
+    """Return some solutions, one a pose."""
     return replace(
         found,
         poses=len(rows),

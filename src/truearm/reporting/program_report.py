@@ -213,7 +213,8 @@ def along_figure(corrections: Sequence[Correction]) -> Figure:
         380,
         xaxis=axis("step of the program, in the order of its text"),
         yaxis=axis("moved [mm]") | {"rangemode": "tozero"},
-        yaxis2=axis("turned [deg]") | {"rangemode": "tozero", "overlaying": "y", "side": "right", "showgrid": False},
+        yaxis2=axis("turned [deg]")
+        | {"rangemode": "tozero", "overlaying": "y", "side": "right", "showgrid": False, "tickmode": "auto"},
     )
 
 

@@ -1,0 +1,56 @@
+"""truearm: programs of 100 000 targets, read and compared with a correction of nothing, beside one pass of a regex.
+
+The programs are those that the tests make.
+"""
+
+from __future__ import annotations
+
+import importlib
+import re
+import sys
+from pathlib import Path
+
+import numpy as np
+from stopwatch import median_seconds, report
+
+import truearm
+from truearm.compensation.program_files import ProgramFile, edited, read_programs
+from truearm.compensation.program_poses import edits_of, pose_numbers, poses_of
+from truearm.compensation.programs import LANGUAGES
+from truearm.compensation.programs.numbers import NUMBER
+from truearm.compensation.programs.program import Language, Program, Source
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+COUNT = 100_000
+NUMBERS = re.compile(NUMBER)
+
+
+def sources(language: Language) -> list[Source]:
+    """Return a program of that many targets."""
+    folder = language.read.__module__.split("programs.")[1].split(".")[0]
+    made: list[Source] = importlib.import_module(f"tests.compensation.programs.test_{folder}").program_of(COUNT)
+    return made
+
+
+def round_trip(program: Program) -> None:
+    """Correct a program by nothing: no byte may change."""
+    poses = poses_of(program)
+    rows = np.array([i for i, target in enumerate(program.targets) if target.form.kind == "pose"], dtype=int)
+    edits = edits_of(program, pose_numbers(program, poses, poses, rows))
+    if edits or any(edited(source.text, edits) != source.text for source in program.sources):
+        raise ValueError(f"{program.language}: a correction of nothing changed the program")
+
+
+figures: dict[str, object] = {}
+for language in LANGUAGES:
+    texts = sources(language)
+    files = [ProgramFile(source.path, source.path.name, source.text.encode("latin-1")) for source in texts]
+    (program,) = read_programs(files)
+    figures[language.name] = {
+        "targets": len(program.targets),
+        "bytes": sum(len(file.original) for file in files),
+        "read": median_seconds(lambda files=files: read_programs(files), 3),
+        "compared": median_seconds(lambda program=program: round_trip(program), 3),
+        "regex": median_seconds(lambda texts=texts: [len(NUMBERS.findall(source.text)) for source in texts], 3),
+    }
+report(figures, {"truearm": truearm.__version__, "numpy": np.__version__})

@@ -173,6 +173,46 @@ def test_real_places_are_given_for_all_frames_or_for_none(truearm: Truearm, cell
     assert "line 15: only some of the frames in use have a real place in the file; got 'base'" in said
 
 
+@pytest.mark.parametrize(("kind", "name"), [("tool", "tProbe"), ("frame", "wobjPlate")])
+def test_a_file_without_the_tools_or_frames_in_use_is_refused(
+    truearm: Truearm, cell: Path, kind: str, name: str
+) -> None:
+    """Else what was measured would count for nothing because of a slip in a name."""
+    file = cell / "cell.yaml"
+    file.write_text(file.read_text().replace(name, "Elsewhere"))
+    code, said = run(truearm, cell, f"--{kind}", file)
+    assert code == 2
+    assert f"no {kind} that the programs use is in the file; got 'elsewhere'; allowed: {name}." in said
+    assert not (cell / "out").exists()
+
+
+@pytest.mark.parametrize("words", [(), ("--revert",)])
+def test_a_folder_is_no_program(truearm: Truearm, cell: Path, words: tuple[str, ...]) -> None:
+    for folder in (".", cell):
+        done = truearm("compensate", cell / "calibrated.yaml", folder, "--out", cell / "out", *words)
+        assert done.code == 2
+        assert "this is a folder, a program is needed. Name the files in it." in done.err
+
+
+def test_what_was_left_or_is_on_an_edge_is_said_with_its_file(truearm: Truearm, cell: Path) -> None:
+    program = cell / "plate.mod"
+    lines = [
+        "  PROC edge()",
+        "    MoveL [[374,0,500],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;",
+        "    MoveL pNowhere,v100,fine,tool0;",
+        "  ENDPROC",
+        "ENDMODULE",
+    ]
+    text = program.read_text().replace("ENDMODULE", "\n".join(lines))
+    program.write_text(text)
+    code, said = run(truearm, cell)
+    assert code == 0
+    number = next(i for i, line in enumerate(text.splitlines(), 1) if "[374,0,500]" in line)
+    assert "Warning (targets-skipped): 1 target was left unchanged, as listed with the reason." in said
+    assert "1 target was moved across the edge of a quadrant or turn of the configuration" in said
+    assert f"as at 0: plate.mod line {number}. Controllers" in said
+
+
 def test_a_robot_that_is_not_calibrated_is_refused(truearm: Truearm, cell: Path) -> None:
     done = truearm("compensate", "irb120", cell / "plate.mod", "--out", cell / "out")
     assert done.code == 2

@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 
 from truearm.compensation.cell import read_cell
-from truearm.compensation.division import Divided, divided
+from truearm.compensation.division import MOST, Divided, divided
 from truearm.compensation.gauge import turns_between
 from truearm.compensation.program_correction import CorrectedPrograms, Correction, corrected_programs
 from truearm.compensation.program_files import (
@@ -367,8 +367,9 @@ def _warnings(robot: Robot, result: CorrectedPrograms, division: Sequence[Divide
         made.append(
             Notice(
                 "moves-not-divided",
-                f"{_counted(left, 'straight or circular move')} not looked at for --split: where the start is not "
-                "sure, or a target was not corrected, is given by joints or is an offset.",
+                f"{_counted(left, 'straight or circular move')} not divided for --split: where the start is not sure, "
+                "a target was not corrected, is given by joints or is an offset, the posture changes on the way, or "
+                f"{MOST} pieces are not enough.",
             )
         )
     if robot.effect_names and robot.payload == NO_PAYLOAD:

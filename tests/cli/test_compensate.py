@@ -7,6 +7,7 @@ import shutil
 from importlib.resources import files
 from pathlib import Path
 
+import numpy as np
 import pytest
 from tests.cli.conftest import Truearm
 
@@ -14,6 +15,7 @@ from truearm.demonstration import demonstration
 from truearm.modeling.formats.robot_file import robot_text
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
+from truearm.modeling.transform import quaternion_from_rotation
 from truearm.robots import load_robot
 
 
@@ -128,6 +130,25 @@ def test_moves_are_divided(truearm: Truearm, cell: Path) -> None:
         code, said = run(truearm, cell, "--split", bad, out="bad")
         assert code == 2
         assert words in said
+
+
+def test_a_move_on_which_the_posture_changes_is_not_divided(truearm: Truearm, cell: Path) -> None:
+    """No straight move leads from one posture of the wrist to the other, and no number of pieces would do."""
+    joints = np.radians([[10.0, 20, 10, 30, 50, 20], [15.0, 22, 8, -148, -52, 202]])
+    position, rotation = load_robot("irb120").poses(joints)
+    configurations = ((0, 0), (-2, 2))
+    moves = [
+        f"    MoveL [[{','.join(f'{1e3 * v:.3f}' for v in p)}],[{','.join(f'{v:.7f}' for v in q)}],[0,{c4},{c6},0],"
+        "[9E9,9E9,9E9,9E9,9E9,9E9]],v100,z1,tool0;"
+        for p, q, (c4, c6) in zip(position, quaternion_from_rotation(rotation), configurations, strict=True)
+    ]
+    (cell / "turn.mod").write_text("\n".join(["MODULE Turn", "  PROC main()", *moves, "  ENDPROC", "ENDMODULE", ""]))
+    code, said = run(truearm, cell, "--split", "0.01", program="turn.mod")
+    assert code == 0
+    assert "2 of 2 targets corrected" in said
+    assert "divided by" not in said
+    assert "the posture changes on the way" in said
+    assert (cell / "out" / "turn.mod").read_text().count("MoveL") == 2
 
 
 @pytest.mark.parametrize(

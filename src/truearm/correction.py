@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 
 from truearm.compensation.cell import read_cell
-from truearm.compensation.division import Divided, divided
+from truearm.compensation.division import MOST, Divided, divided
 from truearm.compensation.gauge import turns_between
 from truearm.compensation.program_correction import CorrectedPrograms, Correction, corrected_programs
 from truearm.compensation.program_files import (
@@ -318,25 +318,28 @@ def _warnings(robot: Robot, result: CorrectedPrograms, division: Sequence[Divide
         made.append(Notice("tools-assumed", frame_words(frames)[-1]))
     skipped = sum(len(one.skipped) for one in corrections)
     if skipped:
-        made.append(Notice("targets-skipped", f"Targets left as they are: {skipped}; each is listed with its reason."))
+        made.append(
+            Notice("targets-skipped", f"{_counted(skipped, 'target')} left unchanged, as listed with the reason.")
+        )
     unknown: Counter[str] = sum((Counter(one.program.unknown) for one in corrections), Counter())
     if unknown:
         words = ", ".join(f"{word} ({number})" for word, number in unknown.most_common(_LISTED))
         made.append(
             Notice(
                 "instructions-unknown",
-                f"Instructions that are not known and were left alone: {words}"
+                f"{_counted(sum(unknown.values()), 'unknown instruction')} left alone: {words}"
                 f"{', ..' if len(unknown) > _LISTED else ''}. If one of them moves the robot, its targets stay.",
             )
         )
     edges = [(one, row) for one in corrections for row in one.on_edge]
     if edges:
-        lines = ", ".join(str(one.program.targets[row].line) for one, row in edges[:_LISTED])
+        targets = [(one.program.sources, one.program.targets[row]) for one, row in edges[:_LISTED]]
+        lines = ", ".join(f"{sources[target.source].path.name} line {target.line}" for sources, target in targets)
         made.append(
             Notice(
                 "configuration-on-edge",
-                f"{len(edges)} targets have a joint at the edge of a quadrant or turn of their configuration, as 0, "
-                f"and now a little beyond it: lines {lines}{', ..' if len(edges) > _LISTED else ''}. Controllers "
+                f"{_counted(len(edges), 'target')} moved across the edge of a quadrant or turn of the configuration "
+                f"by a joint that stands on it, as at 0: {lines}{', ..' if len(edges) > _LISTED else ''}. Controllers "
                 "take the nearest posture there, but step through these first.",
             )
         )
@@ -362,8 +365,9 @@ def _warnings(robot: Robot, result: CorrectedPrograms, division: Sequence[Divide
         made.append(
             Notice(
                 "moves-not-divided",
-                f"Straight and circular moves not looked at for --split: {left}. Where they start is not sure, or "
-                "a target of theirs was not corrected, is given by joints or is an offset.",
+                f"{_counted(left, 'straight or circular move')} not divided for --split: where the start is not sure, "
+                "a target was not corrected, is given by joints or is an offset, the posture changes on the way, or "
+                f"{MOST} pieces are not enough.",
             )
         )
     if robot.effect_names and robot.payload == NO_PAYLOAD:
@@ -374,3 +378,8 @@ def _warnings(robot: Robot, result: CorrectedPrograms, division: Sequence[Divide
             )
         )
     return made
+
+
+def _counted(number: int, what: str) -> str:
+    """Return that so many were: ``1 target was``, ``2 targets were``."""
+    return f"{number} {what}{' was' if number == 1 else 's were'}"

@@ -185,10 +185,19 @@ def _told(programs: Sequence[Program], cell: Cell, kind: Literal["tool", "frame"
         for target in reversed(program.targets)
         if kind == "tool" or target.form.kind == "pose"
     }
+    own = {"tool": "flange", "frame": "base"}[kind]
+    if given and used and not any(name.lower() in given for name in used):
+        first = next(iter(used))
+        raise InputError(
+            f"no {kind} that the programs use is in the file",
+            where=f"--{kind}, {used[first]}",
+            came=", ".join(sorted({name or own for name in given})),
+            allowed=", ".join(dict.fromkeys(name or own for name in used)),
+            cure=f"Call the {kind}s in the file as the programs do, or leave out --{kind}.",
+        )
     known = [name for name in used if given.get(name.lower(), Placed(None, None)).identified is not None]
     missing = [name for name in used if name not in known]
     if known and missing:
-        own = {"tool": "flange", "frame": "base"}[kind]
         raise InputError(
             f"only some of the {kind}s in use have a real place in the file",
             where=used[missing[0]],
@@ -221,7 +230,9 @@ class _Meant:
         )
         configurations = [target.configuration for target in targets]
         order = [index for move in program.moves for index in (move.via, move.target) if index is not None]
-        self._postures: MeantPostures = meant_postures(nominal, flange, configurations, known, order)
+        self._postures: MeantPostures = meant_postures(
+            nominal, flange, configurations, known, order, [target.parent for target in targets]
+        )
         found = self._postures
         self.guess = "" if found.guessed is None else place(program, targets[found.guessed])
         self.joints = found.joints

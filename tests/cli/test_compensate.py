@@ -8,6 +8,7 @@ import shutil
 from importlib.resources import files
 from pathlib import Path
 
+import numpy as np
 import pytest
 from tests.cli.conftest import Truearm
 
@@ -15,6 +16,7 @@ from truearm.demonstration import demonstration
 from truearm.modeling.formats.robot_file import robot_text
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
+from truearm.modeling.transform import quaternion_from_rotation
 from truearm.robots import load_robot
 
 
@@ -153,6 +155,25 @@ def test_moves_are_divided(truearm: Truearm, cell: Path) -> None:
         assert words in said
 
 
+def test_a_move_on_which_the_posture_changes_is_not_divided(truearm: Truearm, cell: Path) -> None:
+    """No straight move leads from one posture of the wrist to the other, and no number of pieces would do."""
+    joints = np.radians([[10.0, 20, 10, 30, 50, 20], [15.0, 22, 8, -148, -52, 202]])
+    position, rotation = load_robot("irb120").poses(joints)
+    configurations = ((0, 0), (-2, 2))
+    moves = [
+        f"    MoveL [[{','.join(f'{1e3 * v:.3f}' for v in p)}],[{','.join(f'{v:.7f}' for v in q)}],[0,{c4},{c6},0],"
+        "[9E9,9E9,9E9,9E9,9E9,9E9]],v100,z1,tool0;"
+        for p, q, (c4, c6) in zip(position, quaternion_from_rotation(rotation), configurations, strict=True)
+    ]
+    (cell / "turn.mod").write_text("\n".join(["MODULE Turn", "  PROC main()", *moves, "  ENDPROC", "ENDMODULE", ""]))
+    code, said = run(truearm, cell, "--split", "0.01", program="turn.mod")
+    assert code == 0
+    assert "2 of 2 targets corrected" in said
+    assert "divided by" not in said
+    assert "the posture changes on the way" in said
+    assert (cell / "out" / "turn.mod").read_text().count("MoveL") == 2
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [
@@ -215,6 +236,46 @@ def test_one_joint_target_alone_has_nothing_left_to_correct(truearm: Truearm, ce
     assert code == 0
     assert "With so few targets (1) little or nothing of the correction is left" in said
     assert (cell / "out" / "plate.mod").read_bytes() == (cell / "plate.mod").read_bytes()
+
+
+@pytest.mark.parametrize(("kind", "name"), [("tool", "tProbe"), ("frame", "wobjPlate")])
+def test_a_file_without_the_tools_or_frames_in_use_is_refused(
+    truearm: Truearm, cell: Path, kind: str, name: str
+) -> None:
+    """Else what was measured would count for nothing because of a slip in a name."""
+    file = cell / "cell.yaml"
+    file.write_text(file.read_text().replace(name, "Elsewhere"))
+    code, said = run(truearm, cell, f"--{kind}", file)
+    assert code == 2
+    assert f"no {kind} that the programs use is in the file; got 'elsewhere'; allowed: {name}." in said
+    assert not (cell / "out").exists()
+
+
+@pytest.mark.parametrize("words", [(), ("--revert",)])
+def test_a_folder_is_no_program(truearm: Truearm, cell: Path, words: tuple[str, ...]) -> None:
+    for folder in (".", cell):
+        done = truearm("compensate", cell / "calibrated.yaml", folder, "--out", cell / "out", *words)
+        assert done.code == 2
+        assert "this is a folder, a program is needed. Name the files in it." in done.err
+
+
+def test_what_was_left_or_is_on_an_edge_is_said_with_its_file(truearm: Truearm, cell: Path) -> None:
+    program = cell / "plate.mod"
+    lines = [
+        "  PROC edge()",
+        "    MoveL [[374,0,500],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;",
+        "    MoveL pNowhere,v100,fine,tool0;",
+        "  ENDPROC",
+        "ENDMODULE",
+    ]
+    text = program.read_text().replace("ENDMODULE", "\n".join(lines))
+    program.write_text(text)
+    code, said = run(truearm, cell)
+    assert code == 0
+    number = next(i for i, line in enumerate(text.splitlines(), 1) if "[374,0,500]" in line)
+    assert "Warning (targets-skipped): 1 target was left unchanged, as listed with the reason." in said
+    assert "1 target was moved across the edge of a quadrant or turn of the configuration" in said
+    assert f"as at 0: plate.mod line {number}. Controllers" in said
 
 
 def test_a_robot_that_is_not_calibrated_is_refused(truearm: Truearm, cell: Path) -> None:

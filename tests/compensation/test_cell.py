@@ -46,6 +46,12 @@ def test_own_base_and_flange_are_the_frames_without_a_name(tmp_path: Path) -> No
     assert cell.frames[""].identified == Transform((0.001, 0.002, 0.003))
 
 
+def test_a_number_is_a_name(tmp_path: Path) -> None:
+    cell = read(tmp_path, "tools:\n  3: {of: flange}\nframes:\n  2: {of: base}\n")
+    assert list(cell.tools) == ["3"]
+    assert list(cell.frames) == ["2"]
+
+
 def test_a_tool_may_be_a_target_of_the_calibration(tmp_path: Path) -> None:
     cell = read(tmp_path, 'tools:\n  tProbe: {of: flange, target: "1", controller: {translation: [0, 0, 125]}}\n')
     assert cell.tools["tprobe"].identified == Transform((0.01, 0.02, 0.125))

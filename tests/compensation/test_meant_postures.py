@@ -119,3 +119,23 @@ def test_a_side_without_an_end_is_the_turn_next_to_zero() -> None:
     ]
     meant = meant_postures(robot, matrices(robot, joints), words, np.stack([UNKNOWN, UNKNOWN]), [])
     np.testing.assert_allclose(meant.joints, joints, atol=1e-8)
+
+
+def test_an_offset_is_in_the_posture_of_what_it_is_an_offset_from() -> None:
+    """However the robot comes there: Offs and RelTool keep the configuration of the robtarget."""
+    robot = load_robot("irb1600")
+    parent = np.radians([-120.0, -5, 20, 12, -50, -185])
+    offset = parent + np.radians([0.5, 3, -4, 2, 1, 6])  # into another quadrant of axis 6
+    before = np.radians([80.0, 30, -20, -170, 50, 100])
+    poses = matrices(robot, np.stack([before, parent, offset]))
+    known = np.stack([before, UNKNOWN, UNKNOWN])
+    said = [ANY_POSTURE, quadrants(robot, parent), ANY_POSTURE]
+    meant = meant_postures(robot, poses, said, known, [0, 2, 1], [None, None, 1])
+    np.testing.assert_allclose(meant.joints, np.stack([before, parent, offset]), atol=1e-8)
+    # An offset of an offset is in that posture too; without the link it is the one nearest to where the robot was.
+    twice = meant_postures(
+        robot, poses[[0, 1, 2, 2]], [*said, ANY_POSTURE], known[[0, 1, 2, 2]], [0, 3], [None, None, 1, 2]
+    )
+    np.testing.assert_allclose(twice.joints[3], offset, atol=1e-8)
+    alone = meant_postures(robot, poses, said, known, [0, 2, 1])
+    assert np.abs(alone.joints[2] - offset).max() > 1.0

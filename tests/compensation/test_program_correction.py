@@ -101,7 +101,7 @@ def test_a_track_is_reported_in_millimetres(tmp_path: Path) -> None:
     program = tmp_path / "a.ls"
     program.write_text(ls(joints("1000 mm", *six), joints("1500 mm", *six), joints("1200 mm", "40 deg", *six[1:])))
     cell = tmp_path / "cell.yaml"
-    cell.write_text("truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\ntools:\n  F: {of: flange}\n")
+    cell.write_text("truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\ntools:\n  flange: {of: flange}\n")
     done = correct(on_a_track(), [program], tools=cell)
     assert done.result.corrections[0].corrected.all()
     done.save(tmp_path / "out")

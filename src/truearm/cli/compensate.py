@@ -111,7 +111,8 @@ def print_correction(correction: ProgramCorrection) -> None:
         typer.echo(f"  and {len(skipped) - _EXPLAINED} more; --json lists all")
     for division in correction.division:
         if division.moves:
-            typer.echo(f"  {division.moves} moves divided by {division.added} more targets")
+            moves, more = division.moves, division.added
+            typer.echo(f"  {moves} move{'s'[: moves > 1]} divided by {more} more target{'s'[: more > 1]}")
     for warning in summary["warnings"]:
         typer.echo(f"Warning ({warning['code']}): {warning['message']}")
 

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from truearm.compensation.division import Divided
+from truearm.compensation.division import MOST, Divided
 from truearm.compensation.gauge import turns_between
 from truearm.compensation.program_correction import CorrectedPrograms, Frames
 from truearm.modeling.chain import Array
@@ -44,25 +44,28 @@ def check_correction(robot: Robot, result: CorrectedPrograms, division: Sequence
         made = [Notice("no-targets", "There is no target in the programs that could be corrected.")]
     skipped = sum(len(one.skipped) for one in corrections)
     if skipped:
-        made.append(Notice("targets-skipped", f"Targets left as they are: {skipped}; each is listed with its reason."))
+        made.append(
+            Notice("targets-skipped", f"{_counted(skipped, 'target')} left unchanged, as listed with the reason.")
+        )
     unknown: Counter[str] = sum((Counter(one.program.unknown) for one in corrections), Counter())
     if unknown:
         words = ", ".join(f"{word} ({number})" for word, number in unknown.most_common(_LISTED))
         made.append(
             Notice(
                 "instructions-unknown",
-                f"Instructions that are not known and were left alone: {words}"
+                f"{_counted(sum(unknown.values()), 'unknown instruction')} left alone: {words}"
                 f"{', ..' if len(unknown) > _LISTED else ''}. If one of them moves the robot, its targets stay.",
             )
         )
     edges = [(one, row) for one in corrections for row in one.on_edge]
     if edges:
-        lines = ", ".join(str(one.program.targets[row].line) for one, row in edges[:_LISTED])
+        targets = [(one.program.sources, one.program.targets[row]) for one, row in edges[:_LISTED]]
+        lines = ", ".join(f"{sources[target.source].path.name} line {target.line}" for sources, target in targets)
         made.append(
             Notice(
                 "configuration-on-edge",
-                f"{len(edges)} targets have a joint at the edge of a quadrant or turn of their configuration, as 0, "
-                f"and now a little beyond it: lines {lines}{', ..' if len(edges) > _LISTED else ''}. Controllers "
+                f"{_counted(len(edges), 'target')} moved across the edge of a quadrant or turn of the configuration "
+                f"by a joint that stands on it, as at 0: {lines}{', ..' if len(edges) > _LISTED else ''}. Controllers "
                 "take the nearest posture there, but step through these first.",
             )
         )
@@ -88,8 +91,9 @@ def check_correction(robot: Robot, result: CorrectedPrograms, division: Sequence
         made.append(
             Notice(
                 "moves-not-divided",
-                f"Straight and circular moves not looked at for --split: {left}. Where they start is not sure, or "
-                "a target of theirs was not corrected, is given by joints or is an offset.",
+                f"{_counted(left, 'straight or circular move')} not divided for --split: where the start is not sure, "
+                "a target was not corrected, is given by joints or is an offset, the posture changes on the way, or "
+                f"{MOST} pieces are not enough.",
             )
         )
     if robot.payload == NO_PAYLOAD and any(effect.loaded for effect in robot.effects):
@@ -137,3 +141,8 @@ def frame_words(frames: Frames) -> list[str]:
             f"one all over the workspace, {size(frames.flange)} from the identified one."
         )
     return said
+
+
+def _counted(number: int, what: str) -> str:
+    """Return that so many were: ``1 target was``, ``2 targets were``."""
+    return f"{number} {what}{' was' if number == 1 else 's were'}"

@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Annotated, Final, Literal
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from truearm.compensation.programs.orientations import (
     FIXED_XYZ_ANGLES,
@@ -59,6 +59,14 @@ def _unit_length(q: tuple[float, ...]) -> tuple[float, ...]:
     if abs(float(np.linalg.norm(q)) - 1.0) > 1e-3:
         raise ValueError(f"a quaternion (w, x, y, z) must have length 1, this one has {np.linalg.norm(q):.6g}")
     return q
+
+
+def _number_as_name(name: object) -> object:
+    """Return the name of a tool that has a number, which YAML reads as one without quotes."""
+    return str(name) if type(name) is int else name
+
+
+Name = Annotated[str, BeforeValidator(_number_as_name)]
 
 
 class _Entry(BaseModel):
@@ -102,8 +110,8 @@ class CellFile(_Entry):
 
     truearm: Literal["truearm-cell/1"]
     units: _Units
-    tools: dict[str, _Tool] = {}
-    frames: dict[str, _Frame] = {}
+    tools: dict[Name, _Tool] = {}
+    frames: dict[Name, _Frame] = {}
 
 
 @dataclass(frozen=True)

@@ -46,7 +46,7 @@ class Divided:
         How many targets were added.
     left
         Lines of straight and circular moves that could not be looked at, because their start is not sure, or one of
-        their targets was not corrected or is no pose of its own.
+        their targets was not corrected or is no pose of its own; and of those that stray in the most pieces still.
     """
 
     edits: tuple[Edit, ...]
@@ -102,16 +102,19 @@ def divided(language: Language, correction: Correction, between: Between, farthe
         meant = np.concatenate([one.meant.at(s) for one, s in zip(open_moves, shares, strict=True)])
         near = np.concatenate([one.near(s) for one, s in zip(open_moves, shares, strict=True)])
         fakes, found = between(rows, meant, near)
-        again, at = [], 0
+        again: list[_Dividing] = []
+        left_over: list[_Dividing] = []
+        at = 0
         for one, asked in zip(open_moves, shares, strict=True):
             part = slice(at, at + len(asked))
             at += len(asked)
             if not found[part].all():
                 left.append(program.moves[one.index].line)
             elif one.strays(fakes[part], farthest):
-                again.append(one)
+                (again if one.divided_further(farthest) else left_over).append(one)
             else:
                 done.append(one)
+        left += [program.moves[one.index].line for one in left_over]
         open_moves = again
     cut = sorted((one for one in done if one.pieces > 1), key=lambda one: one.index)
     edits = language.divide(program, [one.division() for one in cut]) if cut else []
@@ -143,7 +146,7 @@ class _Dividing:
         self.meant = ways(correction.before)
         self._ends = correction.after[[before, move.target]]
         self._joints = correction.joints[[before, move.target]]
-        self._fakes = correction.after[:0]
+        self._fakes, self._far = correction.after[:0], 0.0
 
     @property
     def shares(self) -> Array:
@@ -156,17 +159,21 @@ class _Dividing:
         return np.asarray(start + shares[:, None] * (end - start))
 
     def strays(self, fakes: Array, farthest: float) -> bool:
-        """Return whether what the controller interpolates strays too far; then there are more pieces from now on."""
+        """Return whether what the controller interpolates strays too far."""
         self._fakes = np.concatenate([self._ends[:1], fakes, self._ends[1:]])
-        far = 0.0
+        self._far = 0.0
         for piece in range(self.pieces):
             one = self._fakes[4 * piece : 4 * piece + 5]
             gone = _Path(one[0], one[4], one[2] if self._round else None).at(_LOOKED_AT)
-            far = max(far, float(np.linalg.norm(gone[:, :3, 3] - one[1:4, :3, 3], axis=1).max()))
-        if far <= farthest or self.pieces == MOST:
+            self._far = max(self._far, float(np.linalg.norm(gone[:, :3, 3] - one[1:4, :3, 3], axis=1).max()))
+        return self._far > farthest
+
+    def divided_further(self, farthest: float) -> bool:
+        """Return whether there are more pieces from now on; there are none where the posture changes on the way."""
+        if self.pieces == MOST:
             return False
         # What a piece strays falls with the square of its length.
-        self.pieces = min(max(self.pieces + 1, math.ceil(self.pieces * math.sqrt(far / farthest))), MOST)
+        self.pieces = min(max(self.pieces + 1, math.ceil(self.pieces * math.sqrt(self._far / farthest))), MOST)
         return True
 
     def division(self) -> Division:

@@ -1,7 +1,8 @@
 """The postures that a program means: the joint readings of the nominal robot, as its controller picks them.
 
 A pose can be reached in up to eight postures and several turns. Configuration data in the program say which is meant;
-where they leave a choice, or there are none, it is the posture nearest to where the robot comes from.
+where they leave a choice, or there are none, it is the posture nearest to where the robot comes from. An offset has the
+configuration of what it is an offset from, in the posture next to that.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.compensation.programs.program import Configuration
+from truearm.compensation.programs.program import ANY_POSTURE, Configuration
 from truearm.modeling.chain import Array
 from truearm.modeling.inverse.branches import branch_rule
 from truearm.modeling.inverse.closed_form import SLOTS, ClosedForm
@@ -86,7 +87,12 @@ def _allowed(configuration: Configuration, joint: int, reading: Array, slack: fl
 
 
 def meant_postures(
-    nominal: Robot, flange: Array, configurations: Sequence[Configuration], known: Array, order: Iterable[int]
+    nominal: Robot,
+    flange: Array,
+    configurations: Sequence[Configuration],
+    known: Array,
+    order: Iterable[int],
+    parents: Sequence[int | None] = (),
 ) -> MeantPostures:
     """Return the postures that a program means.
 
@@ -102,6 +108,9 @@ def meant_postures(
         Readings ``(n, joints)`` [rad or m] of the model where the program gives joints, else NaN.
     order
         Indices in the order in which the robot goes from one to the next; none of them need be there.
+    parents
+        For each the index of the pose that it is an offset from, None for none; empty if none is an offset. An offset
+        without a configuration is in the posture nearest to that of the pose it is an offset from, where that has one.
     """
     joints = known.copy()
     reachable: NDArray[np.bool_] = np.asarray(~np.isnan(known).any(axis=1))
@@ -124,11 +133,23 @@ def meant_postures(
     guessed = None
     place = {index: row for row, index in enumerate(wanted)}
     before: Array | None = None
+
+    def parent_of(index: int) -> Array | None:
+        """Return the readings of what an offset starts from, where the program says them and none of its own."""
+        parent = parents[index] if parents and configurations[index] == ANY_POSTURE else None
+        while parent is not None and configurations[parent] == ANY_POSTURE and parents[parent] is not None:
+            parent = parents[parent]
+        if parent is None or configurations[parent] == ANY_POSTURE:
+            return None
+        return walk.chosen(place[parent], before)
+
     for index in dict.fromkeys((*order, *range(len(flange)))):
         row = place.get(index)
         if row is not None:
             near = configurations[index].near
             reference = before if near is None else nominal.controller.joints(np.array([near]))[0]
+            above = parent_of(index)
+            reference = reference if above is None else above
             if reference is None and guessed is None and walk.open[row]:
                 guessed = index
             found = walk.chosen(row, reference)

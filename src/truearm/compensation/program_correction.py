@@ -212,7 +212,9 @@ class _Meant:
         )
         configurations = [target.configuration for target in targets]
         order = [index for move in program.moves for index in (move.via, move.target) if index is not None]
-        self._postures: MeantPostures = meant_postures(nominal, flange, configurations, known, order)
+        self._postures: MeantPostures = meant_postures(
+            nominal, flange, configurations, known, order, [target.parent for target in targets]
+        )
         found = self._postures
         self.guess = "" if found.guessed is None else place(program, targets[found.guessed])
         self.joints = found.joints

@@ -235,6 +235,8 @@ def _unchanged_original(path: Path, record: Record) -> bytes:
 
 
 def _record(path: Path) -> Record | None:
+    if path.is_dir():
+        raise InputError("this is a folder, a program is needed", where=str(path), cure="Name the files in it.")
     beside = record_path(path)
     if not exists(beside):
         return None

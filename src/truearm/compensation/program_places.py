@@ -29,13 +29,22 @@ def told(programs: Sequence[Program], cell: Cell, kind: Literal["tool", "frame"]
             used.add(name)
             if name not in needed and (kind == "tool" or target.form.kind == "pose"):
                 needed[name] = place(program, target)
+    own, without = {
+        "tool": ("flange", "the flange is taken to be where it agrees best with the nominal one"),
+        "frame": ("base", "the base is shifted so that nothing moves on average"),
+    }[kind]
+    if given and needed and not any(name.lower() in given for name in used):
+        first = next(iter(needed))
+        raise InputError(
+            f"no {kind} that the programs use is in the file",
+            where=f"--{kind}, {needed[first]}",
+            came=", ".join(sorted({name or own for name in given})),
+            allowed=", ".join(name or own for name in needed),
+            cure=f"Call the {kind}s in the file as the programs do, or leave out --{kind}.",
+        )
     known = {name for name in used if given.get(name.lower(), Placed(None, None)).identified is not None}
     missing = [name for name in needed if name not in known]
     if known and missing:
-        own, without = {
-            "tool": ("flange", "the flange is taken to be where it agrees best with the nominal one"),
-            "frame": ("base", "the base is shifted so that nothing moves on average"),
-        }[kind]
         raise InputError(
             f"only some of the {kind}s in use have a real place in the file",
             where=needed[missing[0]],

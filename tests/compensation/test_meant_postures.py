@@ -80,6 +80,26 @@ def test_without_a_configuration_it_is_the_one_nearest_to_where_the_robot_comes_
     np.testing.assert_allclose(alone.joints[0], path[20], atol=1e-8)
 
 
+def test_on_a_straight_way_the_branch_stays_however_far_the_wrist_turns() -> None:
+    """A line that turns the tool by 150 deg: another branch is nearer in its joints, and no line leads there."""
+    robot = load_robot("kr5")
+    ends = np.radians([[10.0, -80, 90, 20, 40, 0], [10.0, -80, 90, 165, 40, -100]])
+    poses, configurations = matrices(robot, ends), [ANY_POSTURE] * 2
+    known = np.stack([ends[0], UNKNOWN])
+    by_joints = meant_postures(robot, poses, configurations, known, [0, 1])
+    straight = meant_postures(robot, poses, configurations, known, [0, 1], straight=[1])
+    rule = branch_rule(robot)
+    assert rule is not None
+    numbers = [int(rule.numbers(robot.sweep(found.joints))[1]) for found in (by_joints, straight)]
+    assert numbers[0] != numbers[1] == int(rule.numbers(robot.sweep(ends[:1]))[0])
+    np.testing.assert_allclose(straight.joints[1], ends[1], atol=1e-8)
+    # From a stretched wrist both ways of bending are open.
+    known[0, 4] = 0.001
+    poses[0] = matrices(robot, known[:1])[0]
+    stretched = meant_postures(robot, poses, configurations, known, [0, 1], straight=[1])
+    assert int(rule.numbers(robot.sweep(stretched.joints))[1]) == numbers[0]
+
+
 def test_with_nothing_to_go_by_the_first_branch_is_taken_and_said() -> None:
     robot = load_robot("ur5")
     joints = np.radians([[10.0, -80, 70, -90, -80, 30]])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,9 +10,9 @@ import numpy as np
 import pytest
 
 from truearm.compensation.cell import Cell, Placed
-from truearm.compensation.program_correction import corrected_programs
+from truearm.compensation.program_correction import commanded, corrected_programs
 from truearm.compensation.programs.fanuc_ls import FANUC_LS
-from truearm.compensation.programs.program import Program, Source
+from truearm.compensation.programs.program import Configuration, Program, Source
 from truearm.compensation.programs.rapid import RAPID
 from truearm.correction import correct
 from truearm.errors import InputError
@@ -23,6 +24,7 @@ JOINTS = "MoveAbsJ [[{},20,-10,0,45,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool
 POSE = "MoveL [[{},0,400],[0.70710678,0,0.70710678,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0{};"
 POSITION = "P[{}]{{\n  GP1:\n  UF : F, UT : F,\n  {}\n}};\n"
 FLANGE = Cell({"": Placed(None, Transform())}, {})
+FLANGE_AND_BASE = Cell({"": Placed(None, Transform())}, {"": Placed(None, Transform())})
 
 
 def rapid(*moves: str) -> Program:
@@ -110,3 +112,24 @@ def test_a_track_is_reported_in_millimetres(tmp_path: Path) -> None:
     low, high = (float(part.partition("<")[0]) for part in row.split('<td class="n">')[1:])
     assert (low, high) == pytest.approx((1000, 1500), abs=5)
     assert "<td>mm</td>" in row
+
+
+def test_a_turn_that_a_controller_takes_to_the_letter_is_not_left() -> None:
+    """A joint at the end of its turn: some controllers would go round to the other end, others go a little beyond."""
+    robot = worn(load_robot("irb120"))
+    program = rapid(POSE.format(400, ""))
+    (target,) = program.targets
+    free = Program("RAPID", program.sources, (replace(target, configuration=Configuration("front", "up", "flip")),))
+    meant = commanded(robot, free)[0, 0]
+    real = corrected_programs(robot, [free], FLANGE_AND_BASE).corrections[0].joints[0, 0]
+    assert 1e-4 < abs(real - meant) < 1e-2
+    side = (1, meant, math.inf) if real < meant else (1, -math.inf, meant)
+    found = []
+    for literal in (True, False):
+        bound = Configuration("front", "up", "flip", (side,), literal=literal)
+        told = Program("RAPID", program.sources, (replace(target, configuration=bound),))
+        found.append(corrected_programs(robot, [told], FLANGE_AND_BASE).corrections[0])
+    assert not found[0].corrected[0]
+    assert "it would leave the configuration in the program" in found[0].skipped[0].reason
+    assert found[1].corrected[0]
+    assert found[1].on_edge == (0,)

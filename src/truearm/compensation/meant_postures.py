@@ -7,7 +7,7 @@ configuration of what it is an offset from, in the posture next to that.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -24,6 +24,8 @@ from truearm.modeling.inverse.turns import beyond_limits, limits, nearest_turns
 from truearm.modeling.robot import Robot
 
 _TURN: Final = 2.0 * np.pi
+#: Below this sine a wrist is stretched, and which way it bends is by chance.
+_STRETCHED: Final = 0.03
 #: Turns that a joint may have made.
 _TURNS: Final = np.arange(-2.0, 3.0)
 #: A reading may be this far [rad] beyond a bound of the configuration. Joints often stand at a bound, as at 0, and
@@ -93,6 +95,7 @@ def meant_postures(
     known: Array,
     order: Iterable[int],
     parents: Sequence[int | None] = (),
+    straight: Collection[int] = (),
 ) -> MeantPostures:
     """Return the postures that a program means.
 
@@ -111,6 +114,9 @@ def meant_postures(
     parents
         For each the index of the pose that it is an offset from, None for none; empty if none is an offset. An offset
         without a configuration is in the posture nearest to that of the pose it is an offset from, where that has one.
+    straight
+        The poses that the robot comes to on a line or a circle. On its way it stays on the branch where it was, unless
+        its wrist was stretched.
     """
     joints = known.copy()
     reachable: NDArray[np.bool_] = np.asarray(~np.isnan(known).any(axis=1))
@@ -124,8 +130,11 @@ def meant_postures(
     starts = form.starts(flange[wanted, :3, 3], flange[wanted, :3, :3])
     candidates = starts.joints
     possible: NDArray[np.bool_] = ~np.isnan(candidates[:, :, 0]) & ~starts.nearest
-    number = np.full(possible.shape, -1)
-    number[possible] = rule.numbers(nominal.trunk.sweep(candidates[possible].T))
+    number, bend = np.full(possible.shape, -1), np.zeros(possible.shape)
+    sweep = nominal.trunk.sweep(candidates[possible].T)
+    number[possible], bend[possible] = rule.numbers(sweep), rule.bend(sweep)
+    given = nominal.trunk.sweep(np.nan_to_num(known).T)
+    number_given, bend_given = rule.numbers(given), rule.bend(given)
     fixed = np.zeros(candidates.shape, dtype=bool)
     reachable[wanted] = possible.any(axis=1)
     _confine(nominal, candidates, possible, number, fixed, [configurations[i] for i in wanted])
@@ -133,6 +142,7 @@ def meant_postures(
     guessed = None
     place = {index: row for row, index in enumerate(wanted)}
     before: Array | None = None
+    branch: int | None = None
 
     def parent_of(index: int) -> Array | None:
         """Return the readings of what an offset starts from, where the program says them and none of its own."""
@@ -141,7 +151,8 @@ def meant_postures(
             parent = parents[parent]
         if parent is None or configurations[parent] == ANY_POSTURE:
             return None
-        return walk.chosen(place[parent], before)
+        found = walk.chosen(place[parent], before, None)
+        return None if found is None else found[0]
 
     for index in dict.fromkeys((*order, *range(len(flange)))):
         row = place.get(index)
@@ -152,10 +163,14 @@ def meant_postures(
             reference = reference if above is None else above
             if reference is None and guessed is None and walk.open[row]:
                 guessed = index
-            found = walk.chosen(row, reference)
+            kept = branch if index in straight and near is None and above is None else None
+            found = walk.chosen(row, reference, kept)
             if found is None:
                 continue
-            joints[index] = found
+            joints[index], slot = found
+            branch = int(number[row, slot]) if bend[row, slot] > _STRETCHED else None
+        else:
+            branch = int(number_given[index]) if bend_given[index] > _STRETCHED else None
         before = joints[index]
     return MeantPostures(joints, reachable, guessed)
 
@@ -224,12 +239,15 @@ class _Walk:
         self._any: NDArray[np.bool_] = np.asarray(self._possible.any(axis=1))
         self._turned, self._several = turned, several
 
-    def chosen(self, row: int, reference: Array | None) -> Array | None:
-        """Return the readings of a pose nearest to a reference; None if it has none."""
+    def chosen(self, row: int, reference: Array | None, branch: int | None) -> tuple[Array, int] | None:
+        """Return the readings of a pose nearest to a reference, on a branch if it has one there, and which they are.
+
+        None if there are none.
+        """
         if not self._any[row]:
             return None
         if not self.open[row]:
-            return np.asarray(self._turned[row, self._only[row]])
+            return np.asarray(self._turned[row, self._only[row]]), int(self._only[row])
         joints = self._turned[row]
         if reference is None:
             cost = np.abs(joints).max(axis=1) + 1e3 * self._number[row]
@@ -240,8 +258,10 @@ class _Walk:
                 high = np.floor((self._high - joints) / _TURN)
                 joints = joints + _TURN * np.clip(turns, np.minimum(low, 0.0), np.maximum(high, 0.0))
             cost = np.abs(joints - reference).max(axis=1)
-        slot = int(np.argmin(np.where(self._possible[row], cost, np.inf)))
-        return np.asarray(joints[slot])
+        possible = self._possible[row]
+        on_branch = possible & (self._number[row] == branch)
+        slot = int(np.argmin(np.where(on_branch if on_branch.any() else possible, cost, np.inf)))
+        return np.asarray(joints[slot]), slot
 
 
 def _by_seeds(

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from truearm.compensation.cell import NOTHING_GIVEN, Cell
 from truearm.compensation.fake_targets import FakeTargets, fake_targets, matrices, nominal_robot
 from truearm.compensation.gauge import base_shift, best_agreement, turns_between
-from truearm.compensation.meant_postures import MeantPostures, agrees, meant_postures
+from truearm.compensation.meant_postures import ON_EDGE, MeantPostures, agrees, meant_postures
 from truearm.compensation.program_places import Places, Told, told
 from truearm.compensation.program_poses import edits_of, joint_numbers, joints_of, place, pose_numbers, poses_of
 from truearm.compensation.programs.program import Configuration, Edit, Program, Skipped
@@ -189,6 +189,16 @@ def commanded(robot: Robot, program: Program, cell: Cell = NOTHING_GIVEN) -> Arr
     return _Meant(robot, nominal_robot(robot), program, cell).joints
 
 
+def _straight(program: Program) -> frozenset[int]:
+    """Return the targets to which the first move that goes there is straight or circular."""
+    first: dict[int, str] = {}
+    for move in program.moves:
+        for index in (move.via, move.target):
+            if index is not None:
+                first.setdefault(index, move.kind)
+    return frozenset(index for index, kind in first.items() if kind != "joint")
+
+
 class _Meant:
     """What one program means."""
 
@@ -213,7 +223,7 @@ class _Meant:
         configurations = [target.configuration for target in targets]
         order = [index for move in program.moves for index in (move.via, move.target) if index is not None]
         self._postures: MeantPostures = meant_postures(
-            nominal, flange, configurations, known, order, [target.parent for target in targets]
+            nominal, flange, configurations, known, order, [target.parent for target in targets], _straight(program)
         )
         found = self._postures
         self.guess = "" if found.guessed is None else place(program, targets[found.guessed])
@@ -249,7 +259,8 @@ class _Meant:
         on_edge: tuple[int, ...] = ()
         for row in np.flatnonzero(~self._usable).tolist():
             reasons[row] = (
-                "the nominal robot reaches it in no posture of the configuration that the program states"
+                "the nominal robot reaches it in no posture of the configuration that the program states, or only in a "
+                "singular one: check its configuration data, tool and frame"
                 if self._postures.reachable[row]
                 else "out of reach of the nominal robot: check its tool and frame"
             )
@@ -298,7 +309,8 @@ class _Meant:
         """Return the targets that would leave the readings of their configuration, with the reason."""
         changed: dict[int, str] = {}
         for configuration, members in self._configured(rows, reasons):
-            for row in members[~agrees(self._robot, joints[members], configuration)].tolist():
+            slack = _ROUNDING if configuration.literal else ON_EDGE
+            for row in members[~agrees(self._robot, joints[members], configuration, slack)].tolist():
                 shown = self._robot.controller.readings(joints[row][None])[0]
                 words = ", ".join(
                     f"{math.degrees(value):.2f} deg" if joint.kind == "revolute" else f"{value * 1e3:.2f} mm"

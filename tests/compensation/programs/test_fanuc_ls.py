@@ -23,7 +23,7 @@ from truearm.robots import load_robot
 
 SAMPLES = Path(__file__).parent / "samples" / "fanuc_ls"
 HALF = (-pi, pi)
-NUT = Configuration("front", "up", readings=((1, *HALF), (4, *HALF), (5, -pi, 0.0), (6, *HALF)))
+NUT = Configuration("front", "up", readings=((1, *HALF), (4, *HALF), (5, -pi, 0.0), (6, *HALF)), literal=True)
 
 
 def sample(name: str) -> Source:

@@ -154,7 +154,6 @@ def test_moves_of_the_cell(cell: Program) -> None:
 
 def test_what_the_cell_leaves_alone(cell: Program) -> None:
     assert [(s.source, s.line, s.reason) for s in cell.skipped] == [
-        (0, 22, "XHOME is in $config.dat, which other programs share"),
         (0, 40, "LOCAL is declared without numbers"),
         (0, 51, "Y, Z, A, B, C are not written and would stay as before"),
         (0, 65, "the tool is computed"),
@@ -311,8 +310,8 @@ def test_targets_that_cannot_be_corrected(body: str, data: str, reason: str) -> 
 
 
 def test_one_name_is_listed_once() -> None:
-    assert reasons(read("PTP XHOME\nLIN XP1\nPTP XHOME\nPTP $POS_ACT")) == [
-        "XHOME is not declared in this program",
+    assert reasons(read("PTP XP2\nLIN XP1\nPTP XP2\nPTP $POS_ACT\nPTP XHOME")) == [
+        "XP2 is not declared in this program",
         "XP1 is not declared in this program",
     ]
 

@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from truearm.compensation.programs.numbers import rewritten
-from truearm.compensation.programs.program import Division, Edit, Program, Source
+from truearm.compensation.programs.program import ANY_POSTURE, Division, Edit, Program, Source
 from truearm.compensation.programs.rapid import RAPID
 from truearm.compensation.programs.rapid.data import configuration
 from truearm.errors import InputError
@@ -121,12 +121,36 @@ def test_every_target_of_a_program_is_found(polish: Program) -> None:
 
 
 def test_the_configuration_data_say_which_postures_are_meant(polish: Program) -> None:
+    (source,) = polish.sources
+    looked_at = RAPID.read([Source(source.path, source.text.replace("ConfL \\Off", "ConfL \\On "))])
+    assert looked_at.targets[1].configuration.readings == quadrants(0, -1, -2)
+    assert looked_at.targets[1].configuration.elbow == "up"
+    assert looked_at.targets[2].configuration.readings == quadrants(-1, 0, 1)
+    assert looked_at.targets[2].configuration.elbow == "down"
+    assert looked_at.targets[0].configuration.readings == ()
+    assert {t.configuration.wrist or t.configuration.shoulder for t in looked_at.targets} == {None}
+
+
+def test_the_configuration_data_are_free_where_the_controller_does_not_look_at_them(polish: Program) -> None:
+    """ConfL Off frees what lines alone go to; p10 is also the target of a MoveJ."""
     assert polish.targets[1].configuration.readings == quadrants(0, -1, -2)
-    assert polish.targets[1].configuration.elbow == "up"
-    assert polish.targets[2].configuration.readings == quadrants(-1, 0, 1)
-    assert polish.targets[2].configuration.elbow == "down"
-    assert polish.targets[0].configuration.readings == ()
-    assert {t.configuration.wrist or t.configuration.shoulder for t in polish.targets} == {None}
+    assert polish.targets[2].configuration == ANY_POSTURE
+    target = "[[3,0,4],[0,0,1,0],[0,-1,1,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
+    lines = [
+        f"MoveL {target},v9,fine,tool0;",
+        "! ConfJ \\Off;",
+        f"MoveJ {target},v9,fine,tool0;",
+        "ConfJ\\Off; confl \\off;",
+        f"MoveJ {target},v9,fine,tool0;",
+        f"MoveL {target},v9,fine,tool0;",
+        "ConfL\\On;",
+        f"MoveL {target},v9,fine,tool0;",
+        f"MoveJ {target},v9,fine,tool0;",
+    ]
+    text = "MODULE m\n  PROC main()\n" + "\n".join(lines) + "\n  ENDPROC\nENDMODULE\n"
+    read = RAPID.read([Source(Path("m.mod"), text)])
+    free = [target.configuration == ANY_POSTURE for target in read.targets]
+    assert free == [False, False, True, True, False, True]
 
 
 def test_every_move_is_found(polish: Program) -> None:

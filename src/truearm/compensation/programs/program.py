@@ -90,6 +90,9 @@ class Configuration:
         shows it.
     outside
         ``(joint, low, high)``: the joint reads less than `low`, or `high` or more [rad].
+    literal
+        Whether the controller takes the readings to the letter. Others take the nearest posture where a joint is a
+        little beyond.
     near
         Readings [rad or m], as the controller shows them, that the posture is nearest to; if None, and the rest leaves
         a choice, nearest to where the robot comes from.
@@ -100,6 +103,7 @@ class Configuration:
     wrist: Literal["noflip", "flip"] | None = None
     readings: tuple[tuple[int, float, float], ...] = ()
     outside: tuple[tuple[int, float, float], ...] = ()
+    literal: bool = False
     near: tuple[float, ...] | None = None
 
 

@@ -106,6 +106,10 @@ class BranchRule:
         number: NDArray[np.intp] = np.asarray(4 * back + 2 * down + (self.wrist * wrist < 0), dtype=np.intp)
         return number
 
+    def bend(self, sweep: Sweep) -> Array:
+        """Return how much joint 5 bends the wrist, 0 in a singular posture and 1 at most, ``(n,)``."""
+        return np.abs(_expressions(joint_axes(sweep))[2])
+
 
 def branch_rule(robot: Robot) -> BranchRule | None:
     """Return the rule of a robot, by its nominal axes, or None if its branches have no such names.

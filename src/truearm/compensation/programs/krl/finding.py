@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Final, NamedTuple
 
 from truearm.compensation.programs.krl.aggregates import JOINTS, aggregate
@@ -21,6 +22,8 @@ from truearm.compensation.programs.program import Skipped
 
 #: Where the robot stands already: a move there changes nothing.
 _PRESENT: Final = frozenset({"$POS_ACT", "$AXIS_ACT", "$POS_ACT_MES", "$AXIS_ACT_MES"})
+#: Home positions, which KUKA keeps in $config.dat: every cell has its own, and no program goes there for accuracy.
+_HOME: Final = re.compile(r"XHOME\d*")
 #: More offsets than this at one place are a mistake.
 _MOST_OFFSETS: Final = 20
 
@@ -149,6 +152,8 @@ class Finder:
         reference = REFERENCE.fullmatch(text.flat, *span)
         key = reference[1].upper() if reference else ""
         if key in _PRESENT:
+            return None
+        if _HOME.fullmatch(name.upper()):
             return None
         variable = None if reference is None or reference[3] else self._names.find(key, scopes)
         if variable is None or reference is None:

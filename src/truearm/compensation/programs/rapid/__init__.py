@@ -6,8 +6,11 @@ Kernel (3HAC050946-001) for the rest of the syntax; application manuals for the 
 dispensing, painting and continuous processes, which all have the tool for their last argument.
 
 A tool that is not held by the robot, a work object that the robot holds or another unit moves, and displacements of the
-program (PDispOn, PDispSet) put targets where the file does not say; such targets are left as they are. ConfL and ConfJ
-are not looked at: the configuration data of a target hold whether they are on or off.
+program (PDispOn, PDispSet) put targets where the file does not say; such targets are left as they are.
+
+After ConfL or ConfJ with Off the controller does not look at configuration data but takes the nearest posture, and so
+are the targets read that moves only go to then. That is followed in the order of each file's text, which begins with
+both on.
 """
 
 from __future__ import annotations
@@ -19,6 +22,7 @@ from typing import Final
 from truearm.compensation.programs.lines import BYTE_ORDER_MARK
 from truearm.compensation.programs.program import Language, Program, Source
 from truearm.compensation.programs.rapid.division import divided
+from truearm.compensation.programs.rapid.monitoring import with_postures_left_free
 from truearm.compensation.programs.rapid.moves import MOTIONS, QUIET
 from truearm.compensation.programs.rapid.syntax import listing_of
 from truearm.compensation.programs.rapid.targets import Finder
@@ -32,7 +36,7 @@ def _is_one(text: str) -> bool:
 
 def _read(sources: Sequence[Source]) -> Program:
     listing = listing_of(sources, frozenset(MOTIONS), QUIET)
-    return Finder(listing).program(RAPID.name)
+    return with_postures_left_free(Finder(listing).program(RAPID.name))
 
 
 RAPID: Final = Language(

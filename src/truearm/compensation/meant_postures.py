@@ -220,7 +220,7 @@ class _Walk:
         number: NDArray[np.intp],
         fixed: NDArray[np.bool_],
     ) -> None:
-        self._candidates, self._number = candidates, number
+        self._number = number
         low, high = limits(nominal)
         free = ~fixed
         turned = nearest_turns(nominal, candidates, np.zeros(candidates.shape[2]))

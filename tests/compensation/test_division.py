@@ -17,6 +17,7 @@ from truearm.compensation.fake_targets import nominal_robot
 from truearm.compensation.program_correction import corrected_programs
 from truearm.compensation.program_files import edited
 from truearm.compensation.program_poses import poses_of
+from truearm.compensation.programs.fanuc_ls import FANUC_LS
 from truearm.compensation.programs.program import Program, Source
 from truearm.compensation.programs.rapid import RAPID
 from truearm.modeling.inverse.kinematics import inverse
@@ -118,3 +119,42 @@ def test_an_arc_without_a_circle_is_no_fault(via: str) -> None:
     again, cut = split(f"MoveJ {START},v100,fine,tool0;", f"MoveC {via},{END},v100,fine,tool0;")
     assert cut.added < MOST
     assert np.isfinite(poses_of(again)).all()
+
+
+TIMED = """\
+/PROG  A
+/ATTR
+/MN
+   1:J P[1] 20% FINE    ;
+   2:L P[2] {speed} FINE    ;
+   3:L P[1] 100mm/sec FINE    ;
+/POS
+P[1]{{
+   GP1:
+\tUF : 0, UT : 0,\t\tCONFIG : 'N U T, 0, 0, 0',
+\tX =   400.000  mm,\tY =    20.000  mm,\tZ =    20.000  mm,
+\tW =   180.000 deg,\tP =   -60.000 deg,\tR =   180.000 deg
+}};
+P[2]{{
+   GP1:
+\tUF : 0, UT : 0,\t\tCONFIG : 'N U T, 0, 0, 0',
+\tX =   400.000  mm,\tY =   220.000  mm,\tZ =     0.000  mm,
+\tW =   180.000 deg,\tP =   -60.000 deg,\tR =   180.000 deg
+}};
+/END
+"""
+
+
+@pytest.mark.parametrize(("speed", "moves", "left"), [("100mm/sec", 2, ()), ("2sec", 1, (5,))])
+def test_a_move_that_its_language_leaves_whole_is_listed_and_not_counted(
+    speed: str, moves: int, left: tuple[int, ...]
+) -> None:
+    """A speed in seconds would hold for every piece."""
+    robot = worn(load_robot("lrmate200ic"), 2.0)
+    read = FANUC_LS.read([Source(Path("a.ls"), TIMED.format(speed=speed))])
+    done = corrected_programs(robot, [read], Cell({}, {}))
+    assert done.corrections[0].corrected.all()
+    cut = divided(FANUC_LS, done.corrections[0], done.between[0], FARTHEST)
+    assert (cut.moves, cut.left) == (moves, left)
+    again = FANUC_LS.read([Source(Path("a.ls"), edited(read.sources[0].text, cut.edits))])
+    assert len(again.moves) == len(read.moves) + cut.added

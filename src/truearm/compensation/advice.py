@@ -92,8 +92,8 @@ def check_correction(robot: Robot, result: CorrectedPrograms, division: Sequence
             Notice(
                 "moves-not-divided",
                 f"{_counted(left, 'straight or circular move')} not divided for --split: where the start is not sure, "
-                "a target was not corrected, is given by joints or is an offset, the posture changes on the way, or "
-                f"{MOST} pieces are not enough.",
+                "a target was not corrected, is given by joints or is an offset, the posture changes on the way, "
+                f"{MOST} pieces are not enough, or its instruction has options that pieces of it cannot have.",
             )
         )
     if robot.payload == NO_PAYLOAD and any(effect.loaded for effect in robot.effects):

@@ -18,11 +18,10 @@ import numpy as np
 
 from truearm.compensation.program_correction import Between, Correction
 from truearm.compensation.program_poses import numbers_of
-from truearm.compensation.programs.orientations import ROTATION_VECTOR
 from truearm.compensation.programs.program import Division, Edit, Language, Move, Program
 from truearm.errors import InputError
 from truearm.modeling.chain import Array
-from truearm.modeling.transform import rotation_vector
+from truearm.modeling.transform import homogeneous, rotation_from_vector, rotation_vector
 
 #: Where a piece is looked at, as shares of it.
 _LOOKED_AT: Final = np.array([0.25, 0.5, 0.75])
@@ -46,7 +45,8 @@ class Divided:
         How many targets were added.
     left
         Lines of straight and circular moves that could not be looked at, because their start is not sure, or one of
-        their targets was not corrected or is no pose of its own; and of those that stray in the most pieces still.
+        their targets was not corrected or is no pose of its own; of those that stray in the most pieces still; and of
+        those whose pieces would be something else in this language.
     """
 
     edits: tuple[Edit, ...]
@@ -117,8 +117,10 @@ def divided(language: Language, correction: Correction, between: Between, farthe
         left += [program.moves[one.index].line for one in left_over]
         open_moves = again
     cut = sorted((one for one in done if one.pieces > 1), key=lambda one: one.index)
-    edits = language.divide(program, [one.division() for one in cut]) if cut else []
-    return Divided(tuple(edits), len(cut), sum(one.pieces - 1 for one in cut), tuple(sorted(left)))
+    edits, whole = language.divide(program, [one.division() for one in cut])
+    left += [program.moves[index].line for index in whole]
+    parted = [one for one in cut if one.index not in whole]
+    return Divided(tuple(edits), len(parted), sum(one.pieces - 1 for one in parted), tuple(sorted(left)))
 
 
 class _Dividing:
@@ -220,15 +222,13 @@ class _Path:
 
     def at(self, shares: Array) -> Array:
         """Return poses ``(m, 4, 4)`` at shares of the way ``(m,)``."""
-        made = np.zeros((len(shares), 4, 4))
-        made[:, 3, 3] = 1.0
-        made[:, :3, :3] = ROTATION_VECTOR.matrices(shares[:, None] * self._turn) @ self._start[:3, :3]
+        along = shares[:, None]
         if self._circle is None:
-            made[:, :3, 3] = self._start[:3, 3] + shares[:, None] * (self._end[:3, 3] - self._start[:3, 3])
+            position = self._start[:3, 3] + along * (self._end[:3, 3] - self._start[:3, 3])
         else:
             centre, spin, radius = self._circle
-            made[:, :3, 3] = centre + np.einsum("nij,j->ni", ROTATION_VECTOR.matrices(shares[:, None] * spin), radius)
-        return made
+            position = centre + rotation_from_vector(along * spin) @ radius
+        return homogeneous(rotation_from_vector(along * self._turn) @ self._start[:3, :3], position)
 
 
 def _circle(a: Array, b: Array, c: Array) -> tuple[Array, Array, Array] | None:

@@ -18,6 +18,7 @@ from truearm.modeling.inverse.branches import BRANCHES, branch_rule
 from truearm.modeling.inverse.kinematics import inverse
 from truearm.modeling.inverse.solutions import JointSolutions, PoseStatus
 from truearm.modeling.robot import Robot
+from truearm.modeling.transform import homogeneous
 
 _There = Callable[[JointSolutions, NDArray[np.intp]], NDArray[np.bool_]]
 
@@ -198,6 +199,4 @@ def _merged(parts: list[tuple[NDArray[np.intp], JointSolutions]], count: int) ->
 def matrices(robot: Robot, joints: Array) -> Array:
     """Return poses ``(n, 4, 4)`` [m] of the flange of a robot whose base is the world."""
     position, rotation = robot.poses(joints)
-    made = np.zeros((len(position), 4, 4))
-    made[:, :3, :3], made[:, :3, 3], made[:, 3, 3] = rotation, position, 1.0
-    return made
+    return homogeneous(rotation, position)

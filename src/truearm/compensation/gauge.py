@@ -15,11 +15,10 @@ from typing import Final
 import numpy as np
 
 from truearm.compensation.fake_targets import matrices, nominal_robot
-from truearm.compensation.programs.orientations import ROTATION_VECTOR
 from truearm.modeling.chain import Array
 from truearm.modeling.inverse.kinematics import reach
 from truearm.modeling.robot import Robot
-from truearm.modeling.transform import rotation_vector
+from truearm.modeling.transform import rotation_from_vector, rotation_vector
 
 #: Configurations on which flange and base are compared.
 _CONFIGURATIONS: Final = 300
@@ -117,6 +116,6 @@ def _by_flange(poses: Array) -> Array:
 def _small(motion: Array) -> Array:
     """Return the transform ``(4, 4)`` of a translation and a rotation vector ``(6,)``."""
     made = np.eye(4)
-    made[:3, :3] = ROTATION_VECTOR.matrices(motion[None, 3:])[0]
+    made[:3, :3] = rotation_from_vector(motion[3:])
     made[:3, 3] = motion[:3]
     return made

@@ -12,6 +12,7 @@ from truearm.compensation.programs.program import Edit, Form, Program, ProgramTa
 from truearm.errors import InputError
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
+from truearm.modeling.transform import homogeneous
 
 
 def poses_of(program: Program) -> Array:
@@ -137,11 +138,8 @@ def edits_of(program: Program, numbers: dict[int, Array]) -> list[Edit]:
 
 
 def _poses(form: Form, values: Array) -> Array:
-    made = np.zeros((len(values), 4, 4))
-    made[:, :3, 3], made[:, 3, 3] = values[:, :3] * form.length, 1.0
     turned = np.eye(3) if form.orientation is None else form.orientation.matrices(values[:, 3:] * form.angle)
-    made[:, :3, :3] = turned
-    return made
+    return homogeneous(turned, values[:, :3] * form.length)
 
 
 def _joint_units(robot: Robot, form: Form) -> Array:

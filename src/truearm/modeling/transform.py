@@ -66,6 +66,20 @@ def rotation_vector(R: Array) -> Array:
     return q[..., 1:] * np.where(s > 1e-12, angle / np.maximum(s, 1e-12), 2.0)
 
 
+def rotation_from_vector(v: Array) -> Array:
+    """Return rotation matrices ``(..., 3, 3)`` of rotation vectors ``(..., 3)`` [rad], of any norm."""
+    angle = np.linalg.norm(v, axis=-1, keepdims=True)
+    part = 0.5 * np.sinc(angle / (2 * np.pi)) * v
+    return rotation_from_quaternion(np.concatenate([np.cos(angle / 2), part], axis=-1))
+
+
+def homogeneous(R: Array, p: Array) -> Array:
+    """Return matrices ``(n, 4, 4)`` of rotations ``(n, 3, 3)`` and positions ``(n, 3)`` [m]."""
+    made = np.zeros((len(p), 4, 4))
+    made[:, :3, :3], made[:, :3, 3], made[:, 3, 3] = R, p, 1.0
+    return made
+
+
 def fixed_rotation(quaternion: Sequence[float]) -> tuple[Element, ...]:
     """Return the elements of a constant rotation, none for the identity."""
     w, *v = (float(x) for x in quaternion)

@@ -154,7 +154,8 @@ def test_a_division_reads_back(language: Language) -> None:
             one, two, three = (tuple(row) for row in numbers_of(target.form, pose, near).tolist())
             circle = move.via is not None
             cut = Division(index, ((one, two if circle else None),), three if circle else None)
-            edits = language.divide(program, [cut])
+            edits, whole = language.divide(program, [cut])
+            assert whole == ([] if edits else [index])
             if not edits:  # pieces of this one would mean something else
                 continue
             tried += 1

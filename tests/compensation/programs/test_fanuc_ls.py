@@ -73,7 +73,7 @@ def edited(found: Program, divisions: Sequence[Division]) -> Source:
     assert FANUC_LS.divide is not None
     (source,) = found.sources
     text, at = "", 0
-    for edit in FANUC_LS.divide(found, divisions):
+    for edit in FANUC_LS.divide(found, divisions).edits:
         assert edit.start >= at
         text += source.text[at : edit.start] + edit.text
         at = edit.stop

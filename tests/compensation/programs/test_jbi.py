@@ -309,7 +309,7 @@ def test_incomplete_jobs_are_refused() -> None:
 def divided(sources: list[Source], divisions: Sequence[Division]) -> tuple[list[Source], Program]:
     program = JBI.read(sources)
     assert JBI.divide is not None
-    new = edited(program, JBI.divide(program, divisions))
+    new = edited(program, JBI.divide(program, divisions).edits)
     return new, JBI.read(new)
 
 

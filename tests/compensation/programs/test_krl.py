@@ -422,7 +422,7 @@ def test_a_divided_line() -> None:
         ((703.25, -55.0, 640.0, 10.0, 0.00001, 180.0), None),
         ((703.5, -50.0, 640.00049, 10.0, 0.0, -180.0), None),
     )
-    edits = KRL.divide(program, [Division(line, pieces)])
+    edits = KRL.divide(program, [Division(line, pieces)]).edits
     text = edited(program, edits)[0].text
     assert (
         "\tLIN {X 703.250,Y -55.000,Z 640.000,A 10.0000,B 0.0000,C 180.0000} C_DIS\r\n"
@@ -443,7 +443,7 @@ def test_a_divided_circle() -> None:
     assert KRL.divide is not None
     circle = next(i for i, move in enumerate(program.moves) if move.line == 36)
     via, end, last = ((900.0 + i, 5.0, 1000.0, 0.0, 0.0, 180.0) for i in range(3))
-    edits = KRL.divide(program, [Division(circle, ((end, via),), last)])
+    edits = KRL.divide(program, [Division(circle, ((end, via),), last)]).edits
     text = edited(program, edits)[0].text
     assert (
         "   circ {X 900.000,Y 5.000,Z 1000.000,A 0.0000,B 0.0000,C 180.0000}, "
@@ -459,7 +459,7 @@ def test_what_cannot_be_divided_stays_whole() -> None:
     program = KRL.read(sample(*CELL))
     assert KRL.divide is not None
     whole = [i for i, move in enumerate(program.moves) if move.target_text == (0, 0)]
-    assert KRL.divide(program, [Division(i, (((0.0,) * 6, None),)) for i in whole]) == []
+    assert KRL.divide(program, [Division(i, (((0.0,) * 6, None),)) for i in whole]) == ([], [*whole])
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
@@ -467,7 +467,7 @@ def test_a_piece_ends_its_line_as_the_program_does(end: str) -> None:
     text = f"DEF A ( )\n  PTP {FRAMES}\n  LIN {FRAMES}\nEND".replace("\n", end)
     program = KRL.read([Source(Path("a.src"), text)])
     assert KRL.divide is not None
-    (edit,) = KRL.divide(program, [Division(1, (((1.0,) * 6, None),))])
+    (edit,) = KRL.divide(program, [Division(1, (((1.0,) * 6, None),))]).edits
     assert edit.text == "LIN {X 1.000,Y 1.000,Z 1.000,A 1.0000,B 1.0000,C 1.0000}" + end + "  "
 
 

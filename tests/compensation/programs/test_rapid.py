@@ -557,7 +557,7 @@ def test_quadrants_that_are_none_are_left_open() -> None:
 
 def division(program: Program, move: int, *points: tuple[float, ...]) -> list[Edit]:
     assert RAPID.divide is not None
-    return RAPID.divide(program, [Division(move, tuple((point, None) for point in points))])
+    return RAPID.divide(program, [Division(move, tuple((point, None) for point in points))]).edits
 
 
 def test_a_linear_move_is_divided_by_the_same_instruction() -> None:
@@ -584,7 +584,7 @@ def test_a_linear_move_is_divided_by_the_same_instruction() -> None:
 def test_a_circular_move_is_divided_with_its_via(polish: Program) -> None:
     assert RAPID.divide is not None
     half, mid, last = ((x, 3.0, 4.0, *DOWN) for x in (1.0, 2.0, 3.0))
-    edits = RAPID.divide(polish, [Division(3, ((mid, half),), last)])
+    edits = RAPID.divide(polish, [Division(3, ((mid, half),), last)]).edits
     (source,) = edited(polish, edits)
     again = RAPID.read([source])
     first, second = again.moves[3:5]

@@ -69,7 +69,7 @@ def edited(program: Program, edits: list[Edit]) -> str:
 
 def divided(program: Program, *divisions: Division) -> str:
     assert URSCRIPT.divide is not None
-    return edited(program, URSCRIPT.divide(program, divisions))
+    return edited(program, URSCRIPT.divide(program, divisions).edits)
 
 
 # What is found

@@ -7,6 +7,8 @@ from typing import Final
 
 #: A number in a program.
 NUMBER: Final = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
+#: Neither millimetres nor degrees are ever as many.
+LARGEST: Final = 1e6
 _PARTS: Final = re.compile(r"[+-]?\d*\.?(\d*)(?:[eE]([+-]?\d+))?")
 #: A number has more decimals only by mistake, and no float carries them.
 _MOST: Final = 15

@@ -30,7 +30,12 @@ from typing import Final
 import numpy as np
 
 from truearm.modeling.chain import Array
-from truearm.modeling.transform import quaternion_from_rotation, rotation_from_quaternion, rotation_vector
+from truearm.modeling.transform import (
+    quaternion_from_rotation,
+    rotation_from_quaternion,
+    rotation_from_vector,
+    rotation_vector,
+)
 
 #: Two rotations that differ by less [rad] are the same: the rounding of the arithmetic behind them.
 _SAME: Final = 1e-8
@@ -129,12 +134,6 @@ def _nearest_moving_xyz(R: Array, near: Array) -> Array:
     return np.asarray(-_nearest_zyx(R.swapaxes(1, 2), -near[:, ::-1])[:, ::-1])
 
 
-def _matrices_of_vectors(numbers: Array) -> Array:
-    angle = np.linalg.norm(numbers, axis=1, keepdims=True)
-    part = 0.5 * np.sinc(angle / _TURN) * numbers
-    return rotation_from_quaternion(np.concatenate([np.cos(angle / 2), part], axis=1))
-
-
 def _nearest_vectors(R: Array, near: Array) -> Array:
     v = rotation_vector(R)
     angle, size = (np.linalg.norm(u, axis=1, keepdims=True) for u in (v, near))
@@ -151,4 +150,4 @@ FIXED_XYZ_ANGLES: Final = Orientation("angles about x y z, fixed axes", 3, _matr
 MOVING_XYZ_ANGLES: Final = Orientation(
     "angles about x y z, moving axes", 3, _matrices_of_moving_xyz, _nearest_moving_xyz
 )
-ROTATION_VECTOR: Final = Orientation("rotation vector", 3, _matrices_of_vectors, _nearest_vectors)
+ROTATION_VECTOR: Final = Orientation("rotation vector", 3, rotation_from_vector, _nearest_vectors)

@@ -268,16 +268,30 @@ class Division:
     move
         Index of the move.
     points
-        What the robot has to pass before the move's own target, one entry an instruction to insert: the numbers of its
-        target, and of its via for a circle (else None), in the form and units of the move's target. What a circle
-        passes on its last piece is its own entry's: ``via`` of the move itself becomes `last_via`.
+        One entry an instruction to insert before the move: the numbers of its target, and of its via for a circle
+        (else None), in the form and units of the move's target.
     last_via
-        Numbers of the via of the last piece, for a circle.
+        For a circle the numbers of the via of its last piece, which is the move itself.
     """
 
     move: int
     points: tuple[tuple[tuple[float, ...], tuple[float, ...] | None], ...]
     last_via: tuple[float, ...] | None = None
+
+
+class Pieces(NamedTuple):
+    """Moves divided.
+
+    Attributes
+    ----------
+    edits
+        What changes in the text.
+    whole
+        Indices of moves that were to be divided and stay whole, because pieces of them would be something else.
+    """
+
+    edits: list[Edit]
+    whole: list[int]
 
 
 @dataclass(frozen=True)
@@ -288,8 +302,6 @@ class Language:
     ----------
     name
         Its name.
-    maker
-        Whose controllers speak it.
     suffixes
         Of its files, lower case with the dot. The suffix decides the language; what is in the file has to agree.
     is_one
@@ -297,7 +309,7 @@ class Language:
     read
         Read the files of one program, given together.
     divide
-        Return the edits that divide moves; None if the language's programs cannot be divided yet.
+        Divide moves; None if the language's programs cannot be divided.
     together
         Whether files that are given together are one program and share names; else each is one for itself.
     companions
@@ -305,11 +317,10 @@ class Language:
     """
 
     name: str
-    maker: str
     suffixes: tuple[str, ...]
     is_one: Callable[[str], bool]
     read: Callable[[Sequence[Source]], Program]
-    divide: Callable[[Program, Sequence[Division]], list[Edit]] | None = None
+    divide: Callable[[Program, Sequence[Division]], Pieces] | None = None
     together: bool = False
     companions: tuple[tuple[str, str], ...] = ()
 

@@ -18,6 +18,7 @@ from truearm.modeling.inverse.candidates import Candidates
 from truearm.modeling.inverse.closed_form import ClosedForm
 from truearm.modeling.inverse.pose_solver import PoseTask, weakest_motion
 from truearm.modeling.inverse.turns import beyond_limits, nearest_turns
+from truearm.modeling.transform import homogeneous
 
 #: A nominal start that misses by more [reach lengths, rad] is no start but for the nearest pose.
 _NEAR: Final = 0.05
@@ -167,7 +168,7 @@ class BranchSearch:
         of Nubiola, section 1.5). The closed form knows a branch up to its very end, where Newton's steps leave it.
         """
         part, joints = self._task.of(pose), self._turned[pose]
-        wanted = _matrices(np.stack(part.rotation).transpose(2, 1, 0), part.position.T)
+        wanted = homogeneous(np.stack(part.rotation).transpose(2, 1, 0), part.position.T)
         shifted, every = wanted, np.arange(len(pose))
         for _ in range(_FAKE_TARGETS):
             x, y, z, position = np.moveaxis(shifted[:, :3, :], 0, -1).transpose(1, 0, 2)
@@ -178,17 +179,10 @@ class BranchSearch:
             none = there[every, slot] < 0
             joints = np.where(none[:, None], joints, found[every, slot])
             sweep = part.sweep(part.variables(joints))
-            shifted = wanted @ np.linalg.inv(_matrices(sweep.matrix(), sweep.position.T)) @ shifted
+            shifted = wanted @ np.linalg.inv(homogeneous(sweep.matrix(), sweep.position.T)) @ shifted
         return joints
 
 
 def _missed(task: PoseTask, joints: Array) -> Array:
     """Return by how much joints turned so miss the poses [reach lengths, rad], ``(n,)``."""
     return np.asarray(np.linalg.norm(task.error(task.sweep(task.variables(joints))), axis=1))
-
-
-def _matrices(rotation: Array, position: Array) -> Array:
-    """Return homogeneous matrices, ``(n, 4, 4)``."""
-    made = np.zeros((len(position), 4, 4))
-    made[:, :3, :3], made[:, :3, 3], made[:, 3, 3] = rotation, position, 1.0
-    return made

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from truearm.modeling.chain import Array, Sweep
 from truearm.modeling.inverse.branches import Line, joint_axes
 from truearm.modeling.robot import Robot
-from truearm.modeling.transform import cross
+from truearm.modeling.transform import cross, homogeneous
 
 #: Most solutions of one pose.
 SLOTS: Final = 8
@@ -79,8 +79,7 @@ class ClosedForm:
 
     def starts(self, position: Array, rotation: Array) -> Starts:
         """Return the solutions for poses of the tip in the world, ``(n, 3)`` [m] and ``(n, 3, 3)``."""
-        poses = np.zeros((len(position), 4, 4))
-        poses[:, :3, :3], poses[:, :3, 3], poses[:, 3, 3] = rotation, position, 1.0
+        poses = homogeneous(rotation, position)
         found = self._arm.calculate_IK_batched(list(self._from_world @ poses @ self._behind), _THREADS)
         joints = np.full((len(position), SLOTS, 6), np.nan)
         nearest = np.ones((len(position), SLOTS), dtype=bool)

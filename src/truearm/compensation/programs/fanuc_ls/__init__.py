@@ -29,6 +29,7 @@ from truearm.compensation.programs.fanuc_ls.configuration import configuration
 from truearm.compensation.programs.fanuc_ls.division import divide
 from truearm.compensation.programs.fanuc_ls.instructions import Instructions
 from truearm.compensation.programs.fanuc_ls.text import LsFile, Position, is_one
+from truearm.compensation.programs.numbers import LARGEST
 from truearm.compensation.programs.orientations import FIXED_XYZ_ANGLES
 from truearm.compensation.programs.program import (
     ANY_POSTURE,
@@ -45,8 +46,6 @@ from truearm.errors import InputError
 _NAME: Final = "FANUC LS"
 _POSE: Final = Form("XYZWPR", "pose", angle=math.pi / 180, orientation=FIXED_XYZ_ANGLES)
 _JOINTS: Final = Form("joints", "joints", angle=math.pi / 180)
-#: Neither millimetres nor degrees are ever as many.
-_LARGEST: Final = 1e6
 _TRACKED: Final = re.compile(r"\bLINE_TRACK_SCHEDULE_NUMBER\s*:\s*0*[1-9]", re.IGNORECASE)
 
 
@@ -64,7 +63,7 @@ class _Positions:
             return position.fault or self._said.no_place[number]
         is_pose = position.names[0] == "X"
         values = tuple([float(text) for text in position.texts])
-        if not max(map(abs, values)) <= _LARGEST:
+        if not max(map(abs, values)) <= LARGEST:
             raise InputError(
                 f"a number of P[{position.number}] is out of all proportion",
                 where=self._file.where(position.places[0][0]),
@@ -167,4 +166,4 @@ def read(sources: Sequence[Source]) -> Program:
     return Program(_NAME, tuple(sources), tuple(targets), tuple(moves), skipped=tuple(skipped), unknown=dict(unknown))
 
 
-FANUC_LS: Final = Language(_NAME, "FANUC", (".ls",), is_one, read, divide)
+FANUC_LS: Final = Language(_NAME, (".ls",), is_one, read, divide)

@@ -18,7 +18,7 @@ from typing import Final, NamedTuple
 from truearm.compensation.programs.fanuc_ls.text import LsFile, Position
 from truearm.compensation.programs.lines import line_end, replaced
 from truearm.compensation.programs.numbers import rewritten
-from truearm.compensation.programs.program import Division, Edit, Move, Program, ProgramTarget
+from truearm.compensation.programs.program import Division, Edit, Move, Pieces, Program, ProgramTarget
 
 _WORD: Final = r"(?:[^\s\[\];]|\[[^\[\]\n]*\])+"
 #: Speed, termination, options that last, options that happen once.
@@ -44,14 +44,17 @@ class _Piece(NamedTuple):
     after: str
 
 
-def divide(program: Program, divisions: Sequence[Division]) -> list[Edit]:
-    """Return the edits that divide moves."""
+def divide(program: Program, divisions: Sequence[Division]) -> Pieces:
+    """Divide moves."""
     edits: list[Edit] = []
+    whole: list[int] = []
     for source in range(len(program.sources)):
         chosen = [division for division in divisions if program.moves[division.move].source == source]
         if chosen:
-            edits += _DividedFile(program, source).edits(chosen)
-    return edits
+            file = _DividedFile(program, source)
+            edits += file.edits(chosen)
+            whole += file.whole
+    return Pieces(edits, whole)
 
 
 class _DividedFile:
@@ -65,6 +68,8 @@ class _DividedFile:
         self._last = max(int(found[1]) for found in _REFERRED.finditer(self._raw))
         self._line_end = line_end(self._raw)
         self._added: list[str] = []
+        #: Moves that stay whole.
+        self.whole: list[int] = []
 
     def edits(self, divisions: Sequence[Division]) -> list[Edit]:
         """Return the edits of the file."""
@@ -76,6 +81,7 @@ class _DividedFile:
             position = self._taught[target.name[2:-1].partition(":")[0]]
             piece = self._piece(move)
             if piece is None or not position.alone or position.external:
+                self.whole.append(division.move)
                 continue
             words: list[str] = []
             for point, via in division.points:

@@ -201,4 +201,4 @@ def _interval(joint: int, degrees: float) -> tuple[int, float, float]:
     return joint, _OPEN - radians(degrees), _OPEN + radians(degrees)
 
 
-JBI: Final = Language("INFORM", "Yaskawa", (".jbi",), is_one, read, divide)
+JBI: Final = Language("INFORM", (".jbi",), is_one, read, divide)

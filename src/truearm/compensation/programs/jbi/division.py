@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from truearm.compensation.programs.jbi.job import Job, Position, State, jobs_of
 from truearm.compensation.programs.lines import Lines, indentation, line_end
 from truearm.compensation.programs.numbers import written
-from truearm.compensation.programs.program import Division, Edit, Program, ProgramTarget
+from truearm.compensation.programs.program import Division, Edit, Pieces, Program, ProgramTarget
 
 
 @dataclass
@@ -32,8 +32,8 @@ class _Additions:
         return name
 
 
-def divide(program: Program, divisions: Sequence[Division]) -> list[Edit]:
-    """Return the edits that divide linear and circular moves.
+def divide(program: Program, divisions: Sequence[Division]) -> Pieces:
+    """Divide linear and circular moves.
 
     Every job gets its new positions behind the last one of its table, with the next free numbers. Between the pieces
     of a circle stands a MOVL to the point where the robot is already: circles of different curvature have to be
@@ -49,7 +49,7 @@ def divide(program: Program, divisions: Sequence[Division]) -> list[Edit]:
             own = [division for division in wanted if job.start <= program.moves[division.move].statement[0] < job.stop]
             if own:
                 edits += _of_job(program, source, job, own)
-    return edits
+    return Pieces(edits, [])
 
 
 def _of_job(program: Program, source: int, job: Job, divisions: Sequence[Division]) -> Iterator[Edit]:

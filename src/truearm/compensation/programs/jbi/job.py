@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from truearm.compensation.programs.lines import BYTE_ORDER_MARK, Lines
-from truearm.compensation.programs.numbers import NUMBER
+from truearm.compensation.programs.numbers import LARGEST, NUMBER
 from truearm.compensation.programs.program import Source
 from truearm.errors import InputError
 
@@ -152,7 +152,7 @@ def _job(source: Source, lines: Lines, start: int, stop: int) -> Job:
         line_number = lines.number(begin)
         if not state.postype:
             source.refuse(line_number, f"{name} stands before any ///POSTYPE", allowed=", ".join(_POSTYPES))
-        if max(map(abs, values)) > _LARGEST.get(state.postype, 1e6):
+        if max(map(abs, values)) > _LARGEST.get(state.postype, LARGEST):
             source.refuse(line_number, f"{name} has a number out of all proportion", came=max(values, key=abs))
         if state.postype == "PULSE" and not all(value.is_integer() for value in values):
             source.refuse(line_number, f"{name} has a part of a pulse", came=values, allowed="whole pulses")

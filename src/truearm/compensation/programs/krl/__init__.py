@@ -51,7 +51,6 @@ def is_one(text: str) -> bool:
 
 KRL: Final = Language(
     name="KRL",
-    maker="KUKA",
     suffixes=(".src", ".dat", ".sub"),
     is_one=is_one,
     read=read,

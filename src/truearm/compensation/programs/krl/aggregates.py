@@ -25,7 +25,7 @@ from math import inf, pi, radians
 from typing import Final, NamedTuple
 
 from truearm.compensation.programs.krl.lines import Text
-from truearm.compensation.programs.numbers import NUMBER
+from truearm.compensation.programs.numbers import LARGEST, NUMBER
 from truearm.compensation.programs.orientations import ZYX_ANGLES
 from truearm.compensation.programs.program import Configuration, Form
 
@@ -49,7 +49,6 @@ _USUAL: Final = re.compile(
     re.ASCII | re.IGNORECASE,
 )
 _BITS: Final = re.compile(r"'\s*+([BH])\s*+([0-9A-F]++)\s*+'", re.ASCII | re.IGNORECASE)
-_MOST: Final = 1e6
 _SIX: Final = range(1, 7)
 
 Item = tuple[float | None, int, int]
@@ -85,7 +84,7 @@ def aggregate(text: Text, start: int, stop: int, *, offset: bool = False) -> Agg
     if usual is not None and usual.end() == stop:
         *numbers, status, turn = usual.groups()
         written: tuple[float, ...] = tuple(map(float, numbers))
-        if max(written) <= _MOST and min(written) >= -_MOST:
+        if max(written) <= LARGEST and min(written) >= -LARGEST:
             spans = tuple(map(usual.span, _SIX))
             return Aggregate(POSE, written, spans, int(status) if status else None, int(turn) if turn else None)
     items, problem = _items(text, start, stop)
@@ -131,8 +130,8 @@ def _items(text: Text, start: int, stop: int) -> tuple[dict[str, Item], str | No
         rest = item[3]
         if item[2] is not None and (not rest or rest.isspace()):
             value = float(item[2])
-            if not abs(value) <= _MOST:
-                raise text.refusal("a number is out of all proportion", item.start(2), item[2], f"up to {_MOST:g}")
+            if not abs(value) <= LARGEST:
+                raise text.refusal("a number is out of all proportion", item.start(2), item[2], f"up to {LARGEST:g}")
             items[name] = value, *item.span(2)
         else:
             items[name] = _bits(rest.strip()) if name in ("S", "T") else None, *item.span(3)

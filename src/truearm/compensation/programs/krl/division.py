@@ -7,20 +7,22 @@ from typing import Final
 
 from truearm.compensation.programs.lines import indentation, line_end, replaced
 from truearm.compensation.programs.numbers import written
-from truearm.compensation.programs.program import Division, Edit, Form, Move, Program
+from truearm.compensation.programs.program import Division, Edit, Form, Move, Pieces, Program
 
 _NAMES: Final = ("X", "Y", "Z", "A", "B", "C")
 
 
-def divide(program: Program, divisions: Sequence[Division]) -> list[Edit]:
-    """Return the edits that put a piece of a move into a line of its own before it.
+def divide(program: Program, divisions: Sequence[Division]) -> Pieces:
+    """Put pieces of moves into lines of their own before them.
 
     Moves whose :attr:`Move.target_text` is ``(0, 0)`` stay whole.
     """
     edits: list[Edit] = []
+    whole: list[int] = []
     for division in divisions:
         move = program.moves[division.move]
         if move.target_text == (0, 0) or not division.points:
+            whole.append(division.move)
             continue
         form = program.targets[move.target].form
         text = program.sources[move.source].text
@@ -30,7 +32,7 @@ def divide(program: Program, divisions: Sequence[Division]) -> list[Edit]:
         edits.append(Edit(move.source, start, start, "".join(pieces)))
         if division.last_via is not None and move.via_text is not None:
             edits.append(Edit(move.source, *move.via_text, _written(form, division.last_via)))
-    return edits
+    return Pieces(edits, whole)
 
 
 def _piece(text: str, move: Move, form: Form, target: Sequence[float], via: Sequence[float] | None) -> str:

@@ -41,7 +41,6 @@ def _read(sources: Sequence[Source]) -> Program:
 
 RAPID: Final = Language(
     name="RAPID",
-    maker="ABB",
     suffixes=(".mod", ".prg", ".sys", ".modx", ".prgx", ".sysx"),
     is_one=_is_one,
     read=_read,

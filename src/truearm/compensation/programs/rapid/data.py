@@ -34,7 +34,7 @@ from typing import Final, Literal
 
 import numpy as np
 
-from truearm.compensation.programs.numbers import NUMBER
+from truearm.compensation.programs.numbers import LARGEST, NUMBER
 from truearm.compensation.programs.orientations import MOVING_XYZ_ANGLES, QUATERNION
 from truearm.compensation.programs.program import Configuration, Form
 from truearm.modeling.transform import Transform, rotation_from_quaternion
@@ -47,8 +47,6 @@ OFFS: Final = Form("Offs", "pose")
 #: The turns of RelTool follow each other about x, the new y and the new z.
 RELTOOL: Final = Form("RelTool", "pose", angle=_DEGREE, orientation=MOVING_XYZ_ANGLES)
 
-#: No robot reaches further [mm], and no joint turns further [deg].
-_FARTHEST: Final = 1e6
 #: From here on a number says that there is no such axis; written 9E9.
 _ABSENT: Final = 9e8
 #: A joint in a quadrant beyond these has turned ten times: it is no quadrant.
@@ -105,7 +103,7 @@ def wrong_number(form: Form, values: tuple[float, ...]) -> tuple[str, str, str] 
     """Return what is wrong with the numbers of a target, what came and what is allowed, or None."""
     lengths = values[:3] if form.kind == "pose" else values
     for value in lengths:
-        if not isfinite(value) or abs(value) > _FARTHEST:
+        if not isfinite(value) or abs(value) > LARGEST:
             return "a number of a target is out of all proportion", f"{value:g}", "1 000 000 at most"
     return wrong_quaternion(values[3:]) if form.orientation is QUATERNION else None
 

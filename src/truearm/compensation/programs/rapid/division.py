@@ -13,7 +13,7 @@ from typing import Final
 
 from truearm.compensation.programs.lines import indentation, line_end, replaced
 from truearm.compensation.programs.numbers import written
-from truearm.compensation.programs.program import Division, Edit, Move, Program, ProgramTarget
+from truearm.compensation.programs.program import Division, Edit, Move, Pieces, Program, ProgramTarget
 from truearm.compensation.programs.rapid.arguments import arguments_of
 from truearm.compensation.programs.rapid.data import RELTOOL, ROBTARGET_TAIL
 from truearm.compensation.programs.rapid.listing import code_of
@@ -21,8 +21,8 @@ from truearm.compensation.programs.rapid.listing import code_of
 _WORD: Final = re.compile(r"\w++")
 
 
-def divided(program: Program, divisions: Sequence[Division]) -> list[Edit]:
-    r"""Return the edits that divide moves.
+def divided(program: Program, divisions: Sequence[Division]) -> Pieces:
+    r"""Divide moves.
 
     Moves without a known place of their statement are left whole: those with a time (``\T``), an identity for moves
     of several robots (``\ID``), ``\Conc`` or ``\Inpos``; instructions that do something at the end of the path or at
@@ -30,16 +30,18 @@ def divided(program: Program, divisions: Sequence[Division]) -> list[Edit]:
     offsets from targets without a name.
     """
     codes: dict[int, str] = {}
-    edits = []
+    edits: list[Edit] = []
+    whole: list[int] = []
     for division in divisions:
         move = program.moves[division.move]
         if move.statement == (0, 0):
+            whole.append(division.move)
             continue
         for source in (move.source, program.targets[move.target].source):
             if source not in codes:
                 codes[source] = code_of(program.sources[source].text)[0]
         edits += _divided(program, codes, move, division)
-    return edits
+    return Pieces(edits, whole)
 
 
 def _divided(program: Program, codes: dict[int, str], move: Move, division: Division) -> list[Edit]:

@@ -161,4 +161,4 @@ class _File:
         return self.targets.reach(value, at)
 
 
-URSCRIPT: Final = Language("URScript", "Universal Robots", (".script", ".urscript"), _is_one, _read, divide)
+URSCRIPT: Final = Language("URScript", (".script", ".urscript"), _is_one, _read, divide)

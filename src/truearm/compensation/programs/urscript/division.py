@@ -16,7 +16,7 @@ from typing import Final
 
 from truearm.compensation.programs.lines import indentation, line_end, replaced
 from truearm.compensation.programs.numbers import NUMBER, written
-from truearm.compensation.programs.program import Division, Edit, Move, Program, ProgramTarget
+from truearm.compensation.programs.program import Division, Edit, Move, Pieces, Program, ProgramTarget
 from truearm.compensation.programs.urscript.text import Text, Value
 
 #: Blend radius at the points on the way [m]; less where pieces are short.
@@ -28,16 +28,19 @@ _WORD: Final = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 _DECIMALS: Final = 6
 
 
-def divide(program: Program, divisions: Sequence[Division]) -> list[Edit]:
-    """Return the edits that divide moves; none for a move that cannot be divided."""
+def divide(program: Program, divisions: Sequence[Division]) -> Pieces:
+    """Divide moves."""
     texts: dict[int, _Blends] = {}
     edits: list[Edit] = []
+    whole: list[int] = []
     for division in divisions:
         source = program.moves[division.move].source
         if source not in texts:
             texts[source] = _Blends(Text(program.sources[source]))
-        edits += _edits(program, division, texts[source])
-    return edits
+        made = _edits(program, division, texts[source])
+        edits += made
+        whole += [] if made else [division.move]
+    return Pieces(edits, whole)
 
 
 class _Blends:
@@ -79,6 +82,7 @@ class _Blends:
 
 
 def _edits(program: Program, division: Division, blends: _Blends) -> list[Edit]:
+    """Return the edits that divide a move; none if it stays whole."""
     move, text = program.moves[division.move], blends.text
     target = program.targets[move.target]
     function, opened = blends.call(move)

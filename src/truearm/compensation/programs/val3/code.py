@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from truearm.compensation.programs.lines import Lines
-from truearm.compensation.programs.numbers import NUMBER
+from truearm.compensation.programs.numbers import LARGEST, NUMBER
 from truearm.compensation.programs.program import MoveKind, Source
 from truearm.compensation.programs.val3.data import Attributes, parse
 
@@ -266,7 +266,7 @@ def _words(source: Source, lines: Lines, code: str, place: tuple[int, int], star
     if numbers is not None:
         words.offset = tuple(map(float, numbers.groups()))
         words.places = tuple((start + first, start + stop) for first, stop in numbers.regs[1:])
-        if max(map(abs, words.offset)) > 1e6:
+        if max(map(abs, words.offset)) > LARGEST:
             source.refuse(line, "an offset is out of all proportion", came=max(words.offset))
     return words
 

@@ -14,7 +14,7 @@ from typing import Final
 from xml.parsers import expat
 
 from truearm.compensation.programs.lines import BYTE_ORDER_MARK, Lines
-from truearm.compensation.programs.numbers import NUMBER
+from truearm.compensation.programs.numbers import LARGEST, NUMBER
 from truearm.compensation.programs.program import Source
 
 FRAME: Final = ("x", "y", "z", "rx", "ry", "rz")
@@ -42,8 +42,6 @@ _VALUE: Final = re.compile(
     rf' rx="((?>{NUMBER}))" ry="((?>{NUMBER}))" rz="((?>{NUMBER}))"(?=[ />])'
 )
 _NUMBER: Final = re.compile(rf"\s*((?>{NUMBER}))\s*")
-#: No length or angle is larger, in any unit.
-_LARGEST: Final = 1e6
 
 Attributes = dict[str, str]
 
@@ -168,7 +166,7 @@ class _Reader:
         fast = _VALUE.match(self._source.text, place) if NUMBERS[variable.type] is FRAME else None
         if fast is not None:
             values, places = tuple(map(float, fast.groups()[1:])), fast.regs[2:]
-            if max(map(abs, values)) > _LARGEST:
+            if max(map(abs, values)) > LARGEST:
                 self._source.refuse(line, f"{variable.name} has a number out of all proportion", came=values)
         else:
             values, places = self._numbers(variable, place, line)
@@ -200,7 +198,7 @@ class _Reader:
             if found_number is None:
                 self._source.refuse(line, f"{name} of {variable.name} is no number", came=number)
             value = float(found_number[1])
-            if abs(value) > _LARGEST:
+            if abs(value) > LARGEST:
                 self._source.refuse(line, f"{name} of {variable.name} is out of all proportion", came=number)
             values.append(value)
             places.append((start + found_number.start(1), start + found_number.end(1)))

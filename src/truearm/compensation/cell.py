@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Annotated, Final, Literal
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, model_validator
 
 from truearm.compensation.programs.orientations import (
     FIXED_XYZ_ANGLES,
@@ -36,6 +36,7 @@ from truearm.compensation.programs.orientations import (
 )
 from truearm.errors import InputError
 from truearm.files import read_yaml
+from truearm.modeling.formats.entries import STRICT, Number, Triple
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 from truearm.units import sized_si
@@ -50,9 +51,6 @@ _ORIENTATIONS: Final[dict[str, Orientation]] = {
     "rxryrz": MOVING_XYZ_ANGLES,
     "rotation_vector": ROTATION_VECTOR,
 }
-
-Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
-Triple = tuple[Number, Number, Number]
 
 
 def _unit_length(q: tuple[float, ...]) -> tuple[float, ...]:
@@ -70,7 +68,7 @@ Name = Annotated[str, BeforeValidator(_number_as_name)]
 
 
 class _Entry(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = STRICT
 
 
 class _Units(_Entry):

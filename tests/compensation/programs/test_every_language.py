@@ -186,7 +186,10 @@ def test_a_division_reads_back(language: Language) -> None:
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(data=st.data())
 def test_nothing_that_is_read_makes_it_fall(language: Language, data: st.DataObject) -> None:
-    """Programs cut off, with pieces swapped, doubled or replaced by anything: read, or refused in words."""
+    """Programs cut off, with pieces swapped, doubled or replaced by anything: read, or refused in words.
+
+    What is read can be corrected, and nothing but the numbers of targets changes.
+    """
     sources = list(data.draw(st.sampled_from(samples(language))))
     which = data.draw(st.integers(0, len(sources) - 1))
     text = sources[which].text
@@ -214,6 +217,13 @@ def test_nothing_that_is_read_makes_it_fall(language: Language, data: st.DataObj
             assert span is None or float(whole[span[0] : span[1]] or "0") == value
     poses_of(program)
     language.is_one(broken)
+    same = {i: np.array(target.values) for i, target in enumerate(program.targets)}
+    assert edits_of(program, same) == []
+    # No two targets have the same number, and what stands between numbers stays.
+    after = texts(program, edits_of(program, {i: v + shifted(program.targets[i]) for i, v in same.items()}))
+    for number, (source, text_after) in enumerate(zip(program.sources, after, strict=True)):
+        spans = [s for t in program.targets if t.source == number for s in t.places if s and s[0] < s[1]]
+        assert without(source.text, spans) == skeleton(text_after, source.text, spans)
 
 
 @languages

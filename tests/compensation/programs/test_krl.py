@@ -2,7 +2,8 @@
 
 The syntax of the samples is that of KUKA System Software 8.3, Operating and Programming Instructions for System
 Integrators ("Programming for user group Expert", "Status and Turn") and of KUKA, Expert Programming, KSS 5.2 ("Motion
-programming": aggregates, geometric operator, CIRC); inline forms are as the teach pendant of KSS 8.3 writes them.
+programming": aggregates, geometric operator, CIRC), as public programs have it; inline forms are as the teach pendant
+of KSS 8.3 writes them.
 """
 
 from __future__ import annotations

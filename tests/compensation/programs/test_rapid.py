@@ -3,7 +3,8 @@
 The sample programs are ours. Their syntax is that of the sections on MoveAbsJ, MoveC, MoveExtJ, MoveJ, MoveL, MoveLDO,
 SearchL, TriggL, Offs, RelTool, confdata, jointtarget, robtarget, tooldata and wobjdata of ABB's "Technical reference
 manual, RAPID Instructions, Functions and Data types" (3HAC050917-001), of "RAPID Kernel" (3HAC050946-001), and of the
-application manual "Arc and Arc Sensor" for ArcL, ArcLStart and ArcCEnd.
+application manual "Arc and Arc Sensor" for ArcL, ArcLStart and ArcCEnd, as public programs and code that quotes the
+manuals have them.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ rotation vector      rx, ry, rz (URScript)                    exp of the vector
 Sources: ABB, Technical reference manual RAPID, data type orient; KUKA, System Software, operating and programming
 instructions, FRAME; FANUC, R-30iB operator's manual, "position data", and Yaskawa, DX200 operator's manual, "user
 coordinates", for rotations about fixed axes; Staubli, VAL3 reference manual, type trsf; Universal Robots, script
-manual, "poses".
+manual, "poses". They are cited from memory; known postures of each maker's robots are in the tests.
 """
 
 from __future__ import annotations

@@ -14,7 +14,8 @@ certain which move came before it or where that one ended: after labels, calls a
 (macros), after moves to places that are not known, and before and after offsets and skips.
 
 Sources: FANUC, R-30iB/R-30iB Mate controller, HandlingTool operator's manual (V9.40), sections 7.2.1 (motion
-instructions), 7.2.6 and 11.9 (positions), 7.2.9 (frame numbers) and 12.2.7 (ASCII programs).
+instructions), 7.2.6 and 11.9 (positions), 7.2.9 (frame numbers) and 12.2.7 (ASCII programs). The manual was not at
+hand: its sections are those that a public repository's notes on it name, and the syntax is that of public programs.
 """
 
 from __future__ import annotations

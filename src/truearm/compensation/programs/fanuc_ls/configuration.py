@@ -16,7 +16,7 @@ others, no posture has the readings asked for, and the target is not corrected.
 
 All this holds for arms of six axes with a wrist in line. An L or R is not looked at.
 
-Source: FANUC, HandlingTool operator's manual (V9.40), section 11.21.2.
+Source: FANUC, HandlingTool operator's manual (V9.40), section 11.21.2, by a public repository's notes on it.
 """
 
 from __future__ import annotations

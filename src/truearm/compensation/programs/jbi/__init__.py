@@ -5,7 +5,8 @@ them what they are (pulses of the motors, joint angles or a pose), and with whic
 which posture. Sources: Yaskawa, NX100 data transmission manual (HW0481924), section 4.1 "Job data format", and DX100
 data transmission manual (HW0482494), sections 4.1 and 4.3, for the file; NX100 operator's manual (149235-1CD),
 "Manipulator types", for the posture and "Circular interpolation" for MOVC; FS100 and YRC1000 INFORM language manuals
-for the instructions.
+for the instructions. That circles of different curvature are separated, the tag FPT, front and rear, and on which side
+180 deg is are from memory.
 
 Tool 0 is a tool file like the others, and user frame 1 is the first one: their numbers are the names here. No job
 says where they are. Positions of base and of station axes (BC, EC, BP, EX) stay as they are.

@@ -6,7 +6,9 @@ behind a colon is in the axes of the place before it. Relative moves follow the 
 
 Sources: KUKA System Software 8.3, Operating and Programming Instructions for System Integrators, "Programming for user
 group Expert" (variables, motion instructions, splines), "Status and Turn", and the inline forms; KUKA, Expert
-Programming, KSS 5.2, "Motion programming" (aggregates, the geometric operator, CIRC) and "Data lists".
+Programming, KSS 5.2, "Motion programming" (aggregates, the geometric operator, CIRC) and "Data lists". The titles are
+from memory, the manuals were not at hand: the syntax was studied in public programs, and the bits of Status and Turn
+agree with points taught on real robots.
 
 What the language leaves open is decided so:
 

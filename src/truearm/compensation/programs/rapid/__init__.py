@@ -3,7 +3,8 @@
 Sources: ABB, Technical reference manual, RAPID Instructions, Functions and Data types (3HAC050917-001): the sections of
 MoveAbsJ, MoveC, MoveJ, MoveL and their variants, the Trigg and Search instructions, Offs, RelTool and PDispOn; RAPID
 Kernel (3HAC050946-001) for the rest of the syntax; application manuals for the instructions of arc and spot welding,
-dispensing, painting and continuous processes, which all have the tool for their last argument.
+dispensing, painting and continuous processes, which all have the tool for their last argument. Those manuals were not
+at hand: they are cited as public programs, and public code that quotes them, have their contents.
 
 A tool that is not held by the robot, a work object that the robot holds or another unit moves, and displacements of the
 program (PDispOn, PDispSet) put targets where the file does not say; such targets are left as they are.

@@ -1,7 +1,8 @@
 """Data of RAPID written out: targets, their configuration data, tools and work objects.
 
 Sources: ABB, Technical reference manual, RAPID Instructions, Functions and Data types (3HAC050917-001), data types
-robtarget, jointtarget, confdata, orient, pose, tooldata and wobjdata, functions Offs and RelTool.
+robtarget, jointtarget, confdata, orient, pose, tooldata and wobjdata, functions Offs and RelTool. The quadrants were
+read in a scan of an ABB manual; the table of cfx and the order of RelTool's angles in public code that quotes ABB.
 
 cf1, cf4 and cf6 of confdata are quadrants: a joint in quadrant k reads k * 90 deg or more and less than
 (k + 1) * 90 deg. cfx numbers the eight postures of an arm that can bend over backwards:

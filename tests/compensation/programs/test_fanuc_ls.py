@@ -1,8 +1,8 @@
 """FANUC LS programs.
 
 Syntax from FANUC, R-30iB/R-30iB Mate controller, HandlingTool operator's manual (V9.40), sections 7.2.1 (motion
-instructions), 7.2.6 and 11.9 (positions), 7.2.9 (frame numbers), 11.21.2 (configuration) and 12.2.7 (ASCII programs), by
-a public repository's notes on it, and from public programs.
+instructions), 7.2.6 and 11.9 (positions), 7.2.9 (frame numbers), 11.21.2 (configuration) and 12.2.7 (ASCII programs),
+by a public repository's notes on it, and from public programs.
 """
 
 from __future__ import annotations

@@ -8,10 +8,10 @@ from typing import Final
 import numpy as np
 
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.twin import Twin, measure
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.robots import load_robot
+from truearm.simulation.twin import Twin, measure
 from truearm.studies.katana import NAMES
 
 #: One step of a parameter as the document counts them: rad and mm.

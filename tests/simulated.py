@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.truths import truth_twin
-from truearm.measurement.twin import Twin, measure
 from truearm.robots import load_robot
+from truearm.simulation.truths import truth_twin
+from truearm.simulation.twin import Twin, measure
 
 
 def campaign(robot: str, poses: int, noise: float, seed: int, truth: str = "random") -> tuple[Twin, Dataset]:

@@ -11,8 +11,8 @@ import pytest
 from tests.simulated import campaign
 
 from truearm.calibration import calibrate, check
-from truearm.identification.fit import identify
-from truearm.identification.models import MODELS
+from truearm.identification.solving.fit import identify
+from truearm.identification.solving.models import MODELS
 from truearm.measurement.dataset import Dataset, IntArray
 from truearm.measurement.readers.matrices import read_matrices
 from truearm.measurement.statistics import errors_of

@@ -11,14 +11,14 @@ import pytest
 
 from truearm.calibration import calibrate, check, validate
 from truearm.errors import InputError
-from truearm.identification.advice import check_fit
-from truearm.identification.fit import identify
-from truearm.identification.models import MODELS
+from truearm.identification.judging.advice import check_fit
+from truearm.identification.solving.fit import identify
+from truearm.identification.solving.models import MODELS
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.devices import measured_with, named_device
-from truearm.measurement.truths import truth_twin
-from truearm.measurement.twin import Twin
 from truearm.robots import load_robot
+from truearm.simulation.devices import measured_with, named_device
+from truearm.simulation.truths import truth_twin
+from truearm.simulation.twin import Twin
 
 ROBOT = load_robot("irb120")
 GEOMETRIC = {m.name: m for m in MODELS}["geometric"]

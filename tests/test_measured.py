@@ -11,16 +11,16 @@ import pytest
 from ruamel.yaml import YAML
 
 from truearm.calibration import Calibration, calibrate
-from truearm.identification.fit import identify
-from truearm.identification.losses import Loss
-from truearm.identification.models import MODELS
+from truearm.identification.solving.fit import identify
+from truearm.identification.solving.losses import Loss
+from truearm.identification.solving.models import MODELS
 from truearm.measurement.dataset import Dataset, IntArray
 from truearm.measurement.readers.canonical import csv_text, read_csv
 from truearm.measurement.readers.matrices import read_matrices
 from truearm.measurement.statistics import errors_of
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
-from truearm.planning.measurement_plan import plan_measurements, with_targets
+from truearm.planning.choosing.measurement_plan import plan_measurements, with_targets
 from truearm.robots import load_robot
 
 SEEDS = range(10)
@@ -69,7 +69,7 @@ def test_the_elastic_model_on_the_irb120(irb120: Dataset, train: int, mean: floa
     assert np.median([mean_mm(run) for run in runs]) <= mean
     assert np.median([max_mm(run) for run in runs]) <= largest
     for run in runs:
-        assert run.fit.standing("compliance_1") == "uninformed"
+        assert run.fit.parameter_status("compliance_1") == "uninformed"
         told = next(n.message for n in run.warnings if n.code == "effects-uninformed")
         assert "compliance_1" in told
 
@@ -99,7 +99,7 @@ def test_the_arm_warmed_up_during_the_campaign(irb120: Dataset) -> None:
     held_out = []
     for seed in range(3):
         order = np.random.default_rng(seed).permutation(irb120.configurations)
-        robot = load_robot("irb120").carrying(PAYLOAD)
+        robot = load_robot("irb120").with_payload(PAYLOAD)
         fit = identify(robot, irb120.of_configurations(order[:300]), model)
         spread = errors_of(fit.robot, irb120.of_configurations(order[300:])).position_spread
         assert spread is not None
@@ -199,7 +199,7 @@ def test_a_measured_file_is_written_as_it_was_read(positioner: tuple[Robot, Path
 def test_chosen_configurations_against_random_ones_on_the_irb120(irb120: Dataset, effects: tuple[str, ...]) -> None:
     """38 of 300 by O1: with hardening stiffness at least as good in the mean and better in the maximum."""
     model = replace(next(m for m in MODELS if m.name == "elastic"), effects=effects)
-    robot = load_robot("irb120").carrying(PAYLOAD)
+    robot = load_robot("irb120").with_payload(PAYLOAD)
     chosen, drawn = [], []
     for seed in SEEDS[:5]:
         order = np.random.default_rng(seed).permutation(irb120.configurations)

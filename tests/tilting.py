@@ -8,10 +8,10 @@ from typing import Final
 
 import numpy as np
 
-from truearm.measurement.truths import truth_twin
-from truearm.measurement.twin import Twin
-from truearm.measurement.twin_joint import JointTruth
 from truearm.robots import load_robot
+from truearm.simulation.truths import truth_twin
+from truearm.simulation.twin import Twin
+from truearm.simulation.twin_joint import JointTruth
 
 DEGREE: Final = math.radians(1.0)
 #: Of the document's inclinometers.

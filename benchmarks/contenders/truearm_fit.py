@@ -6,15 +6,15 @@ import numpy as np
 from stopwatch import inputs, median_seconds, report
 
 import truearm
-from truearm.identification.fit import identify
-from truearm.identification.frames import initial_frames
-from truearm.identification.models import MODELS
-from truearm.identification.monte_carlo import monte_carlo
-from truearm.identification.problem import Problem
-from truearm.identification.solver import solve
+from truearm.identification.judging.monte_carlo import monte_carlo
+from truearm.identification.solving.fit import identify
+from truearm.identification.solving.models import MODELS
+from truearm.identification.solving.problem import Problem
+from truearm.identification.solving.solver import solve
+from truearm.identification.start_values.frames import initial_frames
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.truths import truth_twin
 from truearm.robots import load_robot
+from truearm.simulation.truths import truth_twin
 
 NOISE = 0.05e-3
 nominal = load_robot("irb120")

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from truearm.measurement.readers.matrices import read_matrices
-from truearm.measurement.truths import truth_twin
 from truearm.modeling.formats.urdf import urdf_text
 from truearm.modeling.inverse.branches import BRANCHES, branch_rule
 from truearm.robots import load_robot
+from truearm.simulation.truths import truth_twin
 
 CONFIGURATIONS, POSES = 1000, 10_000
 TRAIN, HELD_OUT, CAMPAIGNS, NOISE = 50, 200, 5, 0.05e-3
@@ -45,7 +45,7 @@ np.savez(
 rule = branch_rule(nominal)
 assert rule is not None
 q = nominal.random_configurations(16 * POSES, rng)
-q = q[rule.numbers(real.sweep(q)) == BRANCHES.index("front-up-noflip")][:POSES]
+q = q[rule.numbers(real.forward_kinematics(q)) == BRANCHES.index("front-up-noflip")][:POSES]
 assert len(q) == POSES
 position, rotation = real.poses(q)
 np.savez(folder / "inverse.npz", position=position, rotation=rotation, seed=q + rng.uniform(-0.1, 0.1, q.shape))

@@ -6,8 +6,8 @@ import numpy as np
 from stopwatch import inputs, median_seconds, report
 
 import truearm
-from truearm.measurement.truths import STATION
 from truearm.robots import load_robot
+from truearm.simulation.truths import STATION
 
 given = np.load(inputs() / "kinematics.npz")
 real = load_robot("irb120").with_values(dict(zip(given["names"].tolist(), given["values"].tolist(), strict=True)))
@@ -20,11 +20,11 @@ for count, repeats in ((1, 300), (50, 300), (1000, 300), (100_000, 5)):
     q = np.tile(q1000, (max(1, count // len(q1000)), 1))[:count]
 
     def position(q: np.ndarray = q) -> object:
-        return robot.sweep(q, "1").position
+        return robot.forward_kinematics(q, "1").position
 
     def with_jacobian(q: np.ndarray = q) -> object:
-        sweep = robot.sweep(q, "1")
-        return sweep.position, robot.linear(sweep, q, names)
+        kinematics = robot.forward_kinematics(q, "1")
+        return kinematics.position, robot.position_jacobian(kinematics, q, names)
 
     figures[f"position_{count}"] = median_seconds(position, repeats)
     figures[f"position_and_jacobian_{count}"] = median_seconds(with_jacobian, repeats)

@@ -16,15 +16,15 @@ from numpy.typing import NDArray
 
 from truearm.errors import InputError, nearest_names
 from truearm.files import read_bytes, writable_folder, write_files
-from truearm.identification.advice import check_fit
-from truearm.identification.bounds import Bounds, read_bounds
-from truearm.identification.fit import Fit, Redundant, Status, identify, place
-from truearm.identification.losses import LOSSES, Loss
-from truearm.identification.models import FRAMES, MODELS, Model
-from truearm.identification.plausibility import check_against
-from truearm.identification.selection import AUTO, Selection, select
-from truearm.identification.settling import check_settling
-from truearm.identification.transmission import check_transmission
+from truearm.identification.choosing.selection import AUTO, Selection, select
+from truearm.identification.judging.advice import check_fit
+from truearm.identification.judging.arrival_lag import check_arrival_lag
+from truearm.identification.judging.plausibility import check_against
+from truearm.identification.judging.transmission import check_transmission
+from truearm.identification.solving.bounds import Bounds, read_bounds
+from truearm.identification.solving.fit import Fit, Redundant, Status, identify, place
+from truearm.identification.solving.losses import LOSSES, Loss
+from truearm.identification.solving.models import FRAMES, MODELS, Model
 from truearm.measurement.checks import check_data, check_range
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.readers.canonical import read_csv
@@ -143,7 +143,7 @@ class Calibration:
                     "value": from_si(p.value, unit),
                     "deviation": None if p.deviation is None else from_si(p.deviation, unit),
                     "informed": p.informed,
-                    "status": self.fit.standing(p.name),
+                    "status": self.fit.parameter_status(p.name),
                 }
             )
         return rows
@@ -211,8 +211,8 @@ def calibrate(
     data
         Readings, or a canonical CSV file.
     model
-        One of :data:`truearm.identification.models.MODELS` by name; ``frames``, which leaves the robot as it is and
-        finds base, targets and fixtures alone, a tool's tip for example; or ``auto``: the joint effects that
+        One of :data:`truearm.identification.solving.models.MODELS` by name; ``frames``, which leaves the robot as it is
+        and finds base, targets and fixtures alone, a tool's tip for example; or ``auto``: the joint effects that
         cross-validation on the training part says the data can carry.
     train
         How many configurations to train on, drawn with `seed`; the rest is held out. None is 70 %; ``all`` holds
@@ -222,11 +222,11 @@ def calibrate(
     loss
         ``linear``, ``huber``, ``cauchy`` or ``l1``.
     redundancy
-        ``prior`` or ``drop``, see :func:`truearm.identification.fit.identify`.
+        ``prior`` or ``drop``, see :func:`truearm.identification.solving.fit.identify`.
     bounds
         Limits of parameter values, or a bounds file.
     payload, gravity
-        What the robot carried and how it was mounted, see :meth:`truearm.modeling.robot.Robot.carrying`.
+        What the robot carried and how it was mounted, see :meth:`truearm.modeling.robot.Robot.with_payload`.
     effects
         Joint effects to add to the model, of :data:`truearm.modeling.effects.EFFECTS` by name.
     progress
@@ -253,7 +253,7 @@ def calibrate(
         source = urdf_source(robot)
         urdf = None if source is None else read_bytes(source[0])
         robot = load_robot(robot)
-    robot = robot.carrying(payload, gravity)
+    robot = robot.with_payload(payload, gravity)
     digest = ""
     if isinstance(data, str | Path):
         progress("reading the data")
@@ -324,7 +324,7 @@ def calibrate(
             *_check_proof(before, validation),
             *check_fit(fit),
             *noticed,
-            *check_settling(fit, data),
+            *check_arrival_lag(fit, data),
             *check_transmission(fit, first),
         ),
         data=data,
@@ -359,7 +359,7 @@ def check(
     data = load_data(data) if isinstance(data, str | Path) else data
     ranged: tuple[Notice, ...] = ()
     if device is not None:
-        from truearm.measurement.devices import named_device  # with its inverse kinematics, only where it is asked for
+        from truearm.simulation.devices import named_device  # with its inverse kinematics, only where it is asked for
 
         ranged = tuple(check_range(data, named_device(device)))
     if robot is None:
@@ -402,7 +402,7 @@ def validate(
             cure="Use the calibrated.yaml that 'truearm calibrate' wrote: it holds base and targets.",
         )
     check_joints(robot, data)
-    robot = robot.carrying(payload, gravity)
+    robot = robot.with_payload(payload, gravity)
     if data.temperature is None and any(effect.warmed for effect in robot.effects):
         raise InputError(
             "the robot was calibrated with its temperature, and the data do not say theirs",

@@ -15,7 +15,6 @@ import numpy as np
 
 from truearm.compensation.advice import check_correction, frame_words
 from truearm.compensation.cell import read_cell
-from truearm.compensation.division import Divided, divided
 from truearm.compensation.gauge import turns_between
 from truearm.compensation.program_correction import CorrectedPrograms, Correction, corrected_programs
 from truearm.compensation.program_files import (
@@ -29,6 +28,7 @@ from truearm.compensation.program_files import (
     write_programs,
 )
 from truearm.compensation.programs.program import Edit, Program, Source
+from truearm.compensation.split import Divided, divided
 from truearm.errors import InputError
 from truearm.files import writable_folder
 from truearm.modeling.parts import Payload
@@ -224,7 +224,7 @@ def correct(
         If a program cannot be read or was corrected already, the robot is not calibrated, a tool or frame is not
         defined, or with `strict` a target cannot be corrected.
     """
-    arm = (robot if isinstance(robot, Robot) else load_robot(str(robot))).carrying(payload)
+    arm = (robot if isinstance(robot, Robot) else load_robot(str(robot))).with_payload(payload)
     cell = read_cell(arm, None if tools is None else Path(tools), None if frames is None else Path(frames))
     files = program_files([Path(path) for path in programs], again=again)
     progress("reading the programs")

@@ -17,15 +17,15 @@ from truearm.compensation.program_correction import commanded
 from truearm.correction import ProgramCorrection, correct
 from truearm.errors import InputError
 from truearm.files import exists, read_bytes, read_yaml, write_files, write_new_text
-from truearm.identification.fit import Status
+from truearm.identification.solving.fit import Status
 from truearm.measurement.readers.canonical import csv_text
-from truearm.measurement.truths import truth_twin
-from truearm.measurement.twin import Twin, measure
-from truearm.measurement.twin_joint import PERFECT
 from truearm.modeling.formats.robot_file import RobotFile, robot_from_file
 from truearm.modeling.transform import Transform
 from truearm.reporting.program_report import Checked
 from truearm.robots import load_robot
+from truearm.simulation.truths import truth_twin
+from truearm.simulation.twin import Twin, measure
+from truearm.simulation.twin_joint import PERFECT
 
 #: The program that is corrected, and where its work object is in the controller's base: the numbers it has itself.
 _PLATE: Final = "plate.mod"

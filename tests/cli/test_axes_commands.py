@@ -11,10 +11,10 @@ from tests.cli.conftest import Truearm
 from tests.identification.test_axes import runs
 
 from truearm.measurement.readers.canonical import csv_text
-from truearm.measurement.truths import truth_twin
-from truearm.measurement.twin import measure
 from truearm.modeling.transform import IDENTITY
 from truearm.robots import load_robot
+from truearm.simulation.truths import truth_twin
+from truearm.simulation.twin import measure
 
 
 @pytest.fixture(scope="module")

@@ -22,7 +22,7 @@ from truearm.robots import load_robot
 
 def worn() -> Robot:
     """Return an IRB 120 as a calibration leaves it: errors, springy joints, a base in the instrument's frame."""
-    springy = load_robot("irb120").with_effects(["compliance"]).carrying(Payload(2.0, (0.0, 0.0, 0.1)))
+    springy = load_robot("irb120").with_effects(["compliance"]).with_payload(Payload(2.0, (0.0, 0.0, 0.1)))
     errors = {"a_3": 0.2708, "theta_offset_3": 0.002, "alpha_4": -1.5695, "d_4": 0.3024, "compliance_3": 1.3e-4}
     return springy.with_values(errors | {"base_x": 1.0, "base_rz": 0.5})
 
@@ -81,7 +81,7 @@ def test_with_tool_and_frame_nothing_is_assumed(truearm: Truearm, cell: Path) ->
 
 
 def test_a_robot_without_a_payload_is_asked_for_one_if_it_bends(truearm: Truearm, cell: Path) -> None:
-    for robot, asked in ((worn().carrying(Payload()), True), (stiff(), False)):
+    for robot, asked in ((worn().with_payload(Payload()), True), (stiff(), False)):
         (cell / "calibrated.yaml").write_text(robot_text(robot))
         code, said = run(truearm, cell, "--json", out=f"out{asked}")
         assert code == 0

@@ -12,8 +12,8 @@ from scipy.spatial.transform import Rotation
 from truearm.calibration import calibrate
 from truearm.compensation.fake_targets import fake_targets, matrices, nominal_robot
 from truearm.compensation.gauge import best_agreement
-from truearm.compensation.meant_postures import meant_postures
 from truearm.compensation.programs.program import Configuration
+from truearm.compensation.resolved_configurations import resolved_configurations
 from truearm.errors import InputError
 from truearm.measurement.readers.matrices import read_matrices
 from truearm.modeling.inverse.branches import BRANCHES, branch_rule
@@ -25,7 +25,7 @@ from truearm.robots import load_robot
 def worn(robot: Robot, seed: int = 1) -> Robot:
     """Return a robot with drawn errors and springy joints, where an instrument would see it."""
     rng = np.random.default_rng(seed)
-    springy = robot.with_effects(["compliance"]).carrying(Payload(2.0, (0.02, 0.0, 0.1)))
+    springy = robot.with_effects(["compliance"]).with_payload(Payload(2.0, (0.02, 0.0, 0.1)))
     drawn = {
         p.name: p.value + p.prior * float(rng.standard_normal())
         for p in springy.parameters.values()
@@ -74,10 +74,10 @@ def test_ten_thousand_targets_of_the_measured_irb120(irb120: Robot) -> None:
     base, flange = best_agreement(irb120)
     joints = irb120.random_configurations(11_000, rng)
     wanted = np.linalg.inv(_base(irb120)) @ matrices(irb120, joints)
-    asked = rule.numbers(nominal.sweep(joints))
+    asked = rule.numbers(nominal.forward_kinematics(joints))
     words = [Configuration(*BRANCHES[number].split("-")) for number in asked.tolist()]
     unknown = np.full(joints.shape, np.nan)
-    meant = meant_postures(nominal, np.linalg.inv(base) @ wanted @ flange, words, unknown, range(len(joints)))
+    meant = resolved_configurations(nominal, np.linalg.inv(base) @ wanted @ flange, words, unknown, range(len(joints)))
     rows = np.flatnonzero(~np.isnan(meant.joints).any(axis=1))[:10_000]
     assert len(rows) == 10_000
     found = fake_targets(irb120, wanted[rows], meant.joints[rows])
@@ -85,7 +85,7 @@ def test_ten_thousand_targets_of_the_measured_irb120(irb120: Robot) -> None:
     assert np.linalg.norm(there[:, :3, 3] - wanted[rows, :3, 3], axis=1).max() < 1e-9
     turned = Rotation.from_matrix(np.swapaxes(there[:, :3, :3], 1, 2) @ wanted[rows, :3, :3]).magnitude()
     assert turned.max() < 1e-8
-    on_branch = rule.numbers(nominal.sweep(found.joints)) == asked[rows]
+    on_branch = rule.numbers(nominal.forward_kinematics(found.joints)) == asked[rows]
     assert on_branch.mean() >= 0.9999
     caused = {"beyond-limit", "branch-lost", "unreachable"}
     assert all(found.solutions.status[row].value in caused for row in np.flatnonzero(~on_branch))

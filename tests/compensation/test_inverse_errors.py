@@ -11,12 +11,12 @@ from tests.modeling.test_conventions import about, slid
 from tests.modeling.test_joint_errors import TABLE_1, TABLE_3, error, with_table_3
 
 from truearm.compensation.inverse_errors import design, fake_targets, inverted
-from truearm.compensation.line_test import LineErrors, from_data, on_twin, reduction, summary
 from truearm.errors import InputError
-from truearm.measurement.twin import Twin, measure
 from truearm.modeling.transform import IDENTITY, Transform
-from truearm.planning.seven_lines import DIRECTIONS, SevenLines, readings, seven_lines
+from truearm.planning.poses.seven_lines import DIRECTIONS, SevenLines, readings, seven_lines
 from truearm.robots import load_robot
+from truearm.simulation.twin import Twin, measure
+from truearm.validation.line_test import LineErrors, from_data, on_twin, reduction, summary
 
 
 @pytest.fixture(scope="module")

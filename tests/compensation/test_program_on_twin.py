@@ -18,12 +18,12 @@ from truearm.compensation.program_correction import Correction, commanded, corre
 from truearm.compensation.program_files import edited
 from truearm.compensation.programs.program import Program, Source
 from truearm.compensation.programs.rapid import RAPID
-from truearm.measurement.truths import truth_twin
-from truearm.measurement.twin import Twin, measure
-from truearm.measurement.twin_joint import PERFECT
 from truearm.modeling.inverse.branches import branch_rule
 from truearm.modeling.transform import Transform, quaternion_from_rotation
 from truearm.robots import load_robot
+from truearm.simulation.truths import truth_twin
+from truearm.simulation.twin import Twin, measure
+from truearm.simulation.twin_joint import PERFECT
 
 NOISE = 0.03e-3
 LOW, HIGH = np.radians([[-90, 0, -80, -150, -90, -180], [90, 110, 70, 150, 90, 180]])
@@ -81,7 +81,7 @@ def all_over_the_workspace(count: int, rng: np.random.Generator) -> str:
     joints = rng.uniform(LOW, HIGH, (count, 6))
     poses = np.linalg.inv(frame) @ matrices(nominal, joints) @ tool
     quadrants = np.floor(np.degrees(joints[:, [0, 3, 5]]) / 90).astype(int)
-    elbows = branch_rule(nominal).numbers(nominal.sweep(joints)) & 2  # type: ignore[union-attr]
+    elbows = branch_rule(nominal).numbers(nominal.forward_kinematics(joints)) & 2  # type: ignore[union-attr]
     lines = [
         f"    MoveJ [[{x:.2f},{y:.2f},{z:.2f}],[{','.join(f'{v:.7f}' for v in q)}],[{a},{b},{c},{elbow}],"
         "[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tProbe\\WObj:=wobjPlate;"

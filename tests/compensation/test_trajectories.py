@@ -12,16 +12,16 @@ import pytest
 
 from truearm.compensation.trajectories import corrected, path_error
 from truearm.errors import InputError
-from truearm.measurement.twin import Twin
-from truearm.measurement.twin_joint import JointTruth
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY, Transform
-from truearm.planning.joint_motion import JointMotion, joint_motion
-from truearm.planning.paths import Circle, Line
-from truearm.planning.time_law import timed
-from truearm.planning.trajectory import Trajectory
+from truearm.planning.paths.joint_motion import JointMotion, joint_motion
+from truearm.planning.paths.paths import Circle, Line
+from truearm.planning.paths.time_law import timed
+from truearm.planning.paths.trajectory import Trajectory
 from truearm.robots import load_robot
+from truearm.simulation.twin import Twin
+from truearm.simulation.twin_joint import JointTruth
 
 #: Tables 4.3 and 4.4 of the Katana thesis.
 COMPLIANCE = [math.radians(1 / k) / 9.80665 for k in (122, 90, 75, 78, 80)]

@@ -11,20 +11,20 @@ from numpy.testing import assert_allclose
 from tests.modeling.test_joint_errors import with_table_3
 
 from truearm.errors import InputError
-from truearm.identification.axis_analysis import AxisAnalysis, analyse
-from truearm.identification.axis_circles import AxisProblem, axis_circles
-from truearm.identification.axis_fit import NORMAL_95, fit_axes
+from truearm.identification.axes.analysis import AxisAnalysis, analyse
+from truearm.identification.axes.circles import AxisProblem, axis_circles
+from truearm.identification.axes.fit import NORMAL_95, fit_axes
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of
-from truearm.measurement.truths import truth_twin
-from truearm.measurement.twin import Twin, measure
-from truearm.measurement.twin_joint import JointTruth
 from truearm.modeling.chain import Array
 from truearm.modeling.conversion import converted
 from truearm.modeling.lines import base_and_flange, frame_between, joint_axes
 from truearm.modeling.parameters import FreeParameters
 from truearm.modeling.transform import IDENTITY
 from truearm.robots import load_robot
+from truearm.simulation.truths import truth_twin
+from truearm.simulation.twin import Twin, measure
+from truearm.simulation.twin_joint import JointTruth
 
 
 def runs(step: float = 6.0, posture: tuple[float, ...] = (0, 0, 0, 0, 30, 0)) -> Array:

@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from truearm.identification.componentwise import least_absolute
-from truearm.identification.problem import Problem
-from truearm.identification.solver import solve
+from truearm.identification.solving.componentwise import least_absolute
+from truearm.identification.solving.problem import Problem
+from truearm.identification.solving.solver import solve
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.twin import Twin, measure
 from truearm.modeling.parameters import FreeParameters
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY
 from truearm.robots import load_robot
+from truearm.simulation.twin import Twin, measure
 
 
 def arm() -> Robot:

@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 from tests.simulated import more_of
 
-from truearm.identification.fit import Fit, Status, identify
-from truearm.identification.models import MODELS
-from truearm.identification.redundancy import Redundancy
+from truearm.identification.solving.fit import Fit, Status, identify
+from truearm.identification.solving.models import MODELS
+from truearm.identification.solving.redundancy import Redundancy
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of
-from truearm.measurement.truths import truth_twin
-from truearm.measurement.twin import Twin, measure
 from truearm.modeling.conversion import CONVERSIONS, converted
 from truearm.modeling.formats import dh_table
 from truearm.modeling.robot import Robot
 from truearm.robots import load_robot
+from truearm.simulation.truths import truth_twin
+from truearm.simulation.twin import Twin, measure
 
 GEOMETRIC = {m.name: m for m in MODELS}["geometric"]
 GUIDE = Path(__file__).parents[2] / "docs" / "guide" / "conventions.md"

@@ -9,18 +9,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.simulated import campaign, more_of
 
-from truearm.identification.bounds import Bounds
-from truearm.identification.fit import Fit, Status, identify
-from truearm.identification.losses import Loss
-from truearm.identification.models import MODELS, Model
-from truearm.identification.problem import Problem
+from truearm.identification.solving.bounds import Bounds
+from truearm.identification.solving.fit import Fit, Status, identify
+from truearm.identification.solving.losses import Loss
+from truearm.identification.solving.models import MODELS, Model
+from truearm.identification.solving.problem import Problem
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of
-from truearm.measurement.truths import truth_twin
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import Payload
 from truearm.modeling.transform import Transform, quaternion_from_rotation, rotation_from_quaternion
 from truearm.robots import load_robot
+from truearm.simulation.truths import truth_twin
 
 BY_NAME = {m.name: m for m in MODELS}
 GEOMETRIC = BY_NAME["geometric"]
@@ -30,7 +30,7 @@ GEOMETRIC = BY_NAME["geometric"]
 @pytest.mark.parametrize("with_orientation", [False, True])
 def test_the_jacobian_of_every_model_agrees_with_central_differences(model: Model, with_orientation: bool) -> None:
     rng = np.random.default_rng(4)
-    robot = model.prepared(load_robot("irb120").carrying(Payload(2.0, (0.05, 0.0, 0.1))))
+    robot = model.prepared(load_robot("irb120").with_payload(Payload(2.0, (0.05, 0.0, 0.1))))
     frame = Transform((0.1, 0.02, 0.15), (0.6, 0.0, 0.8, 0.0))
     robot = robot.with_frames(Transform((1.0, 0.2, -0.3), (0.5, 0.5, 0.5, 0.5)), {"1": frame, "2": (0.1, 0.1, 0.1)})
     free = model.free(robot)

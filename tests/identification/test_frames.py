@@ -7,8 +7,8 @@ import pytest
 from tests.simulated import campaign
 
 from truearm.errors import InputError
-from truearm.identification.fit import place
-from truearm.identification.frames import initial_frames
+from truearm.identification.solving.fit import place
+from truearm.identification.start_values.frames import initial_frames
 from truearm.measurement.statistics import errors_of
 from truearm.modeling.transform import Transform, quaternion_from_rotation
 from truearm.robots import library, load_robot

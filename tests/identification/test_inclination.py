@@ -10,13 +10,13 @@ import pytest
 from numpy.testing import assert_allclose
 from tests.tilting import JOINTS, TRUTH, tilting_katana
 
-from truearm.identification.inclination import inclination_derivatives, inclinations_of, link_ends
-from truearm.measurement.inclinometer import inclinations
-from truearm.measurement.twin import Twin
+from truearm.identification.inclinometers.inclination import inclination_derivatives, inclinations_of, link_ends
 from truearm.modeling.chain import Array
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
 from truearm.robots import load_robot
+from truearm.simulation.inclinometer import inclinations
+from truearm.simulation.twin import Twin
 
 RNG = np.random.default_rng
 

@@ -8,11 +8,11 @@ import pytest
 from tests.katana import katana
 
 from truearm.errors import InputError
-from truearm.identification.influence import Influence, influence
-from truearm.measurement.truths import truth_twin
-from truearm.measurement.twin import Twin
+from truearm.identification.solving.influence import Influence, influence
 from truearm.modeling.chain import Array
 from truearm.robots import load_robot
+from truearm.simulation.truths import truth_twin
+from truearm.simulation.twin import Twin
 from truearm.studies.katana import NAMES, PERTURBATIONS
 
 HALF = math.radians(0.025)

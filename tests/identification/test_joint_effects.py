@@ -10,22 +10,22 @@ import pytest
 from tests.simulated import campaign
 
 from truearm.errors import InputError
-from truearm.identification.advice import check_fit
-from truearm.identification.bounds import Bounds
-from truearm.identification.fit import Fit, identify
-from truearm.identification.models import MODELS, Model
+from truearm.identification.judging.advice import check_fit
+from truearm.identification.solving.bounds import Bounds
+from truearm.identification.solving.fit import Fit, identify
+from truearm.identification.solving.models import MODELS, Model
 from truearm.measurement.checks import check_data
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.truths import truth_twin
-from truearm.measurement.twin import measure
-from truearm.measurement.twin_joint import JointTruth
 from truearm.modeling.parts import Payload
 from truearm.robots import load_robot
+from truearm.simulation.truths import truth_twin
+from truearm.simulation.twin import measure
+from truearm.simulation.twin_joint import JointTruth
 
 MODEL = {model.name: model for model in MODELS}
 TOOL = Payload(2.7, (0.05, 0.025, 0.1))
 COMPLIANCE = {2: 0.032e-3, 3: 0.130e-3, 4: 0.605e-3, 5: 0.419e-3, 6: 0.647e-3}
-IRB120 = load_robot("irb120").carrying(TOOL)
+IRB120 = load_robot("irb120").with_payload(TOOL)
 
 
 def bent(poses: int) -> Dataset:
@@ -47,7 +47,7 @@ def test_compliance_is_that_of_the_twin_and_the_vertical_axis_is_named() -> None
     notices = told(fit)
     assert notices["effects-uninformed"].startswith("The data say nothing about compliance_1: nothing loads")
     assert not {"no-loads", "negative-effect", "too-many-effects"} & set(notices)
-    assert fit.standing("compliance_1") == "uninformed"
+    assert fit.parameter_status("compliance_1") == "uninformed"
     assert fit.robot.values["compliance_1"] == pytest.approx(0.0, abs=1e-6)
 
 
@@ -65,7 +65,7 @@ def test_a_robot_without_masses_is_told_so() -> None:
     assert "no link masses and no payload" in notices["no-loads"]
     assert "--payload" in notices["no-loads"]
     assert "effects-uninformed" not in notices
-    assert "no-loads" not in told(identify(weightless.carrying(TOOL), data, MODEL["elastic"]))
+    assert "no-loads" not in told(identify(weightless.with_payload(TOOL), data, MODEL["elastic"]))
     assert "no-loads" not in told(identify(weightless, data, MODEL["joints"]))
 
 
@@ -82,7 +82,7 @@ def test_more_effects_than_the_data_can_carry(model: str, few: int, enough: int)
 
 def test_loads_of_the_wrong_sign_come_out_as_negative_springs() -> None:
     data = bent(50)
-    message = told(identify(IRB120.carrying(gravity=(0.0, 0.0, 9.81)), data, MODEL["elastic"]))["negative-effect"]
+    message = told(identify(IRB120.with_payload(gravity=(0.0, 0.0, 9.81)), data, MODEL["elastic"]))["negative-effect"]
     assert "compliance_2, compliance_3" in message
     assert "masses, payload or gravity may be wrong" in message
     assert "negative-effect" not in told(identify(IRB120, data, MODEL["tilting"]))

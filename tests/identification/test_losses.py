@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from truearm.identification.fit import Status, identify
-from truearm.identification.losses import Loss, norms_of, robust_scale, weights
-from truearm.identification.models import MODELS
-from truearm.measurement.devices import measured_with, named_device
-from truearm.measurement.truths import truth_twin
+from truearm.identification.solving.fit import Status, identify
+from truearm.identification.solving.losses import Loss, norms_of, robust_scale, weights
+from truearm.identification.solving.models import MODELS
 from truearm.robots import load_robot
+from truearm.simulation.devices import measured_with, named_device
+from truearm.simulation.truths import truth_twin
 
 GEOMETRIC = {m.name: m for m in MODELS}["geometric"]
 

@@ -6,18 +6,18 @@ from functools import cache
 import numpy as np
 import pytest
 
-from truearm.identification.fit import identify
-from truearm.identification.models import MODELS
-from truearm.identification.monte_carlo import MonteCarlo, monte_carlo
-from truearm.identification.problem import Problem
-from truearm.identification.solver import solve
+from truearm.identification.judging.monte_carlo import MonteCarlo, monte_carlo
+from truearm.identification.solving.fit import identify
+from truearm.identification.solving.models import MODELS
+from truearm.identification.solving.problem import Problem
+from truearm.identification.solving.solver import solve
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of
-from truearm.measurement.truths import truth_twin
-from truearm.measurement.twin import Twin, measure
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 from truearm.robots import load_robot
+from truearm.simulation.truths import truth_twin
+from truearm.simulation.twin import Twin, measure
 
 BY_NAME = {m.name: m for m in MODELS}
 SIGMA = 0.05e-3

@@ -10,8 +10,8 @@ import pytest
 from tests.katana import UNIT, drawn, katana, readings, values
 
 from truearm.errors import InputError
-from truearm.identification.influence import influence
-from truearm.identification.pose_by_pose import (
+from truearm.identification.solving.influence import influence
+from truearm.identification.solving.pose_by_pose import (
     Combination,
     PoseByPose,
     influence_based,
@@ -20,9 +20,9 @@ from truearm.identification.pose_by_pose import (
 )
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of
-from truearm.measurement.twin import Twin
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
+from truearm.simulation.twin import Twin
 from truearm.studies.katana import NAMES, PERTURBATIONS, UNITS
 
 NOISE = 1e-5
@@ -86,7 +86,7 @@ def test_poses_together_are_what_each_pose_gives_alone(method: Method) -> None:
         assert together.iterations[pose] == alone.iterations[0]
 
 
-def linear(robot: Robot, data: Dataset) -> tuple[Array, Array]:
+def position_jacobian(robot: Robot, data: Dataset) -> tuple[Array, Array]:
     """Return position errors ``(n, 3)`` and Jacobians ``(n, 3, 17)`` by central differences of the twin."""
     J = np.empty((len(data.joints), 3, len(NAMES)))
     start, step = values(robot), 1e-5
@@ -102,7 +102,7 @@ def linear(robot: Robot, data: Dataset) -> tuple[Array, Array]:
 def test_small_errors_are_given_the_smallest_step_in_rad_and_mm() -> None:
     data = readings(drawn(1e-3, 3), 5, 0.0, 3)
     found = standard(katana(), data, tolerance=1e-13)
-    for error, J, vector in zip(*linear(katana(), data), found.sets, strict=True):
+    for error, J, vector in zip(*position_jacobian(katana(), data), found.sets, strict=True):
         counted = J * UNIT
         expected = UNIT * (counted.T @ np.linalg.solve(counted @ counted.T, error))
         np.testing.assert_allclose((vector - values(katana())) / UNIT, expected / UNIT, rtol=0, atol=1e-9)
@@ -115,7 +115,7 @@ def test_small_errors_end_where_steps_weighted_by_influence_are_smallest(damping
     data = readings(drawn(1e-3, 4), 5, 0.0, 4)
     found = by_influence(katana(), data, tolerance=1e-13, damping=damping)
     k = influence(katana(), data.joints, NAMES, "tip", PERTURBATIONS).vector.T
-    for error, J, weight, vector in zip(*linear(katana(), data), k, found.sets, strict=True):
+    for error, J, weight, vector in zip(*position_jacobian(katana(), data), k, found.sets, strict=True):
         counted = J * UNIT
         expected = weight * (counted.T @ np.linalg.solve((counted * weight) @ counted.T, error))
         np.testing.assert_allclose((vector - values(katana())) / UNIT, expected, rtol=0, atol=1e-9)

@@ -8,9 +8,9 @@ import pytest
 from tests.simulated import campaign, more_of
 
 from truearm.errors import InputError
-from truearm.identification.bounds import Bounds
-from truearm.identification.fit import Fit, Redundant, Status, identify
-from truearm.identification.models import MODELS
+from truearm.identification.solving.bounds import Bounds
+from truearm.identification.solving.fit import Fit, Redundant, Status, identify
+from truearm.identification.solving.models import MODELS
 from truearm.measurement.statistics import errors_of
 from truearm.robots import library, load_robot
 
@@ -59,7 +59,7 @@ def test_a_combination_changes_no_prediction() -> None:
         names = list(redundancy.members)
         direction = np.array([redundancy.members[n] for n in names])
         for target in robot.robot.targets:
-            linear, _ = robot.robot.derivatives(robot.robot.sweep(q, target.name), q, names)
+            linear, _ = robot.robot.jacobians(robot.robot.forward_kinematics(q, target.name), q, names)
             moved = np.einsum("p,pin->in", direction, linear)
             assert np.abs(moved).max() < 1e-6 * np.abs(direction[:, None, None] * linear).max() + 1e-14
 
@@ -105,7 +105,7 @@ def test_a_joint_that_never_moved_is_a_loss_of_rank(still: list[int]) -> None:
                        redundancy=redundancy)  # fmt: skip
         assert fit.status is Status.RANK_LOSS, redundancy
         assert fit.unseen
-        assert all(fit.standing(name) == "not-determined" for name in fit.unseen)
+        assert all(fit.parameter_status(name) == "not-determined" for name in fit.unseen)
 
 
 def test_a_single_target_on_the_last_axis_leaves_honest_deviations() -> None:

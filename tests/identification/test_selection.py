@@ -11,18 +11,18 @@ import pytest
 
 from truearm.calibration import calibrate
 from truearm.errors import InputError
-from truearm.identification.bounds import Bounds
-from truearm.identification.fit import identify
-from truearm.identification.models import MODELS
-from truearm.identification.selection import Selection, select
+from truearm.identification.choosing.selection import Selection, select
+from truearm.identification.solving.bounds import Bounds
+from truearm.identification.solving.fit import identify
+from truearm.identification.solving.models import MODELS
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of
-from truearm.measurement.truths import truth_twin
-from truearm.measurement.twin import Twin, measure
-from truearm.measurement.twin_joint import JointTruth
 from truearm.modeling.parts import LinkMass, Payload
 from truearm.modeling.robot import Robot
 from truearm.robots import load_robot
+from truearm.simulation.truths import truth_twin
+from truearm.simulation.twin import Twin, measure
+from truearm.simulation.twin_joint import JointTruth
 
 NOISE = 2e-5
 ELASTIC = next(model for model in MODELS if model.name == "elastic")
@@ -57,7 +57,7 @@ def taken(selection: Selection) -> list[str]:
 def few(monkeypatch: pytest.MonkeyPatch) -> tuple[str, ...]:
     """Some effects to choose from, which is quicker."""
     candidates = ("backlash", "hardening", "approach", "thermal-growth")
-    monkeypatch.setattr("truearm.identification.selection._CANDIDATES", candidates)
+    monkeypatch.setattr("truearm.identification.choosing.selection._CANDIDATES", candidates)
     return candidates
 
 

@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from truearm.identification.fit import Fit, identify
-from truearm.identification.models import MODELS
-from truearm.identification.transmission import check_transmission, periodic_errors
+from truearm.identification.judging.transmission import check_transmission, periodic_errors
+from truearm.identification.solving.fit import Fit, identify
+from truearm.identification.solving.models import MODELS
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.truths import truth_twin
-from truearm.measurement.twin import measure
-from truearm.measurement.twin_joint import JointTruth
 from truearm.modeling.robot import Robot
 from truearm.robots import load_robot
+from truearm.simulation.truths import truth_twin
+from truearm.simulation.twin import measure
+from truearm.simulation.twin_joint import JointTruth
 
 ELASTIC = next(model for model in MODELS if model.name == "elastic")
 
@@ -29,7 +29,7 @@ def campaign(robot: Robot, gears: dict[int, tuple[int, float]], poses: int, seed
     twin = truth_twin(robot, "random", rng)
     erring = {joint: JointTruth(gear=((periods, size, 0.7),)) for joint, (periods, size) in gears.items()}
     data = measure(replace(twin, joints=erring), robot.random_configurations(poses, rng), 3e-5, rng)
-    return identify(robot.carrying(twin.robot.payload), data, ELASTIC), data
+    return identify(robot.with_payload(twin.robot.payload), data, ELASTIC), data
 
 
 @pytest.mark.parametrize("seed", range(3))

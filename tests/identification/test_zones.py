@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 from truearm.errors import InputError
-from truearm.identification.fit import identify
-from truearm.identification.models import MODELS
-from truearm.identification.zones import Zones, identify_zones
+from truearm.identification.choosing.zones import Zones, identify_zones
+from truearm.identification.solving.fit import identify
+from truearm.identification.solving.models import MODELS
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.devices import measured_with, named_device
-from truearm.measurement.truths import truth_twin
-from truearm.measurement.twin import Twin, measure
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.robots import load_robot
+from truearm.simulation.devices import measured_with, named_device
+from truearm.simulation.truths import truth_twin
+from truearm.simulation.twin import Twin, measure
 
 GEOMETRIC = next(model for model in MODELS if model.name == "geometric")
 

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 from truearm.errors import InputError
-from truearm.identification.problem import SETUP, Problem
+from truearm.identification.solving.problem import SETUP, Problem
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.observations import OBSERVATIONS, compared
-from truearm.measurement.truths import joint_truths
-from truearm.measurement.twin import Twin
 from truearm.modeling.chain import Array
 from truearm.modeling.parameters import FreeParameters
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 from truearm.robots import load_robot
+from truearm.simulation.truths import joint_truths
+from truearm.simulation.twin import Twin
 
 COUNT = 7
 SIGMA = {"position": 2e-5, "orientation": 3e-4, "distance": 1e-6, "height": 5e-6}
@@ -69,8 +69,8 @@ def truth(robot: Robot, joints: Array, target: str, fixture: str | None) -> Arra
     frames = Twin(robot, joint_truths(robot)).frames(joints)[target]
     if fixture is None:
         return frames
-    sweep, T = robot.fixture_sweep(fixture), np.eye(4)
-    T[:3, :3], T[:3, 3] = sweep.matrix()[0], sweep.position[:, 0]
+    kinematics, T = robot.fixture_kinematics(fixture), np.eye(4)
+    T[:3, :3], T[:3, 3] = kinematics.matrix()[0], kinematics.position[:, 0]
     return np.asarray(np.linalg.inv(T) @ frames)
 
 
@@ -178,7 +178,7 @@ def test_jacobian_by_central_differences(name: str, fixture: str | None, effects
 def with_setup(robot: Robot, data: Dataset) -> Dataset:
     """Add what is known of the fixtures: the place of one, and its distance from another."""
     fixtures = (*data.fixtures, "other")
-    places = {name: robot.fixture_sweep(name).position[:, 0] for name in ("point", "other", "frame")}
+    places = {name: robot.fixture_kinematics(name).position[:, 0] for name in ("point", "other", "frame")}
     apart = float(np.linalg.norm(places["other"] - places["frame"]))
     known = Dataset(
         source="here",

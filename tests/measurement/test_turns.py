@@ -9,12 +9,12 @@ from numpy.testing import assert_allclose
 
 from truearm.measurement.circles import fit_circle
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.truths import truth_twin
 from truearm.measurement.turns import find_runs, turn_of
-from truearm.measurement.twin import Twin, measure
-from truearm.measurement.twin_joint import JointTruth
 from truearm.modeling.chain import Array
 from truearm.robots import load_robot
+from truearm.simulation.truths import truth_twin
+from truearm.simulation.twin import Twin, measure
+from truearm.simulation.twin_joint import JointTruth
 
 
 def campaign(joints: Array) -> Dataset:

@@ -81,11 +81,11 @@ def test_random_chain_agrees_with_pinocchio(seed: int) -> None:
     chain, values, count = random_chain(rng)
     scale = [[np.pi if e.turns else 0.05] for e in chain.elements if e.variable is not None]
     variables = rng.uniform(-1, 1, (count, CONFIGURATIONS)) * np.array(scale)
-    sweep = chain.sweep(variables, values)
+    kinematics = chain.forward_kinematics(variables, values)
     moving = [i for i, e in enumerate(chain.elements) if e.variable is not None]
-    jacobian = np.concatenate(sweep.derivatives(moving), axis=1)  # (elements, 6, n)
+    jacobian = np.concatenate(kinematics.jacobians(moving), axis=1)  # (elements, 6, n)
     compare_with_pinocchio(
-        chain, values, variables, sweep.position.T, sweep.matrix(), np.moveaxis(jacobian, (0, 1), (2, 1))
+        chain, values, variables, kinematics.position.T, kinematics.matrix(), np.moveaxis(jacobian, (0, 1), (2, 1))
     )
 
 
@@ -153,12 +153,12 @@ def check_derivatives(robot: Robot, rng: np.random.Generator) -> None:
     names = list(robot.parameters)
     h = 1e-5  # truncation and rounding are both of the order of 1e-11 here
     for target in ("tip", "point"):
-        sweep = robot.sweep(q, target)
-        linear, angular = robot.derivatives(sweep, q, names)
+        kinematics = robot.forward_kinematics(q, target)
+        linear, angular = robot.jacobians(kinematics, q, names)
         for i, name in enumerate(names):
-            ahead = robot.sweep(q, target, {**robot.values, name: robot.values[name] + h})
-            behind = robot.sweep(q, target, {**robot.values, name: robot.values[name] - h})
-            turn = (ahead.matrix() - behind.matrix()) @ np.swapaxes(sweep.matrix(), 1, 2)
+            ahead = robot.forward_kinematics(q, target, {**robot.values, name: robot.values[name] + h})
+            behind = robot.forward_kinematics(q, target, {**robot.values, name: robot.values[name] - h})
+            turn = (ahead.matrix() - behind.matrix()) @ np.swapaxes(kinematics.matrix(), 1, 2)
             assert_allclose(linear[i], (ahead.position - behind.position) / (2 * h), rtol=0, atol=1e-9, err_msg=name)
             assert_allclose(angular[i], vee(turn) / (2 * h), rtol=0, atol=1e-9, err_msg=name)
 
@@ -192,7 +192,7 @@ def test_derivative_by_the_parameters_of_another_target_is_zero() -> None:
     rng = np.random.default_rng(3)
     robot = random_robot(CONVENTIONS[0], (), rng)
     q = robot.random_configurations(2, rng)
-    linear, angular = robot.derivatives(robot.sweep(q, "tip"), q, ["target_point_x"])
+    linear, angular = robot.jacobians(robot.forward_kinematics(q, "tip"), q, ["target_point_x"])
     assert not linear.any()
     assert not angular.any()
 
@@ -215,16 +215,16 @@ def check_trials(robot: Robot, names: list[str], rng: np.random.Generator) -> No
     trials = 4
     q = robot.random_configurations(CONFIGURATIONS, rng)
     values = trial_values(robot, names, trials, rng)
-    together = robot.sweep(q, "tip", values)
-    linear, angular = robot.derivatives(together, q, list(robot.parameters), values)
+    together = robot.forward_kinematics(q, "tip", values)
+    linear, angular = robot.jacobians(together, q, list(robot.parameters), values)
     assert together.position.shape == (3, trials, CONFIGURATIONS)
     assert together.matrix().shape == (trials, CONFIGURATIONS, 3, 3)
     for trial in range(trials):
         own: dict[str, float | Array] = {
             n: v if isinstance(v, float) else float(v[trial, 0]) for n, v in values.items()
         }
-        alone = robot.sweep(q, "tip", own)
-        alone_linear, alone_angular = robot.derivatives(alone, q, list(robot.parameters), own)
+        alone = robot.forward_kinematics(q, "tip", own)
+        alone_linear, alone_angular = robot.jacobians(alone, q, list(robot.parameters), own)
         assert_allclose(together.position[:, trial], alone.position, rtol=0, atol=1e-14)
         assert_allclose(together.matrix()[trial], alone.matrix(), rtol=0, atol=1e-14)
         assert_allclose(linear[:, :, trial], alone_linear, rtol=0, atol=1e-14)
@@ -258,13 +258,13 @@ def test_sweep_goes_on_from_another() -> None:
     rng = np.random.default_rng(6)
     chain, values, count = random_chain(rng)
     variables = rng.uniform(-1, 1, (count, CONFIGURATIONS))
-    whole = chain.sweep(variables, values)
+    whole = chain.forward_kinematics(variables, values)
     front, back = Chain(chain.elements[:2]), Chain(chain.elements[2:])
-    pieces = back.sweep(variables, values, front.sweep(variables, values))
+    pieces = back.forward_kinematics(variables, values, front.forward_kinematics(variables, values))
     assert_allclose(pieces.position, whole.position, rtol=0, atol=0)
     assert_allclose(pieces.matrix(), whole.matrix(), rtol=0, atol=0)
     indices = range(len(chain.elements))
-    for actual, expected in zip(pieces.derivatives(indices), whole.derivatives(indices), strict=True):
+    for actual, expected in zip(pieces.jacobians(indices), whole.jacobians(indices), strict=True):
         assert_allclose(actual, expected, rtol=0, atol=0)
 
 

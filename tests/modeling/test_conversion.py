@@ -8,7 +8,6 @@ from numpy.testing import assert_allclose
 from tests.modeling.test_chain import random_frame, random_robot
 
 from truearm.errors import InputError
-from truearm.measurement.twin import Twin
 from truearm.modeling.chain import Array, Chain
 from truearm.modeling.conventions import CONVENTIONS, Convention, JointKind
 from truearm.modeling.conventions.cpc import published_direction
@@ -19,6 +18,7 @@ from truearm.modeling.parts import Joint, LinkMass, Payload
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 from truearm.robots import library, load_robot
+from truearm.simulation.twin import Twin
 
 COMMON_NORMALS = ("standard-dh", "modified-dh", "s-model")
 TILTING = tuple(name for name in CONVERSIONS if name not in COMMON_NORMALS)
@@ -41,8 +41,8 @@ def centres(robot: Robot, q: Array) -> Array:
     found = []
     for mass in robot.masses:
         links = Chain((*robot.base_elements, *(e for link in robot.link_elements[: mass.joint] for e in link)))
-        sweep = links.sweep(robot.variables(q, robot.values), robot.values)
-        found.append(sweep.matrix() @ mass.cog + sweep.position.T)
+        kinematics = links.forward_kinematics(robot.variables(q, robot.values), robot.values)
+        found.append(kinematics.matrix() @ mass.cog + kinematics.position.T)
     return np.array(found)
 
 

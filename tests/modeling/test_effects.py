@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from truearm.measurement.truths import joint_truths
-from truearm.measurement.twin import Twin
-from truearm.measurement.twin_joint import JointTruth
 from truearm.modeling.effects import EFFECTS, Effect
 from truearm.modeling.effects.backlash import SEATED
 from truearm.modeling.parts import LinkMass, Payload
 from truearm.modeling.postures import Postures, approach_of
 from truearm.modeling.robot import Robot
 from truearm.robots import load_robot
+from truearm.simulation.truths import joint_truths
+from truearm.simulation.twin import Twin
+from truearm.simulation.twin_joint import JointTruth
 
 #: All together; of clearance in one form, and the twin knows temperatures where warm-up knows only an order.
 NAMES = tuple(effect.name for effect in EFFECTS if effect.name not in ("clearance-linear-contact", "warm-up"))
@@ -71,14 +71,20 @@ def test_derivatives_are_central_differences_under_load(effect: type[Effect]) ->
     robot = loaded_arm((effect.name,), 3)
     at = robot.loaded(circumstances(robot, 40, 4))
     names = [p.name for e in robot.effects for p in e.parameters]
-    linear, angular = robot.derivatives(robot.sweep(at, "tip"), at, names)
+    linear, angular = robot.jacobians(robot.forward_kinematics(at, "tip"), at, names)
     for i, name in enumerate(names):
         h = 1e-3 * robot.parameters[name].prior
-        ahead, behind = (robot.sweep(at, "tip", {**robot.values, name: robot.values[name] + s * h}) for s in (1, -1))
+        ahead, behind = (
+            robot.forward_kinematics(at, "tip", {**robot.values, name: robot.values[name] + s * h}) for s in (1, -1)
+        )
         expected = (ahead.position - behind.position) / (2 * h)
         scale = np.abs(linear[i]).max()
         assert_allclose(linear[i], expected, rtol=0, atol=1e-6 * scale + 1e-13 / h, err_msg=name)
-        turned = (ahead.matrix() - behind.matrix()) @ np.swapaxes(robot.sweep(at, "tip").matrix(), 1, 2) / (2 * h)
+        turned = (
+            (ahead.matrix() - behind.matrix())
+            @ np.swapaxes(robot.forward_kinematics(at, "tip").matrix(), 1, 2)
+            / (2 * h)
+        )
         vee = np.stack([turned[:, 2, 1], turned[:, 0, 2], turned[:, 1, 0]])
         assert_allclose(angular[i], vee, rtol=0, atol=1e-6 * np.abs(angular[i]).max() + 1e-13 / h, err_msg=name)
     assert np.abs(linear).max() > 0
@@ -100,9 +106,9 @@ def test_nothing_is_nan_where_a_moment_is_zero(effect: type[Effect], massless: b
     if massless:
         robot = replace(robot, masses=(), payload=Payload())
     straight_up = np.zeros((1, 6))  # no moment about joint 1, nearly none about the others
-    sweep = robot.sweep(straight_up, "tip")
-    linear, angular = robot.derivatives(sweep, straight_up, list(robot.parameters))
-    assert np.isfinite(sweep.position).all()
+    kinematics = robot.forward_kinematics(straight_up, "tip")
+    linear, angular = robot.jacobians(kinematics, straight_up, list(robot.parameters))
+    assert np.isfinite(kinematics.position).all()
     assert np.isfinite(linear).all()
     assert np.isfinite(angular).all()
 
@@ -114,7 +120,7 @@ def test_a_horizontal_arm_sags() -> None:
     for joint in (2, 3, 5):
         bent = arm.with_values({f"compliance_{joint}": 1e-4}).poses(stretched)[0][0]
         assert bent[2] < rigid[2] - 1e-5
-    hanging = arm.carrying(gravity=(0.0, 0.0, 9.81)).with_values({"compliance_2": 1e-4}).poses(stretched)[0][0]
+    hanging = arm.with_payload(gravity=(0.0, 0.0, 9.81)).with_values({"compliance_2": 1e-4}).poses(stretched)[0][0]
     assert hanging[2] > rigid[2] + 1e-5
 
 

@@ -54,7 +54,7 @@ def calibrated(robot: Robot, effects: tuple[str, ...] = (), seed: int = 1) -> Ro
     """A robot as a calibration leaves it, in an instrument's frame and with something in its hand."""
     rng = np.random.default_rng(seed)
     robot = robot.with_effects(effects).with_frames(random_frame(rng), {"tip": (0.01, 0.02, 0.1)})
-    robot = robot.carrying(Payload(2.7, (0.05, 0.025, 0.1)), (0.5, -0.3, -9.7))
+    robot = robot.with_payload(Payload(2.7, (0.05, 0.025, 0.1)), (0.5, -0.3, -9.7))
     away = {
         n: p.value + AWAY[p.group] * (rng.normal() if p.group != "compliance" else rng.uniform())
         for n, p in robot.parameters.items()
@@ -395,7 +395,7 @@ def test_another_payload_is_one_constant() -> None:
     other = Payload(1.1, (0.0, 0.04, 0.02))
     made = module(robot)
     made["PAYLOAD"] = (other.mass, other.cog)
-    check_poses(made["forward"](q := configurations(robot)), robot.carrying(other), q)
+    check_poses(made["forward"](q := configurations(robot)), robot.with_payload(other), q)
 
 
 ALONE = """
@@ -451,7 +451,7 @@ def test_what_a_file_cannot_hold_is_said(format_: str) -> None:
     robot = calibrated(load_robot("ur5" if format_ == "python" else "kr5"), ("approach", "compliance"))
     if format_ in ("dh", "mdh"):
         robot = replace(load_robot("kr5").with_effects(["approach", "compliance"]), targets=robot.targets)
-        robot = robot.with_values({"approach_2": 1e-4, "compliance_3": 1e-5, "base_x": 1.0}).carrying(Payload(1.0))
+        robot = robot.with_values({"approach_2": 1e-4, "compliance_3": 1e-5, "base_x": 1.0}).with_payload(Payload(1.0))
     assert says(robot, format_, "cannot hold the joint effect approach; left out: approach_")
     assert says(robot, format_, "cannot hold where the base stands in the instrument's frame")
     assert says(robot, format_, "cannot hold the targets on the flange; left out: tip.")
@@ -462,7 +462,7 @@ def test_what_a_file_cannot_hold_is_said(format_: str) -> None:
 
 
 def test_masses_are_named() -> None:
-    robot = load_robot("irb120").carrying(Payload(1.0))
+    robot = load_robot("irb120").with_payload(Payload(1.0))
     assert says(robot, "dh", "masses; left out: those of link 2, 4 and the payload.")
 
 

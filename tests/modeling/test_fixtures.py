@@ -57,9 +57,9 @@ def beside(kind: FixtureKind, place: Transform = PLACE, name: str = "table") -> 
 
 
 def matrix_of(robot: Robot, name: str) -> Array:
-    sweep = robot.fixture_sweep(name)
+    kinematics = robot.fixture_kinematics(name)
     T = np.eye(4)
-    T[:3, :3], T[:3, 3] = sweep.matrix()[0], sweep.position[:, 0]
+    T[:3, :3], T[:3, 3] = kinematics.matrix()[0], kinematics.position[:, 0]
     return T
 
 
@@ -113,9 +113,9 @@ def test_many_trials_at_once_are_each_alone(kind: FixtureKind) -> None:
     robot = beside(kind)
     rng = np.random.default_rng(0)
     trials = {n: v + 0.05 * rng.standard_normal((4, 1)) for n, v in robot.values.items() if n.startswith("fixture_")}
-    together = robot.fixture_sweep("table", {**robot.values, **trials})
+    together = robot.fixture_kinematics("table", {**robot.values, **trials})
     for k in range(4):
-        alone = robot.fixture_sweep("table", {**robot.values, **{n: float(v[k, 0]) for n, v in trials.items()}})
+        alone = robot.fixture_kinematics("table", {**robot.values, **{n: float(v[k, 0]) for n, v in trials.items()}})
         np.testing.assert_allclose(together.position[:, k], alone.position, atol=1e-15)
         assert together.position.shape == (3, 4, 1)
 
@@ -148,7 +148,7 @@ def test_a_fixture_and_a_target_may_share_a_name() -> None:
 @pytest.mark.parametrize("name", ["tabel", "wall"])
 def test_an_unknown_fixture_is_refused_with_those_there_are(name: str) -> None:
     with pytest.raises(InputError, match=rf"no fixture of this name; got '{name}'; allowed: table"):
-        beside("plane").fixture_sweep(name)
+        beside("plane").fixture_kinematics(name)
     with pytest.raises(InputError, match="none: the robot has no fixtures"):
         IRB120.fixture(name)
 

@@ -13,8 +13,6 @@ from tests.modeling.pinocchio_oracle import PinocchioChain
 from tests.modeling.test_effects import NAMES, loaded_arm
 
 from truearm.errors import InputError
-from truearm.measurement.truths import joint_truths
-from truearm.measurement.twin import Twin
 from truearm.modeling.chain import Array
 from truearm.modeling.inverse import inverse
 from truearm.modeling.inverse.branches import BRANCHES, branch_rule
@@ -23,6 +21,8 @@ from truearm.modeling.parts import Joint, LinkMass, Payload
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform, rotation_vector
 from truearm.robots import load_robot
+from truearm.simulation.truths import joint_truths
+from truearm.simulation.twin import Twin
 
 SIX = ["irb120", "irb1600", "lrmate200ic", "kr5", "puma560", "ur5", "ur10"]
 
@@ -73,7 +73,7 @@ def test_forward_of_inverse_is_the_pose_on_the_branch_asked_for(name: str, gain:
     assert rule is not None
     q = robot.random_configurations(250, np.random.default_rng(6))
     p, R = robot.poses(q)
-    number = rule.numbers(robot.sweep(q))
+    number = rule.numbers(robot.forward_kinematics(q))
     elsewhere = 0
     for k in np.unique(number):
         chosen = number == k
@@ -135,7 +135,7 @@ def test_every_nominal_branch_is_found_again_where_it_exists(name: str) -> None:
             J = between.joint_jacobian(q)
             q = q + np.stack([np.linalg.lstsq(j, e, rcond=1e-9)[0] for j, e in zip(J, error, strict=True)])
         reached &= np.linalg.norm(error, axis=1) < 1e-8
-    number = rule.numbers(robot.sweep(q))
+    number = rule.numbers(robot.forward_kinematics(q))
     same = [reached[i] and BRANCHES[number[i]] == before.branch[row] for i, row in enumerate(lost)]
     assert not any(same)
 
@@ -162,7 +162,7 @@ def test_words_of_the_branches() -> None:
             [0, -80, 0, 0, 30, 0],  # leaning back, hand behind
         ]
     )
-    names = [BRANCHES[n] for n in rule.numbers(robot.sweep(q))]
+    names = [BRANCHES[n] for n in rule.numbers(robot.forward_kinematics(q))]
     assert names == ["front-up-noflip", "front-up-flip", "front-down-noflip", "back-down-noflip"]
 
 
@@ -176,7 +176,7 @@ def test_joints_keep_their_branch_when_the_arm_is_calibrated_or_moved(name: str)
     q = nominal.random_configurations(2000, np.random.default_rng(1))
     clear = np.linalg.svd(nominal.joint_jacobian(q), compute_uv=False)[:, -1] > 0.03
     assert clear.sum() > 1000
-    agree = rule.numbers(nominal.sweep(q)) == rule.numbers(robot.sweep(q))
+    agree = rule.numbers(nominal.forward_kinematics(q)) == rule.numbers(robot.forward_kinematics(q))
     assert agree[clear].all()
 
 
@@ -214,7 +214,7 @@ def test_under_load_forward_of_inverse_is_the_pose_on_every_branch(effects: tupl
     assert np.abs(robot.poses(np.zeros((1, 6)))[0] - robot.rigid.poses(np.zeros((1, 6)))[0]).max() > 1e-5
     q = robot.random_configurations(150, np.random.default_rng(12))
     p, R = robot.poses(q, "tip")
-    number = rule.numbers(robot.sweep(q))
+    number = rule.numbers(robot.forward_kinematics(q))
     every = inverse(robot, p, R, frame="world", target="tip", branch="all")
     position, rotation = robot.poses(every.joints, "tip")
     assert np.abs(position - p[every.pose]).max() < 1e-9
@@ -257,7 +257,9 @@ def test_readings_under_load_bring_the_twin_to_the_pose() -> None:
 def test_the_pose_with_another_payload_takes_other_readings() -> None:
     arm = loaded_arm(TILTING, 3)
     p, R = arm.poses(arm.random_configurations(20, np.random.default_rng(4)))
-    light, heavy = (inverse(arm.carrying(Payload(mass, (0.0, 0.02, 0.1))), p, R, frame="world") for mass in (0.3, 5.0))
+    light, heavy = (
+        inverse(arm.with_payload(Payload(mass, (0.0, 0.02, 0.1))), p, R, frame="world") for mass in (0.3, 5.0)
+    )
     assert light.complete
     assert heavy.complete
     same = [one == other for one, other in zip(light.branch, heavy.branch, strict=True)]
@@ -511,7 +513,7 @@ def test_an_arm_of_two_joints_is_refused() -> None:
 def _branch(robot: Robot, q: Array) -> str:
     rule = branch_rule(robot)
     assert rule is not None
-    return BRANCHES[int(rule.numbers(robot.sweep(q))[0])]
+    return BRANCHES[int(rule.numbers(robot.forward_kinematics(q))[0])]
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -525,7 +527,7 @@ def test_next_to_a_singular_wrist_branches_are_found_that_the_nominal_arm_has_no
     position, rotation = robot.poses(q)
     rule = branch_rule(robot)
     assert rule is not None
-    number = rule.numbers(robot.sweep(q))
+    number = rule.numbers(robot.forward_kinematics(q))
     lost = 0
     for k in sorted(set(number.tolist())):
         mine = number == k

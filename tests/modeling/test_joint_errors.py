@@ -84,7 +84,7 @@ def test_thirty_errors_have_rank_25_and_23() -> None:
     names = [n for n, p in robot.parameters.items() if p.group == "geometry"]
     assert len(names) == 30
     q = robot.random_configurations(30, np.random.default_rng(1))
-    linear, angular = (part.reshape(30, -1).T for part in robot.derivatives(robot.sweep(q), q, names))
+    linear, angular = (part.reshape(30, -1).T for part in robot.jacobians(robot.forward_kinematics(q), q, names))
     assert np.linalg.matrix_rank(np.concatenate([linear, angular]), tol=1e-9) == 25
     assert np.linalg.matrix_rank(linear, tol=1e-9) == 23
 

@@ -200,7 +200,9 @@ def height_of_weight(robot: Robot, bodies: Array, elements: tuple[tuple[Element,
     for link in robot.masses:
         way = [e for each in elements[: link.joint] for e in each]
         way += [Element("Tx", link.cog[0]), Element("Ty", link.cog[1]), Element("Tz", link.cog[2])]
-        energy -= link.mass * np.array(robot.gravity) @ Chain(tuple(way)).sweep(bodies, robot.values).position
+        energy -= (
+            link.mass * np.array(robot.gravity) @ Chain(tuple(way)).forward_kinematics(bodies, robot.values).position
+        )
     return energy
 
 
@@ -246,9 +248,9 @@ def test_power_of_the_loads_is_what_kinetic_and_potential_energy_lose(name: str)
     for link in robot.masses:
         way = [e for each in robot.link_elements[: link.joint] for e in each]
         way += [Element("Tx", link.cog[0]), Element("Ty", link.cog[1]), Element("Tz", link.cog[2])]
-        sweep = Chain(tuple(way)).sweep(variables, robot.values)
-        R = sweep.matrix()
-        energy += 0.5 * link.mass * (rate(sweep.position) ** 2).sum(axis=0)
+        kinematics = Chain(tuple(way)).forward_kinematics(variables, robot.values)
+        R = kinematics.matrix()
+        energy += 0.5 * link.mass * (rate(kinematics.position) ** 2).sum(axis=0)
         body_rates = np.swapaxes(R, 1, 2) @ np.moveaxis(rate(np.moveaxis(R, 0, -1)), -1, 0)
         spin = np.stack([body_rates[:, 2, 1], body_rates[:, 0, 2], body_rates[:, 1, 0]])
         xx, yy, zz, xy, xz, yz = link.inertia

@@ -492,7 +492,9 @@ def loaded() -> Robot:
     """A robot with a payload, on a wall, with every joint effect, calibrated."""
     rng = np.random.default_rng(2)
     effects = [effect.name for effect in EFFECTS if effect.name != "clearance-linear-contact"]
-    plain = load_robot("irb120").carrying(Payload(2.7, (0.05, 1 / 30, -0.1)), (-9.8, 0.1, 1 / 3)).with_effects(effects)
+    plain = (
+        load_robot("irb120").with_payload(Payload(2.7, (0.05, 1 / 30, -0.1)), (-9.8, 0.1, 1 / 3)).with_effects(effects)
+    )
     moved = [
         replace(p, value=p.value + p.prior * float(rng.normal()), deviation=p.prior / 7, informed=float(rng.uniform()))
         for p in plain.parameters.values()

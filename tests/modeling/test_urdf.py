@@ -654,8 +654,8 @@ def check_new_file(robot: Robot, folder: Path) -> None:
         centres = []
         for r, mass in ((at_identity, old), (again, new)):
             links = Chain(tuple(e for link in r.link_elements[: mass.joint] for e in link))
-            sweep = links.sweep(r.variables(q, r.values), r.values)
-            centres.append(sweep.matrix()[0] @ mass.cog + sweep.position[:, 0])
+            kinematics = links.forward_kinematics(r.variables(q, r.values), r.values)
+            centres.append(kinematics.matrix()[0] @ mass.cog + kinematics.position[:, 0])
         assert_allclose(centres[1], centres[0], rtol=0, atol=1e-12)
 
 

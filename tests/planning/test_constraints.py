@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from truearm.errors import InputError
-from truearm.measurement.truths import STATION, truth_twin
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
-from truearm.planning.clearance import smallest_clearance
-from truearm.planning.constraints import Constraints, allowed, read_constraints
+from truearm.planning.constraints.clearance import smallest_clearance
+from truearm.planning.constraints.constraints import Constraints, allowed, read_constraints
 from truearm.robots import load_robot
+from truearm.simulation.truths import STATION, truth_twin
 
 HEAD = {"truearm": "truearm-constraints/1", "units": {"length": "mm", "angle": "deg"}}
 COUNT = 60
@@ -105,7 +105,7 @@ def test_clearance_of_a_folded_arm() -> None:
 
 
 def test_distances_of_links_by_brute_force(arm: Robot) -> None:
-    from truearm.planning.segments import segment_distance
+    from truearm.planning.constraints.segments import segment_distance
 
     rng = np.random.default_rng(2)
     a, b, c, d = rng.normal(size=(4, 40, 3))

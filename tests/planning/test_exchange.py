@@ -10,8 +10,8 @@ import pytest
 
 from truearm.errors import InputError
 from truearm.modeling.chain import Array
-from truearm.planning.exchange import Candidates, exchanged, most_telling, most_telling_number
-from truearm.planning.observability import INDICES, O1, OfInterest, observability
+from truearm.planning.choosing.exchange import Candidates, exchanged, most_telling, most_telling_number
+from truearm.planning.choosing.observability import INDICES, O1, OfInterest, observability
 
 
 def told(rows: Array, chosen: list[int], known: Array, interest: int) -> float:

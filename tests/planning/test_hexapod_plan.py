@@ -10,28 +10,28 @@ import pytest
 from scipy.optimize import minimize
 
 from truearm.errors import InputError
-from truearm.identification.fit import identify
-from truearm.identification.models import MODELS
+from truearm.identification.hexapod.campaign import Campaign, touching, two_steps
+from truearm.identification.hexapod.placements import identify_placements, in_one_frame
+from truearm.identification.solving.fit import identify
+from truearm.identification.solving.models import MODELS
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.devices.hexapod.geometry import DEVICE, triangle
-from truearm.measurement.devices.hexapod.kinematics import leg_lengths
-from truearm.measurement.devices.hexapod.poses import HexapodPose, poses
-from truearm.measurement.devices.hexapod.session import joined
-from truearm.measurement.devices.hexapod.simulated import ballbar
+from truearm.measurement.hexapod.geometry import DEVICE, triangle
+from truearm.measurement.hexapod.kinematics import leg_lengths
+from truearm.measurement.hexapod.poses import HexapodPose, poses
 from truearm.measurement.statistics import errors_of
-from truearm.measurement.twin import Twin, measure
-from truearm.measurement.twin_joint import JointTruth
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
-from truearm.planning.hexapod.campaign import Campaign, touching, two_steps
+from truearm.planning.constraints.segments import segment_distance
 from truearm.planning.hexapod.clearance import arm_links, clearance
-from truearm.planning.hexapod.placements import identify_placements, in_one_frame
 from truearm.planning.hexapod.reachable import Reachable, reachable
 from truearm.planning.hexapod.steps import steps_text
 from truearm.planning.hexapod.tool import with_cups
-from truearm.planning.segments import segment_distance
 from truearm.robots import load_robot
+from truearm.simulation.hexapod.session import joined
+from truearm.simulation.hexapod.simulated import ballbar
+from truearm.simulation.twin import Twin, measure
+from truearm.simulation.twin_joint import JointTruth
 
 HALF = np.radians(-15.0)
 #: B1 of a fixture that stands before the robot, turned by -30 deg.

@@ -13,7 +13,7 @@ from tests.tilting import DEGREE, RESOLUTION
 from truearm.errors import InputError
 from truearm.measurement.inclinometer import deviation_of_change
 from truearm.modeling.chain import Array
-from truearm.planning.inclinometer import TiltingPlan, plan_tilting
+from truearm.planning.choosing.inclinometer import TiltingPlan, plan_tilting
 from truearm.robots import load_robot
 
 DEVIATION = deviation_of_change(RESOLUTION)
@@ -71,7 +71,7 @@ def test_chosen_pairs_tell_more_than_twice_as_many_at_random(monkeypatch: pytest
     def first_come(rows: Array, count: int, known: Array, interest: int) -> list[int]:
         return list(range(count))
 
-    monkeypatch.setattr("truearm.planning.inclinometer.most_telling", first_come)
+    monkeypatch.setattr("truearm.planning.choosing.inclinometer.most_telling", first_come)
     assert volume(chosen) < volume(planned(inclined=48, posed=16))
 
 

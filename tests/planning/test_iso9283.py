@@ -12,8 +12,8 @@ from truearm.errors import InputError
 from truearm.modeling.inverse import inverse
 from truearm.modeling.parts import Joint
 from truearm.modeling.robot import Robot
-from truearm.planning.iso9283 import PLANES, Cube
-from truearm.planning.largest_cube import largest_cube
+from truearm.planning.poses.iso9283 import PLANES, Cube
+from truearm.planning.poses.largest_cube import largest_cube
 from truearm.robots import load_robot
 
 CUBE = Cube((0.4, 0.1, 0.3), 0.2)

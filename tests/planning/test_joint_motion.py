@@ -17,11 +17,11 @@ from truearm.modeling.inverse.pose_solver import Orientation
 from truearm.modeling.parts import Joint
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY, Transform
-from truearm.planning.joint_motion import JointMotion, joint_motion
-from truearm.planning.paths import Circle, Line
-from truearm.planning.time_law import timed
-from truearm.planning.tip import Tip
-from truearm.planning.trajectory import Trajectory
+from truearm.planning.paths.joint_motion import JointMotion, joint_motion
+from truearm.planning.paths.paths import Circle, Line
+from truearm.planning.paths.time_law import timed
+from truearm.planning.paths.trajectory import Trajectory
+from truearm.planning.poses.tip import Tip
 from truearm.robots import load_robot
 
 TILTED = Transform((0.4, -0.2, 0.7), (0.8, 0.0, 0.6, 0.0))

@@ -8,22 +8,22 @@ import numpy as np
 import pytest
 
 from truearm.errors import InputError
-from truearm.identification.fit import identify
-from truearm.identification.models import MODELS
-from truearm.measurement.truths import truth_twin
-from truearm.measurement.twin import measure
-from truearm.planning.constraints import Constraints
-from truearm.planning.measurement_plan import (
+from truearm.identification.solving.fit import identify
+from truearm.identification.solving.models import MODELS
+from truearm.planning.choosing.measurement_plan import (
     APPROACH,
     MeasurementPlan,
     plan_measurements,
     random_candidates,
     with_targets,
 )
-from truearm.planning.ordering import short_order
-from truearm.planning.prediction import predict
-from truearm.planning.sensitivity import sensitivity
+from truearm.planning.choosing.ordering import short_order
+from truearm.planning.choosing.prediction import predict
+from truearm.planning.choosing.sensitivity import sensitivity
+from truearm.planning.constraints.constraints import Constraints
 from truearm.robots import load_robot
+from truearm.simulation.truths import truth_twin
+from truearm.simulation.twin import measure
 
 MODEL = {model.name: model for model in MODELS}
 

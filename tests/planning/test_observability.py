@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from truearm.planning.observability import INDICES, OfInterest, observability
+from truearm.planning.choosing.observability import INDICES, OfInterest, observability
 
 
 def test_an_orthogonal_jacobian_in_closed_form() -> None:

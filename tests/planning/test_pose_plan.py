@@ -11,9 +11,9 @@ from tests.modeling.pinocchio_oracle import PinocchioChain
 
 from truearm.errors import InputError
 from truearm.modeling.transform import Transform
-from truearm.planning.iso9283 import PLANES, Cube
-from truearm.planning.ordering import all_moving_order, smallest_moves
-from truearm.planning.pose_plan import plan_poses
+from truearm.planning.choosing.ordering import all_moving_order, smallest_moves
+from truearm.planning.poses.iso9283 import PLANES, Cube
+from truearm.planning.poses.pose_plan import plan_poses
 from truearm.robots import load_robot
 
 ARMS = {

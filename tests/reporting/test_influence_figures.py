@@ -5,7 +5,7 @@ import json
 import numpy as np
 from tests.katana import katana
 
-from truearm.identification.influence import Influence, influence
+from truearm.identification.solving.influence import Influence, influence
 from truearm.reporting.influence_figures import influence_figure
 from truearm.studies.katana import NAMES, PERTURBATIONS
 

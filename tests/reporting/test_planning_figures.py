@@ -5,10 +5,10 @@ import json
 import numpy as np
 import pytest
 
-from truearm.planning.iso9283 import PLANES, Cube
-from truearm.planning.joint_motion import joint_motion
-from truearm.planning.pose_plan import plan_poses
-from truearm.planning.time_law import timed
+from truearm.planning.paths.joint_motion import joint_motion
+from truearm.planning.paths.time_law import timed
+from truearm.planning.poses.iso9283 import PLANES, Cube
+from truearm.planning.poses.pose_plan import plan_poses
 from truearm.reporting.planning_figures import joint_trajectories, pose_cube
 from truearm.robots import load_robot
 

@@ -14,12 +14,11 @@ from typing import Any, Final
 import numpy as np
 import pytest
 
-from truearm.identification.fit import Redundant, identify, place
-from truearm.identification.losses import Loss
-from truearm.identification.models import MODELS
+from truearm.identification.solving.fit import Redundant, identify, place
+from truearm.identification.solving.losses import Loss
+from truearm.identification.solving.models import MODELS
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of
-from truearm.measurement.twin import Twin, measure
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform, quaternion_from_rotation
 from truearm.notices import Notice
@@ -27,6 +26,7 @@ from truearm.reporting.numbers import significant
 from truearm.reporting.page import json_for_script
 from truearm.reporting.report import Report, report_html
 from truearm.robots import load_robot
+from truearm.simulation.twin import Twin, measure
 
 HOSTILE: Final = "</script><b>"
 MODEL_BY_NAME: Final = {model.name: model for model in MODELS}

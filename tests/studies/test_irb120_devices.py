@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from truearm.measurement.devices import named_device
-from truearm.measurement.truths import truth_twin
+from truearm.simulation.devices import named_device
+from truearm.simulation.truths import truth_twin
 from truearm.studies import irb120_instruments_tables
 from truearm.studies.irb120_devices import study
 from truearm.studies.irb120_setups import SETUPS, shares, twin_of, visible_configurations

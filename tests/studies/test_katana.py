@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from truearm.measurement.twin import Twin
+from truearm.simulation.twin import Twin
 from truearm.studies.katana import (
     NAMES,
     TILTING,

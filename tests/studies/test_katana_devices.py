@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from truearm.measurement.devices import measured_with, named_device
 from truearm.measurement.observations import compared
-from truearm.measurement.twin import Twin
+from truearm.simulation.devices import measured_with, named_device
+from truearm.simulation.twin import Twin
 from truearm.studies.katana import katana
 from truearm.studies.katana_campaigns import USED, Counts, OnPage, together
 from truearm.studies.katana_devices import study

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from truearm.measurement.devices.hexapod.geometry import triangle
-from truearm.measurement.twin import Twin, measure
-from truearm.measurement.twin_joint import JointTruth
+from truearm.measurement.hexapod.geometry import triangle
 from truearm.modeling.transform import Transform
+from truearm.simulation.twin import Twin, measure
+from truearm.simulation.twin_joint import JointTruth
 from truearm.studies.lrmate import (
     FIXTURE,
     NAMES,

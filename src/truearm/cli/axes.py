@@ -32,7 +32,7 @@ def axes(
 
     from truearm.calibration import load_data
     from truearm.files import refuse_overwriting, writable_folder, write_files
-    from truearm.identification.axis_analysis import analyse
+    from truearm.identification.axes.analysis import analyse
     from truearm.robots import load_robot, urdf_source
 
     if frame not in ("instrument", "robot"):

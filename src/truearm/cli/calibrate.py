@@ -118,7 +118,7 @@ def print_places(calibration: Calibration) -> None:
 
 def exit_unless_finished(calibration: Calibration) -> None:
     """End with exit code 3 if the fit did not come to a good end."""
-    from truearm.identification.fit import Status
+    from truearm.identification.solving.fit import Status
 
     if calibration.status not in (Status.CONVERGED, Status.AT_BOUND):
         raise typer.Exit(3)

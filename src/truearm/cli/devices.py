@@ -9,7 +9,7 @@ from truearm.cli.output import Json, print_json
 
 def devices(json: Json = False) -> None:
     """List the instruments that can be simulated and planned for, with what each is good for."""
-    from truearm.measurement.devices import DEVICES
+    from truearm.simulation.devices import DEVICES
 
     if json:
         print_json(

@@ -11,7 +11,7 @@ from truearm.cli.output import Json, print_json
 from truearm.errors import InputError
 
 if TYPE_CHECKING:
-    from truearm.measurement.devices.hexapod.geometry import Design
+    from truearm.measurement.hexapod.geometry import Design
     from truearm.modeling.chain import Array
     from truearm.modeling.transform import Transform
 
@@ -30,8 +30,8 @@ ToolName = Annotated[
 @app.command("enumerate")
 def enumerate_(json: Json = False) -> None:
     """Count designs, assemblies and poses, and list the poses that teach much the same."""
-    from truearm.measurement.devices.hexapod.geometry import designs
-    from truearm.measurement.devices.hexapod.poses import assemblies, distinct, near_equal, poses
+    from truearm.measurement.hexapod.geometry import designs
+    from truearm.measurement.hexapod.poses import assemblies, distinct, near_equal, poses
 
     found = poses()
     pairs = near_equal(found)
@@ -59,7 +59,7 @@ def uncertainty(
     """Say how well the tool's cups are known, in standard deviations of one length (Nubiola, Table 3.1)."""
     import numpy as np
 
-    from truearm.measurement.devices.hexapod.uncertainty import all_solutions, cup_monte_carlo
+    from truearm.measurement.hexapod.uncertainty import all_solutions, cup_monte_carlo
 
     rng = np.random.default_rng(seed)
     names = ("t1", "t2", "t3")
@@ -99,8 +99,8 @@ def solve(
     from dataclasses import replace
 
     from truearm.files import refuse_overwriting, writable_file, write_text
-    from truearm.measurement.devices.hexapod.geometry import DEVICE
-    from truearm.measurement.devices.hexapod.sheet import read_sheet
+    from truearm.measurement.hexapod.geometry import DEVICE
+    from truearm.measurement.hexapod.sheet import read_sheet
     from truearm.units import sized_si
 
     device = replace(DEVICE, reach=sized_si(reach, "mm", "--range"))
@@ -162,8 +162,8 @@ def plan(
 ) -> None:
     """Plan which configurations of a robot can be measured with the fixture at one place."""
     from truearm.files import refuse_overwriting, writable_file, write_text
-    from truearm.measurement.devices.hexapod.poses import distinct, poses
-    from truearm.measurement.devices.hexapod.sheet import sheet_csv
+    from truearm.measurement.hexapod.poses import distinct, poses
+    from truearm.measurement.hexapod.sheet import sheet_csv
     from truearm.planning.hexapod.reachable import reachable
     from truearm.planning.hexapod.steps import steps_text
     from truearm.planning.hexapod.tool import with_cups
@@ -219,9 +219,9 @@ def world_frame(
 
     import numpy as np
 
-    from truearm.measurement.devices.hexapod.geometry import DEVICE, side_names
-    from truearm.measurement.devices.hexapod.touches import read_touches
-    from truearm.measurement.devices.hexapod.world_frame import world_frame as fitted
+    from truearm.measurement.hexapod.geometry import DEVICE, side_names
+    from truearm.measurement.hexapod.touches import read_touches
+    from truearm.measurement.hexapod.world_frame import world_frame as fitted
     from truearm.planning.hexapod.tool import with_cups
     from truearm.robots import load_robot
     from truearm.units import sized_si
@@ -258,9 +258,9 @@ def world_frame(
 
 
 def _one_pose(number: Any, legs: Any, base: str, tool: str, device: Any) -> tuple[Design, int, Array]:
-    from truearm.measurement.devices.hexapod.geometry import side_names
-    from truearm.measurement.devices.hexapod.kinematics import tool_cups
-    from truearm.measurement.devices.hexapod.poses import poses
+    from truearm.measurement.hexapod.geometry import side_names
+    from truearm.measurement.hexapod.kinematics import tool_cups
+    from truearm.measurement.hexapod.poses import poses
 
     known = poses()
     if not 1 <= number <= len(known):

@@ -61,7 +61,7 @@ def ik(
     writable_folder(out.parent)
     if position_only and axis_only:
         raise InputError("only one of them can hold", where="--position-only, --axis-only", cure="Leave one out.")
-    loaded = load_robot(robot).carrying(read_payload(payload), read_gravity(gravity))
+    loaded = load_robot(robot).with_payload(read_payload(payload), read_gravity(gravity))
     wanted = read_poses(poses)
     if wanted.quaternion is None and not position_only:
         raise InputError(

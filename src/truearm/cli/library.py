@@ -99,8 +99,8 @@ def _share(value: float, name: str) -> str:
 def _content(robot: Robot) -> dict[str, Any]:
     import numpy as np
 
-    from truearm.measurement.truths import truth_names
     from truearm.modeling.formats.controller_entry import controller_entry
+    from truearm.simulation.truths import truth_names
     from truearm.units import SHOWN_AS, from_si, written
 
     shown = SHOWN_AS

@@ -45,12 +45,12 @@ def lines(
 
     from truearm.calibration import load_data
     from truearm.compensation.inverse_errors import fake_targets
-    from truearm.compensation.line_test import from_data, on_twin, summary
     from truearm.files import writable_file, write_text
-    from truearm.measurement.truths import truth_twin
-    from truearm.planning.seven_lines import readings, seven_lines
+    from truearm.planning.poses.seven_lines import readings, seven_lines
     from truearm.robots import load_robot
+    from truearm.simulation.truths import truth_twin
     from truearm.units import from_si, sized_si
+    from truearm.validation.line_test import from_data, on_twin, summary
 
     if truth is not None and data is not None:
         raise InputError("only one of them can be judged", where="--truth, --data", cure="Leave one out.")
@@ -107,7 +107,7 @@ def _print_lines(content: dict[str, Any]) -> None:
 
 def _standing(nominal: Robot, errors: Robot | None, data: Dataset) -> Robot:
     """Return a robot that says where the base and the targets are: one of those given, or placed by the data."""
-    from truearm.identification.fit import place
+    from truearm.identification.solving.fit import place
 
     for robot in (errors, nominal):
         if robot is not None and set(data.targets) <= {target.name for target in robot.targets}:

@@ -61,12 +61,17 @@ def plan(
 
     from truearm.calibration import check_joints, load_data, named_model
     from truearm.files import refuse_overwriting, writable_file, write_files
-    from truearm.measurement.devices import named_device
-    from truearm.planning.constraints import read_constraints
-    from truearm.planning.measurement_plan import device_candidates, plan_measurements, random_candidates, with_targets
-    from truearm.planning.plan_table import plan_csv
+    from truearm.planning.choosing.measurement_plan import (
+        device_candidates,
+        plan_measurements,
+        random_candidates,
+        with_targets,
+    )
+    from truearm.planning.choosing.plan_table import plan_csv
+    from truearm.planning.constraints.constraints import read_constraints
     from truearm.reporting.plan_report import answer, plan_html
     from truearm.robots import load_robot, urdf_source
+    from truearm.simulation.devices import named_device
     from truearm.units import sized_si
 
     page = out.with_suffix(".html")
@@ -92,7 +97,7 @@ def plan(
     instrument = None if device is None else named_device(device)
     with progress() as say:
         say("reading the robot")
-        loaded = load_robot(robot).carrying(read_payload(payload), read_gravity(gravity))
+        loaded = load_robot(robot).with_payload(read_payload(payload), read_gravity(gravity))
         labels = None
         own = bool(loaded.targets)
         readings = None

@@ -46,11 +46,11 @@ def simulate(
     from truearm.cli.output import progress
     from truearm.errors import InputError
     from truearm.files import refuse_overwriting, writable_file, write_text
-    from truearm.measurement.devices import measured_with, named_device
     from truearm.measurement.readers.canonical import csv_text
-    from truearm.measurement.truths import truth_twin
-    from truearm.measurement.twin import measure
     from truearm.robots import load_robot, urdf_source
+    from truearm.simulation.devices import measured_with, named_device
+    from truearm.simulation.truths import truth_twin
+    from truearm.simulation.twin import measure
     from truearm.units import sized_si
 
     if noise is None and device is None:
@@ -66,7 +66,7 @@ def simulate(
     rng = np.random.default_rng(seed)
     nominal = load_robot(robot)
     twin = truth_twin(nominal, truth, rng)
-    twin = replace(twin, robot=twin.robot.carrying(read_payload(payload), read_gravity(gravity)))
+    twin = replace(twin, robot=twin.robot.with_payload(read_payload(payload), read_gravity(gravity)))
     with progress() as say:
         say(f"measuring {poses} configurations")
         if instrument is None:

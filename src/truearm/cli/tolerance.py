@@ -34,8 +34,8 @@ def tolerance(
 
     from truearm.compensation.inverse_errors import design
     from truearm.modeling.conversion import converted
-    from truearm.modeling.tolerances import checked_depth, errors_of_tolerance, flange_error, joint_tolerances
     from truearm.robots import load_robot
+    from truearm.validation.tolerances import checked_depth, errors_of_tolerance, flange_error, joint_tolerances
 
     loaded = load_robot(robot)
     count = len(loaded.joints)

@@ -9,9 +9,9 @@ from typing import Final
 
 import numpy as np
 
-from truearm.compensation.division import MOST, Divided
 from truearm.compensation.gauge import turns_between
 from truearm.compensation.program_correction import CorrectedPrograms, Frames
+from truearm.compensation.split import MOST, Divided
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import NO_PAYLOAD
 from truearm.modeling.robot import Robot

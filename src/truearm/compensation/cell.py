@@ -26,7 +26,10 @@ from typing import Annotated, Final, Literal
 import numpy as np
 from pydantic import AfterValidator, BaseModel, BeforeValidator, model_validator
 
-from truearm.compensation.programs.orientations import (
+from truearm.errors import InputError
+from truearm.files import read_yaml
+from truearm.modeling.formats.entries import STRICT, Number, Triple
+from truearm.modeling.orientations import (
     FIXED_XYZ_ANGLES,
     MOVING_XYZ_ANGLES,
     QUATERNION,
@@ -34,9 +37,6 @@ from truearm.compensation.programs.orientations import (
     ZYX_ANGLES,
     Orientation,
 )
-from truearm.errors import InputError
-from truearm.files import read_yaml
-from truearm.modeling.formats.entries import STRICT, Number, Triple
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 from truearm.units import sized_si
@@ -214,8 +214,8 @@ def _placed(of: str, place: Transform, controller: _Place | None, units: _Units,
 
 
 def _of_target(robot: Robot, name: str) -> Transform:
-    sweep = robot.target(name).chain.sweep(np.zeros((0, 1)), robot.values)
-    return Transform.from_matrix(sweep.matrix()[0], sweep.position[:, 0])
+    kinematics = robot.target(name).chain.forward_kinematics(np.zeros((0, 1)), robot.values)
+    return Transform.from_matrix(kinematics.matrix()[0], kinematics.position[:, 0])
 
 
 def _transform(place: _Place, units: _Units, where: str) -> Transform:

@@ -100,10 +100,10 @@ def fake_targets(robot: Robot, flange: Array, near: Array) -> FakeTargets:
     # The branch that counts is the controller's, of the nominal arm: next to a singular posture the calibrated arm may
     # call the same joints by another name. So the nearest joints are taken, and all branches looked through where they
     # are on another one.
-    meant = rule.numbers(nominal.sweep(near))
+    meant = rule.numbers(nominal.forward_kinematics(near))
 
     def there(solutions: JointSolutions, rows: NDArray[np.intp]) -> NDArray[np.bool_]:
-        return np.asarray(rule.numbers(nominal.sweep(solutions.joints)) == meant[rows])
+        return np.asarray(rule.numbers(nominal.forward_kinematics(solutions.joints)) == meant[rows])
 
     everyone = np.arange(len(flange))
     missed = np.flatnonzero(~there(found, everyone) | ~found.usable)
@@ -125,7 +125,7 @@ def fake_targets(robot: Robot, flange: Array, near: Array) -> FakeTargets:
             status.append(PoseStatus.BEYOND_LIMIT if found.beyond[row].any() else PoseStatus.NEAR_SINGULAR)
         else:
             status.append(one)
-    branch = tuple(BRANCHES[number] for number in rule.numbers(nominal.sweep(found.joints)).tolist())
+    branch = tuple(BRANCHES[number] for number in rule.numbers(nominal.forward_kinematics(found.joints)).tolist())
     return FakeTargets(matrices(nominal, found.joints), replace(found, status=tuple(status), branch=branch))
 
 

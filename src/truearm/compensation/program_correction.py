@@ -18,10 +18,15 @@ from numpy.typing import NDArray
 from truearm.compensation.cell import NOTHING_GIVEN, Cell
 from truearm.compensation.fake_targets import FakeTargets, fake_targets, matrices, nominal_robot
 from truearm.compensation.gauge import base_shift, best_agreement, turns_between
-from truearm.compensation.meant_postures import ON_EDGE, MeantPostures, agrees, meant_postures
 from truearm.compensation.program_places import Places, Told, told
 from truearm.compensation.program_poses import edits_of, joint_numbers, joints_of, place, pose_numbers, poses_of
 from truearm.compensation.programs.program import Configuration, Edit, Program, Skipped
+from truearm.compensation.resolved_configurations import (
+    ON_EDGE,
+    ResolvedConfigurations,
+    agrees,
+    resolved_configurations,
+)
 from truearm.errors import InputError
 from truearm.modeling.chain import Array
 from truearm.modeling.inverse.solutions import PoseStatus
@@ -222,7 +227,7 @@ class _Meant:
         )
         configurations = [target.configuration for target in targets]
         order = [index for move in program.moves for index in (move.via, move.target) if index is not None]
-        self._postures: MeantPostures = meant_postures(
+        self._postures: ResolvedConfigurations = resolved_configurations(
             nominal, flange, configurations, known, order, [target.parent for target in targets], _straight(program)
         )
         found = self._postures

@@ -22,8 +22,8 @@ from truearm.modeling.chain import Array
 from truearm.modeling.inverse.kinematics import NEAR_SINGULAR, reach
 from truearm.modeling.inverse.turns import beyond_limits
 from truearm.modeling.robot import Robot
-from truearm.planning.joint_motion import JointMotion
-from truearm.planning.tip import Tip
+from truearm.planning.paths.joint_motion import JointMotion
+from truearm.planning.poses.tip import Tip
 
 #: The tip is where it shall be within this [m].
 AGREED: Final = 1e-9
@@ -86,7 +86,7 @@ def corrected(robot: Robot, motion: JointMotion, desired: Array, target: str | N
     robot
         The calibrated robot, with its effects.
     motion
-        From :func:`truearm.planning.joint_motion.joint_motion` of the nominal robot.
+        From :func:`truearm.planning.paths.joint_motion.joint_motion` of the nominal robot.
     desired
         The path in the base frame, ``(n, 3)`` [m].
     target

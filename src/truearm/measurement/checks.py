@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import permutations
-from typing import TYPE_CHECKING, Final, Literal
+from typing import Final, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +17,6 @@ from numpy.typing import NDArray
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
 from truearm.notices import Notice
-
-if TYPE_CHECKING:
-    from truearm.measurement.devices.device import Device
 
 Suspicion = Literal["outliers", "targets-swapped", "target-mistaken"]
 
@@ -86,7 +83,22 @@ def _temperatures(data: Dataset) -> list[Notice]:
     ]
 
 
-def check_range(data: Dataset, device: Device) -> list[Notice]:
+class Ranged(Protocol):
+    """An instrument that cannot read everything."""
+
+    @property
+    def name(self) -> str:
+        """Its short name."""
+
+    @property
+    def summary(self) -> str:
+        """What it is and reads, in words."""
+
+    def beyond_range(self, data: Dataset) -> NDArray[np.bool_]:
+        """Return which readings it cannot have read, ``(readings,)``."""
+
+
+def check_range(data: Dataset, device: Ranged) -> list[Notice]:
     """Say which readings are beyond the range of the device that they are said to come from."""
     beyond = np.flatnonzero(device.beyond_range(data)).tolist()
     if not beyond:

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.modeling.chain import Array, Sweep
+from truearm.modeling.chain import Array, ForwardKinematics
 from truearm.modeling.transform import cross
 
 
@@ -26,9 +26,9 @@ class Sighting:
         The chain to the fixture, at one configuration; None for the instrument, whose frame is the world.
     """
 
-    target: Sweep
+    target: ForwardKinematics
     configurations: NDArray[np.intp] | slice
-    fixture: Sweep | None = None
+    fixture: ForwardKinematics | None = None
 
     @cached_property
     def position(self) -> Array:
@@ -42,7 +42,7 @@ class Sighting:
         turned = self.target.matrix()[..., self.configurations, :, :]
         return turned if self.fixture is None else np.swapaxes(self.fixture.matrix(), -1, -2) @ turned
 
-    def linear(self, velocity: Array, names: tuple[str, ...]) -> Array:
+    def position_jacobian(self, velocity: Array, names: tuple[str, ...]) -> Array:
         """Return how the position moves with parameters [m per unit], ``(parameters, 3, ..., k)``.
 
         Parameters
@@ -59,18 +59,22 @@ class Sighting:
         mine = [k for k, name in enumerate(names) if name in self.fixture.places]
         places = [self.fixture.places[names[k]] for k in mine]
         moved = moved.copy()
-        for k, slide, turn in zip(mine, self.fixture.linear(places), self.fixture.angular(places), strict=True):
+        for k, slide, turn in zip(
+            mine, self.fixture.position_jacobian(places), self.fixture.orientation_jacobian(places), strict=True
+        ):
             moved[k] -= slide + cross(*np.broadcast_arrays(turn, arm))
         return self._turned(moved, at=1)
 
-    def angular(self, velocity: Array, names: tuple[str, ...]) -> Array:
-        """Return how the target turns with parameters [rad per unit], as :meth:`linear`."""
+    def orientation_jacobian(self, velocity: Array, names: tuple[str, ...]) -> Array:
+        """Return how the target turns with parameters [rad per unit], as :meth:`position_jacobian`."""
         moved = velocity[..., self.configurations]
         if self.fixture is None:
             return moved
         mine = [k for k, name in enumerate(names) if name in self.fixture.places]
         moved = moved.copy()
-        for k, turn in zip(mine, self.fixture.angular([self.fixture.places[names[k]] for k in mine]), strict=True):
+        for k, turn in zip(
+            mine, self.fixture.orientation_jacobian([self.fixture.places[names[k]] for k in mine]), strict=True
+        ):
             moved[k] -= turn
         return self._turned(moved, at=1)
 

@@ -9,7 +9,7 @@ import numpy as np
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.observations import compared
 from truearm.measurement.sighting import Sighting
-from truearm.modeling.chain import Array, Sweep
+from truearm.modeling.chain import Array, ForwardKinematics
 from truearm.modeling.robot import Robot
 
 
@@ -110,14 +110,14 @@ def errors_of(robot: Robot, data: Dataset) -> Errors:
     length = np.full((count, 1), np.nan) if data.distance is not None or data.height is not None else None
     errors = {"position": position, "orientation": orientation, "distance": length, "height": length}
     at = robot.loaded(data.postures)
-    sweeps: dict[str, Sweep] = {}
+    kinematics: dict[str, ForwardKinematics] = {}
     for target, fixture, observation, readings in compared(data):
         into = errors[observation.name]
         if into is None or (observation.name == "orientation" and robot.target(target).quaternion is None):
             continue
-        if target not in sweeps:
-            sweeps[target] = robot.sweep(at, target)
-        beside = None if fixture is None else robot.fixture_sweep(fixture)
-        seen = Sighting(sweeps[target], data.configuration[readings], beside)
+        if target not in kinematics:
+            kinematics[target] = robot.forward_kinematics(at, target)
+        beside = None if fixture is None else robot.fixture_kinematics(fixture)
+        seen = Sighting(kinematics[target], data.configuration[readings], beside)
         into[readings] = observation.residual(seen, data, readings)
     return Errors(data.configurations, position, orientation, None if length is None else length[:, 0])

@@ -8,8 +8,7 @@ import numpy as np
 
 from truearm.measurement.checks import clean_references
 from truearm.measurement.dataset import Dataset
-from truearm.modeling.chain import Array
-from truearm.modeling.transform import quaternion_from_rotation, rotation_from_quaternion
+from truearm.modeling.transform import quaternion_from_rotation, rigid_motion, rotation_from_quaternion
 
 _HOLDS = 1e-4  # references that keep their distances better than this moved together [m]
 
@@ -32,7 +31,8 @@ def without_table_motion(data: Dataset) -> Dataset:
     quaternion = None if data.quaternion is None else data.quaternion.copy()
     for c in np.flatnonzero(there.sum(axis=1) >= 3).tolist():
         seen = there[c]
-        R, shift, misfit = _rigid(points[c, seen], usual[seen])
+        R, shift = rigid_motion(points[c, seen], usual[seen])
+        misfit = np.linalg.norm(points[c, seen] @ R.T + shift - usual[seen], axis=1).max()
         if misfit > _HOLDS:
             continue
         mine = data.configuration == c
@@ -41,12 +41,3 @@ def without_table_motion(data: Dataset) -> Dataset:
             turned = mine & data.has_orientation
             quaternion[turned] = quaternion_from_rotation(R @ rotation_from_quaternion(quaternion[turned]))
     return replace(data, position=position, quaternion=quaternion)
-
-
-def _rigid(a: Array, b: Array) -> tuple[Array, Array, float]:
-    """Return R and t with R a + t nearest to b, both ``(k, 3)``, and the largest distance left."""
-    centre_a, centre_b = a.mean(axis=0), b.mean(axis=0)
-    U, _, Vt = np.linalg.svd((b - centre_b).T @ (a - centre_a))
-    R = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
-    shift = centre_b - R @ centre_a
-    return R, shift, float(np.linalg.norm(a @ R.T + shift - b, axis=1).max())

@@ -85,7 +85,7 @@ class Element:
 
 
 @dataclass(frozen=True, eq=False)
-class Sweep:
+class ForwardKinematics:
     """A chain run through for all configurations.
 
     Attributes
@@ -103,7 +103,7 @@ class Sweep:
     elements: tuple[Element, ...]
     moves: tuple[Move, ...]
     shape: tuple[int, ...]
-    start: Sweep | None = None
+    start: ForwardKinematics | None = None
 
     @cached_property
     def position(self) -> Array:
@@ -137,7 +137,7 @@ class Sweep:
         arm = _combined(self._tips[index], self._frames[index])
         return self.position - self._filled(arm)
 
-    def linear(self, indices: Sequence[int | None]) -> Array:
+    def position_jacobian(self, indices: Sequence[int | None]) -> Array:
         """Return the velocity of the tip's origin by the values of the elements `indices` [m per unit].
 
         Returns
@@ -164,7 +164,7 @@ class Sweep:
                 np.subtract(row, other, out=row)
         return linear
 
-    def angular(self, indices: Sequence[int | None]) -> Array:
+    def orientation_jacobian(self, indices: Sequence[int | None]) -> Array:
         """Return the angular velocity of the tip frame by the values of the elements `indices` [rad per unit].
 
         Returns
@@ -178,9 +178,9 @@ class Sweep:
                 row[...] = _axis(self.elements[index], self._frames[index])
         return angular
 
-    def derivatives(self, indices: Sequence[int | None]) -> tuple[Array, Array]:
-        """Return :meth:`linear` and :meth:`angular`."""
-        return self.linear(indices), self.angular(indices)
+    def jacobians(self, indices: Sequence[int | None]) -> tuple[Array, Array]:
+        """Return :meth:`position_jacobian` and :meth:`orientation_jacobian`."""
+        return self.position_jacobian(indices), self.orientation_jacobian(indices)
 
     @cached_property
     def _frames(self) -> list[Axes]:
@@ -248,12 +248,12 @@ class Chain:
         """Return the position of the element whose value is `parameter`."""
         return self._index[parameter]
 
-    def sweep(
+    def forward_kinematics(
         self,
         variables: Array,
         values: Mapping[str, float | Array] | None = None,
-        start: Sweep | None = None,
-    ) -> Sweep:
+        start: ForwardKinematics | None = None,
+    ) -> ForwardKinematics:
         """Run through the chain for all configurations.
 
         Parameters
@@ -275,10 +275,10 @@ class Chain:
                 amount = amount + variables[element.variable]
             moves.append(_move(element, amount))
         if start is not None:
-            return Sweep((*start.elements, *self.elements), (*start.moves, *moves), start.shape, start)
+            return ForwardKinematics((*start.elements, *self.elements), (*start.moves, *moves), start.shape, start)
         shape = variables.shape[1:]
         trials = next((value.shape for value in given.values() if isinstance(value, np.ndarray)), ())
-        return Sweep(self.elements, tuple(moves), np.broadcast_shapes(shape, trials) if trials else shape)
+        return ForwardKinematics(self.elements, tuple(moves), np.broadcast_shapes(shape, trials) if trials else shape)
 
 
 # -- one element -----------------------------------------------------------------------------------------

@@ -54,7 +54,7 @@ def postures_in_equilibrium(robot: Robot, at: Postures) -> Postures:
         part = at.at(rows)
         return robot.variables(replace(part, loads=_loads(robot, part, variables)), robot.values)
 
-    straight = robot.straight(at.joints.T)
+    straight = robot.without_deflections(at.joints.T)
     start = robot.variables(replace(at, loads=_loads(robot, at, straight)), robot.values)
     variables = settled(bent, start)
     return replace(at, loads=_loads(robot, at, variables))

@@ -51,7 +51,7 @@ class Fixture:
             return Chain((*fixed_rotation(self.quaternion), *turns[:2], slides[2]))
         return Chain((*slides, *fixed_rotation(self.quaternion), *turns))
 
-    def standing(self, place: Transform) -> dict[str, float]:
+    def values_at(self, place: Transform) -> dict[str, float]:
         """Return the parameter values of a fixture at a place that is turned as `quaternion` says.
 
         Parameters

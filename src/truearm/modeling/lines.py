@@ -46,19 +46,19 @@ class JointAxis:
 
 def joint_axes(robot: Robot) -> list[JointAxis]:
     """Return the joint axes of a robot as it is now, readings at zero."""
-    sweep = robot.rigid.sweep(np.zeros((1, len(robot.joints))))
-    places = {e.variable: i for i, e in enumerate(sweep.elements) if e.variable is not None}
+    kinematics = robot.rigid.forward_kinematics(np.zeros((1, len(robot.joints))))
+    places = {e.variable: i for i, e in enumerate(kinematics.elements) if e.variable is not None}
     return [
-        JointAxis(joint, sweep.axis(places[i])[:, 0], sweep.origin(places[i])[:, 0])
+        JointAxis(joint, kinematics.axis(places[i])[:, 0], kinematics.origin(places[i])[:, 0])
         for i, joint in enumerate(robot.joints)
     ]
 
 
 def at_zero(robot: Robot, elements: Iterable[Element]) -> Array:
     """Return the product of some of a robot's elements, joint variables at zero, ``(4, 4)``."""
-    sweep = Chain(tuple(elements)).sweep(np.zeros((len(robot.joints), 1)), robot.values)
+    kinematics = Chain(tuple(elements)).forward_kinematics(np.zeros((len(robot.joints), 1)), robot.values)
     made = np.eye(4)
-    made[:3, :3], made[:3, 3] = sweep.matrix()[0], sweep.position[:, 0]
+    made[:3, :3], made[:3, 3] = kinematics.matrix()[0], kinematics.position[:, 0]
     return made
 
 

@@ -87,7 +87,7 @@ def joint_loads(
                 allowed=f"({rows}, {size}): one column for each configuration",
             )
     elements = (*chain.from_iterable(robot.moved_links), *robot.flange_elements)
-    moves = Chain(elements).sweep(variables, robot.values).moves
+    moves = Chain(elements).forward_kinematics(variables, robot.values).moves
     ends = [0, *accumulate(len(link) for link in robot.moved_links)]
     bodies = [(ends[link.joint], link.mass, link.cog, link.inertia) for link in robot.masses]
     bodies.append((len(elements), robot.payload.mass, robot.payload.cog, POINT_MASS))

@@ -11,7 +11,7 @@ from typing import TypeVar
 import numpy as np
 
 from truearm.errors import InputError, nearest_names
-from truearm.modeling.chain import Array, Chain, Element, Sweep, across, turn_about
+from truearm.modeling.chain import Array, Chain, Element, ForwardKinematics, across, turn_about
 from truearm.modeling.controller import AS_THE_MODEL, Controller
 from truearm.modeling.conventions import Convention, convention
 from truearm.modeling.effects import EFFECTS, Effect, Layout
@@ -216,8 +216,8 @@ class Robot:
     @property
     def base(self) -> Transform:
         """Where the base frame stands in the world."""
-        sweep = Chain(self.base_elements).sweep(np.zeros((0, 1)), self.values)
-        return Transform.from_matrix(sweep.matrix()[0], sweep.position[:, 0])
+        kinematics = Chain(self.base_elements).forward_kinematics(np.zeros((0, 1)), self.values)
+        return Transform.from_matrix(kinematics.matrix()[0], kinematics.position[:, 0])
 
     def target(self, name: str) -> Target:
         """Return the target called `name`."""
@@ -260,7 +260,7 @@ class Robot:
                 raise InputError("the robot has no such parameter", where=self.name, came=name, cure=cure)
         return self.with_parameters(replace(self.parameters[n], value=float(v)) for n, v in values.items())
 
-    def carrying(self, payload: Payload | None = None, gravity: tuple[float, float, float] | None = None) -> Robot:
+    def with_payload(self, payload: Payload | None = None, gravity: tuple[float, float, float] | None = None) -> Robot:
         """Return the robot with another payload, or mounted another way; None leaves what it has.
 
         Raises
@@ -315,13 +315,13 @@ class Robot:
         Parameters
         ----------
         places
-            What each fixture is and where it stands in the world, see :meth:`Fixture.standing`.
+            What each fixture is and where it stands in the world, see :meth:`Fixture.values_at`.
         """
         kept = {n: p for n, p in self.known.items() if p.group != "fixture"}
         made = tuple(Fixture(name, kind, place.quaternion) for name, (kind, place) in places.items())
         beside = replace(self, fixtures=made, known=kept)
         values = {
-            n: v for f, (_, place) in zip(made, places.values(), strict=True) for n, v in f.standing(place).items()
+            n: v for f, (_, place) in zip(made, places.values(), strict=True) for n, v in f.values_at(place).items()
         }
         return beside.with_parameters(beside.parameters[n].restarted(v) for n, v in values.items())
 
@@ -381,7 +381,7 @@ class Robot:
             )
         return np.ascontiguousarray(readings_in_equilibrium(self, variables).T)
 
-    def straight(self, joints: Array) -> Array:
+    def without_deflections(self, joints: Array) -> Array:
         """Return the variables ``(joints or more, n)`` of joints ``(joints, n)`` that turn and do nothing else."""
         return np.concatenate([joints, np.zeros((len(self.moving) - len(joints), *joints.shape[1:]))])
 
@@ -395,13 +395,15 @@ class Robot:
         if not tilting:
             return variables
         joints = variables[: len(self.joints)]
-        tilted, at = self.straight(joints), Postures(joints.T, loads=joint_loads(self, variables))
+        tilted, at = self.without_deflections(joints), Postures(joints.T, loads=joint_loads(self, variables))
         for effect in tilting:
             for variable, part in effect.deflection(at, self.values).items():
                 tilted[variable] += part
         return tilted
 
-    def sweep(self, q: Array | Postures, target: str | None = None, values: Values | None = None) -> Sweep:
+    def forward_kinematics(
+        self, q: Array | Postures, target: str | None = None, values: Values | None = None
+    ) -> ForwardKinematics:
         """Run through the chain to the flange, or to a target.
 
         Parameters
@@ -414,68 +416,78 @@ class Robot:
             All parameter values, instead of the robot's own; each a number or ``(trials, 1)``.
         """
         values = self.values if values is None else values
-        return self.sweep_of(self.variables(q, values), target, values)
+        return self.forward_kinematics_of(self.variables(q, values), target, values)
 
-    def sweep_of(self, variables: Array, target: str | None = None, values: Values | None = None) -> Sweep:
-        """Run through the chain as :meth:`sweep`, with given variables ``(joints or more, ..., n)`` of the trunk."""
+    def forward_kinematics_of(
+        self, variables: Array, target: str | None = None, values: Values | None = None
+    ) -> ForwardKinematics:
+        """Run through the chain as :meth:`forward_kinematics`, with variables ``(joints or more, ..., n)`` given."""
         values = self.values if values is None else values
-        trunk = self.trunk.sweep(variables, values)
-        return trunk if target is None else self.target(target).chain.sweep(variables, values, trunk)
+        trunk = self.trunk.forward_kinematics(variables, values)
+        return trunk if target is None else self.target(target).chain.forward_kinematics(variables, values, trunk)
 
-    def fixture_sweep(self, name: str, values: Values | None = None) -> Sweep:
-        """Run through the chain to a fixture: one configuration, whatever the joints do; `values` as for `sweep`."""
-        return self.fixture(name).chain.sweep(np.zeros((0, 1)), self.values if values is None else values)
+    def fixture_kinematics(self, name: str, values: Values | None = None) -> ForwardKinematics:
+        """Run through the chain to a fixture: one configuration; `values` as for :meth:`forward_kinematics`."""
+        return self.fixture(name).chain.forward_kinematics(np.zeros((0, 1)), self.values if values is None else values)
 
     def poses(self, q: Array | Postures, target: str | None = None) -> tuple[Array, Array]:
         """Return positions ``(n, 3)`` [m] and rotations ``(n, 3, 3)`` of the flange or a target in the world."""
-        sweep = self.sweep(q, target)
-        return np.ascontiguousarray(sweep.position.T), np.ascontiguousarray(sweep.matrix())
+        kinematics = self.forward_kinematics(q, target)
+        return np.ascontiguousarray(kinematics.position.T), np.ascontiguousarray(kinematics.matrix())
 
     def joint_jacobian(self, q: Array | Postures, target: str | None = None) -> Array:
         """Return the geometric Jacobian ``(n, 6, joints)`` in the world, linear rows first [m, rad per rad or m].
 
         Rates are those of the true joint variables.
         """
-        sweep = self.sweep(q, target)
-        return np.moveaxis(np.concatenate(sweep.derivatives(self.moving[: len(self.joints)]), axis=1), (0, 1), (2, 1))
+        kinematics = self.forward_kinematics(q, target)
+        return np.moveaxis(
+            np.concatenate(kinematics.jacobians(self.moving[: len(self.joints)]), axis=1), (0, 1), (2, 1)
+        )
 
-    def linear(self, sweep: Sweep, q: Array | Postures, names: Sequence[str], values: Values | None = None) -> Array:
+    def position_jacobian(
+        self, kinematics: ForwardKinematics, q: Array | Postures, names: Sequence[str], values: Values | None = None
+    ) -> Array:
         """Return the velocity of the tip of a sweep by the parameters `names` [m per unit of the parameter].
 
         Parameters
         ----------
         sweep
-            From :meth:`sweep` with the same `q` and `values`.
+            From :meth:`forward_kinematics` with the same `q` and `values`.
 
         Returns
         -------
         linear
             ``(len(names), 3, ..., n)`` in the world; zero for parameters of other targets.
         """
-        return self._by_parameters(sweep, sweep.linear, q, names, values)
+        return self._by_parameters(kinematics, kinematics.position_jacobian, q, names, values)
 
-    def angular(self, sweep: Sweep, q: Array | Postures, names: Sequence[str], values: Values | None = None) -> Array:
+    def orientation_jacobian(
+        self, kinematics: ForwardKinematics, q: Array | Postures, names: Sequence[str], values: Values | None = None
+    ) -> Array:
         """Return the angular velocity of the tip of a sweep by the parameters `names` [rad per unit of the parameter].
 
-        Parameters and the shape of what is returned are as for :meth:`linear`.
+        Parameters and the shape of what is returned are as for :meth:`position_jacobian`.
         """
-        return self._by_parameters(sweep, sweep.angular, q, names, values)
+        return self._by_parameters(kinematics, kinematics.orientation_jacobian, q, names, values)
 
-    def derivatives(
-        self, sweep: Sweep, q: Array | Postures, names: Sequence[str], values: Values | None = None
+    def jacobians(
+        self, kinematics: ForwardKinematics, q: Array | Postures, names: Sequence[str], values: Values | None = None
     ) -> tuple[Array, Array]:
-        """Return :meth:`linear` and :meth:`angular`."""
-        return self.linear(sweep, q, names, values), self.angular(sweep, q, names, values)
+        """Return :meth:`position_jacobian` and :meth:`orientation_jacobian`."""
+        return self.position_jacobian(kinematics, q, names, values), self.orientation_jacobian(
+            kinematics, q, names, values
+        )
 
     def _by_parameters(
         self,
-        sweep: Sweep,
+        kinematics: ForwardKinematics,
         by_elements: Callable[[Sequence[int | None]], Array],
         q: Array | Postures,
         names: Sequence[str],
         values: Values | None,
     ) -> Array:
-        places = [sweep.places.get(name) for name in names]
+        places = [kinematics.places.get(name) for name in names]
         derivative = by_elements(places)
         if self.effects and None in places:
             at = self.loaded(q)

@@ -125,3 +125,26 @@ class Transform:
 
 
 IDENTITY: Final = Transform()
+
+
+def rigid_motion(points: Array, places: Array) -> tuple[Array, Array]:
+    """Return rotation and translation that bring points nearest to their places, in the sum of squares (Kabsch 1976).
+
+    Parameters
+    ----------
+    points
+        In the moved frame [m], ``(k, 3)``.
+    places
+        Where they are [m], ``(..., k, 3)``.
+
+    Returns
+    -------
+    R, p
+        ``(..., 3, 3)`` and ``(..., 3)``.
+    """
+    centre, middle = points.mean(axis=0), places.mean(axis=-2)
+    H = np.swapaxes(places - middle[..., None, :], -1, -2) @ (points - centre)
+    U, _, Vt = np.linalg.svd(H)
+    U[..., :, 2] *= np.linalg.det(U @ Vt)[..., None]
+    R = U @ Vt
+    return R, middle - R @ centre

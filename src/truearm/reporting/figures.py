@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.identification.fit import Fit
+from truearm.identification.solving.fit import Fit
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
 from truearm.reporting.drawing import (

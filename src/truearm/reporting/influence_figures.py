@@ -6,7 +6,7 @@ import html
 
 import numpy as np
 
-from truearm.identification.influence import Influence
+from truearm.identification.solving.influence import Influence
 from truearm.reporting.drawing import AFTER, Figure, axis, figure
 from truearm.reporting.numbers import rounded
 

@@ -7,8 +7,8 @@ from typing import Final
 
 import numpy as np
 
-from truearm.planning.measurement_plan import MeasurementPlan
-from truearm.planning.prediction import Prediction
+from truearm.planning.choosing.measurement_plan import MeasurementPlan
+from truearm.planning.choosing.prediction import Prediction
 from truearm.reporting.drawing import AFTER, BEFORE, CAMERA, Figure, axis, base_axes, figure, scene_axis
 from truearm.reporting.numbers import rounded, rounded_to, significant
 from truearm.reporting.page import page

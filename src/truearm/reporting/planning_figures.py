@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
-from truearm.planning.iso9283 import Cube
-from truearm.planning.joint_motion import JointMotion
-from truearm.planning.pose_plan import PosePlan
+from truearm.planning.paths.joint_motion import JointMotion
+from truearm.planning.poses.iso9283 import Cube
+from truearm.planning.poses.pose_plan import PosePlan
 from truearm.reporting.drawing import CAMERA, COLOURS, Figure, axis, base_axes, figure, scene_axis
 from truearm.reporting.numbers import rounded, rounded_to
 

@@ -11,8 +11,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.compensation.division import Divided
 from truearm.compensation.program_correction import Correction
+from truearm.compensation.split import Divided
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import Joint
 from truearm.notices import Notice

@@ -11,8 +11,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.identification.fit import Fit
-from truearm.identification.selection import Selection
+from truearm.identification.choosing.selection import Selection
+from truearm.identification.solving.fit import Fit
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import Errors
 from truearm.modeling.chain import Array

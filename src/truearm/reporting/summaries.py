@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from truearm.identification.selection import Selection
+from truearm.identification.choosing.selection import Selection
 from truearm.measurement.statistics import Errors, Spread
 
 

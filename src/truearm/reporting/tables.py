@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from truearm.identification.fit import Fit, Standing
+from truearm.identification.solving.fit import Fit, ParameterStatus
 from truearm.measurement.statistics import Errors, Spread
 from truearm.reporting.numbers import significant
 from truearm.units import SHOWN_AS, from_si
@@ -86,7 +86,7 @@ class ParameterRow:
     estimate: float
     deviation: float | None
     informed: float | None
-    standing: Standing
+    standing: ParameterStatus
 
     @property
     def status(self) -> str:
@@ -137,7 +137,7 @@ def parameter_rows(fit: Fit) -> tuple[ParameterRow, ...]:
                 estimate=from_si(p.value, unit),
                 deviation=from_si(p.deviation, unit) if was_free and p.deviation is not None else None,
                 informed=p.informed if was_free else None,
-                standing=fit.standing(p.name),
+                standing=fit.parameter_status(p.name),
             )
         )
     return tuple(rows)

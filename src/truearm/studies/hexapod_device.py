@@ -9,29 +9,29 @@ from typing import Final
 import numpy as np
 
 from truearm.errors import InputError
-from truearm.measurement.devices.hexapod.fourth_cup import four_cups, side_frames
-from truearm.measurement.devices.hexapod.geometry import DEVICE
-from truearm.measurement.devices.hexapod.kinematics import SOLUTIONS, rigid_motion, tool_cups
-from truearm.measurement.devices.hexapod.poses import (
+from truearm.measurement.hexapod.geometry import DEVICE
+from truearm.measurement.hexapod.kinematics import SOLUTIONS, tool_cups
+from truearm.measurement.hexapod.poses import (
     CUPS,
     HexapodPose,
     poses,
 )
-from truearm.measurement.devices.hexapod.session import measure_poses, set_up
-from truearm.measurement.devices.hexapod.simulated import ballbar
-from truearm.measurement.devices.hexapod.tool_changer import ToolChanger
-from truearm.measurement.devices.hexapod.uncertainty import (
+from truearm.measurement.hexapod.uncertainty import (
     all_solutions,
     cup_monte_carlo,
 )
-from truearm.measurement.devices.hexapod.world_frame import plain_frame
-from truearm.measurement.twin import Twin
+from truearm.measurement.hexapod.world_frame import plain_frame
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
-from truearm.modeling.transform import IDENTITY, Transform
+from truearm.modeling.transform import IDENTITY, Transform, rigid_motion
 from truearm.planning.hexapod.reachable import Reachable, reachable
 from truearm.planning.hexapod.tool import with_cups
 from truearm.robots import load_robot
+from truearm.simulation.hexapod.fourth_cup import four_cups, side_frames
+from truearm.simulation.hexapod.session import measure_poses, set_up
+from truearm.simulation.hexapod.simulated import ballbar
+from truearm.simulation.hexapod.tool_changer import ToolChanger
+from truearm.simulation.twin import Twin
 from truearm.studies.hexapod_device_tables import (
     ATTACHED,
     REPEATED,

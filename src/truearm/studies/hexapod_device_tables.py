@@ -10,10 +10,9 @@ from typing import Final
 
 import numpy as np
 
-from truearm.measurement.devices.hexapod.fourth_cup import SIDES_OF_FOUR, four_cups
-from truearm.measurement.devices.hexapod.geometry import DEVICE, designs, triangle
-from truearm.measurement.devices.hexapod.kinematics import leg_lengths, rigid_motion, tool_cups
-from truearm.measurement.devices.hexapod.poses import (
+from truearm.measurement.hexapod.geometry import DEVICE, designs, triangle
+from truearm.measurement.hexapod.kinematics import leg_lengths, tool_cups
+from truearm.measurement.hexapod.poses import (
     CUPS,
     HexapodPose,
     assemblies,
@@ -21,12 +20,14 @@ from truearm.measurement.devices.hexapod.poses import (
     distinct,
     near_equal,
 )
-from truearm.measurement.devices.hexapod.uncertainty import (
+from truearm.measurement.hexapod.uncertainty import (
     CupUncertainty,
     all_solutions,
     cup_uncertainty,
 )
 from truearm.modeling.chain import Array
+from truearm.modeling.transform import rigid_motion
+from truearm.simulation.hexapod.fourth_cup import SIDES_OF_FOUR, four_cups
 from truearm.studies.study import Row, Table
 from truearm.validation.pose_accuracy import repeatability
 

@@ -7,9 +7,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from truearm.measurement.devices.hexapod.geometry import DEVICE, triangle
-from truearm.measurement.devices.hexapod.poses import HexapodPose, distance, distinct, near_equal
-from truearm.measurement.devices.hexapod.sheet import PlannedRow
+from truearm.measurement.hexapod.geometry import DEVICE, triangle
+from truearm.measurement.hexapod.poses import HexapodPose, distance, distinct, near_equal
+from truearm.measurement.hexapod.sheet import PlannedRow
 from truearm.modeling.chain import Array
 from truearm.reporting.drawing import AFTER, BEFORE, CAMERA, Figure, axis, figure, scene_axis
 from truearm.reporting.numbers import rounded, rounded_to

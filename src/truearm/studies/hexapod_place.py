@@ -7,11 +7,11 @@ from typing import Final
 
 import numpy as np
 
-from truearm.measurement.devices.hexapod.geometry import DEVICE, triangle
+from truearm.identification.hexapod.campaign import touching
+from truearm.measurement.hexapod.geometry import DEVICE, triangle
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
-from truearm.planning.hexapod.campaign import touching
 
 _DOWN: Final = np.diag([1.0, -1.0, -1.0])
 

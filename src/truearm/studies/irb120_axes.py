@@ -9,14 +9,14 @@ from typing import Any, Final
 
 import numpy as np
 
-from truearm.measurement.truths import truth_twin
-from truearm.measurement.twin import Twin
-from truearm.measurement.twin_joint import PERFECT, JointTruth
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import Payload
 from truearm.reporting.drawing import AFTER, BEFORE, Figure, axis, figure
 from truearm.reporting.numbers import rounded_to
 from truearm.robots import load_robot
+from truearm.simulation.truths import truth_twin
+from truearm.simulation.twin import Twin
+from truearm.simulation.twin_joint import PERFECT, JointTruth
 from truearm.studies.single_joint import AxisTest, Turn, places_of, run_out, turn_of
 from truearm.studies.study import Picture, Row, Study, Table
 
@@ -110,7 +110,7 @@ def study(seeds: int, progress: Callable[[str], None], coarser: int = 1) -> Stud
 
 def _twin(truth: str) -> Twin:
     twin = truth_twin(load_robot("irb120"), truth, np.random.default_rng(0))
-    robot = twin.robot.with_frames(twin.robot.base, {"1": _REFLECTOR}).carrying(_PAYLOAD)
+    robot = twin.robot.with_frames(twin.robot.base, {"1": _REFLECTOR}).with_payload(_PAYLOAD)
     return replace(twin, robot=robot)
 
 

@@ -9,12 +9,12 @@ from typing import Final
 
 import numpy as np
 
-from truearm.identification.models import MODELS
-from truearm.identification.zones import identify_zones
-from truearm.measurement.devices import DEVICES, Device
-from truearm.measurement.truths import truth_twin
-from truearm.measurement.twin import Twin, measure
+from truearm.identification.choosing.zones import identify_zones
+from truearm.identification.solving.models import MODELS
 from truearm.modeling.chain import Array
+from truearm.simulation.devices import DEVICES, Device
+from truearm.simulation.truths import truth_twin
+from truearm.simulation.twin import Twin, measure
 from truearm.studies import irb120_instruments_tables as listed
 from truearm.studies import irb120_setups_tables as compared
 from truearm.studies.irb120_instruments import Accuracy, accuracy, tool_alone
@@ -216,7 +216,7 @@ def _instruments(
 ) -> None:
     nominal = driven()
     twin = truth_twin(nominal, SETUPS[0].truth, rng)
-    nominal = nominal.carrying(twin.robot.payload)
+    nominal = nominal.with_payload(twin.robot.payload)
     truth = Truth.of(twin, nominal.random_configurations(unseen, rng))
     for device in devices:
         counts = (listed.COUNT, 3 * listed.COUNT) if device.name in listed.ONE_NUMBER else (listed.COUNT,)
@@ -230,7 +230,7 @@ def _instruments(
 def _zones(found: Found, unseen: int, training: tuple[int, int], rng: np.random.Generator) -> None:
     nominal = driven()
     twin = running_out(truth_twin(nominal, SETUPS[0].truth, rng))
-    nominal = nominal.carrying(twin.robot.payload)
+    nominal = nominal.with_payload(twin.robot.payload)
     read = measure(twin, nominal.random_configurations(max(training), rng), _NOISE, rng)
     truth = Truth.of(twin, nominal.random_configurations(unseen, rng))
     nests = {t.name: tuple(twin.robot.values[t.parameter(axis)] for axis in "xyz") for t in twin.robot.targets}

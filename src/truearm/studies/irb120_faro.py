@@ -10,9 +10,9 @@ from typing import Final
 import numpy as np
 
 from truearm.errors import InputError
-from truearm.identification.fit import identify
-from truearm.identification.models import FRAMES, MODELS, Model
-from truearm.identification.selection import AUTO, select
+from truearm.identification.choosing.selection import AUTO, select
+from truearm.identification.solving.fit import identify
+from truearm.identification.solving.models import FRAMES, MODELS, Model
 from truearm.measurement.checks import constellation
 from truearm.measurement.dataset import Dataset, IntArray
 from truearm.measurement.readers.matrices import read_matrices
@@ -84,7 +84,7 @@ def study(
         )
     data = without_table_motion(raw)
     robot = load_robot("irb120")
-    carrying = robot.carrying(_PAYLOAD)
+    carrying = robot.with_payload(_PAYLOAD)
     found: defaultdict[tuple[int, str], list[Spread]] = defaultdict(list)
     chosen = []
     for seed in range(seeds):
@@ -163,7 +163,7 @@ def _together(count: int) -> str:
 
 def _cases(robot: Robot, *, further: bool) -> dict[str, tuple[Robot, Model]]:
     """Return what is fitted to every split, and with `further` the effects one by one and together."""
-    carrying = robot.carrying(_PAYLOAD)
+    carrying = robot.with_payload(_PAYLOAD)
     cases = {
         "nominal, base and targets fitted": (robot, FRAMES),
         "offsets": (robot, _MODELS["offsets"]),

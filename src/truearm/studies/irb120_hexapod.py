@@ -10,20 +10,20 @@ from typing import Final
 
 import numpy as np
 
-from truearm.measurement.devices.hexapod.geometry import DEVICE, triangle
-from truearm.measurement.devices.hexapod.kinematics import leg_lengths, rigid_motion
-from truearm.measurement.devices.hexapod.poses import poses
-from truearm.measurement.devices.hexapod.session import SetUp, measure_poses, set_up
-from truearm.measurement.devices.hexapod.simulated import ballbar
-from truearm.measurement.devices.hexapod.world_frame import plain_frame, world_frame
+from truearm.measurement.hexapod.geometry import DEVICE, triangle
+from truearm.measurement.hexapod.kinematics import leg_lengths
+from truearm.measurement.hexapod.poses import poses
+from truearm.measurement.hexapod.world_frame import plain_frame, world_frame
 from truearm.measurement.statistics import Spread, errors_of
-from truearm.measurement.twin import Twin
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform
+from truearm.modeling.transform import Transform, rigid_motion
 from truearm.planning.hexapod.reachable import Reachable, reachable
 from truearm.planning.hexapod.tool import with_cups
 from truearm.robots import load_robot
+from truearm.simulation.hexapod.session import SetUp, measure_poses, set_up
+from truearm.simulation.hexapod.simulated import ballbar
+from truearm.simulation.twin import Twin
 from truearm.studies.hexapod_figures import reached_poses
 from truearm.studies.hexapod_place import PLACE, touched
 from truearm.studies.irb120_placements import Ways, ways, ways_tables
@@ -163,7 +163,7 @@ def study(seeds: int, progress: Callable[[str], None], unseen: int = _UNSEEN, co
 
 def _run(rng: np.random.Generator, unseen: int, coarser: int) -> _Run:
     twin = worn_twin(rng)
-    told = load_robot("irb120").carrying(twin.robot.payload)
+    told = load_robot("irb120").with_payload(twin.robot.payload)
     read = tracked(twin, in_region(_TRAINING, rng), TRACKER, rng)
     truth = tracked(twin, in_region(unseen, rng), 0.0, rng)
     model = calibrated(without_beta(told), read)

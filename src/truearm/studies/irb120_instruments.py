@@ -6,17 +6,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from truearm.identification.fit import Fit, identify, place
-from truearm.identification.models import FRAMES
-from truearm.identification.problem import Problem
-from truearm.identification.redundancy import find_redundancies, taken_on_trust
+from truearm.identification.solving.fit import Fit, identify, place
+from truearm.identification.solving.models import FRAMES
+from truearm.identification.solving.problem import Problem
+from truearm.identification.solving.redundancy import find_redundancies, gauge_freedoms
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.devices import Device, measured_with, named_device
-from truearm.measurement.devices.hexapod.kinematics import rigid_motion
 from truearm.measurement.observations import OBSERVATIONS
-from truearm.measurement.twin import Twin
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
+from truearm.modeling.transform import rigid_motion
+from truearm.simulation.devices import Device, measured_with, named_device
+from truearm.simulation.twin import Twin
 from truearm.studies.irb120_twin import ELASTIC, Truth
 
 #: What no reading tells: base against joint 1, tool against joint 6, slides along parallel axes, sag of joint 1.
@@ -86,7 +86,7 @@ def accuracy(
         _lengths(before - truly),
         _lengths(after - truly),
         _lengths(_resized(after, truly) - truly),
-        taken_on_trust(data),
+        gauge_freedoms(data),
         _unseen(fit, data),
         sum(int(np.isfinite(v).sum()) for v in (data.position, data.distance, data.height) if v is not None)
         + 3 * int(data.has_orientation.sum()),

@@ -9,22 +9,22 @@ from typing import Final
 
 import numpy as np
 
+from truearm.identification.hexapod.placements import identify_placements
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.devices.hexapod.fourth_cup import four_cups, side_frames, with_fourth
-from truearm.measurement.devices.hexapod.geometry import DEVICE
-from truearm.measurement.devices.hexapod.poses import HexapodPose
-from truearm.measurement.devices.hexapod.session import SetUp, cups_dataset, joined, measure_poses, set_up
-from truearm.measurement.devices.hexapod.sheet import PlannedRow
-from truearm.measurement.devices.hexapod.simulated import ballbar
-from truearm.measurement.devices.hexapod.tool_changer import ToolChanger
-from truearm.measurement.devices.hexapod.world_frame import plain_frame, world_frame
+from truearm.measurement.hexapod.geometry import DEVICE
+from truearm.measurement.hexapod.poses import HexapodPose
+from truearm.measurement.hexapod.sheet import PlannedRow
+from truearm.measurement.hexapod.world_frame import plain_frame, world_frame
 from truearm.measurement.statistics import errors_of
-from truearm.measurement.twin import Twin
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
-from truearm.planning.hexapod.placements import identify_placements
 from truearm.planning.hexapod.reachable import reachable
+from truearm.simulation.hexapod.fourth_cup import four_cups, side_frames, with_fourth
+from truearm.simulation.hexapod.session import SetUp, cups_dataset, joined, measure_poses, set_up
+from truearm.simulation.hexapod.simulated import ballbar
+from truearm.simulation.hexapod.tool_changer import ToolChanger
+from truearm.simulation.twin import Twin
 from truearm.studies.hexapod_place import PLACE, fixture_at, placed, touched
 from truearm.studies.irb120_worn import ELASTIC, calibrated
 from truearm.studies.study import Row, Table

@@ -9,8 +9,8 @@ from typing import Final
 
 import numpy as np
 
-from truearm.identification.fit import identify
-from truearm.identification.models import Model
+from truearm.identification.solving.fit import identify
+from truearm.identification.solving.models import Model
 from truearm.measurement.checks import clean_references, constellation
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of

@@ -8,23 +8,23 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.identification.fit import identify
-from truearm.identification.models import Model
+from truearm.identification.solving.fit import identify
+from truearm.identification.solving.models import Model
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.devices.artefacts import PLANAR_ARTEFACT, SPATIAL_ARTEFACT, Artefact
-from truearm.measurement.devices.device import shown
-from truearm.measurement.devices.jogging import postures_at, site
-from truearm.measurement.devices.tracker import TRACKER, Tracker, positions
-from truearm.measurement.truths import STATION, truth_twin
-from truearm.measurement.twin import Twin
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import Payload
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
-from truearm.planning.exchange import most_telling, most_telling_number
-from truearm.planning.observability import O1
-from truearm.planning.sensitivity import sensitivity
+from truearm.planning.choosing.exchange import most_telling, most_telling_number
+from truearm.planning.choosing.observability import O1
+from truearm.planning.choosing.sensitivity import sensitivity
 from truearm.robots import load_robot
+from truearm.simulation.devices.artefacts import PLANAR_ARTEFACT, SPATIAL_ARTEFACT, Artefact
+from truearm.simulation.devices.device import shown
+from truearm.simulation.devices.jogging import postures_at, site
+from truearm.simulation.devices.tracker import TRACKER, Tracker, positions
+from truearm.simulation.truths import STATION, truth_twin
+from truearm.simulation.twin import Twin
 from truearm.studies.irb120_twin import ELASTIC, Truth, driven, running_out
 from truearm.studies.parallel_axes import without_beta
 
@@ -133,7 +133,7 @@ class Calibrated:
 def twin_of(setup: Setup, truth: str) -> Twin:
     """Return the twin with one of the robot file's truths and gears that run out, carrying what the set-up does."""
     twin = running_out(truth_twin(driven(), truth, np.random.default_rng(0)))
-    robot = twin.robot.with_frames(twin.robot.base, setup.nests).carrying(setup.payload)
+    robot = twin.robot.with_frames(twin.robot.base, setup.nests).with_payload(setup.payload)
     return replace(twin, robot=robot)
 
 
@@ -179,7 +179,7 @@ def calibrate(
     rows, known = _rows(setup, joints, seen)
     kept = most_telling(rows, setup.configurations, known, O1()) if chosen else list(range(setup.configurations))
     data = _read(setup, twin, joints[kept], seen[kept], rng)
-    robot = without_beta(driven()).carrying(setup.payload)
+    robot = without_beta(driven()).with_payload(setup.payload)
     return Calibrated(setup, identify(robot, data, model).robot, joints[kept])
 
 
@@ -226,7 +226,7 @@ def _seen_by(setup: Setup) -> Robot:
 
 def _rows(setup: Setup, joints: Array, seen: NDArray[np.bool_], *, tool_known: bool = False) -> tuple[Array, Array]:
     """Return what each configuration would tell, of the nests that are seen, and what is known beforehand."""
-    robot = ELASTIC.prepared(without_beta(driven()).carrying(setup.payload).with_frames(STATION, setup.nests))
+    robot = ELASTIC.prepared(without_beta(driven()).with_payload(setup.payload).with_frames(STATION, setup.nests))
     told = sensitivity(robot, Postures(joints), ELASTIC.free(robot), _ABOUT)
     counted = np.repeat(np.broadcast_to(seen, (len(joints), len(setup.nests))), 3, axis=1)
     told = replace(told, rows=told.rows * counted[..., None])

@@ -9,20 +9,20 @@ from typing import Final
 
 import numpy as np
 
-from truearm.identification.bounds import Bounds
-from truearm.identification.fit import Redundant, identify
-from truearm.identification.models import MODELS
+from truearm.identification.solving.bounds import Bounds
+from truearm.identification.solving.fit import Redundant, identify
+from truearm.identification.solving.models import MODELS
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import Spread, errors_of
-from truearm.measurement.truths import STATION, truth_twin
-from truearm.measurement.twin import Twin, measure
-from truearm.measurement.twin_joint import JointTruth
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
 from truearm.reporting.drawing import AFTER, BEFORE, axis, figure, logarithmic_axis
 from truearm.reporting.numbers import rounded
 from truearm.robots import load_robot
+from truearm.simulation.truths import STATION, truth_twin
+from truearm.simulation.twin import Twin, measure
+from truearm.simulation.twin_joint import JointTruth
 from truearm.studies.parallel_axes import without_beta
 from truearm.studies.study import Picture, Row, Study, Table
 
@@ -213,7 +213,7 @@ def _run(seed: int, unseen: int) -> _Run:
     clean = measure(published, joints, 0.0, rng)
     spread["before"], before = _judged(there, truth)
     spread["exact"], _ = _identified(_told(nominal, published), clean, truth, "drop")
-    spread["payload as printed"], _ = _identified(nominal.carrying(published.robot.payload), clean, truth, "drop")
+    spread["payload as printed"], _ = _identified(nominal.with_payload(published.robot.payload), clean, truth, "drop")
 
     drawn = _drawn(published, nominal, rng)
     drawn_truth = measure(drawn, others, 0.0, rng)
@@ -226,7 +226,7 @@ def _run(seed: int, unseen: int) -> _Run:
     clean_parallel, truth_parallel = (measure(parallel, at, 0.0, rng) for at in (joints, others))
     spread["d_3 held"], _ = _identified(without_beta(told), clean_parallel, truth_parallel, within={"d_3": 0.0})
 
-    wrong = _wrong(nominal.carrying(published.robot.payload), rng)
+    wrong = _wrong(nominal.with_payload(published.robot.payload), rng)
     noisy = _with_noise(clean, _NOISE, rng)
     fitted = identify(wrong, noisy, _ELASTIC).robot
     spread["noisy"], after = _judged(fitted, truth)
@@ -267,7 +267,7 @@ def _told(nominal: Robot, twin: Twin) -> Robot:
     errors = {name: twin.robot.values[name] - nominal.values[name] for name in ("theta_offset_6", "d_6")}
     c, s = math.cos(errors["theta_offset_6"]), math.sin(errors["theta_offset_6"])
     x, y, z = twin.robot.payload.cog
-    return nominal.carrying(Payload(twin.robot.payload.mass, (c * x - s * y, s * x + c * y, z + errors["d_6"])))
+    return nominal.with_payload(Payload(twin.robot.payload.mass, (c * x - s * y, s * x + c * y, z + errors["d_6"])))
 
 
 def _drawn(twin: Twin, nominal: Robot, rng: np.random.Generator) -> Twin:

@@ -9,9 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from truearm.measurement.devices.hexapod.geometry import DEVICE
-from truearm.measurement.devices.hexapod.simulated import ballbar
-from truearm.measurement.twin import Twin
+from truearm.measurement.hexapod.geometry import DEVICE
 from truearm.modeling.chain import Array
 from truearm.modeling.inverse import inverse
 from truearm.modeling.parts import Payload
@@ -20,6 +18,8 @@ from truearm.modeling.transform import IDENTITY
 from truearm.reporting.drawing import AFTER, BEFORE, Figure, axis, figure
 from truearm.reporting.numbers import rounded_to
 from truearm.robots import load_robot
+from truearm.simulation.hexapod.simulated import ballbar
+from truearm.simulation.twin import Twin
 from truearm.studies.irb120_worn import calibrated, in_base, in_region, tracked, worn_twin
 from truearm.studies.parallel_axes import without_beta
 from truearm.studies.study import Picture, Row, Table
@@ -82,9 +82,9 @@ def spheres(twin: Twin, tracker: Robot, rng: np.random.Generator, coarser: int =
     coarser
         Only every so many-th reading.
     """
-    nominal = without_beta(load_robot("irb120").carrying(twin.robot.payload))
+    nominal = without_beta(load_robot("irb120").with_payload(twin.robot.payload))
     spatial = _with_spatial(rng)
-    spatial_nominal = without_beta(load_robot("irb120").carrying(_SPATIAL_LOAD))
+    spatial_nominal = without_beta(load_robot("irb120").with_payload(_SPATIAL_LOAD))
     seen = tracked(twin, in_region(_TRAINING["C-Track"], rng), C_TRACK, rng)
     seen_spatial = tracked(spatial, in_region(_TRAINING["C-Track, spatial"], rng), C_TRACK, rng)
     models = {
@@ -108,7 +108,7 @@ def spheres(twin: Twin, tracker: Robot, rng: np.random.Generator, coarser: int =
 def _with_spatial(rng: np.random.Generator) -> Twin:
     twin = worn_twin(rng, "ctrack-spatial")
     robot = twin.robot
-    return replace(twin, robot=robot.with_frames(robot.base, _SPATIAL).carrying(_SPATIAL_LOAD))
+    return replace(twin, robot=robot.with_frames(robot.base, _SPATIAL).with_payload(_SPATIAL_LOAD))
 
 
 def _taught(twin: Twin, nominal: Robot, rng: np.random.Generator) -> tuple[Array, Array]:

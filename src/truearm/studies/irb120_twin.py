@@ -9,12 +9,12 @@ from typing import Final
 
 import numpy as np
 
-from truearm.identification.models import MODELS, Model
-from truearm.measurement.twin import Twin
-from truearm.measurement.twin_joint import PERFECT
+from truearm.identification.solving.models import MODELS, Model
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.robots import load_robot
+from truearm.simulation.twin import Twin
+from truearm.simulation.twin_joint import PERFECT
 
 #: Lowest and highest joint readings [deg]: section 2.5; upper ends of joints 2 and 3 are the robot's own limits.
 _REGION: Final = ((-90, 0, -80, -150, -90, -180), (90, 110, 70, 150, 90, 180))

@@ -8,16 +8,16 @@ from typing import Final
 
 import numpy as np
 
-from truearm.identification.fit import identify
-from truearm.identification.models import MODELS
+from truearm.identification.solving.fit import identify
+from truearm.identification.solving.models import MODELS
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.truths import truth_twin
-from truearm.measurement.twin import Twin, measure
-from truearm.measurement.twin_joint import PERFECT
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY
 from truearm.robots import load_robot
+from truearm.simulation.truths import truth_twin
+from truearm.simulation.twin import Twin, measure
+from truearm.simulation.twin_joint import PERFECT
 
 #: Frees what the document's Table 2.2 does, and Hayati's beta.
 ELASTIC: Final = next(model for model in MODELS if model.name == "elastic")

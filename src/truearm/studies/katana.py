@@ -10,18 +10,19 @@ from typing import Final, Literal
 
 import numpy as np
 
-from truearm.identification.inclinometers import TiltingFit, calibrate_tilting
-from truearm.measurement.inclinometer import compare, deviation_of_change, measure_pairs
-from truearm.measurement.twin import Twin
-from truearm.measurement.twin_joint import JointTruth
+from truearm.identification.inclinometers.fit import TiltingFit, calibrate_tilting
+from truearm.measurement.inclinometer import deviation_of_change
 from truearm.modeling.chain import Array
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY, Transform
-from truearm.planning.inclinometer import plan_tilting
-from truearm.planning.iso9283 import Cube
-from truearm.planning.largest_cube import largest_cube
+from truearm.planning.choosing.inclinometer import plan_tilting
+from truearm.planning.poses.iso9283 import Cube
+from truearm.planning.poses.largest_cube import largest_cube
 from truearm.robots import load_robot
+from truearm.simulation.inclinometer import compare, measure_pairs
+from truearm.simulation.twin import Twin
+from truearm.simulation.twin_joint import JointTruth
 
 TIP: Final = "tip"
 #: The length of the tool link, d_6 [m].

@@ -10,25 +10,24 @@ import numpy as np
 
 from truearm.compensation.trajectories import corrected
 from truearm.errors import InputError
-from truearm.identification.fit import Fit, identify, place
-from truearm.identification.models import MODELS
-from truearm.identification.redundancy import taken_on_trust
+from truearm.identification.solving.fit import Fit, identify, place
+from truearm.identification.solving.models import MODELS
+from truearm.identification.solving.redundancy import gauge_freedoms
 from truearm.measurement.circles import fit_circle
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.devices import DEVICES, Device, measured_with
-from truearm.measurement.devices.artefacts import MARKERS, PLANAR_ARTEFACT, SPATIAL_ARTEFACT, Artefact
-from truearm.measurement.devices.drawn_circle.pencil import DRAWN_CIRCLE, PencilCircle
-from truearm.measurement.devices.hexapod.kinematics import rigid_motion
-from truearm.measurement.devices.hexapod_poses import HEXAPOD
-from truearm.measurement.devices.known_points import TOUCH_UP
-from truearm.measurement.devices.tracker import TRACKER, Tracker
-from truearm.measurement.twin import Twin
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import Tool
 from truearm.modeling.robot import Robot
-from truearm.modeling.transform import IDENTITY, Transform
-from truearm.planning.joint_motion import JointMotion
-from truearm.planning.trajectory import Trajectory
+from truearm.modeling.transform import IDENTITY, Transform, rigid_motion
+from truearm.planning.paths.joint_motion import JointMotion
+from truearm.planning.paths.trajectory import Trajectory
+from truearm.simulation.devices import DEVICES, Device, measured_with
+from truearm.simulation.devices.artefacts import MARKERS, PLANAR_ARTEFACT, SPATIAL_ARTEFACT, Artefact
+from truearm.simulation.devices.hexapod_poses import HEXAPOD
+from truearm.simulation.devices.known_points import TOUCH_UP
+from truearm.simulation.devices.pencil import DRAWN_CIRCLE, PencilCircle
+from truearm.simulation.devices.tracker import TRACKER, Tracker
+from truearm.simulation.twin import Twin
 from truearm.studies.katana import NOISE, TIP, inclined, katana, published, twin
 from truearm.studies.katana_circle import PENCIL, motions, paths
 
@@ -278,7 +277,7 @@ def _reached(fit: Fit, data: Dataset, joints: Array, true: Array) -> Reached:
         _mean_and_largest(own),
         _mean_and_largest(np.linalg.norm(predicted @ R.T + p - true, axis=1)),
         float(np.sum(spread * truly) / np.sum(truly * truly)) - 1.0,
-        taken_on_trust(data),
+        gauge_freedoms(data),
         fit.unseen,
     )
 

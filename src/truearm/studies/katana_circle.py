@@ -10,17 +10,17 @@ import numpy as np
 
 from truearm.compensation.trajectories import corrected, path_error
 from truearm.errors import InputError
-from truearm.identification.pose_by_pose import least_squares
+from truearm.identification.solving.pose_by_pose import least_squares
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of
-from truearm.measurement.twin import Twin, measure
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
-from truearm.planning.joint_motion import JointMotion, joint_motion
-from truearm.planning.paths import Circle, Line
-from truearm.planning.pose_plan import plan_poses
-from truearm.planning.time_law import timed
-from truearm.planning.trajectory import Trajectory
+from truearm.planning.paths.joint_motion import JointMotion, joint_motion
+from truearm.planning.paths.paths import Circle, Line
+from truearm.planning.paths.time_law import timed
+from truearm.planning.paths.trajectory import Trajectory
+from truearm.planning.poses.pose_plan import plan_poses
+from truearm.simulation.twin import Twin, measure
 from truearm.studies.katana import (
     CHAPTER_5_CUBE,
     NAMES,

@@ -8,9 +8,9 @@ from typing import Final
 
 import numpy as np
 
-from truearm.measurement.devices.artefacts import MARKERS
 from truearm.reporting.drawing import AFTER, BEFORE, Figure, axis, figure, logarithmic_axis
 from truearm.reporting.numbers import rounded
+from truearm.simulation.devices.artefacts import MARKERS
 from truearm.studies.katana_campaigns import (
     DOCUMENT,
     LOW_COST,

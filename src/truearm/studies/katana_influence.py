@@ -9,8 +9,8 @@ from typing import Final
 
 import numpy as np
 
-from truearm.identification.influence import influence
-from truearm.planning.pose_plan import POSES
+from truearm.identification.solving.influence import influence
+from truearm.planning.poses.pose_plan import POSES
 from truearm.reporting.drawing import AFTER, BEFORE, axis, figure
 from truearm.reporting.influence_figures import influence_figure
 from truearm.reporting.numbers import rounded

@@ -9,13 +9,13 @@ from typing import Final
 
 import numpy as np
 
-from truearm.identification.influence import Influence, influence
-from truearm.identification.pose_by_pose import Combination, influence_based, least_squares, minimum_norm
+from truearm.identification.solving.influence import Influence, influence
+from truearm.identification.solving.pose_by_pose import Combination, influence_based, least_squares, minimum_norm
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.twin import measure
 from truearm.modeling.robot import Robot
-from truearm.planning.iso9283 import Cube
-from truearm.planning.pose_plan import plan_poses
+from truearm.planning.poses.iso9283 import Cube
+from truearm.planning.poses.pose_plan import plan_poses
+from truearm.simulation.twin import measure
 from truearm.studies.katana import (
     CHAPTER_5_CUBE,
     NAMES,

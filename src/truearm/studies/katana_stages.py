@@ -8,14 +8,14 @@ from typing import Final
 
 import numpy as np
 
-from truearm.identification.inclinometers import TILTING as EFFECTS
-from truearm.identification.inclinometers import TiltingFit
-from truearm.identification.pose_by_pose import influence_based, least_squares, minimum_norm
-from truearm.measurement.twin import measure
+from truearm.identification.inclinometers.fit import TILTING as EFFECTS
+from truearm.identification.inclinometers.fit import TiltingFit
+from truearm.identification.solving.pose_by_pose import influence_based, least_squares, minimum_norm
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
-from truearm.planning.iso9283 import Cube
-from truearm.planning.pose_plan import PosePlan, plan_poses
+from truearm.planning.poses.iso9283 import Cube
+from truearm.planning.poses.pose_plan import PosePlan, plan_poses
+from truearm.simulation.twin import measure
 from truearm.studies.katana import (
     NAMES,
     NOISE,

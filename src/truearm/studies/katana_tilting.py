@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from truearm.planning.pose_plan import POSES
+from truearm.planning.poses.pose_plan import POSES
 from truearm.reporting.drawing import AFTER, BEFORE, axis, figure, logarithmic_axis
 from truearm.reporting.numbers import rounded
 from truearm.reporting.planning_figures import pose_cube

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from truearm.modeling.chain import Array
-from truearm.planning.pose_plan import POSES
+from truearm.planning.poses.pose_plan import POSES
 from truearm.reporting.drawing import AFTER, BEFORE, COLOURS, Figure, axis, figure
 from truearm.reporting.numbers import rounded
 from truearm.reporting.planning_figures import joint_trajectories

@@ -10,22 +10,22 @@ from typing import Final
 import numpy as np
 
 from truearm.compensation.inverse_errors import fake_targets
-from truearm.compensation.line_test import LineErrors, on_twin, reduction
-from truearm.identification.axis_circles import axis_circles
-from truearm.identification.axis_fit import NORMAL_95, AxisFit, fit_axes
-from truearm.identification.redundancy import Redundancy
+from truearm.identification.axes.circles import axis_circles
+from truearm.identification.axes.fit import NORMAL_95, AxisFit, fit_axes
+from truearm.identification.solving.redundancy import Redundancy
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.twin import Twin, measure
 from truearm.modeling.chain import Array
 from truearm.modeling.conversion import converted
 from truearm.modeling.robot import Robot
-from truearm.modeling.tolerances import tolerance_of
 from truearm.modeling.transform import IDENTITY
-from truearm.planning.seven_lines import DIRECTIONS, SevenLines, readings, seven_lines
+from truearm.planning.poses.seven_lines import DIRECTIONS, SevenLines, readings, seven_lines
 from truearm.reporting.drawing import AFTER, BEFORE, axis, figure
 from truearm.reporting.numbers import rounded_to
 from truearm.robots import load_robot
+from truearm.simulation.twin import Twin, measure
 from truearm.studies.study import Picture, Row, Study, Table
+from truearm.validation.line_test import LineErrors, on_twin, reduction
+from truearm.validation.tolerances import tolerance_of
 
 #: Table 2: lowest and highest reading, step [deg], and the posture of the others.
 _RUNS: Final[Mapping[int, tuple[int, int, int, tuple[float, ...]]]] = {
@@ -228,7 +228,9 @@ def _coverage(exact: AxisFit, share: Array) -> Table:
 def _ranks(nominal: Robot, exact: AxisFit) -> Table:
     names = [n for n, p in nominal.parameters.items() if p.group == "geometry"]
     q = nominal.random_configurations(40, np.random.default_rng(0))
-    linear, angular = (part.reshape(len(names), -1).T for part in nominal.derivatives(nominal.sweep(q), q, names))
+    linear, angular = (
+        part.reshape(len(names), -1).T for part in nominal.jacobians(nominal.forward_kinematics(q), q, names)
+    )
     poses = int(np.linalg.matrix_rank(np.concatenate([linear, angular]), tol=1e-9))
     unseen = "; ".join(r.combination for r in exact.redundancies)
     return Table(

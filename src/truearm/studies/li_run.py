@@ -9,13 +9,13 @@ from typing import Final
 
 import numpy as np
 
-from truearm.identification.fit import identify, place
-from truearm.identification.models import MODELS
+from truearm.identification.solving.fit import identify, place
+from truearm.identification.solving.models import MODELS
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.devices.calibration_table import CalibrationTable, rectangular_grid
-from truearm.measurement.twin import Twin
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
+from truearm.simulation.devices.calibration_table import CalibrationTable, rectangular_grid
+from truearm.simulation.twin import Twin
 from truearm.studies.li import (
     BEYOND,
     BOUNDS,

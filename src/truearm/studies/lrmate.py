@@ -9,23 +9,23 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.identification.problem import Problem
-from truearm.identification.solver import solve
+from truearm.identification.hexapod.campaign import touching
+from truearm.identification.solving.problem import Problem
+from truearm.identification.solving.solver import solve
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.devices.hexapod.geometry import DEVICE
-from truearm.measurement.devices.hexapod.world_frame import WorldFrame, world_frame
-from truearm.measurement.twin import Twin
-from truearm.measurement.twin_joint import JointTruth
+from truearm.measurement.hexapod.geometry import DEVICE
+from truearm.measurement.hexapod.world_frame import WorldFrame, world_frame
 from truearm.modeling.chain import Array
 from truearm.modeling.inverse.branches import BRANCHES, branch_rule
 from truearm.modeling.parameters import FreeParameters
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform, rotation_from_quaternion, rotation_vector
-from truearm.planning.constraints import Constraints, allowed
-from truearm.planning.hexapod.campaign import touching
+from truearm.planning.constraints.constraints import Constraints, allowed
 from truearm.planning.hexapod.tool import with_cups
 from truearm.robots import load_robot
+from truearm.simulation.twin import Twin
+from truearm.simulation.twin_joint import JointTruth
 from truearm.validation.pair_distances import PairDistances, pair_distances
 
 TARGETS: Final = ("1", "2", "3")
@@ -241,7 +241,7 @@ def unseen(robot: Robot, twin: Twin, joints: Array) -> Unseen:
         cup=cup,
         position=frames[np.arange(len(joints)), cup, :3, 3],
         rotation=frames[:, 0, :3, :3],
-        front_up=np.isin(rule.numbers(robot.sweep(joints)), wanted),
+        front_up=np.isin(rule.numbers(robot.forward_kinematics(joints)), wanted),
     )
 
 

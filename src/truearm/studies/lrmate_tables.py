@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from truearm.measurement.devices.hexapod.geometry import DEVICE
+from truearm.measurement.hexapod.geometry import DEVICE
 from truearm.modeling.chain import Array
 from truearm.studies.lrmate_campaign import Outcome, Station
 from truearm.studies.study import Row, Table

@@ -9,8 +9,8 @@ import numpy as np
 
 from truearm.measurement import turns
 from truearm.measurement.circles import fit_circle
-from truearm.measurement.twin import Twin, measure
 from truearm.modeling.chain import Array
+from truearm.simulation.twin import Twin, measure
 
 
 @dataclass(frozen=True)

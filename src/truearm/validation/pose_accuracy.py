@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from truearm.errors import InputError
-from truearm.measurement.devices.hexapod.kinematics import rigid_motion
 from truearm.modeling.chain import Array
-from truearm.modeling.transform import rotation_vector
+from truearm.modeling.transform import rigid_motion, rotation_vector
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,9 +17,9 @@ from truearm.compensation.program_poses import edits_of, numbers_of, pose_number
 from truearm.compensation.programs import LANGUAGES
 from truearm.compensation.programs.lines import Lines
 from truearm.compensation.programs.numbers import NUMBER
-from truearm.compensation.programs.orientations import QUATERNION
 from truearm.compensation.programs.program import Division, Edit, Language, Program, ProgramTarget, Source
 from truearm.errors import InputError
+from truearm.modeling.orientations import QUATERNION
 
 SAMPLES = Path(__file__).parent / "samples"
 dividing = pytest.mark.parametrize("language", [one for one in LANGUAGES if one.divide], ids=lambda one: one.name)

@@ -400,7 +400,7 @@ def test_up_stays_up_when_the_arm_leans_back_over_its_first_axis() -> None:
     leaning = np.deg2rad([[0, 30, 0, 0, 40, 0], [0, -55, -40, 0, 40, 0]])
     straight = np.deg2rad([[0, 30, -100, 0, 40, 0], [0, -55, -130, 0, 40, 0]])
     for postures, side in ((leaning, "U"), (straight, "D")):
-        names = [BRANCHES[number] for number in rule.numbers(robot.sweep(postures))]
+        names = [BRANCHES[number] for number in rule.numbers(robot.forward_kinematics(postures))]
         for name, place in zip(names, "TB", strict=True):
             found = configuration(f"N {side} {place}, 0, 0, 0")
             assert found is not None

@@ -14,9 +14,9 @@ from pathlib import Path
 import pytest
 
 from truearm.compensation.programs.jbi import JBI
-from truearm.compensation.programs.orientations import FIXED_XYZ_ANGLES
 from truearm.compensation.programs.program import Configuration, Division, Edit, Program, Source
 from truearm.errors import InputError
+from truearm.modeling.orientations import FIXED_XYZ_ANGLES
 
 SAMPLES = Path(__file__).parent / "samples" / "jbi"
 

@@ -535,7 +535,7 @@ def test_elbow_words_agree_with_the_arm() -> None:
     rule = branch_rule(robot)
     assert rule is not None
     q = robot.random_configurations(2000, np.random.default_rng(3))
-    words = [BRANCHES[number].split("-") for number in rule.numbers(robot.sweep(q))]
+    words = [BRANCHES[number].split("-") for number in rule.numbers(robot.forward_kinematics(q))]
     tilt, bend = q[:, 1], q[:, 2]
     behind_axis_1 = 270 * np.sin(tilt) + 302 * np.cos(tilt + bend) + 70 * np.sin(tilt + bend) < 0
     behind_arm = 302 * np.cos(bend) + 70 * np.sin(bend) < 0

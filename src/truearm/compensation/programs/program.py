@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, NamedTuple, NoReturn
 
-from truearm.compensation.programs.orientations import Orientation
 from truearm.errors import InputError
+from truearm.modeling.orientations import Orientation
 from truearm.modeling.transform import Transform
 
 MoveKind = Literal["joint", "linear", "circular"]

@@ -13,8 +13,8 @@ import numpy as np
 from truearm.errors import InputError
 from truearm.files import read_text
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.devices.drawn_circle.drawing import DrawnCircle, drawn_circle
-from truearm.measurement.devices.drawn_circle.scan import read_circle
+from truearm.measurement.drawn_circle.drawing import DrawnCircle, drawn_circle
+from truearm.measurement.drawn_circle.scan import read_circle
 from truearm.measurement.readers.canonical import refuse_other_separators
 from truearm.measurement.readers.cells import Cells, Layout, read_cells
 from truearm.measurement.readers.rows import Configurations, found_configurations, in_order

@@ -3,7 +3,7 @@
 A strain wave gear errs twice in a turn of its wave generator (Ghorbel, Gandhi and Alpeter 2001, "On the kinematic
 error in harmonic drive gears"), so two hundred times in a turn of the joint at a ratio of 1 to 100. How often is a fact
 about the gear and stands in the robot file, as ``transmission_periods`` of the joint;
-:mod:`truearm.identification.transmission` finds it in what a fit leaves over.
+:mod:`truearm.identification.judging.transmission` finds it in what a fit leaves over.
 """
 
 from __future__ import annotations

@@ -275,9 +275,9 @@ def origin(tag: Tag, where: str) -> tuple[Triple, Triple]:
 
 def product(elements: Iterable[Element], values: Mapping[str, float] | None = None) -> Array:
     """Return the product of elements without variables, ``(4, 4)``."""
-    sweep = Chain(tuple(elements)).sweep(np.zeros((0, 1)), values)
+    kinematics = Chain(tuple(elements)).forward_kinematics(np.zeros((0, 1)), values)
     made = np.eye(4)
-    made[:3, :3], made[:3, 3] = sweep.matrix()[0], sweep.position[:, 0]
+    made[:3, :3], made[:3, 3] = kinematics.matrix()[0], kinematics.position[:, 0]
     return made
 
 

@@ -103,7 +103,7 @@ class BranchSearch:
         joints = starts.joints
         filled = ~np.isnan(joints[:, :, 0])
         number = np.full(filled.shape, -1)
-        number[filled] = self._rule.numbers(task.robot.rigid.trunk.sweep(joints[filled].T))
+        number[filled] = self._rule.numbers(task.robot.rigid.trunk.forward_kinematics(joints[filled].T))
         return joints, number, filled & ~starts.nearest
 
     def _add_all(self, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -178,11 +178,11 @@ class BranchSearch:
             slot = np.argmin(np.where(there < 0, 1e6, 1e2 * (there != number[:, None]) + 1e1 * ~exact), axis=1)
             none = there[every, slot] < 0
             joints = np.where(none[:, None], joints, found[every, slot])
-            sweep = part.sweep(part.variables(joints))
-            shifted = wanted @ np.linalg.inv(homogeneous(sweep.matrix(), sweep.position.T)) @ shifted
+            kinematics = part.forward_kinematics(part.variables(joints))
+            shifted = wanted @ np.linalg.inv(homogeneous(kinematics.matrix(), kinematics.position.T)) @ shifted
         return joints
 
 
 def _missed(task: PoseTask, joints: Array) -> Array:
     """Return by how much joints turned so miss the poses [reach lengths, rad], ``(n,)``."""
-    return np.asarray(np.linalg.norm(task.error(task.sweep(task.variables(joints))), axis=1))
+    return np.asarray(np.linalg.norm(task.error(task.forward_kinematics(task.variables(joints))), axis=1))

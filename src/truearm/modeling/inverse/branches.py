@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.errors import InputError, nearest_names
-from truearm.modeling.chain import Array, Chain, Sweep
+from truearm.modeling.chain import Array, Chain, ForwardKinematics
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import cross, dot
 
@@ -79,10 +79,10 @@ class Line:
         return np.sqrt(dot(normal, normal))
 
 
-def joint_axes(sweep: Sweep) -> list[Line]:
+def joint_axes(kinematics: ForwardKinematics) -> list[Line]:
     """Return the axes of the six joints as a sweep passed them."""
-    places = {e.variable: i for i, e in enumerate(sweep.elements) if e.variable is not None}
-    return [Line(sweep.axis(places[i]), sweep.origin(places[i])) for i in range(6)]
+    places = {e.variable: i for i, e in enumerate(kinematics.elements) if e.variable is not None}
+    return [Line(kinematics.axis(places[i]), kinematics.origin(places[i])) for i in range(6)]
 
 
 @dataclass(frozen=True)
@@ -99,16 +99,16 @@ class BranchRule:
     elbow: float
     wrist: float
 
-    def numbers(self, sweep: Sweep) -> NDArray[np.intp]:
+    def numbers(self, kinematics: ForwardKinematics) -> NDArray[np.intp]:
         """Return the branch of each configuration of a sweep, as its place in :data:`BRANCHES`, ``(n,)``."""
-        shoulder, elbow, wrist = _expressions(joint_axes(sweep))
+        shoulder, elbow, wrist = _expressions(joint_axes(kinematics))
         back, down = self.shoulder * shoulder < 0, self.elbow * elbow * shoulder < 0
         number: NDArray[np.intp] = np.asarray(4 * back + 2 * down + (self.wrist * wrist < 0), dtype=np.intp)
         return number
 
-    def bend(self, sweep: Sweep) -> Array:
+    def bend(self, kinematics: ForwardKinematics) -> Array:
         """Return how much joint 5 bends the wrist, 0 in a singular posture and 1 at most, ``(n,)``."""
-        return np.abs(_expressions(joint_axes(sweep))[2])
+        return np.abs(_expressions(joint_axes(kinematics))[2])
 
 
 def branch_rule(robot: Robot) -> BranchRule | None:
@@ -121,10 +121,10 @@ def branch_rule(robot: Robot) -> BranchRule | None:
         return None
     readings = np.zeros((6, 2))
     readings[4, 1] = np.pi / 2
-    sweep = robot.rigid.trunk.sweep(readings)
+    kinematics = robot.rigid.trunk.forward_kinematics(readings)
     lines = [
         Line(np.broadcast_to(line.along, (3, 2))[:, :1], np.broadcast_to(line.point, (3, 2))[:, :1])
-        for line in joint_axes(sweep)
+        for line in joint_axes(kinematics)
     ]
     one, two, three, four, five, six = lines
     apart = min(one.sine(two)[0], four.sine(five)[0], five.sine(six)[0])
@@ -136,10 +136,10 @@ def branch_rule(robot: Robot) -> BranchRule | None:
     spherical = max(np.linalg.norm(four.foot(five) - centre), np.linalg.norm(five.foot(four) - centre)) < _CROSSING
     if not spherical and three.sine(four)[0] > _PARALLEL:
         return None
-    plate = Chain(robot.base_elements).sweep(np.zeros((6, 1))).rotation[2]
+    plate = Chain(robot.base_elements).forward_kinematics(np.zeros((6, 1))).rotation[2]
     upwards = float(plate[:, 0] @ one.along[:, 0])
-    shoulder, _, wrist = _expressions(joint_axes(sweep))
-    reach = float(np.linalg.norm(sweep.position[:, 0] - one.point[:, 0]))
+    shoulder, _, wrist = _expressions(joint_axes(kinematics))
+    reach = float(np.linalg.norm(kinematics.position[:, 0] - one.point[:, 0]))
     front = float(np.sign(shoulder[0])) if abs(shoulder[0]) > 1e-3 * reach else float(np.sign(upwards) or 1.0)
     return BranchRule(front, float(np.sign(upwards) or 1.0), float(np.sign(wrist[1]) or 1.0))
 

@@ -51,7 +51,7 @@ class Candidates:
         joints = seed.shape[1]
         self.pose: NDArray[np.intp] = np.zeros(0, dtype=np.intp)
         self.joints: Array = np.zeros((0, joints))
-        self.variables: Array = task.robot.straight(np.zeros((joints, 0)))
+        self.variables: Array = task.robot.without_deflections(np.zeros((joints, 0)))
         self.position_error: Array = np.zeros(0)
         self.orientation_error: Array = np.zeros(0)
         self.reached: NDArray[np.bool_] = np.zeros(0, dtype=bool)
@@ -82,7 +82,7 @@ class Candidates:
         position, angle = part.distances(error)
         number = np.full(len(pose), -1)
         if self._rule is not None:
-            number = self._rule.numbers(part.sweep(variables))
+            number = self._rule.numbers(part.forward_kinematics(variables))
         self.pose = np.concatenate([self.pose, pose])
         self.joints = np.concatenate([self.joints, joints])
         self.variables = np.concatenate([self.variables, variables], axis=1)

@@ -18,7 +18,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.modeling.chain import Array, Sweep
+from truearm.modeling.chain import Array, ForwardKinematics
 from truearm.modeling.inverse.branches import Line, joint_axes
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import cross, homogeneous
@@ -60,7 +60,7 @@ class ClosedForm:
         from eaik.pybindings.EAIK import Robot as Arm  # a tenth of the size of the package, and no mesh libraries
 
         zero = np.zeros((1, 6))
-        nominal, now = robot.rigid.trunk.sweep(zero.T), robot.rigid.sweep(zero, target)
+        nominal, now = robot.rigid.trunk.forward_kinematics(zero.T), robot.rigid.forward_kinematics(zero, target)
         base, wrist = _end_frames(nominal)
         axes = joint_axes(nominal)
         directions = np.column_stack([base[:3, :3].T @ line.along[:, 0] for line in axes]).round(12)
@@ -92,9 +92,9 @@ class ClosedForm:
         return Starts(joints, nearest)
 
 
-def _end_frames(sweep: Sweep) -> tuple[Array, Array]:
+def _end_frames(kinematics: ForwardKinematics) -> tuple[Array, Array]:
     """Return the frames on the first two and on the last two axes of a sweep at one configuration, ``(4, 4)`` each."""
-    axes = joint_axes(sweep)
+    axes = joint_axes(kinematics)
     return _frame(axes[0], axes[1]), _frame(axes[5], axes[4])
 
 

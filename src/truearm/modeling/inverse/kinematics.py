@@ -135,7 +135,7 @@ def _answer(task: PoseTask, pool: Candidates, rows: NDArray[np.intp], wanted: in
     if any(effect.loaded for effect in task.robot.effects):
         # A joint that is all but balanced can come to rest on either side of its play, and the arm elsewhere.
         part, at_rest = task.of(pose), task.robot.variables(joints, task.robot.values)
-        position_error, orientation_error = part.distances(part.error(part.sweep(at_rest)))
+        position_error, orientation_error = part.distances(part.error(part.forward_kinematics(at_rest)))
         reached = reached & (position_error <= REACHED) & (orientation_error <= REACHED)
     if task.orientation == "free":
         orientation_error = np.full(len(rows), np.nan)
@@ -257,7 +257,7 @@ def _seed(robot: Robot, seed: ArrayLike | None, count: int) -> tuple[Array, Arra
 
 def reach(robot: Robot, target: str | None) -> float:
     """Return the length of the stretched arm from its first joint [m]."""
-    sweep = robot.rigid.sweep(np.zeros((1, len(robot.joints))), target)
-    places = [i for i, element in enumerate(sweep.elements) if element.variable is not None]
-    points = [*(sweep.origin(i)[:, 0] for i in places), sweep.position[:, 0]]
+    kinematics = robot.rigid.forward_kinematics(np.zeros((1, len(robot.joints))), target)
+    places = [i for i, element in enumerate(kinematics.elements) if element.variable is not None]
+    points = [*(kinematics.origin(i)[:, 0] for i in places), kinematics.position[:, 0]]
     return float(sum(np.linalg.norm(b - a) for a, b in pairwise(points)))

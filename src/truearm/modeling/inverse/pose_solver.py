@@ -19,7 +19,7 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.modeling.chain import Array, Sweep
+from truearm.modeling.chain import Array, ForwardKinematics
 from truearm.modeling.equilibrium import settled
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import cross, dot
@@ -75,16 +75,16 @@ class PoseTask:
         x, y, z = (column[:, rows] for column in self.rotation)
         return replace(self, position=self.position[:, rows], rotation=(x, y, z))
 
-    def error(self, sweep: Sweep) -> Array:
+    def error(self, kinematics: ForwardKinematics) -> Array:
         """Return what is missing in position [reach lengths] and orientation [rad], ``(n, 3, 5 or 6)``."""
-        away = (self.position - sweep.position) / self.length
+        away = (self.position - kinematics.position) / self.length
         if self.orientation == "free":
             return away.T
-        x, y, z = sweep.rotation
+        x, y, z = kinematics.rotation
         if self.orientation == "axis":
             turn = _turned(cross(z, self.rotation[2]), dot(z, self.rotation[2]), x)
             return np.concatenate([away, dot(turn, x)[None], dot(turn, y)[None]]).T
-        pairs = list(zip(sweep.rotation, self.rotation, strict=True))
+        pairs = list(zip(kinematics.rotation, self.rotation, strict=True))
         sine = 0.5 * sum((cross(now, wanted) for now, wanted in pairs), np.zeros(()))
         cosine = 0.5 * (sum((dot(now, wanted) for now, wanted in pairs), np.zeros(())) - 1.0)
         return np.concatenate([away, _turned(sine, cosine, x)]).T
@@ -94,22 +94,22 @@ class PoseTask:
         position, angle = (np.linalg.norm(part, axis=1) for part in (error[:, :3], error[:, 3:]))
         return np.asarray(position * self.length), np.asarray(angle)
 
-    def jacobian(self, sweep: Sweep, tilting: Array | None = None) -> Array:
+    def jacobian(self, kinematics: ForwardKinematics, tilting: Array | None = None) -> Array:
         """Return how position and orientation follow the true joint variables, ``(n, 3, 5 or 6, joints)``.
 
         A sliding joint is counted in reach lengths, a turning one in rad. Tilts are held, or follow as `tilting` says.
         """
         joints = self.robot.joints
-        linear, angular = sweep.derivatives(self.robot.moving[: len(joints)])  # (joints, 3, n)
+        linear, angular = kinematics.jacobians(self.robot.moving[: len(joints)])  # (joints, 3, n)
         if tilting is not None:
             across = self.robot.moving[len(joints) : 3 * len(joints)]
-            for by_joint, by_tilt in zip((linear, angular), sweep.derivatives(across), strict=True):
+            for by_joint, by_tilt in zip((linear, angular), kinematics.jacobians(across), strict=True):
                 by_joint += np.einsum("tjn,tcn->jcn", tilting, by_tilt)
         rows = [linear / self.length]
         if self.orientation == "full":
             rows.append(angular)
         elif self.orientation == "axis":
-            x, y, _ = sweep.rotation
+            x, y, _ = kinematics.rotation
             rows.append(np.stack([(angular * x).sum(1), (angular * y).sum(1)], axis=1))
         whole = np.concatenate(rows, axis=1)
         sliding = [i for i, joint in enumerate(joints) if joint.kind == "prismatic"]
@@ -118,7 +118,7 @@ class PoseTask:
 
     def variables(self, joints: Array) -> Array:
         """Return the variables ``(joints or more, n)`` of the arm with its joints ``(n, joints)`` turned so."""
-        return settled(lambda _, variables: self.robot.tilted(variables), self.robot.straight(joints.T))
+        return settled(lambda _, variables: self.robot.tilted(variables), self.robot.without_deflections(joints.T))
 
     def tilting(self, variables: Array) -> Array | None:
         """Return how the tilts follow the joints, ``(tilts, joints, n)``, by differences; None if nothing tilts."""
@@ -131,9 +131,9 @@ class PoseTask:
         tilts = self.robot.tilted(moved.reshape(len(variables), -1)).reshape(moved.shape)[count : 3 * count]
         return np.asarray((tilts[:, :count] - tilts[:, count:]) / _DIFFERENCE)
 
-    def sweep(self, variables: Array) -> Sweep:
+    def forward_kinematics(self, variables: Array) -> ForwardKinematics:
         """Run through the chain to the tip."""
-        return self.robot.sweep_of(variables, self.target)
+        return self.robot.forward_kinematics_of(variables, self.target)
 
     def advanced(self, variables: Array, step: Array) -> Array:
         """Return the variables after a step ``(n, joints)`` of the joints, a sliding one's in reach lengths."""
@@ -177,8 +177,8 @@ def solve(task: PoseTask, starts: Array, *, bold: bool = False) -> Solved:
     """
     part, now = task, task.variables(starts)
     found, damping = now.copy(), np.ones(len(starts))
-    sweep = part.sweep(now)
-    e, jacobian = part.error(sweep), part.jacobian(sweep)
+    kinematics = part.forward_kinematics(now)
+    e, jacobian = part.error(kinematics), part.jacobian(kinematics)
     error, active = e.copy(), np.arange(len(starts))
     for number in range(_MOST_STEPS):
         size = np.linalg.norm(e, axis=1)
@@ -190,13 +190,13 @@ def solve(task: PoseTask, starts: Array, *, bold: bool = False) -> Solved:
         if not len(active):
             break
         tried = part.advanced(now, _step(jacobian, e, _FLOOR + (0.0 if bold else damping) * size**2))
-        sweep = part.sweep(tried)
-        tried_error = part.error(sweep)
+        kinematics = part.forward_kinematics(tried)
+        tried_error = part.error(kinematics)
         better = (np.linalg.norm(tried_error, axis=1) < size) | bold
         damping = np.where(better, np.maximum(damping / 5, _DAMPING[0]), damping * 10)
         now, e = np.where(better, tried, now), np.where(better[:, None], tried_error, e)
         tilting = part.tilting(tried) if number >= _PATIENCE else None
-        jacobian = np.where(better[:, None, None], part.jacobian(sweep, tilting), jacobian)
+        jacobian = np.where(better[:, None, None], part.jacobian(kinematics, tilting), jacobian)
         found[:, active], error[active] = now, e
     return Solved(found, error)
 
@@ -208,14 +208,14 @@ def smallest_singular_value(task: PoseTask, variables: Array) -> Array:
     """
     if not variables.shape[1]:
         return np.zeros(0)
-    return np.asarray(np.linalg.svd(task.jacobian(task.sweep(variables)), compute_uv=False)[:, -1])
+    return np.asarray(np.linalg.svd(task.jacobian(task.forward_kinematics(variables)), compute_uv=False)[:, -1])
 
 
 def weakest_motion(task: PoseTask, variables: Array) -> tuple[Array, Array]:
     """Return the :func:`smallest_singular_value` of each pose and its joint motion ``(n, joints)``."""
     if not variables.shape[1]:
         return np.zeros(0), np.zeros((0, len(task.robot.joints)))
-    _, values, motions = np.linalg.svd(task.jacobian(task.sweep(variables)), full_matrices=False)
+    _, values, motions = np.linalg.svd(task.jacobian(task.forward_kinematics(variables)), full_matrices=False)
     return values[:, -1], motions[:, -1]
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
-from truearm.planning.segments import segment_distance
+from truearm.planning.constraints.segments import segment_distance
 
 #: Radius of a ballbar, and of an edge of the base fixture [m].
 BAR_RADIUS: Final = 0.010
@@ -22,11 +22,12 @@ ARM_RADIUS: Final = 0.050
 
 def arm_links(robot: Robot, joints: Array) -> tuple[Array, Array]:
     """Return both ends of the arm's links in the world [m], each ``(links, 3, n)``, from the base to the flange."""
-    sweep = robot.sweep(joints)
+    kinematics = robot.forward_kinematics(joints)
     origins = [
-        np.broadcast_to(sweep.origin(place), sweep.position.shape) for place in robot.moving[: len(robot.joints)]
+        np.broadcast_to(kinematics.origin(place), kinematics.position.shape)
+        for place in robot.moving[: len(robot.joints)]
     ]
-    points = np.array([*origins, sweep.position])
+    points = np.array([*origins, kinematics.position])
     return points[:-1], points[1:]
 
 

@@ -12,16 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.errors import InputError
-from truearm.measurement.devices.hexapod.geometry import DEVICE, SIDES, Device, triangle
-from truearm.measurement.devices.hexapod.poses import HexapodPose
-from truearm.measurement.devices.hexapod.sheet import PlannedRow
+from truearm.measurement.hexapod.geometry import DEVICE, SIDES, Device, triangle
+from truearm.measurement.hexapod.poses import HexapodPose
+from truearm.measurement.hexapod.sheet import PlannedRow
 from truearm.modeling.chain import Array
 from truearm.modeling.inverse import PoseStatus, inverse
 from truearm.modeling.inverse.branches import BRANCHES
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
+from truearm.planning.choosing.ordering import all_moving_order
 from truearm.planning.hexapod.clearance import ARM_RADIUS, clearance
-from truearm.planning.ordering import all_moving_order
 
 #: Why a branch of a pose is left out, in the order in which it is asked.
 OUT_OF_REACH: Final = "out of reach"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from truearm.measurement.devices.hexapod.geometry import DEVICE, Device, side_names
+from truearm.measurement.hexapod.geometry import DEVICE, Device, side_names
 from truearm.modeling.robot import Robot
 from truearm.planning.hexapod.reachable import Reachable
 from truearm.units import from_si

@@ -27,11 +27,10 @@ from collections.abc import Sequence
 from typing import Final
 
 from truearm.compensation.programs.fanuc_ls.configuration import configuration
-from truearm.compensation.programs.fanuc_ls.division import divide
 from truearm.compensation.programs.fanuc_ls.instructions import Instructions
+from truearm.compensation.programs.fanuc_ls.split import divide
 from truearm.compensation.programs.fanuc_ls.text import LsFile, Position, is_one
 from truearm.compensation.programs.numbers import LARGEST
-from truearm.compensation.programs.orientations import FIXED_XYZ_ANGLES
 from truearm.compensation.programs.program import (
     ANY_POSTURE,
     Form,
@@ -43,6 +42,7 @@ from truearm.compensation.programs.program import (
     Source,
 )
 from truearm.errors import InputError
+from truearm.modeling.orientations import FIXED_XYZ_ANGLES
 
 _NAME: Final = "FANUC LS"
 _POSE: Final = Form("XYZWPR", "pose", angle=math.pi / 180, orientation=FIXED_XYZ_ANGLES)

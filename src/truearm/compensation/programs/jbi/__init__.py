@@ -20,11 +20,10 @@ from functools import cache
 from math import radians
 from typing import Final
 
-from truearm.compensation.programs.jbi.division import divide
 from truearm.compensation.programs.jbi.job import JOB, Job, Key, Position, jobs_of
+from truearm.compensation.programs.jbi.split import divide
 from truearm.compensation.programs.jbi.steps import KINDS, NOWHERE, Step, Steps, arcs_of, steps_of
 from truearm.compensation.programs.lines import Lines
-from truearm.compensation.programs.orientations import FIXED_XYZ_ANGLES
 from truearm.compensation.programs.program import (
     ANY_POSTURE,
     Configuration,
@@ -36,6 +35,7 @@ from truearm.compensation.programs.program import (
     Skipped,
     Source,
 )
+from truearm.modeling.orientations import FIXED_XYZ_ANGLES
 
 _PULSES: Final = Form("pulses", "pulses", decimals=(0, 0))
 _ANGLES: Final = Form("joint angles", "joints", angle=radians(1.0))

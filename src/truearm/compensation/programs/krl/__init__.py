@@ -34,8 +34,8 @@ from __future__ import annotations
 import re
 from typing import Final
 
-from truearm.compensation.programs.krl.division import divide
 from truearm.compensation.programs.krl.reading import read
+from truearm.compensation.programs.krl.split import divide
 from truearm.compensation.programs.lines import BYTE_ORDER_MARK
 from truearm.compensation.programs.program import Language
 

@@ -26,8 +26,8 @@ from typing import Final, NamedTuple
 
 from truearm.compensation.programs.krl.lines import Text
 from truearm.compensation.programs.numbers import LARGEST, NUMBER
-from truearm.compensation.programs.orientations import ZYX_ANGLES
 from truearm.compensation.programs.program import Configuration, Form
+from truearm.modeling.orientations import ZYX_ANGLES
 
 POSE: Final = Form("POS", "pose", angle=radians(1.0), orientation=ZYX_ANGLES)
 JOINTS: Final = Form("AXIS", "joints", angle=radians(1.0))

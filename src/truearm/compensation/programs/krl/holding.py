@@ -25,7 +25,7 @@ from truearm.compensation.programs.krl.names import (
     literal_index,
     number_of,
 )
-from truearm.compensation.programs.orientations import ZYX_ANGLES
+from truearm.modeling.orientations import ZYX_ANGLES
 from truearm.modeling.transform import Transform
 
 #: Words of statements that set the tool or the base.

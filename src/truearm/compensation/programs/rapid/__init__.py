@@ -22,9 +22,9 @@ from typing import Final
 
 from truearm.compensation.programs.lines import BYTE_ORDER_MARK
 from truearm.compensation.programs.program import Language, Program, Source
-from truearm.compensation.programs.rapid.division import divided
 from truearm.compensation.programs.rapid.monitoring import with_postures_left_free
 from truearm.compensation.programs.rapid.moves import MOTIONS, QUIET
+from truearm.compensation.programs.rapid.split import divided
 from truearm.compensation.programs.rapid.syntax import listing_of
 from truearm.compensation.programs.rapid.targets import Finder
 

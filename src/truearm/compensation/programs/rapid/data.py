@@ -36,8 +36,8 @@ from typing import Final, Literal
 import numpy as np
 
 from truearm.compensation.programs.numbers import LARGEST, NUMBER
-from truearm.compensation.programs.orientations import MOVING_XYZ_ANGLES, QUATERNION
 from truearm.compensation.programs.program import Configuration, Form
+from truearm.modeling.orientations import MOVING_XYZ_ANGLES, QUATERNION
 from truearm.modeling.transform import Transform, rotation_from_quaternion
 
 _DEGREE: Final = pi / 180.0

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final, NamedTuple
 
-from truearm.compensation.programs.orientations import ROTATION_VECTOR
 from truearm.compensation.programs.program import (
     ANY_POSTURE,
     Configuration,
@@ -22,6 +21,7 @@ from truearm.compensation.programs.program import (
 from truearm.compensation.programs.urscript.script import Call, Script
 from truearm.compensation.programs.urscript.targets import Spot, Targets, Use
 from truearm.compensation.programs.urscript.tcp import COMPUTED, Places, Stretch, Tcp
+from truearm.modeling.orientations import ROTATION_VECTOR
 
 #: A pose, and joints; 1e-6 m are 0.001 mm, and 1e-6 rad less than 0.0001 deg.
 POSE: Final = Form("p[x, y, z, rx, ry, rz]", "pose", 1.0, 1.0, ROTATION_VECTOR, (6, 6))

@@ -21,7 +21,6 @@ from pathlib import Path
 from typing import Final
 
 from truearm.compensation.programs.lines import BYTE_ORDER_MARK, Lines
-from truearm.compensation.programs.orientations import MOVING_XYZ_ANGLES
 from truearm.compensation.programs.program import (
     ANY_POSTURE,
     Configuration,
@@ -37,6 +36,7 @@ from truearm.compensation.programs.val3.code import Routine, Words, routines_of
 from truearm.compensation.programs.val3.data import NUMBERS, Element, Variable, variables_of
 from truearm.compensation.programs.val3.frames import father_of, name_of, transforms
 from truearm.errors import InputError
+from truearm.modeling.orientations import MOVING_XYZ_ANGLES
 
 #: The root of a file; a document type, which could name other files, is not let pass before it.
 _ROOT: Final = re.compile(

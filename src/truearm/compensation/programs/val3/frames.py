@@ -7,10 +7,10 @@ from typing import Final, Literal
 
 import numpy as np
 
-from truearm.compensation.programs.orientations import MOVING_XYZ_ANGLES
 from truearm.compensation.programs.program import Source
 from truearm.compensation.programs.val3.data import Element, Variable
 from truearm.errors import InputError
+from truearm.modeling.orientations import MOVING_XYZ_ANGLES
 from truearm.modeling.transform import IDENTITY, Transform
 
 #: What the chains end at.

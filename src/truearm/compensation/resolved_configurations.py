@@ -1,0 +1,278 @@
+"""The postures that a program means: the joint readings of the nominal robot, as its controller picks them.
+
+A pose can be reached in up to eight postures and several turns. Configuration data in the program say which is meant;
+where they leave a choice, or there are none, it is the posture nearest to where the robot comes from. An offset has the
+configuration of what it is an offset from, in the posture next to that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.compensation.programs.program import ANY_POSTURE, Configuration
+from truearm.modeling.chain import Array
+from truearm.modeling.inverse.branches import branch_rule
+from truearm.modeling.inverse.closed_form import SLOTS, ClosedForm
+from truearm.modeling.inverse.kinematics import inverse
+from truearm.modeling.inverse.solutions import PoseStatus
+from truearm.modeling.inverse.turns import beyond_limits, limits, nearest_turns
+from truearm.modeling.robot import Robot
+
+_TURN: Final = 2.0 * np.pi
+#: Below this sine a wrist is stretched, and which way it bends is by chance.
+_STRETCHED: Final = 0.03
+#: Turns that a joint may have made.
+_TURNS: Final = np.arange(-2.0, 3.0)
+#: A reading may be this far [rad] beyond a bound of the configuration. Joints often stand at a bound, as at 0, and
+#: controllers then take the posture at hand: KUKA's ignore the turn of a joint within 2 deg of zero.
+ON_EDGE: Final = float(np.radians(2.0))
+#: A posture may be this far [rad] beyond a limit: the numbers of the program are rounded.
+_SLACK: Final = 0.02
+#: What a branch's number says, by word and bit.
+_WORDS: Final = (
+    ("shoulder", 4, {"front": 0, "back": 4}),
+    ("elbow", 2, {"up": 0, "down": 2}),
+    ("wrist", 1, {"noflip": 0, "flip": 1}),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class ResolvedConfigurations:
+    """Joint readings of the nominal robot for poses.
+
+    Attributes
+    ----------
+    joints
+        [rad or m], ``(n, joints)``; NaN where there are none.
+    reachable
+        Whether the nominal robot reaches the pose at all, ``(n,)``.
+    guessed
+        Index of the first pose whose posture nothing tells, neither its configuration nor where the robot comes from;
+        None if there is none.
+    """
+
+    joints: Array
+    reachable: NDArray[np.bool_]
+    guessed: int | None
+
+
+def agrees(robot: Robot, joints: Array, configuration: Configuration, slack: float = ON_EDGE) -> NDArray[np.bool_]:
+    """Return whether joints ``(n, joints)`` of a robot lie within the readings of a configuration, ``(n,)``."""
+    shown = robot.controller.readings(joints)
+    inside = np.ones(len(joints), dtype=bool)
+    for joint in _bound(configuration):
+        inside &= _allowed(configuration, joint, shown[:, joint - 1], slack)
+    return inside
+
+
+def _bound(configuration: Configuration) -> tuple[int, ...]:
+    """Return the joints, from 1, whose readings a configuration says something of."""
+    return tuple(dict.fromkeys(joint for joint, _, _ in (*configuration.readings, *configuration.outside)))
+
+
+def _allowed(configuration: Configuration, joint: int, reading: Array, slack: float) -> NDArray[np.bool_]:
+    """Return which readings of a joint a configuration allows, in the shape of `reading`."""
+    allowed = np.ones(reading.shape, dtype=bool)
+    with np.errstate(invalid="ignore"):
+        for number, low, high in configuration.readings:
+            if number == joint:
+                allowed &= (reading >= low - slack) & (reading < high + slack)
+        for number, low, high in configuration.outside:
+            if number == joint:
+                allowed &= (reading < low + slack) | (reading >= high - slack)
+    return allowed
+
+
+def resolved_configurations(
+    nominal: Robot,
+    flange: Array,
+    configurations: Sequence[Configuration],
+    known: Array,
+    order: Iterable[int],
+    parents: Sequence[int | None] = (),
+    straight: Collection[int] = (),
+) -> ResolvedConfigurations:
+    """Return the postures that a program means.
+
+    Parameters
+    ----------
+    nominal
+        The robot that its controller believes in, of six joints or more.
+    flange
+        Poses of the flange in its base frame, ``(n, 4, 4)`` [m].
+    configurations
+        What the program says of each.
+    known
+        Readings ``(n, joints)`` [rad or m] of the model where the program gives joints, else NaN.
+    order
+        Indices in the order in which the robot goes from one to the next; none of them need be there.
+    parents
+        For each the index of the pose that it is an offset from, None for none; empty if none is an offset. An offset
+        without a configuration is in the posture nearest to that of the pose it is an offset from, where that has one.
+    straight
+        The poses that the robot comes to on a line or a circle. On its way it stays on the branch where it was, unless
+        its wrist was stretched.
+    """
+    joints = known.copy()
+    reachable: NDArray[np.bool_] = np.asarray(~np.isnan(known).any(axis=1))
+    wanted = [int(i) for i in np.flatnonzero(~reachable)]
+    if not wanted:
+        return ResolvedConfigurations(joints, reachable, None)
+    rule = branch_rule(nominal)
+    form = ClosedForm(nominal, None) if rule is not None else None
+    if rule is None or form is None or not form.known:
+        return _by_seeds(nominal, flange, configurations, joints, wanted)
+    starts = form.starts(flange[wanted, :3, 3], flange[wanted, :3, :3])
+    candidates = starts.joints
+    possible: NDArray[np.bool_] = ~np.isnan(candidates[:, :, 0]) & ~starts.nearest
+    number, bend = np.full(possible.shape, -1), np.zeros(possible.shape)
+    kinematics = nominal.trunk.forward_kinematics(candidates[possible].T)
+    number[possible], bend[possible] = rule.numbers(kinematics), rule.bend(kinematics)
+    given = nominal.trunk.forward_kinematics(np.nan_to_num(known).T)
+    number_given, bend_given = rule.numbers(given), rule.bend(given)
+    fixed = np.zeros(candidates.shape, dtype=bool)
+    reachable[wanted] = possible.any(axis=1)
+    _confine(nominal, candidates, possible, number, fixed, [configurations[i] for i in wanted])
+    walk = _Walk(nominal, candidates, possible, number, fixed)
+    guessed = None
+    place = {index: row for row, index in enumerate(wanted)}
+    before: Array | None = None
+    branch: int | None = None
+
+    def parent_of(index: int) -> Array | None:
+        """Return the readings of what an offset starts from, where the program says them and none of its own."""
+        parent = parents[index] if parents and configurations[index] == ANY_POSTURE else None
+        while parent is not None and configurations[parent] == ANY_POSTURE and parents[parent] is not None:
+            parent = parents[parent]
+        if parent is None or configurations[parent] == ANY_POSTURE:
+            return None
+        found = walk.chosen(place[parent], before, None)
+        return None if found is None else found[0]
+
+    for index in dict.fromkeys((*order, *range(len(flange)))):
+        row = place.get(index)
+        if row is not None:
+            near = configurations[index].near
+            reference = before if near is None else nominal.controller.joints(np.array([near]))[0]
+            above = parent_of(index)
+            reference = reference if above is None else above
+            if reference is None and guessed is None and walk.open[row]:
+                guessed = index
+            kept = branch if index in straight and near is None and above is None else None
+            found = walk.chosen(row, reference, kept)
+            if found is None:
+                continue
+            joints[index], slot = found
+            branch = int(number[row, slot]) if bend[row, slot] > _STRETCHED else None
+        else:
+            branch = int(number_given[index]) if bend_given[index] > _STRETCHED else None
+        before = joints[index]
+    return ResolvedConfigurations(joints, reachable, guessed)
+
+
+def _confine(
+    nominal: Robot,
+    candidates: Array,
+    possible: NDArray[np.bool_],
+    number: NDArray[np.intp],
+    fixed: NDArray[np.bool_],
+    configurations: Sequence[Configuration],
+) -> None:
+    """Leave of the candidates ``(m, 8, 6)`` those of the configurations, in the turns that these say."""
+    groups: dict[Configuration, list[int]] = {}
+    for row, configuration in enumerate(configurations):
+        if configuration.near is None:
+            groups.setdefault(configuration, []).append(row)
+        else:  # of its own for every target, and of no meaning here
+            groups.setdefault(replace(configuration, near=None), []).append(row)
+    signs = np.array(nominal.controller.signs or (1,) * len(nominal.joints))
+    for configuration, members in groups.items():
+        rows = np.array(members)
+        for word, bit, values in _WORDS:
+            said = getattr(configuration, word)
+            if said is not None:
+                possible[rows] &= (number[rows] & bit) == values[said]
+        for joint in _bound(configuration):
+            shown = nominal.controller.readings(candidates[rows].reshape(-1, candidates.shape[2]))
+            reading = shown[:, joint - 1].reshape(len(rows), SLOTS, 1) + _TURNS * _TURN
+            allowed = _allowed(configuration, joint, reading, ON_EDGE)
+            # Of the turns that are allowed the one nearest to zero.
+            turn = np.argmin(np.where(allowed, np.abs(reading), np.inf), axis=2)
+            turns = np.where(allowed.any(axis=2), _TURNS[turn], 0.0)
+            candidates[rows, :, joint - 1] += signs[joint - 1] * turns * _TURN
+            fixed[rows, :, joint - 1] = True
+            possible[rows] &= allowed.any(axis=2)
+
+
+class _Walk:
+    """The choice among candidates along the way."""
+
+    def __init__(
+        self,
+        nominal: Robot,
+        candidates: Array,
+        possible: NDArray[np.bool_],
+        number: NDArray[np.intp],
+        fixed: NDArray[np.bool_],
+    ) -> None:
+        self._number = number
+        low, high = limits(nominal)
+        free = ~fixed
+        turned = nearest_turns(nominal, candidates, np.zeros(candidates.shape[2]))
+        turned = np.where(free, turned, candidates)
+        beyond: NDArray[np.bool_] = np.asarray(beyond_limits(nominal, turned, _SLACK).any(axis=2))
+        within: NDArray[np.bool_] = possible & ~beyond
+        self._possible: NDArray[np.bool_] = np.asarray(np.where(within.any(axis=1, keepdims=True), within, possible))
+        self._low, self._high = low, high
+        with np.errstate(invalid="ignore"):
+            turns = np.floor((high - turned) / _TURN) + np.floor((turned - low) / _TURN)
+        several: NDArray[np.bool_] = np.asarray(free & (turns > 0))
+        turning = np.asarray((several & np.expand_dims(self._possible, 2)).any(axis=(1, 2)))
+        #: Whether there is a choice.
+        self.open: NDArray[np.bool_] = np.asarray((self._possible.sum(axis=1) > 1) | turning)
+        self._only = np.argmax(self._possible, axis=1)
+        self._any: NDArray[np.bool_] = np.asarray(self._possible.any(axis=1))
+        self._turned, self._several = turned, several
+
+    def chosen(self, row: int, reference: Array | None, branch: int | None) -> tuple[Array, int] | None:
+        """Return the readings of a pose nearest to a reference, on a branch if it has one there, and which they are.
+
+        None if there are none.
+        """
+        if not self._any[row]:
+            return None
+        if not self.open[row]:
+            return np.asarray(self._turned[row, self._only[row]]), int(self._only[row])
+        joints = self._turned[row]
+        if reference is None:
+            cost = np.abs(joints).max(axis=1) + 1e3 * self._number[row]
+        else:
+            turns = np.round((reference - joints) / _TURN) * self._several[row]
+            if turns.any():
+                low = np.ceil((self._low - joints) / _TURN)
+                high = np.floor((self._high - joints) / _TURN)
+                joints = joints + _TURN * np.clip(turns, np.minimum(low, 0.0), np.maximum(high, 0.0))
+            cost = np.abs(joints - reference).max(axis=1)
+        possible = self._possible[row]
+        on_branch = possible & (self._number[row] == branch)
+        slot = int(np.argmin(np.where(on_branch if on_branch.any() else possible, cost, np.inf)))
+        return np.asarray(joints[slot]), slot
+
+
+def _by_seeds(
+    nominal: Robot, flange: Array, configurations: Sequence[Configuration], joints: Array, wanted: list[int]
+) -> ResolvedConfigurations:
+    """Return postures of an arm whose branches have no names: nearest to what the program says, else to zero."""
+    zero = (0.0,) * len(nominal.joints)
+    seeds = nominal.controller.joints(np.array([configurations[i].near or zero for i in wanted]))
+    found = inverse(nominal, flange[wanted, :3, 3], flange[wanted, :3, :3], seed=seeds)
+    reached = np.array([status is not PoseStatus.UNREACHABLE for status in found.status])
+    joints[np.array(wanted)[reached]] = found.joints[reached]
+    reachable: NDArray[np.bool_] = np.asarray(~np.isnan(joints).any(axis=1))
+    untold = [i for i in wanted if configurations[i].near is None]
+    return ResolvedConfigurations(joints, reachable, untold[0] if untold else None)

@@ -1,0 +1,1 @@
+"""Calibration axis by axis, from circles."""

@@ -1,0 +1,355 @@
+"""The whole of axis-by-axis calibration: circles, axes, the frames they fix, tables of parameters, joint errors.
+
+Sources: Nubiola, sections 1.3.2 and 2.3 (base frame from axes 1 and 2, tool frame from the last two; DH parameters by
+Sklar's way and the S-model by Stone's, both from lines in space); KR5 paper, sections 2.2 and 3.2 (joint errors).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Final
+
+import numpy as np
+
+from truearm.errors import InputError
+from truearm.identification.axes.circles import AxisCircle, AxisCircles, axis_circles
+from truearm.identification.axes.fit import NORMAL_95, AxisFit, fit_axes, measured_axes
+from truearm.identification.solving.redundancy import in_words
+from truearm.identification.start_values.frames import initial_frames
+from truearm.measurement.dataset import Dataset
+from truearm.modeling.chain import Array
+from truearm.modeling.conversion import converted
+from truearm.modeling.formats.robot_file import robot_text
+from truearm.modeling.lines import base_and_flange, frame_between, joint_axes
+from truearm.modeling.parameters import FreeParameters, Group
+from truearm.modeling.robot import Robot
+from truearm.modeling.transform import Transform, rotation_vector
+from truearm.notices import Notice
+from truearm.units import SHOWN_AS, from_si
+
+#: Tables of parameters that are made of the axes; parallel axes leave only Hayati's.
+TABLES: Final = ("standard-dh", "s-model", "hayati")
+#: Axes and circles that differ by more than this many deviations are not those of a rigid arm.
+_MISFIT: Final = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class AxisAnalysis:
+    """What circles say about a robot.
+
+    Attributes
+    ----------
+    nominal
+        The robot as its file has it.
+    data
+        The readings.
+    found
+        The circles.
+    measured
+        The axes at zero readings, four numbers each.
+    calibrated
+        The robot in its own convention.
+    errors
+        The robot as its design with joint errors.
+    in_robot_frame
+        Whether the data are given in the robot's base frame; if not, axes 1 and 2 say where it is.
+    """
+
+    nominal: Robot
+    data: Dataset
+    found: AxisCircles
+    measured: AxisFit
+    calibrated: AxisFit
+    errors: AxisFit
+    in_robot_frame: bool
+
+    @cached_property
+    def robot(self) -> Robot:
+        """The calibrated robot, with the targets where its own axes put them."""
+        return self._with_targets(self.calibrated.robot)
+
+    @cached_property
+    def robot_with_errors(self) -> Robot:
+        """The robot as its design with the joint errors found, and the targets."""
+        return self._with_targets(self.errors.robot)
+
+    def _with_targets(self, robot: Robot) -> Robot:
+        position, rotation = robot.poses(self.data.postures)
+        there = self.data.has_position
+        places = {}
+        for index, name in enumerate(self.data.targets):
+            mine = np.flatnonzero((self.data.target == index) & there)
+            at = self.data.configuration[mine]
+            seen = np.einsum("nji,nj->ni", rotation[at], self.data.position[mine] - position[at])
+            places[name] = seen.mean(axis=0)
+        made = robot.with_frames(robot.base, places)
+        kept = {n: p for n, p in robot.parameters.items() if p.group in ("geometry", "joint zero")}
+        said = f"calibrated axis by axis on {len(self.found.circles)} circles of {self.data.source}"
+        return replace(made.with_parameters(kept.values()), history=(*robot.history, said))
+
+    @cached_property
+    def base(self) -> tuple[Transform, float, float]:
+        """Where the base frame stands, and the deviations of its place [m] and of its turn [rad] at the worst."""
+        return self._frame(self._base_of)
+
+    @cached_property
+    def flange(self) -> tuple[Transform, float, float]:
+        """Where the flange stands at zero readings by the last two axes, with the same deviations."""
+        return self._frame(self._flange_of)
+
+    def _frame(self, place: Any) -> tuple[Transform, float, float]:
+        here = place(self.measured.robot)
+
+        def moved(robot: Robot) -> Array:
+            there = place(robot)
+            return np.concatenate([there[:3, 3], rotation_vector(there[:3, :3] @ here[:3, :3].T)])
+
+        _, deviation = self.measured.derived(moved)
+        transform = Transform.from_matrix(here[:3, :3], here[:3, 3])
+        return transform, float(deviation[:3].max()), float(deviation[3:].max())
+
+    def _base_of(self, robot: Robot) -> Array:
+        if self.in_robot_frame:
+            return base_and_flange(self.nominal)[0]
+        axes, plain = joint_axes(robot), joint_axes(self.nominal)
+        to_base = np.linalg.inv(frame_between(plain[0], plain[1])) @ base_and_flange(self.nominal)[0]
+        return np.asarray(frame_between(axes[0], axes[1]) @ to_base)
+
+    def _flange_of(self, robot: Robot) -> Array:
+        axes, plain = joint_axes(robot), joint_axes(self.nominal)
+        to_flange = np.linalg.inv(frame_between(plain[-1], plain[-2])) @ base_and_flange(self.nominal)[1]
+        return np.asarray(frame_between(axes[-1], axes[-2]) @ to_flange)
+
+    def framed(self, robot: Robot) -> Robot:
+        """Return measured axes as a robot between the two frames that they fix."""
+        base, flange = self._base_of(robot), self._flange_of(robot)
+        R, origin = base[:3, :3], base[:3, 3]
+        rows = [
+            {f"axis_{a}": float(v) for a, v in zip("xyz", R.T @ axis.along, strict=True)}
+            | {a: float(v) for a, v in zip("xyz", R.T @ (axis.point - origin), strict=True)}
+            for axis in joint_axes(robot)
+        ]
+        tip = np.linalg.inv(base) @ flange
+        made = replace(
+            robot,
+            joints=tuple(replace(joint, row=row) for joint, row in zip(robot.joints, rows, strict=True)),
+            flange=Transform.from_matrix(tip[:3, :3], tip[:3, 3]),
+            known={},
+        )
+        return made.with_frames(Transform.from_matrix(R, origin), {})
+
+    def table(self, convention_name: str) -> list[dict[str, tuple[float, float]]]:
+        """Return the rows of the measured axes in a convention, each number with its deviation [SI].
+
+        Raises
+        ------
+        InputError
+            If the convention cannot describe the axes: nearly parallel ones in a DH table or the S-model.
+        """
+        columns = [list(joint.row) for joint in converted(self.framed(self.measured.robot), convention_name).joints]
+
+        def numbers(robot: Robot) -> Array:
+            made = converted(self.framed(robot), convention_name)
+            return np.array([j.row[c] for j, wanted in zip(made.joints, columns, strict=True) for c in wanted])
+
+        value, deviation = self.measured.derived(numbers)
+        pairs = iter(zip(value.tolist(), deviation.tolist(), strict=True))
+        return [{column: next(pairs) for column in wanted} for wanted in columns]
+
+    @property
+    def notices(self) -> tuple[Notice, ...]:
+        """What a person should know."""
+        said = []
+        if self.found.left_out:
+            said.append(
+                Notice(
+                    "left-out",
+                    f"{self.found.left_out} of {self.data.configurations} configurations belong to no run in which one"
+                    " joint moves alone, and were not used.",
+                )
+            )
+        said += [Notice("no-circle", f"A target was not used in one run. {refusal}") for refusal in self.found.refused]
+        if self.found.excess > 1.0:
+            said.append(
+                Notice(
+                    "not-circular",
+                    f"The points are {self.found.excess:.2g} times further from their circles than the declared"
+                    " deviations allow: the arm gives way, or something moved. All deviations are widened by that.",
+                )
+            )
+        misfit = self.calibrated.residual
+        if misfit is not None and misfit > _MISFIT:
+            said.append(
+                Notice(
+                    "misfit",
+                    f"The convention {self.nominal.convention_name} leaves {misfit:.2g} deviations between the robot's"
+                    " axes and the measured ones. Convert the robot to hayati, or to joint-errors, if axes are"
+                    " parallel; else the arm does not turn about fixed axes.",
+                )
+            )
+        return tuple(said)
+
+    # -- files ---------------------------------------------------------------------------------------------
+
+    def summary(self) -> dict[str, Any]:
+        """Return what ``axes.json`` holds."""
+        return {
+            "truearm": "truearm-axes/1",
+            "robot": self.nominal.name,
+            "configurations": self.data.configurations,
+            "left_out": self.found.left_out,
+            "frame": "robot" if self.in_robot_frame else "instrument",
+            "declared": self.found.declared,
+            "excess": self.found.excess,
+            "circles": [_circle(circle) for circle in self.found.circles],
+            "axes": self._axes(),
+            "base": _placed(self.base),
+            "flange": _placed(self.flange),
+            "targets": {t.name: [self.robot.values[t.parameter(a)] * 1e3 for a in "xyz"] for t in self.robot.targets},
+            "tables": {name: self._shown_table(name) for name in TABLES},
+            "joint_errors": joint_errors_summary(self.errors),
+            "warnings": [{"code": n.code, "message": n.message} for n in self.notices],
+        }
+
+    def files(self, summary: str) -> Mapping[str, str]:
+        """Return the content of the result files by name; `summary` is the text of ``axes.json``."""
+        return {
+            "calibrated.yaml": robot_text(self.robot),
+            "joint-errors.yaml": robot_text(self.robot_with_errors),
+            "axes.json": summary,
+        }
+
+    def _axes(self) -> list[dict[str, Any]]:
+        robot = self.measured.robot
+        made = []
+        for number, axis in enumerate(joint_axes(robot), 1):
+            mine = [p for p in self.measured.free.parameters if p.name.endswith(f"_{number}")]
+            made.append(
+                {
+                    "joint": number,
+                    "direction": axis.along.tolist(),
+                    "point_mm": (axis.point * 1e3).tolist(),
+                    "point_deviation_mm": max(p.deviation or 0.0 for p in mine if p.unit == "m") * 1e3,
+                    "direction_deviation_mrad": max(p.deviation or 0.0 for p in mine if p.unit == "rad") * 1e3,
+                }
+            )
+        return made
+
+    def _shown_table(self, name: str) -> dict[str, Any]:
+        try:
+            rows = self.table(name)
+        except InputError as refusal:
+            return {"refused": str(refusal)}
+        units = [converted(self.nominal, name).convention.row_units(j.kind) for j in self.nominal.joints]
+        return {
+            "rows": [
+                {
+                    column: {
+                        "unit": SHOWN_AS[unit[column]],
+                        "value": from_si(value, SHOWN_AS[unit[column]]),
+                        "deviation": from_si(deviation, SHOWN_AS[unit[column]]),
+                    }
+                    for column, (value, deviation) in row.items()
+                }
+                for row, unit in zip(rows, units, strict=True)
+            ]
+        }
+
+
+def analyse(robot: Robot, data: Dataset, *, in_robot_frame: bool = False) -> AxisAnalysis:
+    """Find a robot's axes from measurements in which one joint moves at a time.
+
+    Parameters
+    ----------
+    robot
+        Its current values are the nominal ones. Joint effects are kept, and deflect the axes as they say.
+    data
+        Runs of every joint; see :func:`truearm.measurement.turns.find_runs`.
+    in_robot_frame
+        Whether the data are given in the frame of the robot's base, as set up before (KR5 paper, section 3.1).
+
+    Raises
+    ------
+    InputError
+        If a joint has no run, slides, turns the other way or too little, or axes 1 and 2 or the last two are parallel.
+    """
+    if len(robot.joints) != data.joints.shape[1]:
+        raise InputError(
+            f"the data have other joints than {robot.name}",
+            where=data.source,
+            came=f"{data.joints.shape[1]} joints",
+            allowed=f"{len(robot.joints)}",
+        )
+    found = axis_circles(data)
+    placed = robot if in_robot_frame else robot.with_frames(initial_frames(robot, data).base, {})
+    groups: tuple[Group, ...] = ("geometry",) if in_robot_frame else ("base", "geometry")
+    design = converted(placed, "joint-errors")
+    return AxisAnalysis(
+        nominal=robot,
+        data=data,
+        found=found,
+        measured=measured_axes(placed, found.circles),
+        calibrated=fit_axes(placed, found.circles, (*groups, "joint zero")),
+        errors=fit_axes(design, found.circles, groups),
+        in_robot_frame=in_robot_frame,
+    )
+
+
+def joint_errors_summary(fit: AxisFit) -> dict[str, Any]:
+    """Return what a fit in joint errors says: what was found, of what, and what circles cannot see."""
+    everything = FreeParameters((*fit.free.parameters, *(fit.robot.parameters[r.dropped] for r in fit.redundancies)))
+    found = []
+    for p in fit.free.parameters:
+        if p.group == "base":
+            continue
+        unit = SHOWN_AS[p.unit]
+        half = NORMAL_95 * (p.deviation or 0.0)
+        found.append(
+            {
+                "name": p.name,
+                "unit": unit,
+                "value": from_si(p.value, unit),
+                "deviation": from_si(p.deviation or 0.0, unit),
+                "interval": [from_si(p.value - half, unit), from_si(p.value + half, unit)],
+                "is": in_words(fit.combination(p.name), everything),
+            }
+        )
+    unseen = [
+        {"name": r.dropped, "combination": r.combination, "moves_flange": r.dropped in fit.felt}
+        for r in fit.redundancies
+    ]
+    return {"found": found, "unseen": unseen}
+
+
+def _circle(measured: AxisCircle) -> dict[str, Any]:
+    turn, circle = measured.turn, measured.circle
+    return {
+        "joint": measured.joint,
+        "target": measured.target,
+        "points": len(turn.reading),
+        "arc_deg": math.degrees(circle.arc),
+        "centre_mm": (circle.centre * 1e3).tolist(),
+        "centre_deviation_mm": circle.centre_deviation * 1e3,
+        "direction": circle.normal.tolist(),
+        "direction_deviation_mrad": circle.tilt_deviation * 1e3,
+        "radius_mm": circle.radius * 1e3,
+        "radius_deviation_mm": circle.radius_deviation * 1e3,
+        "radial_range_mm": float(np.ptp(circle.radial)) * 1e3,
+        "axial_range_mm": float(np.ptp(circle.axial)) * 1e3,
+        "tangential_range_mm": turn.tangential * 1e3,
+        "angular_range_deg": math.degrees(turn.angular),
+        "backlash_deg": None if turn.backlash is None else math.degrees(turn.backlash),
+    }
+
+
+def _placed(place: tuple[Transform, float, float]) -> dict[str, Any]:
+    transform, slide, turn = place
+    return {
+        "translation_mm": [v * 1e3 for v in transform.translation],
+        "quaternion": list(transform.quaternion),
+        "translation_deviation_mm": slide * 1e3,
+        "rotation_deviation_mrad": turn * 1e3,
+    }

@@ -1,0 +1,1 @@
+"""Which model: the joint effects that the data can carry, a model for each zone."""

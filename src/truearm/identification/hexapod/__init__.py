@@ -1,0 +1,1 @@
+"""Calibration with the hexapod device: in two steps, and from several places."""

@@ -1,0 +1,1 @@
+"""Tilt, backlash and stiffness from inclinometers on the links."""

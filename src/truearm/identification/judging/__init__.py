@@ -1,0 +1,1 @@
+"""What to think of data and fits: plausibility, what residuals show, advice, Monte Carlo."""

@@ -1,0 +1,204 @@
+"""What a person should know about a fit, in plain words and with parameter names."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from truearm.identification.solving.fit import Fit, Status
+from truearm.identification.solving.redundancy import gauge_motion_removed
+from truearm.modeling.conventions import parallel_joints_without_beta
+from truearm.notices import Notice
+
+#: Priors that a parameter may move before the robot, its units or its joint order are doubted.
+_FAR: Final = 6.0
+#: Standard deviations below zero from which a stiffness or a play is doubted.
+_NEGATIVE: Final = 4.0
+#: Share of the prior variance that the data should remove, and of parameters of effects that may fall short of it.
+_HALF: Final = 0.5
+_CROWDED: Final = 0.05
+#: Configurations at which positions are asked for.
+_ANYWHERE: Final = 200
+
+
+def check_fit(fit: Fit) -> list[Notice]:
+    """Return what a fit says about its model, its data and its parameters."""
+    found = []
+    robot = fit.robot
+    if "joint zero" in fit.model.groups and "geometry" in fit.model.groups:
+        pairs = parallel_joints_without_beta(robot.convention, [dict(j.row) for j in robot.joints])
+        if pairs:
+            names = ", ".join(f"{a} and {b}" for a, b in pairs)
+            better = {"standard-dh": "hayati", "modified-dh": "modified-hayati"}.get(
+                robot.convention_name, robot.convention_name
+            )
+            cure = (
+                "Convert the robot: truearm convert, --convention hayati."
+                if robot.convention_name == "s-model"
+                else f"Write 'convention: {better}' in the robot file and 'beta: 0' at the link between them."
+            )
+            found.append(
+                Notice(
+                    "parallel-axes",
+                    f"Joints {names} are parallel and no beta lets them tilt against each other, so the model "
+                    f"cannot follow the real robot. {cure}",
+                )
+            )
+    if fit.status is Status.NOT_CONVERGED:
+        found.append(Notice("not-converged", f"The fit did not converge. {Status.NOT_CONVERGED.advice}"))
+    if fit.unseen:
+        found.append(
+            Notice(
+                "rank-loss",
+                f"The training data do not determine {', '.join(fit.unseen)}, on which predictions elsewhere "
+                f"depend. {Status.RANK_LOSS.advice}",
+            )
+        )
+    if fit.trusted:
+        words = "Nothing outside the robot says where it stands: its base is the world."
+        if "size" in fit.trusted:
+            words += " No length was measured either: the size of everything rests on the nominal lengths."
+        told = _positions_told(fit)
+        words += (
+            " The held-out error is one of readings; positions anywhere are told to about "
+            f"{told * 1e3:.2g} mm on average, but for that."
+        )
+        if fit.blind:
+            words += f" Not seen, and left at nominal values: {'; '.join(fit.blind)}."
+        found.append(Notice("closed-loop", words))
+    if fit.at_bound:
+        found.append(Notice("at-bound", f"At a bound: {', '.join(fit.at_bound)}. {Status.AT_BOUND.advice}"))
+    if fit.redundancies:
+        combinations = "; ".join(f"{r.dropped} ({r.combination})" for r in fit.redundancies)
+        found.append(
+            Notice(
+                "redundant",
+                "Held at their nominal values, because the readings cannot tell the combination in brackets "
+                f"apart: {combinations}." + ("" if fit.unseen else " Predictions are not affected."),
+            )
+        )
+    far = [
+        p.name
+        for p in robot.parameters.values()
+        if p.group in ("joint zero", "geometry", "gain") and abs(p.value - p.nominal) > _FAR * p.prior
+    ]
+    if far:
+        found.append(
+            Notice(
+                "far-from-nominal",
+                f"{', '.join(far[:8])}{' and others' if len(far) > 8 else ''} moved by more than {_FAR:g} times what "
+                "the nominal values are believed to be good for. Is it this robot, in these units, with its joints in "
+                "this order? If so, say in the robot file what its numbers are good for (priors).",
+            )
+        )
+    if fit.excess > 1.0:
+        found.append(
+            Notice(
+                "residuals-exceed-sigma",
+                f"The residuals are {fit.excess:.1f} times what the declared deviations allow: the robot does "
+                f"something that the {fit.model.name} model cannot express, or sigma is too small. The "
+                "deviations of the parameters are widened by that factor.",
+            )
+        )
+    found += _check_effects(fit)
+    if fit.robot.effect_names:
+        effects = ", ".join(fit.robot.effect_names)
+        own = [p.name for effect in robot.effects for p in effect.parameters]
+        found.append(
+            Notice(
+                "urdf-partial",
+                f"calibrated.urdf holds the geometry and the joint zeros; a URDF cannot hold: {effects} "
+                f"({', '.join(own[:6])}{', ..' if len(own) > 6 else ''}), nor the base "
+                "and the targets in the instrument's frame. calibrated.yaml holds everything.",
+            )
+        )
+    return found
+
+
+def _check_effects(fit: Fit) -> list[Notice]:
+    """Say which joint effects the data know nothing about, and which came out as no spring can be."""
+    robot, found = fit.robot, []
+    idle = [
+        effect.name
+        for effect in robot.effects
+        if effect.parameters
+        and not any(p.name in fit.free.names for p in effect.parameters)
+        and all(robot.values[p.name] == p.value for p in effect.parameters)
+    ]
+    if idle:
+        found.append(
+            Notice(
+                "effects-idle",
+                f"The robot file has the joint effects {', '.join(idle)} at nothing, and the model "
+                f"{fit.model.name} does not free them. Add --effect {idle[0]}, or take them out of the file.",
+            )
+        )
+    effects = {p.name for effect in robot.effects for p in effect.parameters}
+    own = [name for name in fit.free.names if name in effects]
+    unknown = [name for name in own if fit.parameter_status(name) == "uninformed"]
+    unknown += [r.dropped for r in fit.redundancies if r.dropped in effects]
+    masses = (robot.payload.mass, *(link.mass for link in robot.masses))
+    if any(effect.loaded for effect in robot.effects) and not any(masses):
+        found.append(
+            Notice(
+                "no-loads",
+                "The robot has no link masses and no payload, so nothing loads its joints and compliance cannot be "
+                "found. Give masses in the robot file, or --payload.",
+            )
+        )
+    elif unknown:
+        found.append(
+            Notice(
+                "effects-uninformed",
+                f"The data say nothing about {', '.join(unknown)}: nothing loads these joints that way (gravity does "
+                "not turn a vertical axis), or there are too few configurations for so many effects. They stay near "
+                "nothing.",
+            )
+        )
+    vague = [name for name in own if name not in unknown and (robot.parameters[name].informed or 1.0) < _HALF]
+    if len(vague) > _CROWDED * len(own):
+        found.append(
+            Notice(
+                "too-many-effects",
+                f"Of {len(own)} parameters of joint effects the data know {len(vague)} less than half, "
+                f"{', '.join(vague[:8])}{' and others' if len(vague) > 8 else ''}: there are too few configurations "
+                f"for so many effects. Measure more{'' if fit.model.tried else ', or let --model auto choose'}.",
+            )
+        )
+    soft = [
+        p.name
+        for p in (robot.parameters[name] for name in own)
+        if p.group in ("compliance", "bearing-compliance", "backlash", "clearance")
+        and p.deviation is not None
+        and p.value < -_NEGATIVE * p.deviation
+        and fit.parameter_status(p.name) == "identified"
+    ]
+    if soft:
+        found.append(
+            Notice(
+                "negative-effect",
+                f"{', '.join(soft)} came out negative, as no spring and no play is: masses, payload or gravity may be "
+                "wrong, or the parameter stands for something else that the model lacks.",
+            )
+        )
+    return found
+
+
+def _positions_told(fit: Fit, seed: int = 0) -> float:
+    """Return the mean error of the targets' positions that the covariance lets expect at random configurations [m].
+
+    What is taken on trust, where the base is and perhaps the size of everything, is left out of account.
+    """
+    robot, names = fit.robot, fit.free.names
+    q = robot.loaded(robot.random_configurations(_ANYWHERE, np.random.default_rng(seed)))
+    lengths = []
+    for target in robot.targets:
+        kinematics = robot.forward_kinematics(q, target.name)
+        (moved,) = gauge_motion_removed(
+            fit.trusted, robot, kinematics, [robot.position_jacobian(kinematics, q, names).reshape(len(names), -1).T]
+        )
+        variance = np.sum((moved @ fit.covariance) * moved, axis=1).reshape(3, -1).mean(axis=0)
+        lengths.append(math.sqrt(8.0 / math.pi) * np.sqrt(np.maximum(variance, 0.0)))
+    return float(np.mean(lengths))

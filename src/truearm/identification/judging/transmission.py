@@ -1,0 +1,131 @@
+"""Find gears that err periodically, in what a fit leaves over.
+
+The residuals of each joint are held against sines of its readings, one number of periods in a turn after the other: a
+periodogram on readings at uneven places (Lomb 1976, "Least-squares frequency analysis of unequally spaced data"). The
+strongest is taken out before the next one is looked for.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from truearm.identification.solving.fit import Fit
+from truearm.measurement.dataset import Dataset
+from truearm.modeling.chain import Array
+from truearm.notices import Notice
+
+#: Periods in a turn that are looked at; fewer than the first are the Fourier series' business.
+_PERIODS: Final = np.arange(20, 401)
+#: A periodic error is believed if chance would show one as strong in any joint less often than this.
+_CHANCE: Final = 1e-3
+_FEWEST: Final = 60  # configurations
+
+
+@dataclass(frozen=True)
+class PeriodicError:
+    """A joint's residual that repeats.
+
+    Attributes
+    ----------
+    joint
+        Number of the joint, from 1.
+    periods
+        In a turn of the joint.
+    amplitude
+        Of the sine [rad].
+    share
+        Of the squared residuals that it explains.
+    chance
+        Probability that noise alone shows one as strong anywhere.
+    """
+
+    joint: int
+    periods: int
+    amplitude: float
+    share: float
+    chance: float
+
+
+def periodic_errors(fit: Fit, data: Dataset) -> tuple[PeriodicError, ...]:
+    """Return the periodic errors of joints whose gear the robot file does not describe, one a joint at most.
+
+    Parameters
+    ----------
+    fit
+        What is left over is seen from it.
+    data
+        The readings it is held against; fewer than 60 configurations say nothing.
+    """
+    robot = fit.robot
+    if data.configurations < _FEWEST or not data.has_position.any():
+        return ()
+    at = robot.loaded(data.postures)
+    count = len(robot.joints)
+    # Of each configuration, summed over its position readings: J'r and J'J by joints, r'r, and how many there are.
+    pull, weight = np.zeros((len(at), count)), np.zeros((len(at), count, count))
+    left, readings = np.zeros(len(at)), np.zeros(len(at))
+    for index, name in enumerate(data.targets):
+        mine = np.flatnonzero((data.target == index) & data.has_position)
+        where = data.configuration[mine]
+        kinematics = robot.forward_kinematics(at, name)
+        rate = kinematics.position_jacobian(robot.moving[:count])[..., where]
+        residual = data.position[mine].T - kinematics.position[:, where]
+        np.add.at(pull, where, np.einsum("jan,an->nj", rate, residual))
+        np.add.at(weight, where, np.einsum("jan,kan->njk", rate, rate))
+        np.add.at(left, where, (residual**2).sum(0))
+        np.add.at(readings, where, 1.0)
+    # The targets of a configuration share its errors, so that it counts as one reading of three coordinates.
+    free = 3 * int((readings > 0).sum()) - len(fit.free.names)
+    open_joints = [
+        i for i, joint in enumerate(robot.joints) if joint.kind == "revolute" and joint.transmission_periods is None
+    ]
+    found: list[PeriodicError] = []
+    total = float(left.sum())
+    while open_joints:
+        tried = [(*_strongest(at.joints[:, i], pull[:, i], weight[:, i, i]), i) for i in open_joints]
+        explained, periods, a, b, joint = max(tried)
+        chance = len(open_joints) * len(_PERIODS) * math.exp(-0.5 * free * explained / total)
+        if chance >= _CHANCE:
+            break
+        found.append(PeriodicError(joint + 1, periods, math.hypot(a, b), explained / total, chance))
+        wave = a * np.sin(periods * at.joints[:, joint]) + b * np.cos(periods * at.joints[:, joint])
+        pull -= weight[:, :, joint] * wave[:, None]
+        total -= explained
+        open_joints.remove(joint)
+    return tuple(sorted(found, key=lambda error: error.joint))
+
+
+def _strongest(q: Array, pull: Array, weight: Array) -> tuple[float, int, float, float]:
+    """Return what the best sine explains of the squared residuals [m^2], its periods, and its two amplitudes [rad]."""
+    angle = _PERIODS[:, None] * q
+    s, c = np.sin(angle), np.cos(angle)
+    ss, sc, cc = (s * s) @ weight, (s * c) @ weight, (c * c) @ weight
+    ys, yc = s @ pull, c @ pull
+    safe = np.maximum(ss * cc - sc * sc, 1e-12 * (ss + cc) ** 2 + 1e-300)
+    a, b = (cc * ys - sc * yc) / safe, (ss * yc - sc * ys) / safe
+    explained = a * ys + b * yc
+    best = int(np.argmax(explained))
+    return float(explained[best]), int(_PERIODS[best]), float(a[best]), float(b[best])
+
+
+def check_transmission(fit: Fit, data: Dataset) -> list[Notice]:
+    """Return a notice if some joints err periodically."""
+    found = periodic_errors(fit, data)
+    if not found:
+        return []
+    told = "; ".join(
+        f"joint {error.joint} {error.periods} times in a turn, by {np.rad2deg(error.amplitude) * 1e3:.1f} millidegrees"
+        for error in found
+    )
+    return [
+        Notice(
+            "transmission-error",
+            f"What is left over repeats with the joints' angles: {told}. Strain wave gears do that, twice in a turn of "
+            "their wave generator. Write transmission_periods to these joints in the robot file, and --model auto "
+            "will try to take the error out.",
+        )
+    ]

@@ -1,0 +1,1 @@
+"""What is minimised, and how: problem, losses, bounds, solver, fit, redundancy."""

@@ -1,0 +1,436 @@
+"""From a nominal robot and training data to an identified robot, with what is known about every parameter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import Enum
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.errors import InputError
+from truearm.identification.solving.bounds import Bounds, bound_vectors
+from truearm.identification.solving.losses import Loss, norms_of, robust_scale
+from truearm.identification.solving.models import FRAMES, Model
+from truearm.identification.solving.problem import SETUP, Problem, check_circumstances, check_solvable
+from truearm.identification.solving.redundancy import (
+    Redundancy,
+    find_redundancies,
+    gauge_freedoms,
+    in_words,
+    unobservable_parameters,
+)
+from truearm.identification.solving.solver import SMALL, Solution, solve
+from truearm.identification.start_values.from_readings import start_from_readings, unanchored
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.observations import OBSERVATIONS
+from truearm.modeling.chain import Array
+from truearm.modeling.parameters import FreeParameters
+from truearm.modeling.robot import Robot
+
+Redundant = Literal["prior", "drop"]
+
+#: ``uninformed``: the data removed less than 5 % of the prior variance, so the value is still a belief.
+ParameterStatus = Literal["identified", "uninformed", "at-bound", "not-determined", "dropped", "fixed"]
+_UNINFORMED: Final = 0.05
+
+#: Noise assumed for readings that declare none, until their own residuals say better [m, rad].
+_FIRST_NOISE: Final = {observation.name: 1e-4 for observation in OBSERVATIONS}
+_NOISE_FLOOR: Final = 1e-9
+#: Rounds until deviations and loads agree with the solution; each leaves a hundredth of the loads' error or less.
+_ROUNDS: Final = 6
+_LOADS_AGREE: Final = 1e-4  # of the last step, in the joints' deflections [rad or m]
+# Spatial median in three dimensions against the mean, for normal noise (Brown 1983), and the median of single numbers.
+_L1_EFFICIENCY: Final = 0.849
+_L1_EFFICIENCY_OF_ONE: Final = 2.0 / np.pi
+
+
+class Status(Enum):
+    """How a fit ended; the value is the word in files, `advice` what to do."""
+
+    CONVERGED = "converged"
+    AT_BOUND = "at-bound"
+    RANK_LOSS = "rank-loss"
+    NOT_CONVERGED = "not-converged"
+
+    @property
+    def advice(self) -> str:
+        """What to do about it."""
+        return {
+            Status.CONVERGED: "Judge the fit by its held-out error.",
+            Status.AT_BOUND: "A parameter stopped at a bound: widen the bound if it was a guess.",
+            Status.RANK_LOSS: "The data are too few or too alike to determine everything that predictions "
+            "depend on: measure more configurations that move every joint, or free fewer parameters.",
+            Status.NOT_CONVERGED: "The steps did not settle: check units, joint order and targets.",
+        }[self]
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """An identified robot. It knows training data only; held-out figures belong to the calibration.
+
+    Attributes
+    ----------
+    robot
+        The robot with identified parameters, their deviations and informed shares.
+    start
+        The robot before: same frames in closed form, nominal parameters.
+    model
+        What was free.
+    status
+        How the fit ended.
+    free
+        The parameters that were identified, in the order of `covariance`.
+    covariance
+        Of the free parameters [SI], ``(parameters, parameters)``.
+    redundancies
+        Parameters held because the data cannot tell them apart, with the combination.
+    at_bound, unseen
+        Names of parameters at a bound, and of those that the data leave undetermined though predictions need them.
+    trusted
+        What nobody measured and every prediction depends on: ``base`` where nothing says how the robot stands, ``size``
+        where no length was measured either.
+    blind
+        What readings without an anchor do not see: combinations of the robot's parameters in words, such as
+        ``d_3 - d_2``, of which the first keeps its nominal value.
+    sigma
+        Standard deviation of a reading [m or rad] by observation, declared (root mean square) or estimated.
+    declared
+        Whether the file declared all of them.
+    excess
+        How much larger the residuals are than the declared deviations allow; 1 if they agree or nothing was
+        declared. The covariance contains it. Parameters at a bound are not uncertain in it.
+    weight
+        What the loss left of each reading, ``(readings,)``, in the order of the dataset; NaN where none was used.
+        For ``l1``, which has no full weight, relative to the median reading.
+    steps
+        Steps of the solver, over all stages.
+    """
+
+    robot: Robot
+    start: Robot
+    model: Model
+    status: Status
+    free: FreeParameters
+    covariance: Array
+    redundancies: tuple[Redundancy, ...]
+    at_bound: tuple[str, ...]
+    unseen: tuple[str, ...]
+    trusted: tuple[str, ...]
+    blind: tuple[str, ...]
+    sigma: dict[str, float]
+    declared: bool
+    excess: float
+    weight: Array
+    steps: int
+
+    def parameter_status(self, name: str) -> ParameterStatus:
+        """Return how much the value of a parameter is worth."""
+        if name in self.unseen:
+            return "not-determined"
+        if any(name == r.dropped for r in self.redundancies):
+            return "dropped"
+        if name not in self.free.names:
+            return "fixed"
+        if name in self.at_bound:
+            return "at-bound"
+        informed = self.robot.parameters[name].informed
+        return "uninformed" if informed is not None and informed < _UNINFORMED else "identified"
+
+    @property
+    def correlations(self) -> Array:
+        """Correlation matrix of the free parameters."""
+        deviation = np.sqrt(np.diag(self.covariance))
+        safe = np.where(deviation > 0, deviation, 1.0)
+        return np.asarray(self.covariance / np.outer(safe, safe))
+
+
+def identify(
+    robot: Robot,
+    data: Dataset,
+    model: Model,
+    *,
+    loss: Loss = "linear",
+    redundancy: Redundant = "prior",
+    bounds: Bounds | None = None,
+    bounds_file: str = "bounds",
+    small: float = SMALL,
+) -> Fit:
+    """Identify a robot from training data.
+
+    Parameters
+    ----------
+    robot
+        Its current parameter values are the start and the centre of the priors; its own base and targets are
+        found anew from the data.
+    data
+        Training readings.
+    model
+        Which parameters are free.
+    loss
+        See :mod:`truearm.identification.solving.losses`.
+    redundancy
+        ``prior``: every parameter is kept near its nominal value as far as its prior says, so redundant ones
+        do no harm. ``drop``: no priors; redundant parameters are held at nominal and named.
+    bounds
+        Limits of parameter values.
+    small
+        Step of the solver that is the last, in priors.
+
+    Raises
+    ------
+    InputError
+        For data without positions, bounds on unknown parameters, bounds that a redundant parameter cannot keep, or
+        too few equations without priors.
+    """
+    start = start_from_readings(model.prepared(robot), data)
+    check_circumstances(start, data)
+    free = unanchored(model.free(start), data)
+    check_bounds = None
+    if bounds is not None:
+        tried = start.with_effects(model.tried).parameters.values()
+        check_bounds = bound_vectors(bounds, free, bounds_file, tried)
+    problem = Problem(start, data, free, dict(_FIRST_NOISE), priors=redundancy == "prior")
+    check_solvable(problem)
+    dropped: tuple[Redundancy, ...] = ()
+    if redundancy == "drop":
+        dropped = find_redundancies(problem, free.start)
+    steps = 0
+    for _ in range(6):
+        held = [r.dropped for r in dropped]
+        if check_bounds is not None:
+            _check_held(held, free, check_bounds, bounds_file)
+        kept = problem.free.without(held)
+        limits = None if check_bounds is None else _limits_of(check_bounds, free, kept)
+        solution, reduced = _solve_with_noise(replace(problem, free=kept), loss, limits, small)
+        steps += solution.steps
+        if redundancy == "prior":
+            break
+        # What is redundant at the nominal robot need not be at the real one: look again there.
+        found = dict(zip(kept.names, solution.vector, strict=True))
+        there = FreeParameters(tuple(replace(p, value=float(found.get(p.name, p.nominal))) for p in free.parameters))
+        problem = replace(problem, free=there, noise=reduced.noise)
+        dropped = find_redundancies(problem, there.start, held)
+        if [r.dropped for r in dropped] == held:
+            break
+    else:
+        solution = replace(solution, converged=False)
+        dropped = tuple(r for r in dropped if r.dropped in held)
+    return _fit(reduced, solution, start, model, loss, dropped, limits, steps)
+
+
+def place(robot: Robot, data: Dataset, loss: Loss = "linear") -> Fit:
+    """Fit only the base and the targets: the uncalibrated robot in the frames of the data."""
+    return identify(robot, data, FRAMES, loss=loss)
+
+
+def _check_held(held: list[str], free: FreeParameters, limits: tuple[Array, Array], where: str) -> None:
+    for name, p, low, high in zip(free.names, free.parameters, *limits, strict=True):
+        if name in held and not low <= p.nominal <= high:
+            raise InputError(
+                "the bounds exclude the nominal value of a redundant parameter, where --redundancy drop holds it",
+                where=f"{where}, {name}",
+                cure="Leave this bound out, or use --redundancy prior.",
+            )
+
+
+def _limits_of(limits: tuple[Array, Array], free: FreeParameters, kept: FreeParameters) -> tuple[Array, Array]:
+    places = [free.names.index(name) for name in kept.names]
+    return limits[0][places], limits[1][places]
+
+
+def _solve_with_noise(
+    problem: Problem, loss: Loss, limits: tuple[Array, Array] | None, small: float
+) -> tuple[Solution, Problem]:
+    """Solve; then again with what the solution says of deviations and of the loads at every joint.
+
+    Deviations are estimated where they are not declared. Declared ones are widened by what the residuals say where
+    there is no anchor: believed to the letter, readings of a closed loop that the model cannot follow would overrule
+    every prior, for the sake of directions that they hardly see.
+    """
+    solution = solve(problem, loss, limits, small)
+    undeclared = {problem.kind(b) for b in problem.blocks if not b.declared}
+    steps = solution.steps
+    settled = False
+    for _ in range(_ROUNDS):
+        noise = {**problem.noise}
+        found_noise = _noise(problem, solution, loss)
+        known = {name: found_noise[name] for name in found_noise if name not in undeclared}
+        wider = _excess(known) if known and not problem.data.anchored else 1.0
+        for name, (estimate, _) in found_noise.items():
+            if name in undeclared:
+                noise[name] = max(estimate * noise[name], _NOISE_FLOOR)
+        change = max((abs(np.log(noise[n] / problem.noise[n])) for n in undeclared), default=0.0)
+        found = dict(zip(problem.free.names, map(float, solution.vector), strict=True))
+        started = FreeParameters(tuple(replace(p, value=found[p.name]) for p in problem.free.parameters))
+        there = replace(
+            problem,
+            robot=problem.robot.with_values(found),
+            noise=noise,
+            free=started,
+            widened=problem.widened * wider,
+        )
+        shift = _load_shift(problem, there)
+        if (settled and shift < _LOADS_AGREE * small) or (not undeclared and shift == 0.0 and wider == 1.0):
+            break
+        settled = change < 0.02 and wider < 1.02
+        problem = there
+        solution = solve(problem, loss, limits, small)
+        steps += solution.steps
+    return replace(solution, steps=steps), problem
+
+
+def _load_shift(before: Problem, after: Problem) -> float:
+    """Return how far joint variables move if the loads are those of another solution [rad or m]."""
+    if before.postures.loads is None:
+        return 0.0
+    values = after.robot.values
+    moved = after.robot.variables(after.postures, values) - after.robot.variables(before.postures, values)
+    return float(np.abs(moved).max())
+
+
+def _noise(problem: Problem, solution: Solution, loss: Loss) -> dict[str, tuple[float, float]]:
+    """Return for each observation the deviation of its whitened residuals, and the degrees of freedom behind it."""
+    kinds = np.concatenate([[problem.kind(b)] * b.rows for b in problem.blocks])
+    of_readings = np.concatenate([[problem.kind(b)] * len(b.readings) for b in problem.blocks])
+    norms = norms_of(solution.residual, problem.components)
+    spent = _informed_rows(problem, solution)
+    found = {}
+    for name in dict.fromkeys(kinds.tolist()):
+        if name == SETUP:
+            continue
+        mine = solution.residual[kinds == name]
+        freedom = len(mine) * max(1.0 - spent / problem.rows, 1e-3)
+        if loss == "linear":
+            found[name] = (float(np.sqrt(np.sum(mine**2) / freedom)), freedom)
+        else:
+            of_name = of_readings == name
+            found[name] = (robust_scale(norms[of_name], problem.components[of_name]), freedom)
+    return found
+
+
+def _informed_rows(problem: Problem, solution: Solution) -> float:
+    """Return how many parameters' worth of residual the fit used up."""
+    prior = problem.free.prior
+    s2 = np.linalg.svd(np.linalg.qr(solution.jacobian * prior, mode="r"), compute_uv=False) ** 2
+    if not problem.priors:
+        return float(len(prior))
+    return float(np.sum(s2 / (s2 + 1.0)))
+
+
+def _fit(
+    problem: Problem,
+    solution: Solution,
+    start: Robot,
+    model: Model,
+    loss: Loss,
+    dropped: tuple[Redundancy, ...],
+    limits: tuple[Array, Array] | None,
+    steps: int,
+) -> Fit:
+    free, x = problem.free, solution.vector
+    at_bound = np.zeros(len(x), dtype=bool)
+    if limits is not None:
+        near = 1e-9 * free.prior
+        at_bound = (x <= limits[0] + near) | (x >= limits[1] - near)
+    weighted = np.ones_like(solution.weight) if loss == "l1" else solution.weight
+    A = solution.jacobian * free.prior * np.repeat(np.sqrt(weighted), problem.components)[:, None]
+    noise = _noise(problem, solution, loss)
+    declared = {problem.kind(b) for b in problem.blocks if b.declared} - {SETUP}
+    excess = _excess({name: noise[name] for name in noise if name in declared}) if declared else 1.0
+    single = float(np.sum(problem.components == 1)) / problem.rows
+    efficiency = single * _L1_EFFICIENCY_OF_ONE + (1.0 - single) * _L1_EFFICIENCY
+    spread = excess / np.sqrt(efficiency) if loss == "l1" else excess
+    excess *= problem.widened
+    covariance = _covariance(A / spread, ~at_bound, problem.priors) * np.outer(free.prior, free.prior)
+    deviation = np.sqrt(np.diag(covariance))
+    informed = np.clip(1.0 - (deviation / free.prior) ** 2, 0.0, 1.0)
+    identified = [
+        replace(start.parameters[n], value=float(v))
+        if bound
+        else replace(start.parameters[n], value=float(v), deviation=float(d), informed=float(i))
+        for n, v, d, i, bound in zip(free.names, x, deviation, informed, at_bound, strict=True)
+    ]
+    robot = start.with_parameters(identified)
+    held = tuple(robot.parameters[r.dropped] for r in dropped)
+    looked_at = FreeParameters((*(robot.parameters[n] for n in free.names), *held))
+    unseen = unobservable_parameters(robot, problem.data, looked_at)
+    trusted = gauge_freedoms(problem.data)
+    used = solution.weight / np.median(solution.weight) if loss == "l1" else solution.weight
+    weight = np.full(len(problem.data.target), np.nan)
+    first = 0
+    for block in problem.blocks:
+        part = used[first : first + len(block.readings)]
+        if block.data is problem.data:
+            weight[block.readings] = np.fmin(weight[block.readings], part)
+        first += len(block.readings)
+    if not solution.converged:
+        status = Status.NOT_CONVERGED
+    elif unseen:
+        status = Status.RANK_LOSS
+    elif at_bound.any():
+        status = Status.AT_BOUND
+    else:
+        status = Status.CONVERGED
+    sigma = {}
+    for name in noise:
+        values = np.concatenate([b.sigma for b in problem.blocks if problem.kind(b) == name])
+        sigma[name] = float(np.sqrt(np.mean(values**2)))
+    return Fit(
+        robot=robot,
+        start=start,
+        model=model,
+        status=status,
+        free=free,
+        covariance=covariance,
+        redundancies=dropped,
+        at_bound=tuple(n for n, bound in zip(free.names, at_bound, strict=True) if bound),
+        unseen=unseen,
+        trusted=trusted,
+        blind=_blind(problem, x) if trusted else (),
+        sigma=sigma,
+        declared=declared == set(noise),
+        excess=excess,
+        weight=weight,
+        steps=steps,
+    )
+
+
+def _blind(problem: Problem, vector: Array) -> tuple[str, ...]:
+    """Return the combinations of the robot's own parameters that the readings do not see."""
+    beside = {p.name for p in problem.free.parameters if p.group in ("target", "fixture")}
+    own = [
+        {n: c for n, c in redundancy.members.items() if n not in beside}
+        for redundancy in find_redundancies(problem, vector)
+    ]
+    return tuple(in_words(members, problem.free) for members in own if members)
+
+
+def _covariance(A: Array, uncertain: NDArray[np.bool_], priors: bool) -> Array:
+    """Return the covariance of parameters scaled by their priors, zero for those that are not uncertain.
+
+    Parameters
+    ----------
+    A
+        Whitened Jacobian per prior, ``(rows, parameters)``.
+    """
+    count = int(uncertain.sum())
+    rows = np.concatenate([A[:, uncertain], np.eye(count)]) if priors else A[:, uncertain]
+    _, s, Vt = np.linalg.svd(np.asarray(np.linalg.qr(rows, mode="r"), dtype=np.float64))
+    spread = Vt.T / np.maximum(s, 1e-12 * s[0])
+    covariance = np.zeros((A.shape[1], A.shape[1]))
+    covariance[np.ix_(uncertain, uncertain)] = spread @ spread.T
+    return covariance
+
+
+def _excess(noise: dict[str, tuple[float, float]]) -> float:
+    """Return the ratio of residuals to declared deviations if it is too large for chance (1 in 1000), else 1.
+
+    The quantile of chi squared is Wilson and Hilferty's (1931).
+    """
+    freedom = sum(dof for _, dof in noise.values())
+    ratio = sum(deviation**2 * dof for deviation, dof in noise.values()) / freedom
+    k = 2.0 / (9.0 * freedom)
+    allowed = (1.0 - k + 3.09 * np.sqrt(k)) ** 3
+    return float(np.sqrt(ratio)) if ratio > allowed else 1.0

@@ -1,0 +1,166 @@
+"""How far each parameter moves the tip, configuration by configuration (Patel, section 3.5).
+
+Every parameter is really moved, one at a time, and the tip is where the chain then puts it: no derivative, so what
+bends is in it. The perturbations are the trials of one sweep over all configurations.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+
+from truearm.errors import InputError, nearest_names
+from truearm.modeling.chain import Array
+from truearm.modeling.postures import Postures
+from truearm.modeling.robot import Robot
+
+#: +0.05 deg and +0.1 mm, by SI unit (Patel, section 3.5).
+PERTURBATION: Final[Mapping[str, float]] = {"rad": math.radians(0.05), "m": 1e-4}
+_NOTHING: Final = 1e-13  # m: what rounding moves
+
+
+@dataclass(frozen=True, eq=False)
+class Influence:
+    """What parameters do to the position of the tip.
+
+    Attributes
+    ----------
+    names
+        The parameters.
+    perturbation
+        How far each of them was moved [m, rad or its own unit], ``(parameters,)``.
+    size
+        How far the tip then moved [m], ``(parameters, n)``.
+    """
+
+    names: tuple[str, ...]
+    perturbation: Array
+    size: Array
+
+    @property
+    def mean(self) -> Array:
+        """Average influence of each parameter [m], ``(parameters,)``."""
+        return np.asarray(self.size.mean(axis=1))
+
+    @property
+    def least(self) -> Array:
+        """Smallest influence of each parameter [m], ``(parameters,)``."""
+        return np.asarray(self.size.min(axis=1))
+
+    @property
+    def greatest(self) -> Array:
+        """Largest influence of each parameter [m], ``(parameters,)``."""
+        return np.asarray(self.size.max(axis=1))
+
+    @cached_property
+    def vector(self) -> Array:
+        """The influence vector k of each configuration, ``(parameters, n)``: 1 for the most influential parameter.
+
+        Raises
+        ------
+        InputError
+            If no parameter moves the tip at some configuration.
+        """
+        most = self.size.max(axis=0)
+        if (most < _NOTHING).any():
+            raise InputError(
+                "none of the parameters moves the tip, so none is the most influential",
+                where=f"configuration {int(np.argmin(most)) + 1}",
+                came=", ".join(self.names),
+                cure="Name more parameters, or leave the configuration out.",
+            )
+        return np.asarray(self.size / most)
+
+
+def influence(
+    robot: Robot,
+    q: Array | Postures,
+    names: Sequence[str],
+    target: str | None,
+    perturbations: Mapping[str, float] | None = None,
+) -> Influence:
+    """Perturb parameters one at a time and see how far the tip moves.
+
+    Parameters
+    ----------
+    robot
+        Perturbed about its current parameter values, with its joint effects; the loads are held.
+    q
+        Joint readings ``(n, joints)``, or postures, n at least 1.
+    names
+        Parameters of the robot.
+    target
+        The tip; the flange if None.
+    perturbations
+        By parameter name [m, rad or its own unit], instead of :data:`PERTURBATION`.
+
+    Raises
+    ------
+    InputError
+        For parameters that the robot does not have, no configuration, or a perturbation that is no size.
+    """
+    perturbation = sizes_of(robot, names, PERTURBATION, perturbations or {}, "perturbation")
+    at = robot.loaded(q)
+    if len(at) == 0:
+        raise InputError("there is no configuration", where=robot.name, cure="Give at least one.")
+    moved = np.diag(perturbation)[:, :, None]
+    values = {**robot.values, **{n: robot.values[n] + steps for n, steps in zip(names, moved, strict=True)}}
+    apart = (
+        robot.forward_kinematics(at, target, values).position
+        - robot.forward_kinematics(at, target).position[:, None, :]
+    )
+    return Influence(tuple(names), perturbation, np.asarray(np.linalg.norm(apart, axis=0)))
+
+
+def sizes_of(
+    robot: Robot, names: Sequence[str], by_unit: Mapping[str, float], given: Mapping[str, float], what: str
+) -> Array:
+    """Return a size for each of the named parameters [m, rad or its own unit], ``(parameters,)``.
+
+    Parameters
+    ----------
+    by_unit
+        Sizes by SI unit.
+    given
+        Sizes by parameter name, which come first.
+    what
+        What the size is, for messages.
+
+    Raises
+    ------
+    InputError
+        For a name that is no parameter, occurs twice or has no size, and for a size that is not above zero.
+    """
+    if not names:
+        raise InputError("no parameter is named", where=robot.name, cure="Name at least one.")
+    for name in names:
+        if name not in robot.parameters:
+            near = nearest_names(name, robot.parameters)
+            cure = f"Did you mean {' or '.join(near)}?" if near else None
+            raise InputError("the robot has no such parameter", where=robot.name, came=name, cure=cure)
+    twice = [name for i, name in enumerate(names) if name in names[:i]]
+    if twice:
+        raise InputError("a parameter is named twice", where=robot.name, came=twice[0])
+    for name, size in given.items():
+        if name not in names:
+            raise InputError(f"the {what} is of a parameter that is not named", where=robot.name, came=name)
+        if not (math.isfinite(size) and size > 0):
+            raise InputError(f"the {what} is no size", where=name, came=size, allowed="above 0")
+    sizes = []
+    for name in names:
+        unit = robot.parameters[name].unit
+        if name not in given and unit not in by_unit:
+            raise InputError(
+                f"the document has no {what} for a parameter of this unit",
+                where=name,
+                came=unit,
+                allowed=", ".join(by_unit),
+                cure=f"Give its {what}.",
+            )
+        sizes.append(given[name] if name in given else by_unit[unit])
+    return np.array(sizes)

@@ -1,0 +1,285 @@
+"""Identification at one pose after the other, as the Katana thesis does it (Patel, section 3.6), beside least squares.
+
+At a single pose the measured position gives three equations for all parameters, so infinitely many sets of them
+explain it. Both methods of the document start every pose from the robot as it is and step until the tip is where it
+was measured:
+
+- minimum norm (equation 3.6): the smallest step that does it, ``J^T (J J^T)^-1 dP``. "Smallest" depends on the units
+  in which parameters are counted; they are rad and mm, as in the document, so lengths hardly move.
+- influence-based (equations 3.7 and 3.8): that step times C < 1, each parameter then times its share in the influence
+  vector k, and again from where that leads. It converges, because ``J diag(k) J^T (J J^T)^-1`` has eigenvalues between
+  min(k) and 1. All steps lie in the span of ``diag(k) J^T``, so for small errors the set ends where
+  ``dE^T diag(k)^-1 dE`` is smallest, whatever C is.
+
+Each set explains its own pose only: of what is wrong with the robot it holds the three combinations that this pose
+sees. The document does not say how "a set of kinematics parameters is calculated that best fit the accuracy to all
+measured poses" from them; see :data:`Combination`. With more poses than parameters the linear combination of the sets
+that fits best is least squares over all poses itself, and going through the poses again from their mean, again and
+again, comes closer to it.
+
+Base and targets are held where the robot has them, unless their parameters are named: this is for readings taken in
+a known frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.errors import InputError
+from truearm.identification.solving.influence import influence, sizes_of
+from truearm.identification.solving.problem import Problem
+from truearm.identification.solving.solver import solve
+from truearm.measurement.dataset import Dataset
+from truearm.modeling.chain import Array
+from truearm.modeling.parameters import FreeParameters
+from truearm.modeling.postures import Postures
+from truearm.modeling.robot import Robot
+
+#: ``mean`` of the sets; ``scaled-mean``: the mean step times the one number that fits all readings best, because
+#: a mean of smallest steps is too short; ``best-pose``: the one set with the smallest mean error at all poses.
+Combination = Literal["mean", "scaled-mean", "best-pose"]
+
+#: What a parameter is counted in where steps are compared: rad and mm, by SI unit.
+UNIT: Final[Mapping[str, float]] = {"rad": 1.0, "m": 1e-3}
+#: What the document's instrument can see [m]: a pose is met when its error is below.
+TOLERANCE: Final = 1e-5
+#: The document prints no value for C.
+DAMPING: Final = 0.5
+
+_ITERATIONS: Final = 1000
+_LOADINGS: Final = 3  # a problem holds the loads of the robot that it starts from
+_RANK: Final = 1e-9  # of the largest singular value
+_BLOCK: Final = 9_000  # positions swept together
+
+
+@dataclass(frozen=True, eq=False)
+class PoseByPose:
+    """What poses say one at a time, and the robot made of it.
+
+    Attributes
+    ----------
+    robot
+        With the combined set.
+    names
+        The parameters that were identified.
+    sets
+        Their values at each pose [SI], ``(n, parameters)``.
+    iterations
+        Steps taken at each pose, ``(n,)``.
+    left
+        Position error of each pose with its own set [m], ``(n,)``.
+    converged
+        Whether that came below the tolerance, ``(n,)``. A pose where it did not counts in the combination as it is.
+    """
+
+    robot: Robot
+    names: tuple[str, ...]
+    sets: Array
+    iterations: NDArray[np.intp]
+    left: Array
+    converged: NDArray[np.bool_]
+
+
+def minimum_norm(
+    robot: Robot,
+    data: Dataset,
+    names: Sequence[str],
+    target: str,
+    *,
+    combination: Combination = "mean",
+    tolerance: float = TOLERANCE,
+    units: Mapping[str, float] | None = None,
+) -> PoseByPose:
+    """Identify parameters with the smallest step at each pose (Patel, equation 3.6).
+
+    Parameters
+    ----------
+    robot
+        Its values are the start; what is not named, joint effects included, is held.
+    data
+        Position readings in the frame that the robot stands in.
+    names
+        Parameters of the robot.
+    target
+        The one whose readings are used.
+    combination
+        See :data:`Combination`.
+    tolerance
+        Position error that counts as none [m].
+    units
+        What a parameter is counted in, by its name [m, rad or its own unit], instead of :data:`UNIT`. A slide that
+        stands for a turn with an arm of 0.2 m counts like it in units of 0.2 m.
+
+    Raises
+    ------
+    InputError
+        For parameters or a target that the robot does not have, no position reading of the target, or a tolerance or
+        unit that is not above zero.
+    """
+    poses = _poses(robot, data, names, target, tolerance, units)
+    return _result(robot, poses, np.ones((len(poses.postures), len(names))), tolerance, combination, "minimum norm")
+
+
+def influence_based(
+    robot: Robot,
+    data: Dataset,
+    names: Sequence[str],
+    target: str,
+    *,
+    damping: float = DAMPING,
+    combination: Combination = "mean",
+    tolerance: float = TOLERANCE,
+    units: Mapping[str, float] | None = None,
+    perturbations: Mapping[str, float] | None = None,
+) -> PoseByPose:
+    """Identify parameters at each pose by their influence there (Patel, equations 3.7 and 3.8).
+
+    Parameters
+    ----------
+    damping
+        C, above 0 and at most 1. It sets the number of iterations.
+    perturbations
+        As for :func:`~truearm.identification.solving.influence.influence`, which gives k once, at the start.
+
+    Other parameters and errors are those of :func:`minimum_norm`.
+    """
+    if not 0.0 < damping <= 1.0:
+        raise InputError("the damping coefficient C is out of range", came=damping, allowed="above 0, at most 1")
+    poses = _poses(robot, data, names, target, tolerance, units)
+    k = influence(robot, poses.postures, names, target, perturbations).vector
+    return _result(robot, poses, damping * k.T, tolerance, combination, f"influence-based, C = {damping:g}")
+
+
+def least_squares(robot: Robot, data: Dataset, names: Sequence[str], target: str) -> Robot:
+    """Identify the same parameters from all poses at once, with their priors, for comparison.
+
+    Readings that declare no standard deviation count with :data:`TOLERANCE`. Parameters and errors are those of
+    :func:`minimum_norm`.
+    """
+    poses = _poses(robot, data, names, target, TOLERANCE, dict.fromkeys(names, 1.0))
+    centres = [p.restarted(p.value) for p in (robot.parameters[name] for name in names)]
+    found = robot
+    for _ in range(_LOADINGS if any(effect.loaded for effect in robot.effects) else 1):
+        free = FreeParameters(tuple(replace(p, value=found.values[p.name]) for p in centres))
+        vector = solve(Problem(found, poses.data, free, {"position": TOLERANCE})).vector
+        found = robot.with_values(dict(zip(names, vector, strict=True)))
+    return _with_set(robot, names, vector, "least squares over all poses")
+
+
+@dataclass(frozen=True, eq=False)
+class _Poses:
+    """The readings of one target, as poses to be explained one at a time."""
+
+    robot: Robot
+    data: Dataset
+    names: tuple[str, ...]
+    target: str
+    unit: Array
+
+    @cached_property
+    def postures(self) -> Postures:
+        """How the arm stood at each reading, with the loads of `robot` at its own parameter values."""
+        return self.robot.loaded(self.data.postures.at(self.data.configuration))
+
+    def compared(self, sets: Array) -> tuple[Array, Array]:
+        """Return measured minus predicted positions ``(n, 3)`` [m] and Jacobians, each pose with its own of `sets`."""
+        # One trial that has other values at every configuration: the chain broadcasts (1, n) as it does (trials, 1).
+        values = {**self.robot.values, **dict(zip(self.names, sets.T[:, None, :], strict=True))}
+        kinematics = self.robot.forward_kinematics(self.postures, self.target, values)
+        J = self.robot.position_jacobian(kinematics, self.postures, self.names, values)[:, :, 0, :]
+        return self.data.position - kinematics.position[:, 0, :].T, np.moveaxis(J, -1, 0).swapaxes(1, 2)
+
+    def mean_errors(self, sets: Array) -> Array:
+        """Return the mean position error over all poses with each of `sets` [m], ``(sets,)``."""
+        means = np.empty(len(sets))
+        size = max(1, _BLOCK // len(self.postures))
+        for block in (slice(first, first + size) for first in range(0, len(sets), size)):
+            values = {**self.robot.values, **dict(zip(self.names, sets[block].T[:, :, None], strict=True))}
+            apart = (
+                self.robot.forward_kinematics(self.postures, self.target, values).position
+                - self.data.position.T[:, None, :]
+            )
+            means[block] = np.linalg.norm(apart, axis=0).mean(axis=1)
+        return means
+
+
+def _poses(
+    robot: Robot,
+    data: Dataset,
+    names: Sequence[str],
+    target: str,
+    tolerance: float,
+    units: Mapping[str, float] | None,
+) -> _Poses:
+    robot.target(target)
+    unit = sizes_of(robot, names, UNIT, units or {}, "unit")
+    if not (np.isfinite(tolerance) and tolerance > 0):
+        raise InputError("the tolerance is no size", came=tolerance, allowed="above 0 m")
+    index = data.targets.index(target) if target in data.targets else -1
+    kept = (data.target == index) & data.has_position
+    if not kept.any():
+        raise InputError(
+            "there is no position reading of this target",
+            where=data.source,
+            came=target,
+            allowed=", ".join(data.targets),
+        )
+    of_target = replace(
+        data,
+        targets=(target,),
+        configuration=data.configuration[kept],
+        target=np.zeros(int(kept.sum()), dtype=np.intp),
+        position=data.position[kept],
+        quaternion=None,
+        sigma=None if data.sigma is None else data.sigma[kept],
+        sigma_rot=None,
+        references=None,
+    )
+    return _Poses(robot, of_target, tuple(names), target, unit)
+
+
+def _result(
+    robot: Robot, poses: _Poses, factor: Array, tolerance: float, combination: Combination, method: str
+) -> PoseByPose:
+    """Step at every pose, each parameter's step times its `factor`, ``(n, parameters)``, and combine."""
+    start = np.array([robot.values[name] for name in poses.names])
+    sets = np.tile(start, (len(poses.postures), 1))
+    iterations = np.zeros(len(sets), dtype=np.intp)
+    for _ in range(_ITERATIONS):
+        error, J = poses.compared(sets)
+        unmet = np.linalg.norm(error, axis=1) >= tolerance
+        if not unmet.any():
+            break
+        iterations += unmet
+        smallest = poses.unit * (np.linalg.pinv(J * poses.unit, rcond=_RANK) @ error[:, :, None])[:, :, 0]
+        sets = sets + np.where(unmet[:, None], factor * smallest, 0.0)
+    left = np.asarray(np.linalg.norm(poses.compared(sets)[0], axis=1))
+    combined = _combined(poses, start, sets, combination)
+    made = _with_set(robot, poses.names, combined, f"{len(sets)} poses one at a time, {method}, {combination}")
+    return PoseByPose(made, poses.names, sets, iterations, left, left < tolerance)
+
+
+def _combined(poses: _Poses, start: Array, sets: Array, combination: Combination) -> Array:
+    if combination == "best-pose":
+        return np.asarray(sets[np.argmin(poses.mean_errors(sets))])
+    along, scale = (sets - start).mean(axis=0), 1.0
+    if combination == "scaled-mean" and along.any():
+        for _ in range(5):  # nearly linear in the scale
+            error, J = poses.compared(np.tile(start + scale * along, (len(sets), 1)))
+            moved = J @ along
+            scale += float(np.sum(moved * error) / np.sum(moved**2))
+    return np.asarray(start + scale * along)
+
+
+def _with_set(robot: Robot, names: Sequence[str], vector: Array, how: str) -> Robot:
+    known = (
+        replace(robot.parameters[n], value=float(v), deviation=None, informed=None)
+        for n, v in zip(names, vector, strict=True)
+    )
+    return replace(robot.with_parameters(known), history=(*robot.history, how))

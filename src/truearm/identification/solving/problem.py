@@ -1,0 +1,301 @@
+"""The whitened residual of a robot on a dataset, and its Jacobian.
+
+Every residual is divided by its standard deviation before it is stacked, so metres never meet radians; a prior is
+one more row, (value - nominal) / deviation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.errors import InputError
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.observations import Observation, compared
+from truearm.measurement.sighting import Sighting
+from truearm.modeling.chain import Array, ForwardKinematics
+from truearm.modeling.parameters import FreeParameters
+from truearm.modeling.postures import Postures
+from truearm.modeling.robot import Robot
+
+#: What the residuals of readings of the fixtures themselves are called.
+SETUP: Final = "setup"
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """The readings of one observation kind of one target from one fixture: consecutive rows of the problem.
+
+    Attributes
+    ----------
+    observation
+        What is compared.
+    data
+        Where the readings are: the problem's data, or what is known of its fixtures.
+    target
+        Name of the target; of a fixture in what is known of fixtures.
+    fixture
+        Name of the fixture it is measured against; None for the instrument's frame.
+    readings
+        Indices into `data`, ``(k,)``.
+    configurations
+        Index of the configuration of each reading; all of them at once, which costs no copy, where the target was
+        read at every one in order.
+    sigma
+        Standard deviation of each reading [m or rad], ``(k,)``.
+    """
+
+    observation: Observation
+    data: Dataset
+    target: str
+    fixture: str | None
+    readings: NDArray[np.intp]
+    configurations: NDArray[np.intp] | slice
+    sigma: Array
+
+    @property
+    def declared(self) -> bool:
+        """Whether the file declares the deviations."""
+        return self.observation.declared_sigma(self.data) is not None
+
+    @property
+    def rows(self) -> int:
+        """Number of equations."""
+        return len(self.readings) * self.observation.components
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Readings, a robot and the parameters that may change.
+
+    Attributes
+    ----------
+    robot
+        Gives the value of every parameter that is not free.
+    data
+        The readings; each target must be known to the robot.
+    free
+        What the solver changes.
+    noise
+        Standard deviation [m or rad] by observation name, for readings that declare none.
+    priors
+        Whether the parameters' priors are rows of the problem.
+    widened
+        How many times larger than declared the deviations of the readings are taken.
+    """
+
+    robot: Robot
+    data: Dataset
+    free: FreeParameters
+    noise: dict[str, float]
+    priors: bool = True
+    widened: float = 1.0
+
+    @cached_property
+    def blocks(self) -> tuple[Block, ...]:
+        """The readings, by target, fixture and observation; then what is known of the fixtures."""
+        parts = [self.data] if self.data.setup is None else [self.data, self.data.setup]
+        return tuple(block for part in parts for block in self._blocks_of(part))
+
+    def _blocks_of(self, data: Dataset) -> Iterator[Block]:
+        for target, fixture, observation, readings in compared(data):
+            sigma = observation.declared_sigma(data)
+            wider = self.widened if data is self.data else 1.0
+            known = np.full(len(readings), self.noise[observation.name]) if sigma is None else wider * sigma[readings]
+            seen = data.configuration[readings]
+            everywhere = np.array_equal(seen, np.arange(data.configurations))
+            yield Block(observation, data, target, fixture, readings, slice(None) if everywhere else seen, known)
+
+    def kind(self, block: Block) -> str:
+        """Return the name under which the deviations of a block are counted."""
+        return block.observation.name if block.data is self.data else SETUP
+
+    @cached_property
+    def postures(self) -> Postures:
+        """The configurations, with the loads of `robot` at its own parameter values."""
+        return self.robot.loaded(self.data.postures)
+
+    @cached_property
+    def components(self) -> NDArray[np.intp]:
+        """Number of equations of each reading, ``(readings,)``."""
+        return np.concatenate([np.full(len(b.readings), b.observation.components) for b in self.blocks])
+
+    @cached_property
+    def rows(self) -> int:
+        """Number of equations from readings."""
+        return sum(block.rows for block in self.blocks)
+
+    def at(self, vector: Array) -> Evaluation:
+        """Compare the robot with the readings at a vector ``(parameters,)``, or at one for each of many trials."""
+        return Evaluation(self, vector)
+
+    def residual(self, vector: Array) -> Array:
+        """Return the whitened residual of the readings alone, ``(rows,)``."""
+        return self.at(vector).residual
+
+    def linearised(self, vector: Array) -> tuple[Array, Array]:
+        """Return the whitened residual ``(rows,)`` of the readings and its Jacobian ``(rows, parameters)``."""
+        here = self.at(vector)
+        return here.residual, here.jacobian
+
+    def prior_rows(self, vector: Array) -> tuple[Array, Array]:
+        """Return the residual of the priors and the diagonal of its Jacobian, both ``(parameters,)``; zero without."""
+        if not self.priors:
+            return np.zeros(len(vector)), np.zeros(len(vector))
+        weight = 1.0 / self.free.prior
+        return (vector - self.free.nominal) * weight, weight
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """A problem at one vector of its free parameters. The Jacobian goes on from the sweep of the residual.
+
+    Attributes
+    ----------
+    problem
+        What is evaluated.
+    vector
+        ``(parameters,)``, or ``(trials, parameters)``, and then all that follows has the trials in front.
+    """
+
+    problem: Problem
+    vector: Array
+
+    @cached_property
+    def residual(self) -> Array:
+        """Whitened residual of the readings, ``(rows,)``."""
+        r = np.empty((*self.vector.shape[:-1], self.problem.rows))
+        for block, rows in self._rows():
+            raw = block.observation.residual(self._sightings[rows.start], block.data, block.readings)
+            np.divide(raw, block.sigma[:, None], out=self._by_reading(r[..., rows], block))
+        return r
+
+    @cached_property
+    def jacobian(self) -> Array:
+        """Derivative of the residual, ``(rows, parameters)``."""
+        names = self.problem.free.names
+        # Parameter by parameter in memory: as sweeps give it, and as QR decompositions take it.
+        J = np.empty((*self.vector.shape[:-1], len(names), self.problem.rows))
+        by_parameter = np.moveaxis(J, -2, 0)
+        for block, rows in self._rows():
+            observation, sigma = block.observation, block.sigma[:, None]
+            seen = self._sightings[rows.start]
+            velocity = self._velocity(block)
+            raw = self._by_reading(self.residual[..., rows], block) * sigma
+            turned = seen.position_jacobian if observation.velocity == "linear" else seen.orientation_jacobian
+            moved = observation.jacobian(seen, raw, turned(velocity, names))
+            np.divide(moved, sigma, out=self._by_reading(by_parameter[..., rows], block))
+        return np.swapaxes(J, -1, -2)
+
+    def _rows(self) -> Iterator[tuple[Block, slice]]:
+        """Go through the blocks, with the equations of the problem that each of them is."""
+        first = 0
+        for block in self.problem.blocks:
+            yield block, slice(first, first + block.rows)
+            first += block.rows
+
+    @staticmethod
+    def _by_reading(rows: Array, block: Block) -> Array:
+        """Return a view of some equations ``(..., rows)`` as ``(..., readings, components)``."""
+        return rows.reshape(*rows.shape[:-1], len(block.readings), block.observation.components)
+
+    @cached_property
+    def _values(self) -> dict[str, float | Array]:
+        return {**self.problem.robot.values, **self.problem.free.values(self.vector)}
+
+    @cached_property
+    def _sightings(self) -> dict[int, Sighting]:
+        """What each block is about, by its first equation."""
+        return {
+            rows.start: Sighting(
+                self._kinematics[block.target] if block.data is self.problem.data else self._fixtures[block.target],
+                block.configurations,
+                None if block.fixture is None else self._fixtures[block.fixture],
+            )
+            for block, rows in self._rows()
+        }
+
+    @cached_property
+    def _kinematics(self) -> dict[str, ForwardKinematics]:
+        """The sweep to each target; all go on from one to the flange."""
+        robot = self.problem.robot
+        variables = robot.variables(self.problem.postures, self._values)
+        trunk = robot.trunk.forward_kinematics(variables, self._values)
+        names = dict.fromkeys(block.target for block in self.problem.blocks if block.data is self.problem.data)
+        return {name: robot.target(name).chain.forward_kinematics(variables, self._values, trunk) for name in names}
+
+    @cached_property
+    def _fixtures(self) -> dict[str, ForwardKinematics]:
+        """The sweep to each fixture."""
+        data = self.problem.data
+        names = dict.fromkeys((*data.fixtures, *(() if data.setup is None else data.setup.targets)))
+        return {name: self.problem.robot.fixture_kinematics(name, self._values) for name in names}
+
+    def _velocity(self, block: Block) -> Array:
+        """Return how a block's target moves in the world with each parameter; blocks of one target share it."""
+        problem, names, moves = self.problem, self.problem.free.names, block.observation.velocity
+        if block.data is not problem.data:
+            kinematics = self._fixtures[block.target]
+            places = [kinematics.places.get(name) for name in names]
+            return (
+                kinematics.position_jacobian(places) if moves == "linear" else kinematics.orientation_jacobian(places)
+            )
+        known = self._velocities
+        if (block.target, moves) not in known:
+            known.clear()  # blocks come target by target: more would only fill memory
+            derivative = problem.robot.position_jacobian if moves == "linear" else problem.robot.orientation_jacobian
+            known[block.target, moves] = derivative(
+                self._kinematics[block.target], problem.postures, names, self._values
+            )
+        return known[block.target, moves]
+
+    @cached_property
+    def _velocities(self) -> dict[tuple[str, str], Array]:
+        return {}
+
+
+def check_circumstances(robot: Robot, data: Dataset) -> None:
+    """Refuse joint effects that need to know what the data do not tell.
+
+    Raises
+    ------
+    InputError
+        Naming the effect and what is missing.
+    """
+    for effect in robot.effects:
+        if effect.ordered and (data.approach is None or data.number is None):
+            raise InputError(
+                f"the effect {effect.name} needs the order in which the configurations were measured",
+                where=data.source,
+                came="configurations that are not numbered",
+                cure="Number the configurations 1, 2, 3 .. in the order of measurement, or choose another model.",
+            )
+        if effect.warmed and data.temperature is None:
+            raise InputError(
+                f"the effect {effect.name} needs the temperature of the arm",
+                where=data.source,
+                cure="Add the column temperature [degC], or choose another model.",
+            )
+
+
+def check_solvable(problem: Problem) -> None:
+    """Refuse fewer equations than unknowns where no prior helps.
+
+    Raises
+    ------
+    InputError
+        With the counts and what to do.
+    """
+    if not problem.priors and problem.rows < len(problem.free.parameters):
+        raise InputError(
+            "there are fewer equations than unknowns",
+            where=problem.data.source,
+            came=f"{problem.rows} equations for {len(problem.free.parameters)} unknown parameters",
+            allowed=f"at least {-(-len(problem.free.parameters) // 3)} readings of three coordinates",
+            cure="Measure more configurations, free fewer parameters, or use --redundancy prior.",
+        )

@@ -1,0 +1,253 @@
+"""Which parameters cannot be told apart, and in which combination (Nubiola, section 2.5.1; Patel, section 2.3).
+
+Columns are looked at in a fixed order (base, targets, joint zeros, geometry from base to tip), first for those
+that stand well apart from the earlier ones, then for those that stand less and less apart; what the others span
+exactly is redundant, and its coordinates in them are the combination. Taking the first that fits in one pass would
+keep, between two axes that are nearly parallel, the slide that is almost spanned and hold the tilt that is not:
+the classical weakness of DH parameters again. A column of whitened readings that is shorter than a third of a prior
+tells nothing either. Columns are scaled by the parameters' priors, that is to physical
+size, never by their own norm alone: a column of rounding noise must stay noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Final, Protocol
+
+import numpy as np
+
+from truearm.identification.solving.problem import Problem
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.observations import OBSERVATIONS
+from truearm.modeling.chain import Array, ForwardKinematics
+from truearm.modeling.parameters import FreeParameters, Parameter
+from truearm.modeling.robot import Robot
+
+_ORDER: Final = ("base", "fixture", "target", "", "joint zero", "geometry")  # "" is every joint effect
+_APART: Final = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)  # share of a column outside the span of the others
+_MEMBER: Final = 1e-9  # priors per prior below which a parameter takes no part in a combination
+_SHOWN: Final = 0.02
+_KNOWS_NOTHING: Final = 0.3  # readings that tell a parameter no better than to three priors do not tell it
+_UNSEEN: Final = 1e-8  # share of the best seen direction
+_FELT: Final = 1e-6  # share of the largest effect of a parameter
+_FELT_TRUSTED: Final = 1e-3  # the same but for a size of all, which readings with noise all but do not see
+_INVOLVED: Final = 0.1  # share of a parameter in the lost directions
+
+
+@dataclass(frozen=True)
+class Redundancy:
+    """A direction in which the parameters can move without any reading noticing.
+
+    Attributes
+    ----------
+    dropped
+        The parameter that is held at its nominal value.
+    members
+        Coefficient of each parameter that takes part, in SI units, 1 for `dropped`.
+    combination
+        The direction in words, for example ``d_3 - d_2``.
+    """
+
+    dropped: str
+    members: dict[str, float]
+    combination: str
+
+
+class Linearisable(Protocol):
+    """A whitened problem, such as :class:`truearm.identification.solving.problem.Problem`."""
+
+    @property
+    def free(self) -> FreeParameters:
+        """What may change."""
+
+    def linearised(self, vector: Array) -> tuple[Array, Array]:
+        """Return the whitened residual ``(rows,)`` at a vector and its Jacobian ``(rows, parameters)``."""
+
+
+def find_redundancies(problem: Linearisable, vector: Array, held: Sequence[str] = ()) -> tuple[Redundancy, ...]:
+    """Return the redundant parameters of a problem at `vector`, with their combinations.
+
+    Parameters
+    ----------
+    held
+        Parameters that are redundant elsewhere. If as many are redundant here, these stay the ones that are held.
+    """
+    A = problem.linearised(vector)[1] * problem.free.prior
+    names = problem.free.names
+    kept = independent_columns(A, range(len(names)), problem.free)
+    dropped = [i for i in _in_order(problem.free) if i not in kept]
+    if held:
+        rest = [i for i, name in enumerate(names) if name not in held]
+        if len(kept) == len(rest) == len(independent_columns(A, rest, problem.free)):
+            kept, dropped = rest, [names.index(name) for name in held]
+    if not dropped:
+        return ()
+    # The direction bends: a parameter may take part only away from `vector`, so one prior along it is looked at too.
+    here = _combinations(A, dropped, kept)
+    along = vector + problem.free.prior * here.sum(axis=0)
+    away = _combinations(problem.linearised(along)[1] * problem.free.prior, dropped, kept)
+    return tuple(_redundancy(problem.free, i, at, there) for i, at, there in zip(dropped, here, away, strict=True))
+
+
+def _in_order(free: FreeParameters) -> list[int]:
+    return sorted(range(len(free.parameters)), key=lambda i: _ORDER.index(_place(free.parameters[i].group)))
+
+
+def _place(group: str) -> str:
+    return group if group in _ORDER else ""
+
+
+def independent_columns(A: Array, among: Iterable[int], free: FreeParameters) -> list[int]:
+    """Return columns of a whitened Jacobian, per prior, that span all of those `among`.
+
+    The ones that stand well apart come first.
+    """
+    norms = np.linalg.norm(A, axis=0)
+    left = [i for i in _in_order(free) if i in set(among) and norms[i] > 1e-12 * norms.max()]
+    rests = {i: A[:, i].copy() for i in left}
+    kept: list[int] = []
+    for apart in _APART:
+        for i in list(left):
+            size = float(np.linalg.norm(rests[i]))
+            if size <= max(apart * norms[i], _KNOWS_NOTHING):
+                continue
+            direction = rests[i] / size
+            kept.append(i)
+            left.remove(i)
+            for k in left:  # twice, against rounding
+                rests[k] -= direction * (direction @ rests[k])
+                rests[k] -= direction * (direction @ rests[k])
+    return kept
+
+
+def _combinations(A: Array, dropped: Sequence[int], kept: Sequence[int]) -> Array:
+    """Return the directions, in priors, that move each dropped parameter by one and change no reading."""
+    directions = np.zeros((len(dropped), A.shape[1]))
+    directions[np.arange(len(dropped)), list(dropped)] = 1.0
+    directions[:, list(kept)] = -np.linalg.lstsq(A[:, list(kept)], A[:, list(dropped)], rcond=None)[0].T
+    return directions
+
+
+def _redundancy(free: FreeParameters, dropped: int, here: Array, away: Array) -> Redundancy:
+    involved = [dropped]
+    involved += [i for i in range(len(here)) if i != dropped and max(abs(here[i]), abs(away[i])) > _MEMBER]
+    members = {free.names[i]: float(here[i] * free.prior[i] / free.prior[dropped]) for i in involved}
+    return Redundancy(free.names[dropped], members, in_words(members, free))
+
+
+def in_words(members: dict[str, float], free: FreeParameters) -> str:
+    """Name the members that matter, a millimetre weighed against a tenth of a degree."""
+    by_name: dict[str, Parameter] = dict(zip(free.names, free.parameters, strict=True))
+    size = {n: abs(c) / (1e-3 if by_name[n].unit == "m" else 1.75e-3) for n, c in members.items()}
+    largest = max(size.values())
+    words = ""
+    for name, coefficient in members.items():
+        if size[name] < _SHOWN * largest:
+            continue
+        factor = abs(coefficient)
+        if abs(factor - 1) < 0.02:
+            text = name
+        else:
+            mixed = by_name[name].unit != by_name[next(iter(members))].unit
+            units = {("m", "rad"): " mm/rad", ("rad", "m"): " rad/mm"}.get(
+                (by_name[name].unit, by_name[next(iter(members))].unit), ""
+            )
+            scale = {" mm/rad": 1e3, " rad/mm": 1e-3}.get(units, 1.0)
+            text = f"{factor * scale:.3g}{units if mixed else ''}·{name}"
+        sign = "-" if coefficient < 0 else "+"
+        words += f" {sign} {text}" if words else text
+    return words
+
+
+def unobservable_parameters(robot: Robot, data: Dataset, free: FreeParameters, seed: int = 0) -> tuple[str, ...]:
+    """Return parameters in directions that the data do not see although poses elsewhere depend on them.
+
+    The directions unseen by the readings are tried on configurations drawn from the robot's limits. A direction
+    that changes nothing there either is a matter of convention (d_2 against d_3) and harmless; one that does is
+    a loss of rank: the data are too alike.
+
+    Where nothing says how the robot stands, the world is its base, and predictions count but for a rigid motion of all;
+    where no length was measured either, but for one scale of all: see :func:`gauge_freedoms`.
+
+    Parameters
+    ----------
+    free
+        The parameters to look at; all others are held.
+    """
+    noise = {observation.name: 1.0 for observation in OBSERVATIONS}
+    plain = Problem(robot, _unit_noise(data), free, noise, priors=False)
+    A = plain.linearised(free.start)[1] * free.prior
+    _, s, Vt = np.linalg.svd(np.linalg.qr(A, mode="r"), full_matrices=True)
+    unseen = Vt[int((s > _UNSEEN * s[0]).sum()) :]
+    if len(unseen) == 0:
+        return ()
+    trusted = gauge_freedoms(data)
+    q = robot.loaded(robot.random_configurations(40, np.random.default_rng(seed)))
+    felt = np.zeros((0, len(free.names)))
+    for target in robot.targets:
+        kinematics = robot.forward_kinematics(q, target.name)
+        parts = [robot.position_jacobian(kinematics, q, free.names)]
+        if target.quaternion is not None:
+            parts.append(robot.orientation_jacobian(kinematics, q, free.names))
+        moved = [part.reshape(len(free.names), -1).T * free.prior for part in parts]
+        if trusted:
+            moved = gauge_motion_removed(trusted, robot, kinematics, moved)
+        felt = np.concatenate([felt, *moved])
+    _, strength, turned = np.linalg.svd(felt @ unseen.T, full_matrices=False)
+    largest = np.linalg.norm(felt, axis=0)
+    least = _FELT * largest.max()
+    if trusted:
+        own = [p.group not in ("base", "target", "fixture") for p in free.parameters]
+        least = _FELT_TRUSTED * max(largest[own], default=0.0)
+    lost = turned[: len(strength)][strength > least] @ unseen
+    involved = np.linalg.norm(lost, axis=0) > _INVOLVED
+    return tuple(name for name, is_in in zip(free.names, involved.tolist(), strict=True) if is_in)
+
+
+def gauge_freedoms(data: Dataset) -> tuple[str, ...]:
+    """Return what nobody measured and every prediction depends on: where the ``base`` is, and the ``size`` of all."""
+    if data.anchored:
+        return ()
+    if data.distance is not None or (data.setup is not None and data.setup.distance is not None):
+        return ("base",)
+    for fixture in range(len(data.fixtures)):
+        lengths = data.position if data.height is None else np.column_stack([data.position, data.height])
+        mine = lengths[data.against == fixture]
+        if any(len(np.unique(column[np.isfinite(column)])) > 1 for column in mine.T):
+            return ("base",)
+    return "base", "size"
+
+
+def gauge_motion_removed(
+    trusted: Sequence[str], robot: Robot, kinematics: ForwardKinematics, moved: Sequence[Array]
+) -> list[Array]:
+    """Take out of moves of a target what a motion of the whole robot does, and a change of its size.
+
+    Parameters
+    ----------
+    trusted
+        From :func:`gauge_freedoms`.
+    sweep
+        To the target, at n configurations.
+    moved
+        How it moves [m], and turns if that is asked too, by each parameter, ``(3 n, parameters)`` each.
+    """
+    base = [f"base_{axis}" for axis in ("x", "y", "z", "rx", "ry", "rz")]
+    places = [kinematics.places[name] for name in base]
+    columns = [
+        part.reshape(6, -1).T
+        for part in (kinematics.position_jacobian(places), kinematics.orientation_jacobian(places))[: len(moved)]
+    ]
+    if "size" in trusted:
+        grown = (kinematics.position - np.array(robot.base.translation)[:, None]).reshape(-1, 1)
+        columns = [np.column_stack([c, g]) for c, g in zip(columns, (grown, np.zeros_like(grown)), strict=False)]
+    together = np.concatenate(columns)
+    Q = np.linalg.qr(together)[0]
+    every = np.concatenate(moved)
+    return [every - Q @ (Q.T @ every)]
+
+
+def _unit_noise(data: Dataset) -> Dataset:
+    setup = None if data.setup is None else replace(data.setup, sigma=np.ones(len(data.setup.target)))
+    return replace(data, sigma=None, sigma_rot=None, setup=setup)

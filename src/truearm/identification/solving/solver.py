@@ -1,0 +1,208 @@
+"""Gauss-Newton with Levenberg's damping on a whitened problem, with bounds and losses.
+
+Each step solves a small triangular problem left by a QR decomposition of the whitened Jacobian (never the normal
+equations: residuals without noise would drown in them). Bounds are kept by solving that small problem under
+bounds (`scipy.optimize.lsq_linear`). Losses other than the linear one reweight whole readings between steps.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.identification.solving.losses import Loss, norms_of, robust_scale, weights
+from truearm.modeling.chain import Array
+from truearm.modeling.parameters import FreeParameters
+
+#: A step this small is the last: the next one would be smaller by the share of the residual that bends, 1e-3 or less.
+SMALL: Final = 1e-6
+#: Size of a step that counts as one, where the prior is no scale (base and targets) [m or rad].
+_GEOMETRIC: Final = 1e-3
+_STEPS: Final = {"linear": 60, "huber": 100, "cauchy": 100, "l1": 300}
+#: How much larger the last step may be where single numbers pull with one strength however near they are.
+_CREEPS: Final = 10.0
+
+
+class Solvable(Protocol):
+    """A whitened problem, such as :class:`truearm.identification.solving.problem.Problem`."""
+
+    @property
+    def free(self) -> FreeParameters:
+        """What may change."""
+
+    @property
+    def priors(self) -> bool:
+        """Whether the parameters' priors are rows of the problem."""
+
+    @property
+    def components(self) -> NDArray[np.intp]:
+        """Number of consecutive rows of each reading, ``(readings,)``."""
+
+    def at(self, vector: Array) -> Evaluated:
+        """Evaluate it at a vector ``(parameters,)``."""
+
+    def prior_rows(self, vector: Array) -> tuple[Array, Array]:
+        """Return the residual of the priors and the diagonal of its Jacobian, both ``(parameters,)``."""
+
+
+class Evaluated(Protocol):
+    """A whitened problem at one vector of its free parameters."""
+
+    @property
+    def problem(self) -> Solvable:
+        """What is evaluated."""
+
+    @property
+    def vector(self) -> Array:
+        """Where, ``(parameters,)``."""
+
+    @property
+    def residual(self) -> Array:
+        """Whitened residual of the readings, ``(rows,)``."""
+
+    @property
+    def jacobian(self) -> Array:
+        """Derivative of the residual, ``(rows, parameters)``."""
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Where a solver stopped.
+
+    Attributes
+    ----------
+    vector
+        Parameter values, in the order of the problem.
+    converged
+        Whether the last step was too small to matter.
+    steps
+        Number of steps taken.
+    residual, jacobian
+        Whitened residual ``(rows,)`` and Jacobian of the readings there, not weighted by a loss.
+    weight
+        What the loss left of each reading, ``(readings,)``.
+    """
+
+    vector: Array
+    converged: bool
+    steps: int
+    residual: Array
+    jacobian: Array
+    weight: Array
+
+
+def solve(
+    problem: Solvable, loss: Loss = "linear", bounds: tuple[Array, Array] | None = None, small: float = SMALL
+) -> Solution:
+    """Minimise the whitened residuals under a loss.
+
+    Parameters
+    ----------
+    problem
+        What is minimised; starts at its free parameters' values, moved inside the bounds.
+    loss
+        ``linear`` is least squares; ``l1`` the sum of the norms of the readings (Li et al. 2016, with
+        "|X - X'|" read as each point's distance).
+    bounds
+        Lowest and highest value of every parameter [SI], infinite where there is none.
+    small
+        Step that is the last, in priors.
+    """
+    start = problem.free.start
+    here = problem.at(start if bounds is None else np.clip(start, *bounds))
+    prior = problem.free.prior
+    damping = 0.0
+    scale: float | None = None
+    steps, converged = 0, False
+    for steps in range(1, _STEPS[loss] + 1):
+        norms = _norms(here)
+        scale = _next_scale(loss, norms, problem.components, scale, steps)
+        w = weights(loss, norms, scale)
+        R, c = _triangle(here, w)
+        cost = _cost(here, w)
+        accepted = False
+        for _ in range(25):
+            step = _step(R * prior, c, damping, _room(here.vector, bounds, prior), full_rank=problem.priors) * prior
+            trial = problem.at(here.vector + step)
+            gain = cost - _cost(trial, w)
+            predicted = float(c @ c) - float(np.sum((R @ step + c) ** 2))
+            accepted = gain >= 0.0 or predicted <= 1e-13 * cost
+            if accepted:
+                damping = 0.0 if damping < 1e-9 else damping / 10
+                break
+            damping = max(10 * damping, 1e-6 * float(np.sum((R * prior) ** 2)) / len(prior))
+        if not accepted:
+            break
+        here = trial
+        last = float(np.abs(step / np.minimum(prior, _GEOMETRIC)).max()) < small * (_CREEPS if loss == "l1" else 1.0)
+        if last or predicted <= 1e-24 * max(cost, 1.0):
+            converged = loss != "l1" or scale <= _FLOOR * float(np.median(_norms(here)) + 1e-300)
+            if converged:
+                break
+    norms = _norms(here)
+    final = np.ones_like(norms) if loss == "linear" else weights(loss, norms, scale or 1.0)
+    return Solution(here.vector, converged, steps, here.residual, here.jacobian, final)
+
+
+_FLOOR: Final = 1e-4  # an l1 reading closer than this share of the median counts as met
+
+
+def _next_scale(loss: Loss, norms: Array, components: NDArray[np.intp], scale: float | None, step: int) -> float:
+    if loss == "linear":
+        return 1.0
+    if loss == "l1":
+        floor = 0.3 * _FLOOR * float(np.median(norms)) + 1e-300
+        return max(floor, float(np.median(norms)) if scale is None else 0.5 * scale)
+    if scale is None or step <= 10:  # then held, so that the weights can settle
+        return max(robust_scale(norms, components), 1e-300)
+    return scale
+
+
+def _norms(here: Evaluated) -> Array:
+    return norms_of(here.residual, here.problem.components)
+
+
+def _cost(here: Evaluated, w: Array) -> float:
+    prior, _ = here.problem.prior_rows(here.vector)
+    return float(np.sum(np.repeat(w, here.problem.components) * here.residual**2)) + float(prior @ prior)
+
+
+def _triangle(here: Evaluated, w: Array) -> tuple[Array, Array]:
+    """Return R and c with |R s + c|^2 equal to the linearised cost of a step s, up to a constant."""
+    root = np.repeat(np.sqrt(w), here.problem.components)
+    stacked = np.column_stack([here.jacobian, here.residual]) * root[:, None]
+    if here.problem.priors:
+        prior, weight = here.problem.prior_rows(here.vector)
+        stacked = np.concatenate([stacked, np.column_stack([np.diag(weight), prior])])
+    triangle = np.asarray(np.linalg.qr(stacked, mode="r"), dtype=np.float64)
+    return triangle[:, :-1], triangle[:, -1]
+
+
+def _room(x: Array, bounds: tuple[Array, Array] | None, prior: Array) -> tuple[Array, Array] | None:
+    if bounds is None:
+        return None
+    return (bounds[0] - x) / prior, (bounds[1] - x) / prior
+
+
+def _step(A: Array, c: Array, damping: float, room: tuple[Array, Array] | None, *, full_rank: bool) -> Array:
+    """Minimise |A s + c|^2 + damping |s|^2, within `room` if there are bounds."""
+    if room is not None:
+        from scipy.optimize import lsq_linear
+
+        low, high = room
+        held = high - low < 1e-15
+        low, high = np.where(held, -1e-15, np.minimum(low, 0.0)), np.where(held, 1e-15, np.maximum(high, 0.0))
+        damped = np.concatenate([A, np.sqrt(damping + 1e-24) * np.eye(A.shape[1])])
+        target = np.concatenate([-c, np.zeros(A.shape[1])])
+        result = lsq_linear(damped, target, bounds=(low, high), method="bvls", tol=1e-14, max_iter=400)
+        return np.asarray(np.clip(result.x, *room))
+    if full_rank and damping == 0.0:
+        size = A.shape[1]  # the row below is zero: what no step can change
+        return np.asarray(-np.linalg.solve(A[:size], c[:size]))
+    U, s, Vt = np.linalg.svd(A, full_matrices=False)
+    kept = s > 1e-14 * s[0]
+    factor = np.where(kept, s / np.where(kept, s**2 + damping, 1.0), 0.0)
+    return np.asarray(-Vt.T @ (factor * (U.T @ c)))

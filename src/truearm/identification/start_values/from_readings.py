@@ -1,0 +1,388 @@
+"""Where robot, targets and fixtures stand before anything is identified, from readings of any kind.
+
+Positions in the instrument's frame give base and targets at once (:mod:`truearm.identification.start_values.frames`).
+Where the only anchor is a few fixtures whose places are known, distances to them give such positions. Without an anchor
+the world is the robot's base. Fixtures follow from the places of the targets in closed form; a target that only touches
+or is held at a distance is looked for around the flange.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from truearm.errors import InputError, nearest_names
+from truearm.identification.solving.problem import Problem
+from truearm.identification.solving.solver import solve
+from truearm.identification.start_values.frames import initial_frames
+from truearm.identification.start_values.loci import centres_of, normals_of, plane_under, point_at_distances
+from truearm.measurement.dataset import Dataset, IntArray
+from truearm.measurement.observations import OBSERVATIONS
+from truearm.modeling.chain import Array
+from truearm.modeling.fixtures import FixtureKind
+from truearm.modeling.parameters import FreeParameters
+from truearm.modeling.robot import Robot
+from truearm.modeling.transform import Transform
+
+Place = tuple[FixtureKind, Transform]
+
+#: How far from the flange a target is looked for, and in what steps [m].
+_REACH: Final = 0.45
+_STEP: Final = 0.09
+#: How many of the places tried are gone on from.
+_TRIED: Final = 6
+#: Deviation that readings are weighed with while targets are looked for [m or rad].
+_ROUGH: Final = 1e-3
+#: How many readings that takes.
+_ENOUGH: Final = 120
+#: How many of one fixture, at least.
+_FEW: Final = 12
+_TELLS: Final = 1e-5
+
+
+def start_from_readings(robot: Robot, data: Dataset) -> Robot:
+    """Return the robot placed where the data say it stands, with the data's targets and fixtures.
+
+    Parameters
+    ----------
+    robot
+        Its kinematic parameters are used as they are. Its own base and targets are left out of account where the data
+        place them.
+
+    Raises
+    ------
+    InputError
+        If readings contradict each other about what a fixture is, or are too few or too much alike to place target
+        and fixture.
+    """
+    if data.fixture is None:
+        return initial_frames(robot, data)
+    kinds = _kinds(data)
+    _refuse_few(data, kinds)
+    placed = _placed(robot, data, kinds)
+    have = {target.name for target in placed.targets}
+    for target in dict.fromkeys(data.target[data.has_reading & (data.against >= 0)].tolist()):
+        if data.targets[target] not in have:
+            placed = _with_target(placed, data, target, kinds)
+    placed = placed.with_fixtures(_fixture_places(placed, data, kinds))
+    _refuse_alike(placed, data)
+    return placed
+
+
+def with_fixtures_of(robot: Robot, data: Dataset) -> Robot:
+    """Return a robot that stands where it says, with its own targets, and with the fixtures of readings of these."""
+    return robot if data.fixture is None else robot.with_fixtures(_fixture_places(robot, data, _kinds(data)))
+
+
+def unanchored(free: FreeParameters, data: Dataset) -> FreeParameters:
+    """Return the parameters without those of the base, where nothing says how it stands: the world is the base."""
+    if data.anchored:
+        return free
+    return free.without(p.name for p in free.parameters if p.group == "base")
+
+
+def _kinds(data: Dataset) -> dict[str, FixtureKind]:
+    """Return what each fixture is, from what is measured against it."""
+    found: dict[str, FixtureKind] = {}
+    for index, name in enumerate(data.fixtures):
+        mine = data.against == index
+        seen: list[FixtureKind] = []
+        if data.height is not None and np.isfinite(data.height[mine]).any():
+            seen.append("plane")
+        if data.distance is not None and np.isfinite(data.distance[mine]).any():
+            seen.append("point")
+        counted = data.position[mine][np.isfinite(data.position[mine]).all(axis=1)]
+        turned = data.quaternion is not None and bool(np.isfinite(data.quaternion[mine]).any())
+        if len(counted) or turned:
+            seen.append("frame" if turned or np.ptp(counted, axis=0).any() else "point")
+        if len(set(seen)) > 1:
+            raise InputError(
+                "the readings disagree about what a fixture is",
+                where=f"{data.source}, fixture {name}",
+                came=" and ".join(dict.fromkeys(seen)),
+                allowed="heights over a plane, distances from a point, or positions counted from a point or in a frame",
+                cure="Give them fixtures of different names.",
+            )
+        found[name] = seen[0] if seen else "point"
+    if data.setup is not None:
+        apart = np.isfinite(data.setup.distance) if data.setup.distance is not None else np.zeros(0, dtype=bool)
+        others = data.setup.against[apart] if len(apart) else np.zeros(0, dtype=np.intp)
+        for name in dict.fromkeys((*data.setup.targets, *(data.fixtures[f] for f in others.tolist() if f >= 0))):
+            if found.setdefault(name, "point") == "plane":
+                raise InputError(
+                    "a plane has no place and no distance from another fixture",
+                    where=f"{data.source}, fixture {name}",
+                    allowed="heights over it, and nothing known of itself",
+                    cure="Remove its row of the role fixture.",
+                )
+    return found
+
+
+def _placed(robot: Robot, data: Dataset, kinds: Mapping[str, FixtureKind]) -> Robot:
+    """Return the robot with its base and with those targets that positions give."""
+    setup = data.setup
+    if data.has_position.any():
+        placed = initial_frames(robot, data)
+    elif setup is not None and setup.has_position.any():
+        sides = [initial_frames(robot, seen) for seen in _triangulated(data, setup)]
+        placed = min(sides, key=lambda found: _misfit(found, data, setup))
+    else:
+        placed = robot.with_frames(robot.base, {})
+    for index, name in enumerate(data.fixtures):
+        if kinds[name] == "frame":
+            placed = _also(placed, {**_targets(initial_frames(robot, _as_instrument(data, index))), **_targets(placed)})
+    return _at_points(placed, data, kinds)
+
+
+def _targets(robot: Robot) -> dict[str, Transform | Array]:
+    """Return where the targets of a robot are on its flange."""
+    places: dict[str, Transform | Array] = {}
+    for target in robot.targets:
+        x, y, z = (robot.values[target.parameter(axis)] for axis in "xyz")
+        turned = target.quaternion
+        places[target.name] = np.array([x, y, z]) if turned is None else Transform((x, y, z), turned)
+    return places
+
+
+def _as_instrument(data: Dataset, fixture: int) -> Dataset:
+    """Return the readings in a fixture's frame as if that were the instrument's."""
+    return replace(data.of_readings(data.against == fixture), fixture=None, fixtures=(), setup=None)
+
+
+def _triangulated(data: Dataset, setup: Dataset) -> Iterator[Dataset]:
+    """Return positions from distances to known points; two sets where these lie in a plane, one on either side."""
+    known = {setup.targets[setup.target[r]]: setup.position[r] for r in np.flatnonzero(setup.has_position).tolist()}
+    places = [known.get(name, np.full(3, np.nan)) for name in data.fixtures]
+    anchors = np.array(places)
+    useful = np.isfinite(anchors).all(axis=1)
+    lengths = np.full((data.configurations, len(data.targets), len(anchors)), np.nan)
+    if data.distance is not None:
+        read = np.flatnonzero(np.isfinite(data.distance) & (data.against >= 0))
+        lengths[data.configuration[read], data.target[read], data.against[read]] = data.distance[read]
+    for side in (1.0, -1.0):
+        where, what, found = [], [], []
+        for c, t in np.argwhere((np.isfinite(lengths) & useful).sum(axis=2) >= 3).tolist():
+            seen = np.isfinite(lengths[c, t]) & useful
+            where.append(c)
+            what.append(t)
+            found.append(point_at_distances(anchors[seen], lengths[c, t, seen], side))
+        if not found:
+            raise InputError(
+                "no target was measured from enough known points",
+                where=data.source,
+                allowed="distances from three known fixtures or more at a configuration",
+                cure="Say where the fixtures stand, or measure the robot's targets with another device first.",
+            )
+        yield replace(
+            data,
+            configuration=np.array(where, dtype=np.intp),
+            target=np.array(what, dtype=np.intp),
+            position=np.array(found),
+            quaternion=None,
+            distance=None,
+            height=None,
+            fixture=None,
+            fixtures=(),
+            setup=None,
+            sigma=None,
+            sigma_rot=None,
+        )
+
+
+def _at_points(robot: Robot, data: Dataset, kinds: Mapping[str, FixtureKind]) -> Robot:
+    """Return the robot with the targets that are held at points: ``R_i t + p_i = c + y_i`` is linear in t and c."""
+    points = [f for f, name in enumerate(data.fixtures) if kinds[name] == "point"]
+    read = np.flatnonzero(np.isin(data.against, points) & np.isfinite(data.position).all(axis=1))
+    have = {t.name for t in robot.targets}
+    targets = [t for t in dict.fromkeys(data.target[read].tolist()) if data.targets[t] not in have]
+    read = read[np.isin(data.target[read], targets)]
+    if len(read) == 0:
+        return robot
+    p, R = robot.poses(data.postures)
+    rows = np.zeros((len(read), 3, 3 * (len(targets) + len(points))))
+    for k, reading in enumerate(read.tolist()):
+        t, f = targets.index(int(data.target[reading])), points.index(int(data.against[reading]))
+        rows[k, :, 3 * t : 3 * t + 3] = R[data.configuration[reading]]
+        rows[k, :, 3 * (len(targets) + f) :][:, :3] = -np.eye(3)
+    right = data.position[read] - p[data.configuration[read]]
+    solved = np.linalg.lstsq(rows.reshape(-1, rows.shape[2]), right.reshape(-1), rcond=1e-6)[0]
+    found = {data.targets[t]: np.asarray(solved[3 * k : 3 * k + 3], float) for k, t in enumerate(targets)}
+    return _also(robot, found)
+
+
+def _also(robot: Robot, found: Mapping[str, Transform | Array]) -> Robot:
+    """Return the robot with some targets more."""
+    return robot.with_frames(robot.base, {**_targets(robot), **found})  # type: ignore[dict-item]
+
+
+def _with_target(robot: Robot, data: Dataset, target: int, kinds: Mapping[str, FixtureKind]) -> Robot:
+    """Return the robot with a target whose place only distances and heights tell."""
+    mine = data.of_readings(data.has_reading & (data.target == target) & (data.against >= 0))
+    mine = _some_of_each_fixture(mine)
+    touched = np.unique(mine.against)
+    mine = replace(
+        mine,
+        fixtures=tuple(data.fixtures[f] for f in touched.tolist()),
+        fixture=np.searchsorted(touched, mine.against),
+        setup=None,
+        sigma=None,
+        sigma_rot=None,
+    )
+    name = data.targets[target]
+    p, R = robot.poses(mine.postures)
+    p, R = p[mine.configuration], R[mine.configuration]
+    steps = np.arange(-_REACH, _REACH + 1e-9, _STEP)
+    grid = np.stack(np.meshgrid(steps, steps, steps), axis=-1).reshape(-1, 3)
+    tips = p + np.einsum("nij,gj->gni", R, grid)
+    cost = np.zeros(len(grid))
+    for index in range(len(mine.fixtures)):
+        of = mine.against == index
+        points = tips[:, of]
+        if mine.distance is not None and np.isfinite(mine.distance[of]).any():
+            centre = centres_of(points, mine.distance[of])
+            off = np.linalg.norm(points - centre[:, None], axis=2) - mine.distance[of]
+        elif mine.height is not None and np.isfinite(mine.height[of]).any():
+            spread = points - points.mean(axis=1, keepdims=True)
+            h = mine.height[of] - mine.height[of].mean()
+            normal = normals_of(spread, h)
+            off = np.einsum("gni,gi->gn", spread, normal) - h
+        else:
+            continue
+        cost += np.sum(off**2, axis=1)
+    found = []
+    for start in np.argsort(cost)[:_TRIED].tolist():
+        tried = _also(robot, {name: grid[start]})
+        tried = tried.with_fixtures(_fixture_places(tried, mine, kinds))
+        own = tried.target(name).chain.parameters
+        free = FreeParameters(tuple(q for q in tried.parameters.values() if q.group == "fixture" or q.name in own))
+        solution = solve(Problem(tried, mine, free, dict.fromkeys(_names(), _ROUGH)))
+        there = solution.vector[[free.names.index(tried.target(name).parameter(axis)) for axis in "xyz"]]
+        found.append((float(solution.residual @ solution.residual), there))
+    return _also(robot, {name: min(found, key=lambda one: one[0])[1]})
+
+
+def _some_of_each_fixture(data: Dataset) -> Dataset:
+    """Return readings that are enough to look for a target, as many of each fixture as of the others."""
+    if len(data.target) <= _ENOUGH:
+        return data
+    fixtures = np.unique(data.against)
+    some = np.zeros(len(data.target), dtype=bool)
+    for fixture in fixtures.tolist():
+        mine = np.flatnonzero(data.against == fixture)
+        count = min(len(mine), max(_FEW, _ENOUGH // len(fixtures)))
+        some[mine[np.linspace(0, len(mine) - 1, count).astype(np.intp)]] = True
+    return data.of_readings(some)
+
+
+def _refuse_few(data: Dataset, kinds: Mapping[str, FixtureKind]) -> None:
+    """Refuse fixtures that stand nowhere, for want of readings."""
+    known = {} if data.setup is None else _known(data.setup)
+    least = {"point": 4, "plane": 3, "frame": 1}
+    for index, name in enumerate(data.fixtures):
+        mine = (data.against == index) & data.has_reading
+        held = np.isfinite(data.position[mine]).all(axis=1).any()
+        count = int(mine.sum())
+        if name not in known and count < (1 if held else least[kinds[name]]):
+            near = nearest_names(name, [other for other in data.fixtures if other != name], 1)
+            raise InputError(
+                "a fixture was measured too few times to know where it stands",
+                where=f"{data.source}, fixture {name}",
+                came=f"{count} reading{'' if count == 1 else 's'} among {data.configurations} configurations",
+                allowed=f"{least[kinds[name]]} or more",
+                cure=f"Did you mean {near[0]}? Else measure more, or leave it out."
+                if near
+                else "Measure more, or leave it out.",
+            )
+
+
+def _fixture_places(robot: Robot, data: Dataset, kinds: Mapping[str, FixtureKind]) -> dict[str, Place]:
+    """Return where the fixtures stand, from the places of the targets; known places as they are known."""
+    at = robot.loaded(data.postures)
+    tips = {t.name: robot.poses(at, t.name)[0] for t in robot.targets if t.name in data.targets}
+    flange = robot.poses(at)[0]
+    known = {} if data.setup is None else _known(data.setup)
+    places: dict[str, Place] = {}
+    for index, name in enumerate(data.fixtures):
+        read = np.flatnonzero((data.against == index) & data.has_reading)
+        points = np.array([tips[data.targets[data.target[r]]][data.configuration[r]] for r in read.tolist()])
+        if kinds[name] == "frame":
+            place = _frame(robot, data, index)
+            place = Transform(known[name], place.quaternion) if name in known else place
+        elif name in known:
+            place = Transform(known[name])
+        elif data.height is not None and kinds[name] == "plane":
+            place = plane_under(points, data.height[read], flange[data.configuration[read]])
+        else:
+            place = Transform(_point(points, data, read, f"{data.source}, fixture {name}"))
+        places[name] = kinds[name], place
+    for name in known:
+        places.setdefault(name, (kinds[name], Transform(known[name])))
+    return places
+
+
+def _known(setup: Dataset) -> dict[str, tuple[float, float, float]]:
+    found = {}
+    for reading in np.flatnonzero(setup.has_position).tolist():
+        x, y, z = setup.position[reading].tolist()
+        found[setup.targets[setup.target[reading]]] = (x, y, z)
+    return found
+
+
+def _frame(robot: Robot, data: Dataset, index: int) -> Transform:
+    """Return where a frame stands: the robot's base, seen from it, the other way round."""
+    from_it = initial_frames(robot, _as_instrument(data, index)).base
+    turned = robot.base.rotation @ from_it.rotation.T
+    return Transform.from_matrix(turned, np.array(robot.base.translation) - turned @ np.array(from_it.translation))
+
+
+def _point(points: Array, data: Dataset, read: IntArray, where: str) -> tuple[float, float, float]:
+    counted = np.isfinite(data.position[read]).all(axis=1)
+    if counted.any():
+        x, y, z = (points[counted] - data.position[read][counted]).mean(axis=0).tolist()
+        return x, y, z
+    if data.distance is None:
+        raise InputError("nothing was measured from this fixture", where=where)
+    x, y, z = centres_of(points[None], data.distance[read])[0].tolist()
+    return x, y, z
+
+
+def _start_parameters(robot: Robot, data: Dataset, groups: Iterable[str]) -> FreeParameters:
+    return unanchored(FreeParameters(tuple(p for p in robot.parameters.values() if p.group in groups)), data)
+
+
+def _misfit(robot: Robot, data: Dataset, setup: Dataset) -> float:
+    """Return how badly a placed robot fits its targets' distances from known points, summed squares [m^2]."""
+    known = _known(setup)
+    off = 0.0
+    for target in robot.targets:
+        tips = robot.poses(data.postures, target.name)[0]
+        mine = data.target == data.targets.index(target.name)
+        for index, name in enumerate(data.fixtures):
+            if data.distance is not None and name in known:
+                read = mine & (data.against == index) & np.isfinite(data.distance)
+                far = np.linalg.norm(tips[data.configuration[read]] - np.array(known[name]), axis=1)
+                off += float(np.sum((far - data.distance[read]) ** 2))
+    return off
+
+
+def _names() -> tuple[str, ...]:
+    return tuple(observation.name for observation in OBSERVATIONS)
+
+
+def _refuse_alike(robot: Robot, data: Dataset) -> None:
+    """Refuse readings that do not even tell where base, targets and fixtures are."""
+    free = _start_parameters(robot, data, ("base", "target", "fixture"))
+    noise = dict.fromkeys(_names(), _ROUGH)
+    J = Problem(robot, data, free, noise, priors=False).linearised(free.start)[1]
+    s = np.linalg.svd(np.linalg.qr(J, mode="r"), compute_uv=False)
+    told = int((s > _TELLS * s[0]).sum())
+    if told < len(free.names):
+        raise InputError(
+            "the readings do not tell where targets and fixtures are: the postures are too few or too much alike",
+            where=data.source,
+            came=f"{data.configurations} postures that determine {told} of {len(free.names)} unknowns",
+            cure="Measure more postures, with the tool turned to different sides.",
+        )

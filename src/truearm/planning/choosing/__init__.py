@@ -1,0 +1,1 @@
+"""Which configurations to measure: observability, exchange search, predicted accuracy."""

@@ -1,0 +1,322 @@
+"""Which configurations to measure for a calibration, in which order, and what comes of it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.errors import InputError
+from truearm.identification.solving.models import Model
+from truearm.identification.solving.redundancy import gauge_freedoms
+from truearm.identification.start_values.frames import initial_frames
+from truearm.identification.start_values.from_readings import unanchored, with_fixtures_of
+from truearm.measurement.dataset import Dataset
+from truearm.modeling.chain import Array
+from truearm.modeling.parts import NO_PAYLOAD, Payload
+from truearm.modeling.postures import Postures
+from truearm.modeling.robot import Robot
+from truearm.planning.choosing.exchange import FIRST, most_telling, most_telling_number
+from truearm.planning.choosing.observability import INDICES, observability
+from truearm.planning.choosing.ordering import short_order
+from truearm.planning.choosing.prediction import Prediction, predict
+from truearm.planning.choosing.sensitivity import sensitivity, sensitivity_of_readings
+from truearm.planning.constraints.constraints import Constraints, allowed
+from truearm.simulation.devices import Device, stationed_for
+from truearm.simulation.truths import DEFAULT_TOOL
+
+#: How far before a configuration each joint stops, to come to it moving forward [rad; m for sliding joints].
+APPROACH: Final = {"revolute": np.deg2rad(2.0), "prismatic": 5e-3}
+_ELSEWHERE: Final = 500
+
+
+@dataclass(frozen=True, eq=False)
+class MeasurementPlan:
+    """Configurations to measure, in the order in which to measure them.
+
+    Attributes
+    ----------
+    robot
+        With the targets that are measured.
+    model
+        What will be identified.
+    objective
+        ``O1`` to ``O5``.
+    labels
+        Name of each configuration.
+    chosen
+        Indices among the candidates, ``(n,)``.
+    joints
+        Readings [rad or m], ``(n, joints)``.
+    before
+        Where each joint stops before, so that all come to a configuration moving forward and backlash cancels; as
+        far as the limits allow, ``(n, joints)``.
+    indices
+        O1 to O5 of the whole.
+    candidates
+        How many configurations there were to choose from, before constraints.
+    rejected
+        How many of them break each constraint; one may break several.
+    usable
+        How many break none.
+    left_out
+        Parameters that the candidates do not tell from others, or hardly at all.
+    seconds
+        Processor time of the search alone.
+    prediction
+        How accurate the calibration will be.
+    reads
+        What the device reads at each configuration, in words; nothing if no device was named.
+    fixtures
+        Where fixtures stand in the base frame [m], ``(3,)`` each; of a plane the foot of its distance from the origin.
+    """
+
+    robot: Robot
+    model: Model
+    objective: str
+    labels: tuple[str, ...]
+    chosen: NDArray[np.intp]
+    joints: Array
+    before: Array
+    indices: Mapping[str, float]
+    candidates: int
+    rejected: Mapping[str, int]
+    usable: int
+    left_out: tuple[str, ...]
+    seconds: float
+    prediction: Prediction
+    reads: tuple[str, ...] = ()
+    fixtures: Mapping[str, Array] = field(default_factory=dict)
+
+    def summary(self) -> dict[str, Any]:
+        """Return the figures as ``--json`` prints them: errors in mm."""
+        told = self.prediction
+        return {
+            "poses": len(self.joints),
+            "objective": self.objective,
+            "indices": dict(self.indices),
+            "candidates": self.candidates,
+            "usable": self.usable,
+            "rejected": dict(self.rejected),
+            "left_out": list(self.left_out),
+            **({"fixtures_mm": {n: (1e3 * p).tolist() for n, p in self.fixtures.items()}} if self.fixtures else {}),
+            "seconds": self.seconds,
+            "prediction": {
+                "floor_mm": told.floor * 1e3,
+                "planned_mm": told.planned * 1e3,
+                "enough": told.enough,
+                "by_number": [
+                    {"poses": int(n), "chosen_mm": c * 1e3, "random_mm": r * 1e3}
+                    for n, c, r in zip(told.numbers, told.chosen.tolist(), told.random.tolist(), strict=True)
+                ],
+            },
+        }
+
+
+def with_targets(robot: Robot, data: Dataset | None = None) -> Robot:
+    """Return a robot that is seen: with its own targets, else placed by readings, else with its tool's targets.
+
+    The tool is the robot file's first, or three reflectors 150 mm apart. Where the robot stands is then not known, and
+    it does not matter to what its readings tell.
+    """
+    if robot.targets:
+        return robot
+    if data is not None and data.has_position.any():
+        return initial_frames(robot, data)
+    tool = next(iter(robot.tools.values()), DEFAULT_TOOL)
+    carrying = robot.with_payload(Payload(tool.mass, tool.cog)) if robot.payload == NO_PAYLOAD else robot
+    return carrying.with_frames(robot.base, tool.targets)
+
+
+def random_candidates(robot: Robot, count: int, rng: np.random.Generator) -> Postures:
+    """Return configurations drawn within the limits, each joint coming to it moving forward."""
+    joints = robot.random_configurations(count, rng)
+    return Postures(joints, approach=np.ones_like(joints), number=np.zeros(count))
+
+
+@dataclass(frozen=True)
+class _AsSaid:
+    """A robot taken at its word, as a device measures it."""
+
+    robot: Robot
+
+    def frames(self, joints: Array) -> Mapping[str, Array]:
+        found = {}
+        for target in self.robot.targets:
+            frame = np.tile(np.eye(4), (len(joints), 1, 1))
+            frame[:, :3, 3], frame[:, :3, :3] = self.robot.poses(joints, target.name)
+            found[target.name] = frame
+        return found
+
+
+def device_candidates(
+    robot: Robot, device: Device, count: int, rng: np.random.Generator
+) -> tuple[Robot, Dataset, Postures]:
+    """Return configurations that a device could measure.
+
+    Returns
+    -------
+    The robot where the device has it stand, with its tool; what the device would read of it without noise; and the
+    postures, each joint coming to them moving forward.
+    """
+    seen = stationed_for(device, robot)
+    readings = device.campaign(seen, _AsSaid(seen.rigid), count, 0.0, rng)
+    at = Postures(readings.joints, approach=np.ones_like(readings.joints), number=np.zeros(count))
+    return seen, readings, at
+
+
+def plan_measurements(
+    robot: Robot,
+    candidates: Postures,
+    model: Model,
+    *,
+    poses: int | None,
+    rng: np.random.Generator,
+    objective: str = "O1",
+    noise: float = 1e-4,
+    labels: tuple[str, ...] | None = None,
+    constraints: Constraints | None = None,
+    where: str = "constraints",
+    seen_from_the_origin: bool = True,
+    readings: Dataset | None = None,
+) -> MeasurementPlan:
+    """Choose configurations to measure.
+
+    Parameters
+    ----------
+    robot
+        Nominal or calibrated, with targets, see :func:`with_targets`; derivatives are taken at its parameter values.
+    candidates
+        To choose from.
+    model
+        What will be identified.
+    poses
+        How many; None lets O1 decide.
+    rng
+        For the prediction.
+    objective
+        ``O1`` to ``O5``.
+    noise
+        Standard deviation of a coordinate about a well identified model [m].
+    labels
+        Names of the candidates; numbers in the order of measurement if None.
+    constraints, where
+        What a configuration must keep besides the robot's limits, and the file that says so, for messages.
+    seen_from_the_origin
+        Whether the instrument stands at the origin of the robot's world, as after a calibration.
+    readings
+        What a device would read at the candidates, see :func:`device_candidates`; None for the positions of all targets
+        at each.
+
+    Raises
+    ------
+    InputError
+        If the objective is not known or does not decide on a number, too few candidates keep the constraints, or
+        there are fewer rows than parameters.
+    """
+    if objective not in INDICES:
+        raise InputError(
+            "there is no objective of this name", where="--objective", came=objective, allowed=", ".join(INDICES)
+        )
+    if poses is None and objective != "O1":
+        raise InputError(
+            "only O1 weighs the number of poses",
+            where="--poses",
+            came=f"auto with --objective {objective}",
+            cure="Name a number of poses, or use --objective O1.",
+        )
+    seen = model.prepared(robot)
+    kept = allowed(seen, candidates, constraints, where, seen_from_the_origin=seen_from_the_origin)
+    rejected = {name: int(np.sum(~keeps)) for name, keeps in kept.items()}
+    usable = np.flatnonzero(np.all(list(kept.values()), axis=0))
+    _refuse_too_few(FIRST if poses is None else poses, len(usable), len(candidates), rejected)
+    if readings is None:
+        free = model.free(seen)
+        trusted: tuple[str, ...] = ()
+        told = sensitivity(seen, candidates.at(usable), free, noise)
+    else:
+        seen = with_fixtures_of(seen, readings)
+        free, trusted = unanchored(model.free(seen), readings), gauge_freedoms(readings)
+        told = sensitivity_of_readings(seen, readings.of_configurations(usable), free, noise)
+    among = told.told_apart(FIRST if poses is None else poses)
+    rows, known = np.ascontiguousarray(told.rows[..., among]), told.known[np.ix_(among, among)]
+    if poses is not None and poses * rows.shape[1] < len(among):
+        raise InputError(
+            "there are fewer equations than parameters",
+            where="--poses",
+            came=poses,
+            allowed=f"{-(-len(among) // rows.shape[1])} or more for the model {model.name}, or auto",
+        )
+    started = time.process_time()
+    found = most_telling_number(rows, known) if poses is None else most_telling(rows, poses, known, INDICES[objective])
+    seconds = time.process_time() - started
+    order = np.array(found, dtype=np.intp)
+    order = order[short_order(candidates.joints[usable[order]])]
+    chosen = usable[order]
+    joints = candidates.joints[chosen]
+    elsewhere = random_candidates(seen, _ELSEWHERE, rng)
+    predicted = sensitivity(seen, elsewhere, free, noise, trusted)
+    chosen_rows = rows[order].reshape(-1, len(among))
+    at_fixtures = {}
+    for fixture in seen.fixtures if readings is not None else ():
+        place = seen.fixture_kinematics(fixture.name).position[:, 0]
+        at_fixtures[fixture.name] = (place - np.array(seen.base.translation)) @ seen.base.rotation
+    return MeasurementPlan(
+        reads=() if readings is None else _in_words(readings.of_configurations(chosen)),
+        fixtures=at_fixtures,
+        robot=seen,
+        model=model,
+        objective=objective,
+        labels=tuple(str(k + 1) for k in range(len(chosen))) if labels is None else tuple(labels[k] for k in chosen),
+        chosen=chosen,
+        joints=joints,
+        before=_before(seen, joints),
+        indices=observability(known + chosen_rows.T @ chosen_rows, len(chosen)),
+        candidates=len(candidates),
+        rejected=rejected,
+        usable=len(usable),
+        left_out=tuple(name for k, name in enumerate(told.free.names) if k not in among),
+        seconds=seconds,
+        prediction=predict(seen, told, order, predicted, elsewhere.joints, noise, rng),
+    )
+
+
+def _in_words(readings: Dataset) -> tuple[str, ...]:
+    """Say what is read at each configuration."""
+    words: list[list[str]] = [[] for _ in readings.labels]
+    for row, (c, t, f) in enumerate(zip(readings.configuration, readings.target, readings.against, strict=True)):
+        said = readings.targets[t]
+        beside = readings.fixtures[f] if f >= 0 else ""
+        if readings.distance is not None and np.isfinite(readings.distance[row]):
+            said += f" from {beside} {readings.distance[row] * 1e3:.2f} mm"
+        elif readings.height is not None and np.isfinite(readings.height[row]):
+            said += f" over {beside} {readings.height[row] * 1e3:.2f} mm"
+        elif beside:
+            said += f" at {beside} ({', '.join(f'{v * 1e3:.2f}' for v in readings.position[row])}) mm"
+        words[c].append(said)
+    return tuple("; ".join(one) for one in words)
+
+
+def _before(robot: Robot, joints: Array) -> Array:
+    low = np.array([-np.inf if joint.limits is None else joint.limits[0] for joint in robot.joints])
+    return np.asarray(np.maximum(joints - [APPROACH[joint.kind] for joint in robot.joints], low))
+
+
+def _refuse_too_few(needed: int, usable: int, candidates: int, rejected: Mapping[str, int]) -> None:
+    if needed < 1:
+        raise InputError("at least one pose is needed", where="--poses", came=needed, allowed="1 or more, or auto")
+    if usable < needed:
+        cost = ", ".join(f"{name} {count}" for name, count in rejected.items() if count)
+        raise InputError(
+            "too few configurations are left to choose from",
+            where="candidates",
+            came=f"{usable} of {candidates} usable" + (f"; rejected by {cost}" if cost else ""),
+            allowed=f"{needed} or more",
+            cure="Widen the constraint that costs most, or give more --candidates."
+            if cost
+            else "Give more candidates.",
+        )

@@ -1,0 +1,126 @@
+"""How accurate a calibration will be, before anything is measured.
+
+The deviations of the readings give the covariance of the parameters, and that gives the error of predictions anywhere.
+A fit takes readings as independent, but what a model cannot follow moves all targets of a pose alike: on the measured
+IRB 120 three quarters of the variance of the residuals, with every model tried. So the covariance is that of a least
+squares fit to readings that hang together, ``P (J' C J + K) P`` with ``P = (J' J + K)^-1``, where K is the information
+of the priors and C the correlation of the readings.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.modeling.chain import Array
+from truearm.modeling.robot import Robot
+from truearm.planning.choosing.exchange import most_telling
+from truearm.planning.choosing.observability import O1
+from truearm.planning.choosing.sensitivity import Sensitivity
+
+#: Numbers of poses that are looked at, from as many as the model needs at least.
+NUMBERS: Final = (8, 10, 12, 15, 18, 20, 25, 30, 35, 40, 50, 60, 80, 100, 150, 200)
+#: More poses are said to be of little use where the error is within this of what no number of poses goes below.
+NEAR: Final = 1.1
+_POOL: Final = 500
+#: Share of a reading's variance that all targets of a pose have in common (irb120-faro, docs/guide/planning.md).
+_COMMON: Final = 0.75
+_DRAWS: Final = 5
+#: Mean length of a vector of three normal coordinates, per deviation.
+_MEAN_LENGTH: Final = math.sqrt(8.0 / math.pi)
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """Mean errors of positions that were not measured [m].
+
+    Attributes
+    ----------
+    floor
+        What no number of poses goes below: the noise of the reading that judges.
+    planned
+        Of the plan.
+    numbers
+        Numbers of poses.
+    chosen, random
+        Error after as many poses, chosen by O1 and drawn by chance, ``(numbers,)``.
+    places
+        Where the flange is at random configurations, in the world, ``(k, 3)``.
+    error
+        Mean error of the targets there, of the model alone, without the noise of a reading, ``(k,)``.
+    """
+
+    floor: float
+    planned: float
+    numbers: NDArray[np.intp]
+    chosen: Array
+    random: Array
+    places: Array
+    error: Array
+
+    @property
+    def enough(self) -> int | None:
+        """The smallest of the numbers with an error at most 10 % above the floor; None if all are too small."""
+        near = self.numbers[self.chosen <= NEAR * self.floor]
+        return int(near[0]) if len(near) else None
+
+
+def predict(
+    robot: Robot,
+    candidates: Sensitivity,
+    chosen: NDArray[np.intp],
+    elsewhere: Sensitivity,
+    q: Array,
+    noise: float,
+    rng: np.random.Generator,
+) -> Prediction:
+    """Predict the error after measuring the chosen candidates, and how it falls with their number.
+
+    Parameters
+    ----------
+    candidates
+        What could be measured.
+    chosen
+        What is.
+    elsewhere
+        The same at the configurations `q` where the model is judged.
+    noise
+        Standard deviation of a coordinate [m].
+    """
+    known = candidates.known
+
+    def variances(measured: NDArray[np.intp]) -> Array:
+        """Return the mean variance of a coordinate at each configuration elsewhere, in variances of the noise."""
+        rows = candidates.rows[measured]
+        together = rows.reshape(len(rows), -1, 3, len(known)).sum(axis=1).reshape(-1, len(known))
+        rows = rows.reshape(-1, len(known))
+        told = rows.T @ rows
+        spread = (1.0 - _COMMON) * told + _COMMON * (together.T @ together) + known
+        moved = elsewhere.rows @ np.linalg.solve(known + told, np.linalg.cholesky(spread))
+        return np.asarray(np.mean(np.sum(moved**2, axis=2), axis=1))
+
+    def mean_error(measured: NDArray[np.intp]) -> float:
+        return float(_MEAN_LENGTH * noise * np.mean(np.sqrt(1.0 + variances(measured))))
+
+    count = len(candidates.rows)
+    pool = rng.permutation(count)[:_POOL]
+    told = candidates.told_apart(max(NUMBERS))
+    least = len(told) / candidates.rows.shape[1]
+    numbers = np.array([n for n in NUMBERS if least <= n <= len(pool)], dtype=np.intp)
+    rows, of_told = candidates.rows[pool][..., told], known[np.ix_(told, told)]
+    by_choice = [mean_error(pool[most_telling(rows, int(n), of_told, O1())]) for n in numbers]
+    orders = [rng.permutation(count) for _ in range(_DRAWS)]
+    by_chance = [float(np.mean([mean_error(order[:n]) for order in orders])) for n in numbers]
+    return Prediction(
+        floor=_MEAN_LENGTH * noise,
+        planned=mean_error(chosen),
+        numbers=numbers,
+        chosen=np.array(by_choice),
+        random=np.array(by_chance),
+        places=robot.poses(q)[0],
+        error=_MEAN_LENGTH * noise * np.sqrt(variances(chosen)),
+    )

@@ -1,0 +1,1 @@
+"""Where an arm may be measured."""

@@ -1,0 +1,241 @@
+"""Where an arm may be measured: limits, loads, places, lines of sight (Nubiola, section 2.5)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from truearm.errors import InputError
+from truearm.files import read_yaml
+from truearm.modeling.chain import Array
+from truearm.modeling.loads import joint_loads
+from truearm.modeling.postures import Postures
+from truearm.modeling.robot import Robot
+from truearm.planning.constraints.clearance import smallest_clearance
+from truearm.units import sized_si
+
+Allowed = NDArray[np.bool_]
+_Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+_Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
+_Range = tuple[_Number, _Number]
+_Vector = tuple[_Number, _Number, _Number]
+_JointNumber = Annotated[int, Field(strict=True, ge=1)]
+_CLOSED: Final = ConfigDict(extra="forbid", frozen=True)
+
+
+class _Units(BaseModel):
+    model_config = _CLOSED
+    length: Literal["mm", "m", "um", "in"]
+    angle: Literal["deg", "rad"]
+
+
+class Box(BaseModel):
+    """Where the flange or all targets must be, in the base frame.
+
+    Attributes
+    ----------
+    of
+        What must be in it.
+    x, y, z
+        Lowest and highest coordinate; any if left out.
+    """
+
+    model_config = _CLOSED
+    of: Literal["flange", "targets"]
+    x: _Range | None = None
+    y: _Range | None = None
+    z: _Range | None = None
+
+
+class Visibility(BaseModel):
+    """Which way targets must look: all that are named, into the instrument.
+
+    Attributes
+    ----------
+    within
+        How far a target may look past the instrument.
+    targets
+        Direction in which each target looks, in the flange frame.
+    instrument
+        Place of the instrument in the base frame; the origin of the world for a robot with its own targets.
+    """
+
+    model_config = _CLOSED
+    within: _Positive
+    targets: Annotated[dict[str, _Vector], Field(min_length=1)]
+    instrument: _Vector | None = None
+
+    @model_validator(mode="after")
+    def _directions(self) -> Visibility:
+        if not all(any(direction) for direction in self.targets.values()):
+            raise ValueError("A direction cannot be zero")
+        return self
+
+
+class Constraints(BaseModel):
+    """Schema ``truearm-constraints/1``.
+
+    Attributes
+    ----------
+    limits
+        Lowest and highest reading by joint number, within the robot's own limits.
+    moments
+        Sign of the moment of the load about a joint's axis, by joint number.
+    box
+        A box for the flange or the targets.
+    floor
+        Lowest height of targets, flange and joints from the third on, in the base frame.
+    visibility
+        Which way the targets must look.
+    clearance
+        Smallest distance between the middle lines of links that are not neighbours.
+    """
+
+    model_config = _CLOSED
+    truearm: Literal["truearm-constraints/1"]
+    units: _Units
+    limits: dict[_JointNumber, _Range] = {}
+    moments: dict[_JointNumber, Literal["positive", "negative"]] = {}
+    box: Box | None = None
+    floor: _Number | None = None
+    visibility: Visibility | None = None
+    clearance: _Positive | None = None
+
+
+def read_constraints(path: Path) -> Constraints:
+    """Read a constraints file."""
+    return read_yaml(path, Constraints)
+
+
+def allowed(
+    robot: Robot, postures: Postures, constraints: Constraints | None, where: str, *, seen_from_the_origin: bool
+) -> Mapping[str, Allowed]:
+    """Return for each constraint at which postures it is kept, ``(n,)``; every one is asked about all postures.
+
+    Parameters
+    ----------
+    robot
+        With targets.
+    constraints
+        None leaves the robot's own limits alone.
+    where
+        The constraints file, for messages.
+    seen_from_the_origin
+        Whether the instrument stands at the origin of the robot's world, unless the constraints say where.
+
+    Raises
+    ------
+    InputError
+        For a joint or target that the robot does not have, a range the wrong way round, a moment of a robot
+        without masses, or an instrument whose place nobody knows.
+    """
+    q = postures.joints
+    world = robot.base
+    robot = _at_the_origin(robot)
+    kept: dict[str, Allowed] = {}
+    low, high = np.array([joint.limits or (-np.inf, np.inf) for joint in robot.joints]).T
+    if constraints is None:
+        kept["limits"] = np.asarray(((q >= low) & (q <= high)).all(axis=1))
+        return kept
+    length = constraints.units.length
+    for number, given in constraints.limits.items():
+        joint = _joint(robot, number, f"{where}, limits")
+        unit = constraints.units.angle if robot.joints[joint].kind == "revolute" else length
+        first, last = _range(given, unit, f"{where}, limits, {number}")
+        low[joint], high[joint] = max(low[joint], first), min(high[joint], last)
+    kept["limits"] = np.asarray(((q >= low) & (q <= high)).all(axis=1))
+    if constraints.moments:
+        if not robot.masses and not robot.payload.mass:
+            raise InputError(
+                "the robot has no masses, so nothing loads its joints",
+                where=f"{where}, moments",
+                cure="Give the masses of its links in the robot file, or a payload.",
+            )
+        loads = joint_loads(robot, robot.variables(postures, robot.values), wrench=_columns(postures.wrench))
+        for number, sign in constraints.moments.items():
+            joint = _joint(robot, number, f"{where}, moments")
+            row = 5 if robot.joints[joint].kind == "revolute" else 2
+            kept[f"moment_{number}"] = np.asarray(loads[joint, row] * (1.0 if sign == "positive" else -1.0) > 0.0)
+    targets = [robot.poses(postures, target.name)[0] for target in robot.targets]
+    if constraints.box is not None:
+        points = targets if constraints.box.of == "targets" else [robot.poses(postures)[0]]
+        kept["box"] = _in_box(constraints.box, points, length, f"{where}, box")
+    if constraints.floor is not None:
+        height = sized_si(constraints.floor, length, f"{where}, floor")
+        kinematics = robot.forward_kinematics(postures)
+        joints = [kinematics.origin(element).T for element in robot.moving[2 : len(robot.joints)]]
+        kept["floor"] = np.all(
+            [points[:, 2] >= height for points in (*joints, kinematics.position.T, *targets)], axis=0
+        )
+    if constraints.visibility is not None:
+        origin = -world.rotation.T @ np.array(world.translation) if seen_from_the_origin else None
+        kept |= _visible(robot, postures, constraints.visibility, constraints.units, f"{where}, visibility", origin)
+    if constraints.clearance is not None:
+        least = sized_si(constraints.clearance, length, f"{where}, clearance")
+        kept["clearance"] = smallest_clearance(robot, postures, least) >= least
+    return kept
+
+
+def _joint(robot: Robot, number: int, where: str) -> int:
+    if number > len(robot.joints):
+        raise InputError("the robot has no such joint", where=where, came=number, allowed=f"1 to {len(robot.joints)}")
+    return number - 1
+
+
+def _range(given: tuple[float, float], unit: str, where: str) -> tuple[float, float]:
+    low, high = (sized_si(value, unit, where) for value in given)
+    if low > high:
+        raise InputError("the range leaves no value", where=where, cure="The lower one comes first.")
+    return low, high
+
+
+def _columns(wrench: Array | None) -> Array | None:
+    return None if wrench is None else wrench.T
+
+
+def _in_box(box: Box, points: list[Array], length: str, where: str) -> Allowed:
+    inside = np.ones(len(points[0]), dtype=bool)
+    for axis, given in enumerate((box.x, box.y, box.z)):
+        if given is not None:
+            low, high = _range(given, length, f"{where}, {'xyz'[axis]}")
+            for one in points:
+                inside &= (one[:, axis] >= low) & (one[:, axis] <= high)
+    return inside
+
+
+def _visible(
+    robot: Robot, postures: Postures, rule: Visibility, units: _Units, where: str, origin: Array | None
+) -> dict[str, Allowed]:
+    """Ask each target; `origin` is that of the world in the base frame, where the instrument may stand."""
+    if rule.instrument is not None:
+        instrument = np.array([sized_si(v, units.length, f"{where}, instrument") for v in rule.instrument])
+    elif origin is not None:
+        instrument = origin
+    else:
+        raise InputError(
+            "nobody knows where the instrument stands",
+            where=where,
+            cure="Add instrument: [x, y, z] in the robot's base frame, or take a calibrated robot.",
+        )
+    within = sized_si(rule.within, units.angle, f"{where}, within")
+    rotation = robot.poses(postures)[1]
+    kept = {}
+    for name, direction in rule.targets.items():
+        robot.target(name)
+        looks = rotation @ (np.array(direction) / np.linalg.norm(direction))
+        sight = instrument - robot.poses(postures, name)[0]
+        cosine = np.einsum("ni,ni->n", looks, sight) / np.linalg.norm(sight, axis=1)
+        kept[f"visibility_{name}"] = np.asarray(cosine >= np.cos(within))
+    return kept
+
+
+def _at_the_origin(robot: Robot) -> Robot:
+    """Return the robot in a world that is its base frame."""
+    places = {f"base_{axis}": 0.0 for axis in ("x", "y", "z", "rx", "ry", "rz")}
+    return replace(robot, base_quaternion=(1.0, 0.0, 0.0, 0.0)).with_values(places)

@@ -1,0 +1,1 @@
+"""Paths, time laws and the joint motions along them."""

@@ -1,0 +1,195 @@
+"""The largest cube in front of an arm on whose diagonal planes it reaches every point.
+
+Where the tip gets to is first looked up among many random configurations: a point counts as reached if the tip came
+near to it. The best cubes of a coarse lattice are then moved and grown in ever smaller steps, while damped Newton's
+steps from the nearest of those configurations reach a grid of points on the diagonal planes, edges and corners
+included, within the joint limits and in any orientation.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import product
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from truearm.errors import InputError
+from truearm.modeling.chain import Array
+from truearm.modeling.inverse.turns import limits
+from truearm.modeling.robot import Robot
+from truearm.planning.poses.iso9283 import Cube
+from truearm.planning.poses.tip import Tip
+
+Direction = Literal["+x", "-x", "+y", "-y"]
+DIRECTIONS: Final = ("+x", "-x", "+y", "-y")
+
+_SAMPLES: Final = 50_000
+#: A point is near to a sample within this [reach lengths].
+_NEAR: Final = 0.06
+#: Spacing of the lattice of centres and sides [reach lengths].
+_LATTICE: Final = 1 / 12
+#: The search goes from the first step to the second, and for the best from there to the third [reach lengths].
+_STEPS: Final = (1 / 16, 1 / 64, 1 / 500)
+_FINALISTS: Final = 5
+#: Cubes of the lattice from which it is made.
+_STARTS: Final = 24
+_MOVES: Final = np.array([(ahead, up, 0.5) for ahead, up in product((0, -1, 1), repeat=2)])
+#: Places on each diagonal plane that have to be reached, from edge to edge; and of its corners alone.
+_PLACES: Final = np.linspace(-1.0, 1.0, 9)
+_CORNERS: Final = np.array([-1.0, 1.0])
+#: Newton's steps from so many of the nearest samples, their damping, and when a point is met [reach lengths].
+_SEEDS: Final = 4
+_MOST_STEPS: Final = 12
+_DAMPING: Final = 1e-3
+_MET: Final = 1e-6
+
+
+def largest_cube(
+    robot: Robot, *, target: str | None = None, ahead: Direction = "+x", nearest: float = 0.0, floor: float = 0.0
+) -> Cube:
+    """Return the largest cube in front of an arm on whose diagonal planes it reaches every point of a 9 x 9 grid.
+
+    The cube is centred on the plane that holds the z axis of the base frame and the direction `ahead`. Whether the arm
+    touches itself, its tool or its surroundings is not looked at: `nearest` and `floor` keep the cube away from base
+    and table. Of many local searches the best one counts; the largest cube there is may be a hundredth larger.
+
+    Parameters
+    ----------
+    robot
+        The arm.
+    target
+        Name of the target that shall reach the points; the flange if None.
+    ahead
+        Direction from the base in which work is done.
+    nearest
+        How far ahead of the base's origin the cube begins at the nearest [m].
+    floor
+        How high above the base's origin it begins at the lowest [m].
+
+    Raises
+    ------
+    InputError
+        If the arm reaches no cube there.
+    """
+    if ahead not in DIRECTIONS:
+        raise InputError("there is no such direction", where="ahead", came=ahead, allowed=", ".join(DIRECTIONS))
+    for name, bound in (("nearest", nearest), ("floor", floor)):
+        if not math.isfinite(bound):
+            raise InputError("a bound of the cube is a finite number", where=name, came=bound)
+    return _Search(robot, target, ahead, nearest, floor).largest()
+
+
+class _Search:
+    def __init__(self, robot: Robot, target: str | None, ahead: Direction, nearest: float, floor: float) -> None:
+        self._robot, self._nearest, self._floor = robot, nearest, floor
+        self._ahead = np.zeros(3)
+        self._ahead["xy".index(ahead[1])] = 1.0 if ahead[0] == "+" else -1.0
+        self._joints = robot.random_configurations(_SAMPLES, np.random.default_rng(0))
+        self._limits, self._tip = limits(robot), Tip(robot, target)
+        tips = self._tip.positions(self._joints)
+        self._length = float(np.linalg.norm(tips, axis=1).max())  # the reach
+        self._tree = cKDTree(tips)
+
+    def largest(self) -> Cube:
+        """Return the largest cube that was found."""
+        places = self._starts()
+        if len(places):
+            places = self._grown(self._shrunk(places), *_STEPS[:2])
+            best = np.argsort(-places[:, 2], kind="stable")[:_FINALISTS]
+            places = self._grown(places[best], *_STEPS[1:])
+        if not len(places):
+            raise InputError(
+                "the arm reaches no cube there",
+                where=self._robot.name,
+                came=f"from {self._nearest * 1e3:g} mm ahead and {self._floor * 1e3:g} mm up",
+                cure="Choose another direction or floor, or give centre and side of the cube.",
+            )
+        return self._cube(places[int(np.argmax(places[:, 2]))])
+
+    def _starts(self) -> Array:
+        """Return distance ahead, height and side of large cubes of a lattice near to samples everywhere, well apart."""
+        step = _LATTICE * self._length
+        near: list[Array] = []
+        for side in np.arange(2, 16) * step:
+            lattice = product(np.arange(0, 13) * step, np.arange(-12, 13) * step, [side])
+            places = np.array(list(lattice))
+            places = places[self._allowed(places)]
+            distance, _ = self._tree.query(self._points(places), distance_upper_bound=_NEAR * self._length)
+            near = [*places[np.isfinite(distance).all(axis=1)], *near]
+        starts: list[Array] = []
+        for place in near:
+            if all(np.abs(place - other).max() > 1.5 * step for other in starts):
+                starts.append(place)
+        return np.array(starts[:_STARTS])
+
+    def _shrunk(self, places: Array) -> Array:
+        """Return those cubes that are reached when they are made a little smaller."""
+        for _ in range(4):
+            places[~self._reached(places), 2] -= _STEPS[0] * self._length / 2
+        return places[self._reached(places)]
+
+    def _grown(self, places: Array, first: float, last: float) -> Array:
+        """Return cubes moved and grown as far as steps lead, from the first size down to the last [reach lengths]."""
+        size = np.full(len(places), first * self._length)
+        while (active := np.flatnonzero(size > last * self._length)).size:
+            tried = places[active, None] + _MOVES * size[active, None, None]
+            good = self._reached(tried.reshape(-1, 3)).reshape(tried.shape[:2])
+            better = good.any(axis=1)
+            places[active[better]] = tried[better, good[better].argmax(axis=1)]
+            size[active[~better]] /= 2
+        return places
+
+    def _reached(self, places: Array) -> NDArray[np.bool_]:
+        """Return which cubes are reached, corners first, because they are where most fail."""
+        left = np.flatnonzero(self._allowed(places))
+        for grid in (_CORNERS, _PLACES):
+            left = left[self._all_reached(self._points(places[left], grid))]
+        reached = np.zeros(len(places), dtype=bool)
+        reached[left] = True
+        return reached
+
+    def _all_reached(self, points: Array) -> NDArray[np.bool_]:
+        """Return of which rows ``(n, points, 3)`` all points are reached."""
+        wanted = points.reshape(-1, 3)
+        missed = np.arange(len(wanted))
+        samples = np.asarray(self._tree.query(wanted, _SEEDS)[1])
+        for sample in samples.T:
+            missed = missed[~self._met(wanted[missed], self._joints[sample[missed]])]
+        lost = np.zeros(len(wanted), dtype=bool)
+        lost[missed] = True
+        return np.asarray(~lost.reshape(points.shape[:2]).any(axis=1))
+
+    def _met(self, wanted: Array, q: Array) -> NDArray[np.bool_]:
+        """Return which points ``(n, 3)`` damped Newton's steps reach from readings `q`, held within the limits."""
+        met = np.zeros(len(wanted), dtype=bool)
+        going = np.arange(len(wanted))
+        for _ in range(_MOST_STEPS):
+            state = self._tip.at(q)
+            error = wanted[going] - state.position
+            left = np.linalg.norm(error, axis=1) > _MET * self._length
+            met[going[~left]] = True
+            going, q, error, J = going[left], q[left], error[left], state.jacobian[left, :3]
+            normal = J @ J.swapaxes(1, 2) + (_DAMPING * self._length) ** 2 * np.eye(3)
+            q = np.clip(q + (J * np.linalg.solve(normal, error[:, :, None])).sum(1), *self._limits)
+        return met
+
+    def _allowed(self, places: Array) -> NDArray[np.bool_]:
+        """Return which cubes ``(n, 3)`` lie beyond what is nearest and above the floor."""
+        ahead, height, side = places.T
+        slack = 1e-9 * self._length
+        return np.asarray((ahead - side / 2 >= self._nearest - slack) & (height - side / 2 >= self._floor - slack))
+
+    def _points(self, places: Array, grid: Array = _PLACES) -> Array:
+        """Return the points at a grid on the diagonal planes of cubes, ``(n, points, 3)``."""
+        unit = Cube(np.zeros(3), 1.0)
+        u, v = (axis.ravel() for axis in np.meshgrid(grid, grid))
+        shape = np.concatenate([plane.points(u, v) for plane in unit.planes])
+        ahead, height, side = places.T
+        centre = np.multiply.outer(ahead, self._ahead) + np.multiply.outer(height, [0.0, 0.0, 1.0])
+        return np.asarray(centre[:, None] + side[:, None, None] * shape)
+
+    def _cube(self, place: Array) -> Cube:
+        return Cube(place[0] * self._ahead + np.array([0.0, 0.0, place[1]]), float(place[2]))

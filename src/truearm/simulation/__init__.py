@@ -1,0 +1,1 @@
+"""The digital twin, truths for it, and instruments that measure it."""

@@ -1,0 +1,60 @@
+"""Instruments: what each sees of a robot, how well, and which readings are its own."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from truearm.errors import InputError, nearest_names
+from truearm.simulation.devices.artefacts import MARKERS, PLANAR_ARTEFACT, SPATIAL_ARTEFACT
+from truearm.simulation.devices.device import Arm, Device, measured_with, stationed_for
+from truearm.simulation.devices.hexapod_poses import HEXAPOD
+from truearm.simulation.devices.known_points import CALIBRATION_TABLE, TOUCH_UP
+from truearm.simulation.devices.lengths import BALLBAR, STRINGS
+from truearm.simulation.devices.pencil import DRAWN_CIRCLE
+from truearm.simulation.devices.small_volumes import FIVE_LASERS, GAUGES, STEREO
+from truearm.simulation.devices.touching import PLANE, POINT, SPHERE, TWO_SPHERES
+from truearm.simulation.devices.tracker import MEASUREMENT_ARM, TRACKER
+
+__all__ = ["DEVICES", "Arm", "Device", "measured_with", "named_device", "stationed_for"]
+
+DEVICES: Final[tuple[Device, ...]] = (
+    TRACKER,
+    MEASUREMENT_ARM,
+    PLANAR_ARTEFACT,
+    SPATIAL_ARTEFACT,
+    MARKERS,
+    BALLBAR,
+    HEXAPOD,
+    STRINGS,
+    STEREO,
+    FIVE_LASERS,
+    GAUGES,
+    PLANE,
+    SPHERE,
+    TWO_SPHERES,
+    POINT,
+    CALIBRATION_TABLE,
+    TOUCH_UP,
+    DRAWN_CIRCLE,
+)
+
+
+def named_device(name: str) -> Device:
+    """Return the device of this name.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    known = {device.name: device for device in DEVICES}
+    if name in known:
+        return known[name]
+    near = nearest_names(name, known)
+    raise InputError(
+        "there is no device of this name",
+        where="device",
+        came=name,
+        allowed=", ".join(known),
+        cure=f"Did you mean {' or '.join(near)}?" if near else None,
+    )

@@ -1,0 +1,233 @@
+"""An instrument: what it sees of an arm, how well, and what stands beside the robot for it."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.errors import InputError
+from truearm.measurement.dataset import Dataset
+from truearm.modeling.chain import Array
+from truearm.modeling.parts import Tool
+from truearm.modeling.robot import Robot
+from truearm.modeling.transform import Transform, rigid_motion
+from truearm.simulation.truths import DEFAULT_TOOL, stationed
+from truearm.simulation.twin import Twin, directions
+
+IntArray = NDArray[np.intp]
+_DRAWS: Final = 200
+_DRAWN: Final = 2000
+_TRIED: Final = 100
+
+
+class Arm(Protocol):
+    """What is measured: a twin, or a robot taken at its word."""
+
+    @property
+    def robot(self) -> Robot:
+        """Its targets by name."""
+
+    def frames(self, joints: Array) -> Mapping[str, Array]:
+        """Return ``T_world_target`` ``(n, 4, 4)`` of every target at joint readings ``(n, joints)``."""
+
+
+@dataclass(frozen=True)
+class Device(ABC):
+    """An instrument.
+
+    Attributes
+    ----------
+    name
+        As the command line spells it.
+    summary
+        What it is and reads, in words.
+    source
+        Where its figures come from.
+    sigma
+        Standard deviation of a coordinate, distance or height that it reads [m].
+    tool
+        What it needs on the flange; None for whatever targets the robot has.
+    """
+
+    name: str
+    summary: str
+    source: str
+    sigma: float
+    tool: Tool | None = None
+
+    def beyond_range(self, data: Dataset) -> NDArray[np.bool_]:
+        """Return which readings the device cannot have read, ``(readings,)``; one without a range reads all."""
+        return np.zeros(len(data.target), dtype=bool)
+
+    @abstractmethod
+    def campaign(self, nominal: Robot, arm: Arm, count: int, sigma: float, rng: np.random.Generator) -> Dataset:
+        """Return what it reads of an arm.
+
+        Parameters
+        ----------
+        nominal
+            What is known of the arm: the nominal robot where it stands, with the targets of its tool. Postures are
+            chosen by it.
+        arm
+            What is read.
+        count
+            Number of configurations.
+        sigma
+            Standard deviation of a reading [m]; zero reads without noise and declares nothing.
+
+        Raises
+        ------
+        InputError
+            If the arm does not reach, or never shows, what is read.
+        """
+
+
+def measured_with(
+    device: Device, nominal: Robot, twin: Twin, count: int, rng: np.random.Generator, sigma: float | None = None
+) -> Dataset:
+    """Return what a device reads of a twin.
+
+    Parameters
+    ----------
+    nominal
+        The robot as it is known; where it stands and what it carries is taken from the twin. A twin may count its base
+        from elsewhere (from axis 2, say), so the nominal robot stands where its flange is nearest to the true one.
+    twin
+        The true robot, given the device's tool if it needs one.
+    count
+        Number of configurations.
+    sigma
+        Standard deviation of a reading [m]; the device's own if None, no noise if zero.
+    """
+    if count < 1 or (sigma is not None and sigma < 0.0):
+        raise InputError(
+            "a campaign needs configurations, and a deviation is not negative",
+            where=device.name,
+            came=f"{count} configurations, deviation {sigma}",
+            allowed="1 configuration or more, deviation 0 or more",
+        )
+    if device.tool is not None:
+        carrying = twin.robot.with_frames(twin.robot.base, device.tool.targets)
+        twin = replace(twin, robot=carrying)
+    values = twin.robot.values
+    places = {t.name: [values[t.parameter(axis)] for axis in "xyz"] for t in twin.robot.targets}
+    standing = nominal.with_frames(_where_it_stands(nominal, twin.robot), places)
+    return device.campaign(standing, twin, count, device.sigma if sigma is None else sigma, rng)
+
+
+def stationed_for(device: Device, robot: Robot) -> Robot:
+    """Return a robot where a simulated instrument sees it, with the device's tool or, if that needs none, its own."""
+    tool = device.tool or next(iter(robot.tools.values()), DEFAULT_TOOL)
+    return stationed(robot, tool)
+
+
+def _where_it_stands(nominal: Robot, true: Robot) -> Transform:
+    q = nominal.random_configurations(_TRIED, np.random.default_rng(0))
+    at_origin = nominal.with_frames(Transform(), {})
+    return Transform.from_matrix(*rigid_motion(at_origin.poses(q)[0], true.poses(q)[0]))
+
+
+def recorded(
+    nominal: Robot,
+    source: str,
+    joints: Array,
+    configuration: Sequence[int] | IntArray,
+    target: Sequence[str],
+    *,
+    position: Array | None = None,
+    quaternion: Array | None = None,
+    distance: Array | None = None,
+    height: Array | None = None,
+    fixtures: tuple[str, ...] = (),
+    fixture: IntArray | None = None,
+    setup: Dataset | None = None,
+    sigma: float = 0.0,
+    sigma_rot: float = 0.0,
+) -> Dataset:
+    """Return readings as a dataset, the configurations numbered in the order of measurement.
+
+    Parameters
+    ----------
+    joints
+        Readings ``(n, joints)``.
+    configuration, target
+        Of each reading.
+    position, quaternion, distance, height, fixtures, fixture, setup
+        As in :class:`truearm.measurement.dataset.Dataset`.
+    sigma, sigma_rot
+        Standard deviations [m], [rad]; nothing is declared where they are zero.
+    """
+    names = tuple(dict.fromkeys(target))
+    n = len(joints)
+    if fixture is not None:
+        used = np.unique(fixture[fixture >= 0])
+        place = np.full(len(fixtures), -1)
+        place[used] = np.arange(len(used))
+        fixtures, fixture = tuple(fixtures[k] for k in used), place[fixture]
+    return Dataset(
+        source=source,
+        labels=tuple(str(k + 1) for k in range(n)),
+        joints=joints,
+        joint_kinds=tuple(joint.kind for joint in nominal.joints),
+        targets=names,
+        configuration=np.asarray(configuration, dtype=np.intp),
+        target=np.array([names.index(name) for name in target], dtype=np.intp),
+        position=np.full((len(target), 3), np.nan) if position is None else position,
+        quaternion=quaternion,
+        distance=distance,
+        height=height,
+        fixtures=fixtures,
+        fixture=fixture,
+        setup=setup,
+        sigma=np.full(len(target), sigma) if sigma > 0 else None,
+        sigma_rot=np.full(len(target), sigma_rot) if sigma_rot > 0 else None,
+        approach=directions(joints),
+        number=np.arange(float(n)),
+    )
+
+
+def shown(
+    nominal: Robot, count: int, rng: np.random.Generator, visible: Visible, what: str
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Return random configurations that show enough of the tool.
+
+    Parameters
+    ----------
+    visible
+        Tells which targets of a robot are seen at joint readings ``(n, joints)``, ``(n, targets)``; a configuration
+        that shows none of them is passed over.
+    what
+        Who looks, for messages.
+
+    Returns
+    -------
+    Joint readings ``(count, joints)``, and which targets are seen ``(count, targets)``.
+    """
+    found, seen = [], []
+    for _ in range(_DRAWS):
+        drawn = nominal.random_configurations(_DRAWN, rng)
+        sees = visible(nominal, drawn)
+        some = sees.any(axis=1)
+        found.append(drawn[some])
+        seen.append(sees[some])
+        if sum(map(len, found)) >= count:
+            return np.concatenate(found)[:count], np.concatenate(seen)[:count]
+    raise InputError(
+        f"{what} sees too few configurations of {nominal.name}",
+        where="device",
+        came=f"{sum(map(len, found))} among {_DRAWN * _DRAWS} within the limits",
+        allowed=f"{count} or more",
+        cure="Take fewer poses, or another device.",
+    )
+
+
+class Visible(Protocol):
+    """Tells which targets of a robot are seen."""
+
+    def __call__(self, robot: Robot, joints: Array) -> NDArray[np.bool_]:
+        """Return ``(n, targets)`` for joint readings ``(n, joints)``."""

@@ -1,0 +1,192 @@
+"""Closed loops: a probe that touches a plane or a sphere, a tip held at a point (Nubiola, section 1.2)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from truearm.measurement.dataset import Dataset
+from truearm.modeling.chain import Array
+from truearm.modeling.parts import Tool
+from truearm.modeling.robot import Robot
+from truearm.simulation.devices.device import Arm, Device, recorded
+from truearm.simulation.devices.jogging import SPARE, jogged, postures_at, site
+
+_STYLUS: Final = Tool({"stylus": (0.02, 0.01, 0.15)})
+
+
+@dataclass(frozen=True)
+class PlaneProbe(Device):
+    """A touch probe on a flat plate, level and leaning to two sides: its tip is in a plane, where nobody knows.
+
+    A level plate alone says nothing of lengths across an upright first axis.
+
+    Attributes
+    ----------
+    size
+        Side of the plate [m].
+    leaning
+        By how much it leans [rad].
+    """
+
+    size: float = 0.3
+    leaning: float = np.deg2rad(30.0)
+
+    def campaign(self, nominal: Robot, arm: Arm, count: int, sigma: float, rng: np.random.Generator) -> Dataset:
+        """Return contacts all over the plate in turns, the probe within 60 deg of its normal."""
+        base, middle = nominal.base.rotation, site(nominal)
+        c, s = np.cos(self.leaning), np.sin(self.leaning)
+        about_x, about_y = [[1, 0, 0], [0, c, -s], [0, s, c]], [[c, 0, s], [0, 1, 0], [-s, 0, c]]
+        plates = base @ np.array([np.eye(3), about_x, about_y])
+        of = np.arange(SPARE * count) % len(plates)
+        places = np.column_stack([rng.uniform(-0.5, 0.5, (len(of), 2)) * self.size, np.zeros(len(of))])
+        name = nominal.targets[0].name
+        goals = middle + np.einsum("nij,nj->ni", plates[of], places)
+        facing = -plates[of, :, 2]
+        kept, joints = postures_at(nominal, name, goals, count, rng, self.name, facing=facing)
+        of, up = of[kept], -facing[kept]
+        miss = sigma * rng.standard_normal(count)
+
+        def short(place: Array) -> Array:
+            return np.asarray((miss - np.sum((place - middle) * up, axis=1))[:, None] * up)
+
+        joints = jogged(nominal, arm, name, joints, short)
+        return recorded(
+            nominal,
+            self.name,
+            joints,
+            range(count),
+            [name] * count,
+            height=np.zeros(count),
+            fixtures=("plate_level", "plate_leaning_1", "plate_leaning_2"),
+            fixture=of.astype(np.intp),
+            sigma=sigma,
+        )
+
+
+@dataclass(frozen=True)
+class SphereProbe(Device):
+    """A touch probe on precision spheres: its tip is at a known distance from their centres.
+
+    Attributes
+    ----------
+    radius
+        Of sphere and tip together [m].
+    apart
+        Distance of two spheres, which is known [m]; None for one alone.
+    known
+        How well [m].
+    """
+
+    radius: float = 0.017
+    apart: float | None = None
+    known: float = 1e-6
+
+    def campaign(self, nominal: Robot, arm: Arm, count: int, sigma: float, rng: np.random.Generator) -> Dataset:
+        """Return contacts on the upper half of the spheres, in turns."""
+        turned, middle = nominal.base.rotation, site(nominal)
+        places = [np.zeros(3)] if self.apart is None else [np.array([0.0, s * self.apart / 2, 0.0]) for s in (-1, 1)]
+        centres = np.array([middle + turned @ place for place in places])
+        of = np.arange(SPARE * count) % len(centres)
+        z = rng.uniform(0.0, 1.0, len(of))
+        around = rng.uniform(0.0, 2 * np.pi, len(of))
+        flat = np.sqrt(1.0 - z**2)
+        normal = np.column_stack([flat * np.cos(around), flat * np.sin(around), z]) @ turned.T
+        name = nominal.targets[0].name
+        goals = centres[of] + self.radius * normal
+        wide = np.deg2rad(75.0)
+        kept, joints = postures_at(nominal, name, goals, count, rng, self.name, facing=-normal, within=wide)
+        of = of[kept]
+        miss = sigma * rng.standard_normal(count)
+
+        def short(place: Array) -> Array:
+            from_centre = place - centres[of]
+            far = np.linalg.norm(from_centre, axis=1, keepdims=True)
+            return np.asarray(from_centre / far * ((self.radius + miss)[:, None] - far))
+
+        joints = jogged(nominal, arm, name, joints, short)
+        fixtures = tuple(f"sphere_{k + 1}" for k in range(len(centres)))
+        return recorded(
+            nominal,
+            self.name,
+            joints,
+            range(count),
+            [name] * count,
+            distance=np.full(count, self.radius),
+            fixtures=fixtures,
+            fixture=of.astype(np.intp),
+            setup=None if self.apart is None else self._between(nominal, fixtures, sigma, rng),
+            sigma=sigma,
+        )
+
+    def _between(self, nominal: Robot, fixtures: tuple[str, ...], sigma: float, rng: np.random.Generator) -> Dataset:
+        exact = self.apart or 0.0
+        return recorded(
+            nominal,
+            self.name,
+            np.zeros((1, len(nominal.joints))),
+            [0],
+            [fixtures[1]],
+            distance=np.array([exact + (self.known if sigma > 0 else 0.0) * rng.standard_normal()]),
+            fixtures=fixtures,
+            fixture=np.zeros(1, dtype=np.intp),
+            sigma=self.known,
+        )
+
+
+@dataclass(frozen=True)
+class HeldAtPoint(Device):
+    """A tip that is jogged by eye to one point, from all sides."""
+
+    def campaign(self, nominal: Robot, arm: Arm, count: int, sigma: float, rng: np.random.Generator) -> Dataset:
+        """Return postures that hold the tip at the point."""
+        point = site(nominal)
+        name = nominal.targets[0].name
+        goals = np.tile(point, (SPARE * count, 1))
+        _, joints = postures_at(nominal, name, goals, count, rng, self.name)
+        wanted = point + sigma * rng.standard_normal((count, 3))
+        joints = jogged(nominal, arm, name, joints, lambda place: wanted - place)
+        return recorded(
+            nominal,
+            self.name,
+            joints,
+            range(count),
+            [name] * count,
+            position=np.zeros((count, 3)),
+            fixtures=("point",),
+            fixture=np.zeros(count, dtype=np.intp),
+            sigma=sigma,
+        )
+
+
+PLANE: Final = PlaneProbe(
+    "plane",
+    "touch probe on a flat plate of 300 mm, level and leaning by 30 deg to two sides",
+    "Nubiola, section 1.2: planar constraints (Ikits and Hollerbach 1997); plate and deviation ours",
+    sigma=5e-6,
+    tool=_STYLUS,
+)
+SPHERE: Final = SphereProbe(
+    "sphere",
+    "touch probe on one sphere of 15 mm radius",
+    "Nubiola, section 1.2: diameter of a sphere as in MasterCal; sizes and deviation ours",
+    sigma=5e-6,
+    tool=_STYLUS,
+)
+TWO_SPHERES: Final = SphereProbe(
+    "two-spheres",
+    "touch probe on two spheres 300 mm apart, known to 0.001 mm",
+    "Nubiola, section 1.2: MasterCal; sizes and deviations ours",
+    sigma=5e-6,
+    tool=_STYLUS,
+    apart=0.3,
+)
+POINT: Final = HeldAtPoint(
+    "point",
+    "tip jogged by eye to one point, from all sides",
+    "Nubiola, section 1.2: point constraint; deviation ours",
+    sigma=5e-5,
+    tool=Tool({"tip": (0.02, 0.01, 0.15)}),
+)

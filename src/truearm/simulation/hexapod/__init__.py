@@ -1,0 +1,1 @@
+"""Campaigns with the hexapod device on a digital twin."""

@@ -1,0 +1,132 @@
+"""Where the truth of a simulated robot comes from."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from truearm.errors import InputError, nearest_names
+from truearm.files import exists
+from truearm.modeling.chain import Array
+from truearm.modeling.effects.fourier import HARMONICS
+from truearm.modeling.parts import NO_PAYLOAD, Payload, Tool
+from truearm.modeling.robot import Robot
+from truearm.modeling.transform import Transform, rotation_from_quaternion
+from truearm.robots import load_robot
+from truearm.simulation.twin import Twin
+from truearm.simulation.twin_joint import PERFECT, Contact, JointTruth
+
+#: Three reflectors about 150 mm apart, like the triangular artefact of Nubiola, section 2.2.1.
+DEFAULT_TOOL = Tool({"1": (0.0, 0.0, 0.125), "2": (0.075, 0.0937, 0.215), "3": (0.150, 0.0, 0.125)})
+
+#: Where a simulated instrument sees the robot stand: 2.6 m away, a little lower, turned by a third of a turn.
+STATION = Transform((2.4, 0.9, -0.5), (math.cos(math.pi / 3), 0.0, 0.0, math.sin(math.pi / 3)))
+
+
+def truth_names(robot: Robot) -> tuple[str, ...]:
+    """Return the truths a robot can be simulated with by name."""
+    return ("nominal", "random", *robot.truths)
+
+
+def truth_twin(robot: Robot, truth: str, rng: np.random.Generator) -> Twin:
+    """Return the twin of a robot.
+
+    Parameters
+    ----------
+    robot
+        The nominal robot.
+    truth
+        ``nominal``; ``random``, geometry and joint zeros drawn from their priors; the name of one of the robot
+        file's truths; or a robot file, whose own base and targets are used if it has targets.
+    rng
+        For ``random``.
+
+    Raises
+    ------
+    InputError
+        If there is no such truth, or the file is of another kind of robot.
+    """
+    tool = next(iter(robot.tools.values()), DEFAULT_TOOL)
+    if truth in robot.truths:
+        published = robot.truths[truth]
+        true = robot.with_values(published.values)
+        joints = joint_truths(true)
+        for number, compliance in published.compliance.items():
+            joints[number] = replace(joints.get(number, PERFECT), compliance=compliance)
+        return Twin(stationed(true, tool), joints, _contact(true))
+    if truth == "nominal":
+        return Twin(stationed(robot, tool), joint_truths(robot), _contact(robot))
+    if truth == "random":
+        drawn = {
+            p.name: p.value + p.prior * float(rng.standard_normal())
+            for p in robot.parameters.values()
+            if p.group in ("geometry", "joint zero")
+        }
+        return Twin(stationed(robot.with_values(drawn), tool), joint_truths(robot), _contact(robot))
+    if not Path(truth).suffix and not exists(Path(truth)):
+        known = truth_names(robot)
+        near = nearest_names(truth, known)
+        raise InputError(
+            f"{robot.name} has no truth of this name",
+            where="--truth",
+            came=truth,
+            allowed=f"{', '.join(known)}, or a robot file",
+            cure=f"Did you mean {' or '.join(near)}?" if near else None,
+        )
+    other = load_robot(truth)
+    if [j.kind for j in other.joints] != [j.kind for j in robot.joints]:
+        raise InputError(
+            f"this robot has other joints than {robot.name}",
+            where=truth,
+            came=f"{len(other.joints)} joints",
+            allowed=f"{len(robot.joints)}, of the same kinds",
+        )
+    return Twin(other if other.targets else stationed(other, tool), joint_truths(other), _contact(other))
+
+
+def joint_truths(robot: Robot) -> dict[int, JointTruth]:
+    """Return what the joint effects of a robot file say about each joint."""
+    values = robot.values
+
+    def of(name: str, number: int) -> float:
+        return values.get(f"{name}_{number}", 0.0)
+
+    def sines(number: int) -> tuple[tuple[int, float, float], ...]:
+        parts = ((k, of(f"fourier_sin{k}", number), of(f"fourier_cos{k}", number)) for k in HARMONICS)
+        periods = robot.joints[number - 1].transmission_periods
+        gear = (periods or 0, of("transmission_sin", number), of("transmission_cos", number))
+        return tuple((k, math.hypot(s, c), math.atan2(c, s)) for k, s, c in (*parts, gear) if s or c)
+
+    return {
+        number: JointTruth(
+            compliance=of("compliance", number),
+            quadratic=of("compliance_quadratic", number),
+            cubic=of("compliance_cubic", number),
+            backlash=of("backlash", number),
+            clearance=of("clearance", number),
+            bearing=of("bearing_compliance", number),
+            gear=sines(number),
+            hysteresis=of("approach", number),
+            growth=of("thermal_growth", number),
+        )
+        for number in range(1, len(robot.joints) + 1)
+    }
+
+
+def _contact(robot: Robot) -> Contact:
+    return "document" if "clearance-linear-contact" in robot.effect_names else "exact"
+
+
+def stationed(robot: Robot, tool: Tool) -> Robot:
+    """Return a robot with its base as it is, seen from the station, carrying a tool.
+
+    A payload that the robot has already includes the tool's mass.
+    """
+    base, R = robot.base, rotation_from_quaternion(np.array(STATION.quaternion))
+    moved: Array = R @ np.array(base.translation) + np.array(STATION.translation)
+    placed = robot.with_frames(Transform.from_matrix(R @ base.rotation, moved), tool.targets)
+    payload = Payload(tool.mass, tool.cog) if robot.payload == NO_PAYLOAD else robot.payload
+    return replace(placed, payload=payload, history=(*robot.history, "simulated truth"))

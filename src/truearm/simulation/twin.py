@@ -1,0 +1,296 @@
+"""The digital twin: a robot whose truth is known, seen only through its readings.
+
+It follows a path of its own: frames, motions and masses are 4x4 matrices, one configuration after the other, and the
+arm is let sag until moments and deflections agree. Nothing here calls the chain sweep, the loads or the joint effects
+of the models, so a mistake there cannot hide by appearing on both sides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Final, TypedDict, Unpack
+
+import numpy as np
+
+from truearm.errors import InputError
+from truearm.measurement.dataset import Dataset
+from truearm.modeling.chain import Array
+from truearm.modeling.robot import Robot
+from truearm.simulation.twin_body import (
+    Link,
+    forces_of,
+    leaning,
+    moved,
+    product,
+    second_moments,
+    weight,
+    wrench_at,
+)
+from truearm.simulation.twin_joint import PERFECT, Contact, JointTruth
+
+#: Where every length is what its parameter says [degC].
+REFERENCE_TEMPERATURE: Final = 20.0
+_ROUNDS: Final = 50
+_SETTLED: Final = 1e-13
+
+
+class Conditions(TypedDict, total=False):
+    """Under what `n` configurations are held; what is left out is at rest, unloaded and at 20 degC.
+
+    approach
+        Direction of the last move of each joint, +1, -1 or 0 for unknown, ``(n, joints)``; if left out, it follows
+        from the order of the configurations.
+    temperature
+        Of the arm [degC], ``(n,)``.
+    wrench
+        Force [N] and moment about the flange's origin [N m] on the flange, in base axes, ``(n, 6)``.
+    velocity, acceleration
+        Of the joints [rad/s and rad/s^2; m for prismatic joints], ``(n, joints)``; where one is left out it is zero.
+    """
+
+    approach: Array
+    temperature: Array
+    wrench: Array
+    velocity: Array
+    acceleration: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Posture:
+    """Where a twin truly stands.
+
+    Attributes
+    ----------
+    links
+        Frame of each link behind the tilt of its joint, in the base ``(joints, 4, 4)``.
+    targets
+        ``T_world_target`` ``(4, 4)`` of every target.
+    loads
+        Force [N] and moment [N m] ``(joints, 6)`` that everything beyond a joint puts on it: weight, inertia and the
+        wrench on the flange. Its sign is the load's: a compliant joint gives way in its direction. It is taken about
+        the joint's origin in the joint's axes: z along the joint, x and y of the frame right behind its own element
+        (of Rz(theta) for DH), before the tilt; joints that are not about their frame's z have some x and y across it.
+    deflection
+        What each joint leans about x and y and turns about, or slides along, z beyond its reading ``(joints, 3)``.
+    """
+
+    links: Array
+    targets: Mapping[str, Array]
+    loads: Array
+    deflection: Array
+
+
+@dataclass(frozen=True)
+class Twin:
+    """A true robot.
+
+    Attributes
+    ----------
+    robot
+        True parameter values, true base, true targets, masses, payload and gravity.
+    joints
+        The truth about joints and links, by joint number; a joint that is left out is perfect.
+    contact
+        How clearance tilt follows from the moments.
+    """
+
+    robot: Robot
+    joints: Mapping[int, JointTruth] = field(default_factory=dict)
+    contact: Contact = "exact"
+
+    def __post_init__(self) -> None:
+        count = len(self.robot.joints)
+        for number, truth in self.joints.items():
+            where = f"joint {number} of the twin of {self.robot.name}"
+            if not 1 <= number <= count:
+                raise InputError("the robot has no such joint", where=where, allowed=f"1 to {count}")
+            link = self._cold[number - 1]
+            if (truth.clearance or truth.bearing) and not (link.turns and link.generator[1, 0] == 1.0):
+                raise InputError("only a joint that turns about its frame's z can tilt", where=where)
+
+    def target_frames(self, reading: Array) -> Mapping[str, Array]:
+        """Return ``T_world_target`` ``(4, 4)`` of every target for one joint reading ``(joints,)``, at rest."""
+        return self.postures(np.asarray(reading)[None])[0].targets
+
+    def frames(self, joints: Array, **conditions: Unpack[Conditions]) -> Mapping[str, Array]:
+        """Return ``T_world_target`` ``(n, 4, 4)`` of every target at joint readings ``(n, joints)``."""
+        found = [posture.targets for posture in self.postures(joints, **conditions)]
+        return {target.name: np.array([at[target.name] for at in found]) for target in self.robot.targets}
+
+    def postures(self, joints: Array, **conditions: Unpack[Conditions]) -> tuple[Posture, ...]:
+        """Return where the twin stands at joint readings ``(n, joints)``.
+
+        A joint turns by gain times reading plus what its :class:`JointTruth` adds, and leans right behind that turn
+        by ``Rx Ry``. Moments are those of the arm as it has given way: deflections are found again until none
+        changes by more than 1e-13 rad. A backlash may not come to rest, then the 50th round stays.
+
+        Raises
+        ------
+        InputError
+            If readings or conditions have another shape.
+        """
+        n, count = len(joints), len(self.robot.joints)
+        rest = np.zeros((n, count))
+        joints = _shaped("joint readings", joints, (n, count))
+        approach = _shaped("approach", conditions.get("approach", directions(joints)), (n, count))
+        temperature = _shaped("temperature", conditions.get("temperature", np.full(n, REFERENCE_TEMPERATURE)), (n,))
+        wrench = _shaped("wrench", conditions.get("wrench", np.zeros((n, 6))), (n, 6))
+        velocity = _shaped("velocity", conditions.get("velocity", rest), (n, count))
+        acceleration = _shaped("acceleration", conditions.get("acceleration", rest), (n, count))
+        rows = zip(joints, approach, temperature, wrench, velocity, acceleration, strict=True)
+        return tuple(self._settled(*row) for row in rows)
+
+    def _settled(
+        self, reading: Array, approach: Array, temperature: float, wrench: Array, velocity: Array, acceleration: Array
+    ) -> Posture:
+        links = self._links(temperature - REFERENCE_TEMPERATURE)
+        numbers = range(1, len(links) + 1)
+        truths = [self.joints.get(number, PERFECT) for number in numbers]
+        geared = np.array([self.robot.values.get(f"gain_{number}", 1.0) for number in numbers]) * reading
+
+        def given_way(loads: Array) -> Array:
+            rows = zip(truths, reading, approach, loads, links, strict=True)
+            return np.array(
+                [
+                    (*t.tilt(load[3], load[4], self.contact), t.turn(q, a, load[5 if link.turns else 2]))
+                    for t, q, a, load, link in rows
+                ]
+            )
+
+        settled = given_way(np.zeros((len(links), 6)))
+        for _ in range(_ROUNDS):
+            deflection = settled
+            posture = self._posture(links, geared, deflection, wrench, velocity, acceleration)
+            settled = given_way(posture.loads)
+            if np.abs(settled - deflection).max() < _SETTLED:
+                break
+        return posture
+
+    def _posture(
+        self,
+        links: tuple[Link, ...],
+        geared: Array,
+        deflection: Array,
+        wrench: Array,
+        velocity: Array,
+        acceleration: Array,
+    ) -> Posture:
+        gravity = np.array(self.robot.gravity)
+        T = np.stack([np.eye(4), np.zeros((4, 4)), np.zeros((4, 4))])
+        axes, frames, weights = [], [], []
+        for link, q, (alpha, beta, gamma), qd, qdd in zip(
+            links, geared, deflection, velocity, acceleration, strict=True
+        ):
+            T = moved(T, link, q + gamma, qd, qdd)
+            axes.append(T[0] @ link.axes)
+            T = T @ leaning(alpha, beta) @ link.after if alpha or beta else T @ link.after
+            frames.append(T[0])
+            weights.append(weight(link.body, T, gravity))
+        flange = T @ self._flange
+        carried = weight(self._payload, flange, gravity) + forces_of(wrench, flange[0, :3, 3])
+        loads = []
+        for axis, of_link in zip(reversed(axes), reversed(weights), strict=True):
+            carried = carried + of_link
+            loads.append(wrench_at(carried, axis))
+        world = self._base @ flange[0]
+        return Posture(
+            links=np.stack(frames),
+            targets={name: world @ place for name, place in self._targets.items()},
+            loads=np.stack(loads[::-1]),
+            deflection=deflection,
+        )
+
+    def _links(self, warmer: float) -> tuple[Link, ...]:
+        """Return the links of an arm that is some kelvin warmer than the reference."""
+        grown = {number: truth.growth * warmer for number, truth in self.joints.items() if truth.growth * warmer}
+        if not grown:
+            return self._cold
+        return tuple(
+            self._link(number, grown[number]) if number in grown else cold for number, cold in enumerate(self._cold, 1)
+        )
+
+    def _link(self, number: int, growth: float) -> Link:
+        masses = [mass for mass in self.robot.masses if mass.joint == number]
+        return Link.made_of(self.robot.link_elements[number - 1], self.robot.values, growth, masses)
+
+    @cached_property
+    def _cold(self) -> tuple[Link, ...]:
+        return tuple(self._link(number, 0.0) for number in range(1, len(self.robot.joints) + 1))
+
+    @cached_property
+    def _base(self) -> Array:
+        return product(self.robot.base_elements, self.robot.values)
+
+    @cached_property
+    def _flange(self) -> Array:
+        return product(self.robot.flange_elements, self.robot.values)
+
+    @cached_property
+    def _payload(self) -> Array:
+        return second_moments(self.robot.payload.mass, self.robot.payload.cog)
+
+    @cached_property
+    def _targets(self) -> Mapping[str, Array]:
+        return {t.name: product(t.chain.elements, self.robot.values) for t in self.robot.targets}
+
+
+def directions(joints: Array) -> Array:
+    """Return the direction of the last move of each joint, +1 or -1, by the order of its readings ``(n, joints)``.
+
+    It is 0 as long as the joint has not moved.
+    """
+    moves = np.zeros(np.shape(joints))
+    for row in range(1, len(moves)):
+        moves[row] = np.sign(joints[row] - joints[row - 1])
+        moves[row] = np.where(moves[row] == 0.0, moves[row - 1], moves[row])
+    return moves
+
+
+def measure(
+    twin: Twin,
+    joints: Array,
+    noise: float,
+    rng: np.random.Generator,
+    source: str = "twin",
+    **conditions: Unpack[Conditions],
+) -> Dataset:
+    """Return what an instrument reads of the twin at joint readings ``(n, joints)``.
+
+    Parameters
+    ----------
+    noise
+        Standard deviation of each coordinate [m]; declared in the data unless it is zero.
+    conditions
+        See :class:`Conditions`.
+    """
+    robot = twin.robot
+    names = tuple(target.name for target in robot.targets)
+    frames = twin.frames(joints, **conditions)
+    position = np.stack([frames[name][:, :3, 3] for name in names], axis=1).reshape(-1, 3)
+    position = position + rng.normal(0.0, 1.0, position.shape) * noise
+    n = len(joints)
+    return Dataset(
+        source=source,
+        labels=tuple(str(i + 1) for i in range(n)),
+        joints=np.asarray(joints, float),
+        joint_kinds=tuple(joint.kind for joint in robot.joints),
+        targets=names,
+        configuration=np.repeat(np.arange(n), len(names)),
+        target=np.tile(np.arange(len(names)), n),
+        position=position,
+        sigma=np.full(n * len(names), noise) if noise > 0 else None,
+        approach=conditions.get("approach", directions(joints)),
+        number=np.arange(float(n)),
+        temperature=conditions.get("temperature"),
+        wrench=conditions.get("wrench"),
+    )
+
+
+def _shaped(what: str, values: Array, shape: tuple[int, ...]) -> Array:
+    if np.shape(values) != shape:
+        raise InputError(
+            f"wrong number of values: {what}", came=f"an array of shape {np.shape(values)}", allowed=str(shape)
+        )
+    return np.asarray(values, float)

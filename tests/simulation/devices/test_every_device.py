@@ -1,0 +1,416 @@
+"""One contract for every registered device: what it reads is so, what it declares is so, and it calibrates."""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from truearm.errors import InputError
+from truearm.identification.solving.fit import Status, identify
+from truearm.identification.solving.models import MODELS
+from truearm.identification.solving.redundancy import gauge_freedoms
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.readers.canonical import csv_text, read_csv
+from truearm.measurement.statistics import errors_of
+from truearm.modeling.chain import Array
+from truearm.modeling.robot import Robot
+from truearm.modeling.transform import Transform
+from truearm.robots import load_robot
+from truearm.simulation.devices import DEVICES, measured_with, named_device
+from truearm.simulation.truths import joint_truths, truth_twin
+from truearm.simulation.twin import Twin
+
+GEOMETRIC, ELASTIC = ({m.name: m for m in MODELS}[name] for name in ("geometric", "elastic"))
+NAMES = [device.name for device in DEVICES]
+#: Readings are recovered to this [m or rad]: half a nanometre is what a jogged arm may still be off.
+EXACT = 1e-9
+every_device = pytest.mark.parametrize("name", NAMES)
+
+
+@cache
+def nominal(robot: str) -> Robot:
+    return load_robot(robot)
+
+
+@cache
+def read_by(
+    name: str, robot: str = "irb120", count: int = 70, sigma: float | None = 0.0, seed: int = 0
+) -> tuple[Twin, Dataset]:
+    """Return the twin with the tool of the device, and what the device reads of it."""
+    rng, device = np.random.default_rng([zlib.crc32(name.encode()), seed]), named_device(name)
+    twin = truth_twin(nominal(robot), "random", rng)
+    data = measured_with(device, nominal(robot), twin, count, rng, sigma)
+    if device.tool is not None:
+        twin = replace(twin, robot=twin.robot.with_frames(twin.robot.base, device.tool.targets))
+    return twin, data
+
+
+def residuals(twin: Twin, data: Dataset) -> Array:
+    """Return reading minus truth of every coordinate, distance or height, with the fixtures where they fit best.
+
+    A frame is laid on by Kabsch's rotation, a centre is found by linear least squares, a plane by its singular vector.
+    """
+    frames = twin.frames(data.joints)
+    tips = np.array([frames[data.targets[t]][c, :3, 3] for c, t in zip(data.configuration, data.target, strict=True)])
+    off = []
+    for index in np.unique(data.against).tolist():
+        mine = data.against == index
+        at, read = tips[mine], data.position[mine]
+        if data.height is not None:
+            Vt = np.linalg.svd(at - at.mean(axis=0))[2]
+            off.append((at - at.mean(axis=0)) @ Vt[2] - data.height[mine])
+        elif data.distance is not None:
+            rows = np.column_stack([2 * (at - at.mean(axis=0)), np.ones(len(at))])
+            right = ((at - at.mean(axis=0)) ** 2).sum(axis=1) - data.distance[mine] ** 2
+            centre = at.mean(axis=0) + np.linalg.lstsq(rows, right, rcond=None)[0][:3]
+            for _ in range(5):
+                far = np.linalg.norm(at - centre, axis=1)
+                centre = (
+                    centre + np.linalg.lstsq((centre - at) / far[:, None], data.distance[mine] - far, rcond=None)[0]
+                )
+            off.append(data.distance[mine] - np.linalg.norm(at - centre, axis=1))
+        elif index < 0:
+            off.append((read - at).ravel())
+        else:
+            a, b = read - read.mean(axis=0), at - at.mean(axis=0)
+            U, _, Vt = np.linalg.svd(a.T @ b)
+            R = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
+            off.append((a - b @ R.T).ravel())
+    return np.concatenate(off)
+
+
+# -- the registry ------------------------------------------------------------------------------------------
+
+
+def test_names_are_unlike_and_every_device_says_what_it_is() -> None:
+    assert len(set(NAMES)) == len(NAMES) == 18
+    for device in DEVICES:
+        assert device.summary
+        assert device.source
+        assert 0.0 < device.sigma < 1e-3
+        assert named_device(device.name) is device
+
+
+def test_an_unknown_device_is_refused() -> None:
+    with pytest.raises(InputError, match=r"no device of this name; got 'balbar'; allowed: tracker, .*mean ballbar"):
+        named_device("balbar")
+
+
+# -- what is read ------------------------------------------------------------------------------------------
+
+
+#: Heights that are not all alike have tests of their own.
+every_device_but_drawn = pytest.mark.parametrize("name", [name for name in NAMES if name != "drawn-circle"])
+
+
+@every_device_but_drawn
+def test_without_noise_it_reads_what_the_twin_does_and_declares_nothing(name: str) -> None:
+    twin, data = read_by(name)
+    assert np.abs(residuals(twin, data)).max() < EXACT
+    assert (data.sigma, data.sigma_rot) == (None, None)
+    if data.quaternion is not None:
+        frames = twin.frames(data.joints)[data.targets[0]][:, :3, :3]
+        w, x, y, z = data.quaternion.T
+        turned = np.array([1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)]).T
+        np.testing.assert_allclose(turned, frames[:, :, 0], atol=1e-14)
+
+
+@every_device_but_drawn
+def test_noise_is_what_is_declared(name: str) -> None:
+    twin, data = read_by(name, sigma=None)
+    device = named_device(name)
+    assert data.sigma is not None
+    assert set(data.sigma.tolist()) == {device.sigma}
+    off = residuals(twin, data)
+    # places of fixtures, found from the readings, take some of the noise: six numbers of each at most
+    spent = 6.0 * len(data.fixtures)
+    found = np.sqrt(np.sum(off**2) / (len(off) - spent))
+    # nine coordinates of a hexapod's pose err together: they are declared to weigh no more than its six lengths
+    assert found == pytest.approx(device.sigma * (0.75 if name == "hexapod" else 1.0), rel=0.35)
+    assert np.abs(off).max() < 6 * device.sigma
+    assert (data.sigma_rot is None) == (data.quaternion is None)
+
+
+@pytest.mark.parametrize("name", ["tracker", "markers", "ballbar", "plane"])
+def test_another_deviation_is_read_and_declared(name: str) -> None:
+    twin, data = read_by(name, count=40, sigma=1e-4)
+    assert data.sigma is not None
+    assert set(data.sigma.tolist()) == {1e-4}
+    assert 3e-5 < float(np.sqrt(np.mean(residuals(twin, data) ** 2))) < 1.5e-4
+
+
+def refuse_poses_of_five_joints(name: str, robot: str) -> None:
+    """The hexapod asks for whole poses, which five joints cannot take."""
+    if (name, robot) == ("hexapod", "katana450"):
+        with pytest.raises(InputError, match=r"katana450 cannot take the poses.*six turning joints"):
+            read_by(name, robot)
+        pytest.skip("refused, as it should be")
+
+
+@every_device
+@pytest.mark.parametrize("robot", ["irb120", "katana450"])
+def test_configurations_are_within_the_limits_and_all_are_read(name: str, robot: str) -> None:
+    refuse_poses_of_five_joints(name, robot)
+    _, data = read_by(name, robot)
+    low, high = np.array([joint.limits for joint in nominal(robot).joints]).T
+    assert ((data.joints >= low) & (data.joints <= high)).all()
+    assert data.configurations == 70
+    assert set(data.configuration.tolist()) == set(range(70))
+    assert set(data.against[data.has_reading].tolist()) == set(range(len(data.fixtures))) or not data.fixtures
+    assert data.has_reading.all()
+
+
+@every_device
+def test_the_same_seed_reads_the_same(name: str) -> None:
+    one, other, another = (read_by.__wrapped__(name, count=6, sigma=None, seed=seed)[1] for seed in (0, 0, 1))
+    assert csv_text(one) == csv_text(other) != csv_text(another)
+
+
+@every_device
+def test_files_keep_all_of_it(name: str, tmp_path: Path) -> None:
+    _, data = read_by(name, sigma=None)
+    text = csv_text(data)
+    path = tmp_path / "data.csv"
+    path.write_text(text, encoding="utf-8")
+    again = read_csv(path)
+    assert csv_text(again) == text
+    for field in ("joints", "position", "quaternion", "distance", "height", "sigma", "sigma_rot", "approach", "number"):
+        before, after = getattr(data, field), getattr(again, field)
+        assert (before is None) == (after is None), field
+        if before is not None:
+            np.testing.assert_allclose(after, before, rtol=1e-14, atol=1e-17, err_msg=field)
+    # names are numbered in the order of their first appearance
+    assert np.array_equal(again.configuration, data.configuration)
+    assert [again.targets[t] for t in again.target] == [data.targets[t] for t in data.target]
+    assert [again.fixtures[f] for f in again.against if f >= 0] == [data.fixtures[f] for f in data.against if f >= 0]
+    assert (again.setup is None) == (data.setup is None)
+    if again.setup is not None and data.setup is not None:
+        np.testing.assert_allclose(again.setup.position, data.setup.position, rtol=1e-14)
+        np.testing.assert_allclose(again.setup.sigma, data.setup.sigma, rtol=1e-14)  # type: ignore[arg-type]
+
+
+# -- what each of them sees --------------------------------------------------------------------------------
+
+
+def test_the_tracker_sees_reflectors_that_look_at_it() -> None:
+    twin, data = read_by("tracker")
+    flange = Twin(twin.robot.with_frames(twin.robot.base, {"flange": (0.0, 0.0, 0.0)})).frames(data.joints)["flange"]
+    places = np.array([[twin.robot.values[f"target_{name}_{axis}"] for axis in "xyz"] for name in data.targets])
+    looks = (places - places.mean(axis=0)) / np.linalg.norm(places - places.mean(axis=0), axis=1)[:, None]
+    world = np.einsum("nij,nj->ni", flange[data.configuration, :3, :3], looks[data.target])
+    cosine = -np.sum(world * data.position, axis=1) / np.linalg.norm(data.position, axis=1)
+    degrees = np.rad2deg(np.arccos(cosine))
+    assert 20.0 < degrees.max() < 31.0  # what is seen is judged by the nominal robot
+
+
+def test_the_flat_artefact_is_read_square_to_its_plate_alone() -> None:
+    twin, data = read_by("optical-cmm-planar")
+    normal = twin.frames(data.joints)["artefact"][:, :3, 1]
+    cosine = np.abs(np.sum(normal * data.position, axis=1)) / np.linalg.norm(data.position, axis=1)
+    assert np.rad2deg(np.arccos(cosine)).max() < 15.5
+
+
+def test_markers_look_one_way() -> None:
+    twin, data = read_by("markers")
+    looks = twin.frames(data.joints)["markers"][:, :3, 0]
+    cosine = -np.sum(looks * data.position, axis=1) / np.linalg.norm(data.position, axis=1)
+    assert 40.0 < np.rad2deg(np.arccos(cosine)).max() < 60.5
+
+
+def test_lengths_and_places_are_within_the_range() -> None:
+    bar = read_by("ballbar")[1].distance
+    assert bar is not None
+    assert np.abs(bar - 0.3).max() < 1e-3
+    for name, box in (("stereo", [2e-3] * 3), ("five-lasers", [0.0395, 0.0385, 0.0365]), ("gauges", [1e-2] * 3)):
+        place = read_by(name)[1].position
+        assert (np.abs(place).max(axis=0) < np.array(box) / 2).all()
+        assert (np.ptp(place, axis=0) > 0.5 * np.array(box)).all()
+
+
+def test_two_spheres_are_as_far_apart_as_is_known() -> None:
+    twin, data = read_by("two-spheres")
+    tips = twin.frames(data.joints)["stylus"][:, :3, 3]
+    centres = []
+    for sphere in (0, 1):
+        at = tips[data.against == sphere]
+        middle = at.mean(axis=0)
+        rows = np.column_stack([2 * (at - middle), np.ones(len(at))])
+        centres.append(middle + np.linalg.lstsq(rows, ((at - middle) ** 2).sum(axis=1), rcond=None)[0][:3])
+    assert data.setup is not None
+    assert data.setup.distance is not None
+    assert np.linalg.norm(centres[1] - centres[0]) == pytest.approx(0.3, abs=1e-8)
+    assert data.setup.distance.tolist() == [0.3]
+
+
+# -- calibration -------------------------------------------------------------------------------------------
+
+
+def fitted(got: Array, true: Array, *, size: bool) -> Array:
+    """Return points ``(n, 3)`` moved onto others as a rigid body, or one that may grow (Umeyama 1991)."""
+    a, b = got - got.mean(axis=0), true - true.mean(axis=0)
+    U, s, Vt = np.linalg.svd(a.T @ b)
+    D = np.diag([1.0, 1.0, np.linalg.det(U @ Vt)])
+    grown = float(np.trace(np.diag(s) @ D) / np.sum(a * a)) if size else 1.0
+    return np.asarray(grown * a @ U @ D @ Vt + true.mean(axis=0))
+
+
+@every_device
+@pytest.mark.parametrize("robot", ["irb120", "katana450"])
+def test_without_noise_everything_else_follows(name: str, robot: str) -> None:
+    """Held-out readings, and the places of the tool all over the limits but for what is taken on trust."""
+    refuse_poses_of_five_joints(name, robot)
+    twin, data = read_by(name, robot)
+    held_out = range(3, 70, 4) if name == "drawn-circle" else range(50, 70)  # of each circle some
+    training = data.of_configurations([k for k in range(70) if k not in held_out])
+    fit = identify(nominal(robot), training, GEOMETRIC)
+    assert fit.status is Status.CONVERGED
+    errors = errors_of(fit.robot, data.of_configurations(held_out))
+    for off in (errors.position_norms, errors.orientation_norms, errors.length_norms):
+        assert len(off) == 0 or off.max() < EXACT
+
+    q = nominal(robot).random_configurations(60, np.random.default_rng(9))
+    true = np.concatenate([frames[:, :3, 3] for frames in twin.frames(q).values()])
+    got = np.concatenate([fit.robot.poses(q, target.name)[0] for target in twin.robot.targets])
+    before = fit.start.with_frames(fit.robot.base, {})
+    trusted = gauge_freedoms(data)
+    if trusted:
+        got = fitted(got, true, size="size" in trusted)
+    # a plane tells the most remote postures a hundred times less than those on it
+    assert np.abs(got - true).max() < (5e-7 if name == "plane" else 1e-9)
+    flange = np.abs(fitted(before.poses(q)[0], twin.robot.poses(q)[0], size=True) - twin.robot.poses(q)[0]).max()
+    assert flange > 1e-4  # it was not so before
+
+
+@pytest.mark.parametrize("name", ["strings", "ballbar", "five-lasers", "plane"])
+def test_an_arm_that_bends_is_identified_from_its_own_loops(name: str) -> None:
+    """The twin sags by its own moments; the elastic model has to find that in readings of any kind."""
+    rng, device = np.random.default_rng(2), named_device(name)
+    robot = nominal("irb120").with_effects(ELASTIC.effects)
+    soft = {"compliance_2": 2e-5, "compliance_3": 4e-5, "compliance_4": 1e-4, "compliance_5": 1e-4}
+    drawn = truth_twin(robot, "random", rng).robot.with_values(soft)
+    data = measured_with(device, nominal("irb120"), Twin(drawn, joint_truths(drawn)), 80, rng, 0.0)
+    training, held_out = data.of_configurations(range(60)), data.of_configurations(range(60, 80))
+    laden = nominal("irb120").with_payload(drawn.payload)
+    fits = [identify(laden, training, model) for model in (ELASTIC, GEOMETRIC)]
+    elastic, rigid = (errors_of(fit.robot, held_out) for fit in fits)
+    found = np.concatenate([elastic.position_norms, elastic.length_norms]).max()
+    # the joints' tilts and the loads follow each other to a thousandth of the sag
+    assert found < 1e-5
+    assert found < 0.05 * np.concatenate([rigid.position_norms, rigid.length_norms]).max()
+
+
+@every_device
+def test_a_robot_of_three_joints_is_calibrated_or_refused(name: str) -> None:
+    """With three joints a stylus cannot be turned: a plate, or a point, is out of reach or does not tell the tool."""
+    try:
+        _, data = read_by(name, "li3", 40)
+        fit = identify(nominal("li3"), data.of_configurations(range(28)), GEOMETRIC)
+    except InputError:
+        assert name in (
+            "hexapod",
+            "plane",
+            "sphere",
+            "two-spheres",
+            "point",
+            "calibration-table",
+            "touch-up",
+            "drawn-circle",
+        )
+        return
+    errors = errors_of(fit.robot, data.of_configurations(range(28, 40)))
+    everything = np.concatenate([errors.position_norms, errors.orientation_norms, errors.length_norms])
+    # closed loops hardly see some directions; there the priors leave a micrometre
+    assert everything.max() < (2e-6 if gauge_freedoms(data) else EXACT)
+
+
+@cache
+def covered(name: str) -> tuple[int, int]:
+    """Return how many of the well determined parameters lie in their stated 95 % intervals, and how many there are."""
+    within = counted = 0
+    for trial in range(3):
+        twin, data = read_by(name, count=50, sigma=None, seed=100 + trial)
+        fit = identify(nominal("irb120"), data, GEOMETRIC)
+        assert fit.excess == 1.0
+        for p in fit.robot.parameters.values():
+            if p.group in ("geometry", "joint zero") and p.informed is not None and p.informed > 0.5:
+                assert p.deviation is not None
+                counted += 1
+                within += abs(p.value - twin.robot.values[p.name]) < 1.96 * p.deviation
+    return within, counted
+
+
+def test_stated_intervals_hold_the_truth_as_often_as_they_say() -> None:
+    """Over all devices: 800 parameters of 50 robots; those of one robot go together, so 2 % either way is chance."""
+    found = {name: covered(name) for name in NAMES}
+    for name, (within, counted) in found.items():
+        assert counted > 40, name
+        assert within >= 0.8 * counted, name
+    within, counted = np.sum(list(found.values()), axis=0).tolist()
+    assert counted > 600
+    assert 0.92 <= within / counted <= 0.98
+
+
+# -- refusals ----------------------------------------------------------------------------------------------
+
+
+def test_a_level_plate_does_not_see_what_moves_the_arm_along_it() -> None:
+    """Lengths across the first axis carry the tool along the plate, whatever the posture: they stay beliefs."""
+    _, data = read_by("plane", count=210, sigma=None)
+    data = replace(data.of_readings(data.against == 0), fixtures=("plate_level",))
+    fit = identify(nominal("irb120"), data, GEOMETRIC)
+    assert fit.status is Status.RANK_LOSS
+    assert {"a_2", "d_2", "d_3"} <= set(fit.unseen)
+    assert {"a_1", "a_2", "d_1", "theta_offset_1"} <= set(fit.blind)
+    assert fit.parameter_status("theta_offset_3") == "identified"
+
+
+def cramped(robot: Robot) -> Robot:
+    """Return the robot with hardly any room in its joints."""
+    return replace(robot, joints=tuple(replace(joint, limits=(0.1, 0.101)) for joint in robot.joints))
+
+
+def test_an_arm_out_of_reach_of_the_measurement_arm_is_refused() -> None:
+    rng = np.random.default_rng(0)
+    twin = truth_twin(nominal("irb120"), "nominal", rng)
+    far = replace(twin, robot=twin.robot.with_frames(Transform((9.0, 0.0, 0.0)), {}))
+    with pytest.raises(InputError, match=r"measurement-arm sees too few configurations of irb120.*got '0 among"):
+        measured_with(named_device("measurement-arm"), nominal("irb120"), far, 5, rng)
+
+
+@pytest.mark.parametrize("name", ["tracker", "optical-cmm-planar", "markers"])
+def test_an_arm_that_turns_its_back_is_refused(name: str) -> None:
+    """An arm that hardly moves is seen from some side, not from all; the artefact with targets all round would be."""
+    rng = np.random.default_rng(0)
+    twin = truth_twin(nominal("irb120"), "nominal", rng)
+    refused = []
+    for turn in np.linspace(0.0, np.pi, 4, endpoint=False):
+        base = Transform((2.0, 0.5, 0.0), (float(np.cos(turn)), 0.0, 0.0, float(np.sin(turn))))
+        turned = replace(twin, robot=twin.robot.with_frames(base, {"1": (0.0, 0.0, 0.1)}))
+        try:
+            measured_with(named_device(name), cramped(nominal("irb120")), turned, 5, rng)
+        except InputError as refusal:
+            refused.append(str(refusal))
+    assert refused
+    assert all(f"{name} sees too few configurations of irb120" in said for said in refused)
+
+
+@pytest.mark.parametrize("name", ["ballbar", "gauges", "plane", "two-spheres"])
+def test_an_arm_that_does_not_reach_is_refused(name: str) -> None:
+    rng = np.random.default_rng(0)
+    twin = truth_twin(nominal("irb120"), "nominal", rng)
+    with pytest.raises(InputError, match=rf"{name}: irb120 does not reach .* of 9 places within reach'; allowed: 3 or"):
+        measured_with(named_device(name), cramped(nominal("irb120")), twin, 3, rng)
+
+
+@pytest.mark.parametrize("name", ["ballbar", "gauges", "point", "touch-up"])
+def test_a_truth_too_far_from_the_nominal_robot_cannot_be_jogged(name: str) -> None:
+    rng = np.random.default_rng(0)
+    twin = truth_twin(nominal("irb120"), "nominal", rng)
+    short = replace(twin, robot=twin.robot.with_values({"a_2": 0.02, "d_4": 0.02}))
+    with pytest.raises(InputError, match=r"irb120: the tool can.* be jogged to where it is measured.*too far from"):
+        measured_with(named_device(name), nominal("irb120"), short, 10, rng)

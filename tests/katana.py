@@ -7,10 +7,10 @@ from typing import Final
 
 import numpy as np
 
+from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
-from truearm.robots import load_robot
 from truearm.simulation.twin import Twin, measure
 from truearm.studies.katana import NAMES
 

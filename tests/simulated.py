@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
-from truearm.robots import load_robot
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import Twin, measure
 

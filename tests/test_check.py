@@ -10,15 +10,16 @@ import numpy as np
 import pytest
 from tests.simulated import campaign
 
-from truearm.calibration import calibrate, check
 from truearm.identification.solving.fit import identify
 from truearm.identification.solving.models import MODELS
+from truearm.jobs.calibrate import calibrate
+from truearm.jobs.check import check
+from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset, IntArray
 from truearm.measurement.readers.matrices import read_matrices
 from truearm.measurement.statistics import errors_of
 from truearm.measurement.table_motion import without_table_motion
 from truearm.modeling.chain import Array
-from truearm.robots import load_robot
 
 Corruption = Callable[[Dataset, np.random.Generator], Dataset]
 SEEDS = range(3)
@@ -52,7 +53,7 @@ def clean(request: pytest.FixtureRequest) -> tuple[str, Dataset]:
 
 
 def codes(data: Dataset, robot: str | None) -> set[str]:
-    return {notice.code for notice in check(data, robot)}
+    return {notice.code for notice in check(robot, data).warnings}
 
 
 def test_clean_data_are_not_doubted(clean: tuple[str, Dataset]) -> None:
@@ -169,7 +170,7 @@ def test_exchanged_and_mistaken_targets_show_without_a_robot(measured: Dataset, 
 def test_the_reading_is_named(measured: Dataset, seed: int) -> None:
     rng = np.random.default_rng(seed)
     first, second = two_targets(measured, np.random.default_rng(seed))
-    (notice,) = check(target_mistaken(measured, rng))
+    (notice,) = check(target_mistaken(measured, rng)).warnings
     label = measured.labels[measured.configuration[first]]
     names = [measured.targets[measured.target[r]] for r in (first, second)]
     assert f"{label}/{names[0]} (is target {names[1]})" in notice.message
@@ -192,7 +193,7 @@ def test_a_moved_table_shows(measured: Dataset, seed: int, points: int) -> None:
 
 
 def test_the_mistaken_reference_readings_are_named(with_references: Dataset) -> None:
-    notices = {n.code: n.message for n in check(with_references, "irb120")}
+    notices = {n.code: n.message for n in check("irb120", with_references).warnings}
     assert set(notices) == {"missing", "target-mistaken"}
     for label, is_target in ((22, 3), (51, 3), (136, 2), (400, 2)):
         assert f"{label}/base_3 (is target {is_target})" in notices["target-mistaken"]

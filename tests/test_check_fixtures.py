@@ -9,13 +9,15 @@ from functools import cache
 import numpy as np
 import pytest
 
-from truearm.calibration import calibrate, check, validate
 from truearm.errors import InputError
 from truearm.identification.judging.advice import check_fit
 from truearm.identification.solving.fit import identify
 from truearm.identification.solving.models import MODELS
+from truearm.jobs.calibrate import calibrate
+from truearm.jobs.check import check
+from truearm.jobs.validate import validate
+from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
-from truearm.robots import load_robot
 from truearm.simulation.devices import measured_with, named_device
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import Twin
@@ -35,7 +37,7 @@ def campaign(device: str, count: int = 60, seed: int = 0) -> tuple[Twin, Dataset
 
 
 def codes(data: Dataset) -> dict[str, str]:
-    return {notice.code: notice.message for notice in check(data, ROBOT)}
+    return {notice.code: notice.message for notice in check(ROBOT, data).warnings}
 
 
 @pytest.mark.parametrize("device", ["ballbar", "strings", "plane", "two-spheres", "point", "gauges", "drawn-circle"])
@@ -114,9 +116,9 @@ def test_targets_read_by_one_of_several_instruments_are_not_missing() -> None:
 def test_a_robot_of_a_closed_loop_does_not_know_where_an_instrument_stands() -> None:
     _, data = campaign("ballbar")
     calibrated = calibrate(ROBOT, data, train=45).robot
-    assert validate(calibrated, data).length_spread is not None
+    assert validate(calibrated, data).length is not None
     frames = replace(data, distance=None, fixture=None, fixtures=(), position=np.zeros((len(data.target), 3)))
-    with pytest.raises(InputError, match=r"calibrated without any instrument's frame.*--model frames"):
+    with pytest.raises(InputError, match=r"calibrated without any instrument's frame.*`model=frames`"):
         validate(calibrated, frames)
 
 
@@ -146,20 +148,20 @@ def test_how_well_positions_are_told_is_true(device: str) -> None:
 @pytest.mark.parametrize("device", ["ballbar", "gauges", "five-lasers", "stereo", "measurement-arm"])
 def test_readings_beyond_the_range_of_a_device_are_named(device: str) -> None:
     _, data = campaign(device)
-    assert check(data, device=device) == ()
+    assert check(data, device=device).warnings == ()
     if data.distance is not None:
         far = replace(data, distance=data.distance + np.where(np.arange(len(data.distance)) == 4, 2.5e-3, 0.0))
     else:
         moved = np.where(np.arange(len(data.target))[:, None] == 4, 4.0, 0.0)
         far = replace(data, position=data.position + moved)
-    found = [notice.message for notice in check(far, device=device) if notice.code == "beyond-range"]
+    found = [notice.message for notice in check(far, device=device).warnings if notice.code == "beyond-range"]
     assert len(found) == 1
     assert f"1 readings are beyond what the device {device} can read (configuration/target): 5/" in found[0]
 
 
 def test_a_device_without_a_range_reads_all() -> None:
     _, data = campaign("plane")
-    assert check(data, device="plane") == ()
+    assert check(data, device="plane").warnings == ()
 
 
 def test_stereo_cameras_read_a_sphere_larger_than_the_cube_that_is_used_of_it() -> None:
@@ -167,4 +169,4 @@ def test_stereo_cameras_read_a_sphere_larger_than_the_cube_that_is_used_of_it() 
     for away, named in ((1.9e-3, 0), (2.1e-3, 1)):
         position = data.position.copy()
         position[3] = (0.0, away, 0.0)
-        assert len(check(replace(data, position=position), device="stereo")) == named
+        assert len(check(replace(data, position=position), device="stereo").warnings) == named

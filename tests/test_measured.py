@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
-from truearm.calibration import Calibration, calibrate
 from truearm.identification.solving.fit import identify
 from truearm.identification.solving.losses import Loss
 from truearm.identification.solving.models import MODELS
+from truearm.jobs.calibrate import calibrate
+from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset, IntArray
 from truearm.measurement.readers.canonical import csv_text, read_csv
 from truearm.measurement.readers.matrices import read_matrices
@@ -21,7 +22,7 @@ from truearm.measurement.statistics import errors_of
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
 from truearm.planning.choosing.measurement_plan import plan_measurements, with_targets
-from truearm.robots import load_robot
+from truearm.results.calibration import Calibration
 
 SEEDS = range(10)
 #: The end-effector of the campaign, after Nubiola's triangular artefact, which it resembles.
@@ -101,7 +102,7 @@ def test_the_arm_warmed_up_during_the_campaign(irb120: Dataset) -> None:
         order = np.random.default_rng(seed).permutation(irb120.configurations)
         robot = load_robot("irb120").with_payload(PAYLOAD)
         fit = identify(robot, irb120.of_configurations(order[:300]), model)
-        spread = errors_of(fit.robot, irb120.of_configurations(order[300:])).position_spread
+        spread = errors_of(fit.robot, irb120.of_configurations(order[300:])).position
         assert spread is not None
         held_out.append(1e3 * spread.mean)
         for link in (3, 4):  # the long ones: about 10 K of aluminium

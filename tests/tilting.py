@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from truearm.robots import load_robot
+from truearm.library import load_robot
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import Twin
 from truearm.simulation.twin_joint import JointTruth

@@ -12,8 +12,8 @@ from truearm.identification.solving.models import MODELS
 from truearm.identification.solving.problem import Problem
 from truearm.identification.solving.solver import solve
 from truearm.identification.start_values.frames import initial_frames
+from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
-from truearm.robots import load_robot
 from truearm.simulation.truths import truth_twin
 
 NOISE = 0.05e-3

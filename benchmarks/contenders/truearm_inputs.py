@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from truearm.library import load_robot
 from truearm.measurement.readers.matrices import read_matrices
 from truearm.modeling.formats.urdf import urdf_text
 from truearm.modeling.inverse.branches import BRANCHES, branch_rule
-from truearm.robots import load_robot
 from truearm.simulation.truths import truth_twin
 
 CONFIGURATIONS, POSES = 1000, 10_000

@@ -6,7 +6,7 @@ import numpy as np
 from stopwatch import inputs, median_seconds, report
 
 import truearm
-from truearm.robots import load_robot
+from truearm.library import load_robot
 from truearm.simulation.truths import STATION
 
 given = np.load(inputs() / "kinematics.npz")

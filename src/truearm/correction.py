@@ -31,11 +31,11 @@ from truearm.compensation.programs.program import Edit, Program, Source
 from truearm.compensation.split import Divided, divided
 from truearm.errors import InputError
 from truearm.files import writable_folder
+from truearm.library import load_robot
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.reporting.program_report import Checked, ProgramReport, ReportedFile, program_html
-from truearm.robots import load_robot
 
 REPORT: Final = "compensation.html"
 

@@ -11,18 +11,19 @@ from typing import Final
 
 import numpy as np
 
-from truearm.calibration import Calibration, calibrate
 from truearm.compensation.gauge import best_agreement
 from truearm.compensation.program_correction import commanded
 from truearm.correction import ProgramCorrection, correct
 from truearm.errors import InputError
 from truearm.files import exists, read_bytes, read_yaml, write_files, write_new_text
 from truearm.identification.solving.fit import Status
+from truearm.jobs.calibrate import calibrate
+from truearm.library import load_robot
 from truearm.measurement.readers.canonical import csv_text
 from truearm.modeling.formats.robot_file import RobotFile, robot_from_file
 from truearm.modeling.transform import Transform
 from truearm.reporting.program_report import Checked
-from truearm.robots import load_robot
+from truearm.results.calibration import Calibration
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import Twin, measure
 from truearm.simulation.twin_joint import PERFECT

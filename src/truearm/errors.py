@@ -3,18 +3,28 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+import re
+from collections.abc import Callable, Iterable
+from typing import Final
+
+#: A parameter that a text names, with a value or without: `seed`, `train=all`.
+_NAMED: Final = re.compile(r"`(?P<name>[a-z][a-z_]*)(?:=(?P<value>[^`]*))?`")
 
 
 class InputError(ValueError):
     """Input that truearm refuses, with everything a person needs to mend it.
 
+    Texts name parameters of a job in backticks (```seed```, ```train=all```), so that every caller can show them in its
+    own words: Python as they are, the command as its options (:meth:`told`).
+
     Parameters
     ----------
     what
         What is wrong, in plain words.
+    parameter
+        Which parameter of the job; several are separated by a comma and a blank.
     where
-        File, row, column or option.
+        File, row and column, or the robot, where that says more than the parameter.
     came
         What was found there.
     allowed
@@ -27,19 +37,33 @@ class InputError(ValueError):
         self,
         what: str,
         *,
+        parameter: str | None = None,
         where: str | None = None,
         came: object = None,
         allowed: str | None = None,
         cure: str | None = None,
     ) -> None:
-        self.what, self.where, self.came, self.allowed, self.cure = what, where, came, allowed, cure
-        parts = [f"{where}: {what}" if where else what]
-        if came is not None:
-            parts.append(f"got {_shown(came)}")
-        if allowed is not None:
-            parts.append(f"allowed: {allowed}")
+        self.what, self.parameter, self.where = what, parameter, where
+        self.came, self.allowed, self.cure = came, allowed, cure
+        super().__init__(self.told(str))
+
+    def told(self, spelled: Callable[[str], str]) -> str:
+        """Return the message with parameters as `spelled` names them, backticks included for those in texts."""
+        where = self.where
+        if where is None and self.parameter is not None:
+            where = ", ".join(spelled(name) for name in self.parameter.split(", "))
+        parts = [f"{where}: {self.what}" if where else self.what]
+        if self.came is not None:
+            parts.append(f"got {_shown(self.came)}")
+        if self.allowed is not None:
+            parts.append(f"allowed: {self.allowed}")
         message = "; ".join(parts).rstrip(".") + "."
-        super().__init__(f"{message} {cure}" if cure else message)
+        return f"{message} {self.cure}" if self.cure else message
+
+
+def with_parameters(text: str, spelled: Callable[[str, str | None], str]) -> str:
+    """Return a text in which every parameter named in backticks is as `spelled` writes it, with its value if any."""
+    return _NAMED.sub(lambda found: spelled(found["name"], found["value"]), text)
 
 
 def _shown(came: object) -> str:
@@ -59,3 +83,9 @@ def nearest_names(name: str, known: Iterable[str], count: int = 3, likeness: flo
     """
     by_folded = {candidate.lower(): candidate for candidate in known}
     return [by_folded[match] for match in difflib.get_close_matches(name.lower(), by_folded, count, likeness)]
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str | None:
+    """Return a sentence that offers the known names most like `name`, None if none is like it."""
+    near = nearest_names(name, known)
+    return f"Did you mean {' or '.join(near)}?" if near else None

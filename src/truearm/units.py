@@ -70,11 +70,21 @@ def believable(unit: str, *, deviation: bool = False) -> tuple[float, float]:
     return float(f"{from_si(low, unit):.9g}"), float(f"{from_si(high, unit):.9g}")
 
 
-def sized_si(value: float, unit: str, where: str, *, came: object = None, deviation: bool = False) -> float:
+def sized_si(
+    value: float,
+    unit: str,
+    where: str | None = None,
+    *,
+    parameter: str | None = None,
+    came: object = None,
+    deviation: bool = False,
+) -> float:
     """Convert one number to metres or radians, or refuse one that is out of all proportion.
 
     Parameters
     ----------
+    where, parameter
+        What the refusal names: a place in a file, or a parameter of a job.
     came
         The number as the file has it.
     deviation
@@ -85,6 +95,7 @@ def sized_si(value: float, unit: str, where: str, *, came: object = None, deviat
         return to_si(value, unit)
     raise InputError(
         f"the number is too {'small' if deviation and value < low else 'large'} to be meant",
+        parameter=parameter,
         where=where,
         came=value if came is None else came,
         allowed=f"{low:.6g} to {high:.6g}{'' if unit == '1' else f' {unit}'}",
@@ -110,12 +121,15 @@ def written(value: float, unit: str) -> float:
     return raw
 
 
-def checked_unit(unit: str | None, allowed: tuple[str, ...], where: str) -> str:
-    """Return `unit` if it is one of `allowed`, else refuse it."""
+def checked_unit(
+    unit: str | None, allowed: tuple[str, ...], where: str | None = None, *, parameter: str | None = None
+) -> str:
+    """Return `unit` if it is one of `allowed`, else refuse it, naming a place in a file or a parameter of a job."""
     if unit in allowed:
         return unit
     raise InputError(
         "no unit is given" if not unit else "the unit is not one that fits here",
+        parameter=parameter,
         where=where,
         came=unit or None,
         allowed=", ".join(allowed),

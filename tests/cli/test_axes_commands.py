@@ -10,9 +10,9 @@ import pytest
 from tests.cli.conftest import Truearm
 from tests.identification.test_axes import runs
 
+from truearm.library import load_robot
 from truearm.measurement.readers.canonical import csv_text
 from truearm.modeling.transform import IDENTITY
-from truearm.robots import load_robot
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import measure
 

@@ -13,11 +13,11 @@ import pytest
 from tests.cli.conftest import Truearm
 
 from truearm.demonstration import demonstration
+from truearm.library import load_robot
 from truearm.modeling.formats.robot_file import robot_text
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import quaternion_from_rotation
-from truearm.robots import load_robot
 
 
 def worn() -> Robot:

@@ -15,8 +15,8 @@ from tests.cli.conftest import Truearm
 
 import truearm as package
 from truearm.demonstration import Demonstration
+from truearm.library import load_robot
 from truearm.measurement.readers.canonical import csv_text, read_csv
-from truearm.robots import load_robot
 
 IDS = ["irb120", "irb1600", "katana450", "kr5", "li3", "lrmate200ic", "puma560", "ur10", "ur5"]
 

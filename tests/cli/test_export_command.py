@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 from tests.cli.conftest import Truearm
 
+from truearm.library import load_robot
 from truearm.modeling.formats.dh_csv import read_dh_csv
 from truearm.modeling.formats.export import FORMATS
-from truearm.robots import load_robot
 
 
 @pytest.fixture(scope="module")

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from tests.cli.conftest import Truearm
 
+from truearm.library import load_robot
 from truearm.measurement.hexapod.geometry import triangle
 from truearm.measurement.hexapod.poses import poses
 from truearm.measurement.hexapod.sheet import read_sheet
 from truearm.measurement.readers.canonical import read_csv
-from truearm.robots import load_robot
 
 
 def test_enumerate(truearm: Truearm) -> None:

@@ -12,7 +12,7 @@ import pytest
 from tests.cli.conftest import Truearm
 from tests.cli.test_refusals import refused
 
-from truearm.robots import load_robot
+from truearm.library import load_robot
 
 #: The tool of the truth `tracker-triangular`.
 PAYLOAD = "2.7kg,50mm,25mm,100mm"
@@ -108,7 +108,7 @@ def test_auto_tells_how_it_chose(truearm: Truearm, data: Path, tmp_path: Path) -
     assert {a["round"] for a in way["attempts"]} == set(range(1, way["attempts"][-1]["round"] + 1))
     assert not any(a["taken"] for a in way["attempts"] if a["round"] == way["attempts"][-1]["round"])
     assert 0.01 < way["elastic_mm"] < 0.1
-    assert found["command"].endswith(f"--model auto --train 28 --seed 0 --payload {PAYLOAD}")
+    assert found["command"].endswith(f"data.csv --model auto --payload {PAYLOAD} --out DIR")
     report = (tmp_path / "report.html").read_text()
     assert "How the model was chosen" in report
     for attempt in way["attempts"]:

@@ -10,9 +10,9 @@ import pytest
 
 from truearm.compensation.cell import Cell, read_cell
 from truearm.errors import InputError
+from truearm.library import load_robot
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
-from truearm.robots import load_robot
 
 HEAD = "truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\n"
 

@@ -7,8 +7,8 @@ from scipy.spatial.transform import Rotation
 
 from truearm.compensation.fake_targets import fake_targets, matrices, nominal_robot
 from truearm.compensation.gauge import base_shift, best_agreement
+from truearm.library import load_robot
 from truearm.modeling.robot import Robot
-from truearm.robots import load_robot
 
 
 def small(motion: list[float]) -> np.ndarray:

@@ -12,9 +12,9 @@ from tests.modeling.test_joint_errors import TABLE_1, TABLE_3, error, with_table
 
 from truearm.compensation.inverse_errors import design, fake_targets, inverted
 from truearm.errors import InputError
+from truearm.library import load_robot
 from truearm.modeling.transform import IDENTITY, Transform
 from truearm.planning.poses.seven_lines import DIRECTIONS, SevenLines, readings, seven_lines
-from truearm.robots import load_robot
 from truearm.simulation.twin import Twin, measure
 from truearm.validation.line_test import LineErrors, from_data, on_twin, reduction, summary
 

@@ -16,9 +16,9 @@ from truearm.compensation.programs.program import Configuration, Program, Source
 from truearm.compensation.programs.rapid import RAPID
 from truearm.correction import correct
 from truearm.errors import InputError
+from truearm.library import load_robot
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
-from truearm.robots import load_robot
 
 JOINTS = "MoveAbsJ [[{},20,-10,0,45,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;"
 POSE = "MoveL [[{},0,400],[0.70710678,0,0.70710678,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0{};"

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from truearm.calibration import Calibration, calibrate
 from truearm.compensation.cell import Cell, Placed
 from truearm.compensation.fake_targets import matrices
 from truearm.compensation.gauge import best_agreement
@@ -18,9 +17,11 @@ from truearm.compensation.program_correction import Correction, commanded, corre
 from truearm.compensation.program_files import edited
 from truearm.compensation.programs.program import Program, Source
 from truearm.compensation.programs.rapid import RAPID
+from truearm.jobs.calibrate import calibrate
+from truearm.library import load_robot
 from truearm.modeling.inverse.branches import branch_rule
 from truearm.modeling.transform import Transform, quaternion_from_rotation
-from truearm.robots import load_robot
+from truearm.results.calibration import Calibration
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import Twin, measure
 from truearm.simulation.twin_joint import PERFECT

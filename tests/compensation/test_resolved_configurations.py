@@ -11,9 +11,9 @@ import pytest
 from truearm.compensation.fake_targets import matrices
 from truearm.compensation.programs.program import ANY_POSTURE, Configuration
 from truearm.compensation.resolved_configurations import ON_EDGE, agrees, resolved_configurations
+from truearm.library import load_robot
 from truearm.modeling.inverse.branches import BRANCHES, branch_rule
 from truearm.modeling.robot import Robot
-from truearm.robots import load_robot
 
 IRB120 = load_robot("irb120")
 UNKNOWN = np.full(6, np.nan)

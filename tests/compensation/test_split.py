@@ -20,9 +20,9 @@ from truearm.compensation.programs.fanuc_ls import FANUC_LS
 from truearm.compensation.programs.program import Program, Source
 from truearm.compensation.programs.rapid import RAPID
 from truearm.compensation.split import MOST, Divided, divided
+from truearm.library import load_robot
 from truearm.modeling.inverse.kinematics import inverse
 from truearm.modeling.transform import Transform
-from truearm.robots import load_robot
 
 IRB120 = worn(load_robot("irb120"), 2.0)
 AT_BASE = Cell(FLANGE.tools, {"": Placed(None, Transform())})

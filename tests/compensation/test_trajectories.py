@@ -12,6 +12,7 @@ import pytest
 
 from truearm.compensation.trajectories import corrected, path_error
 from truearm.errors import InputError
+from truearm.library import load_robot
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY, Transform
@@ -19,7 +20,6 @@ from truearm.planning.paths.joint_motion import JointMotion, joint_motion
 from truearm.planning.paths.paths import Circle, Line
 from truearm.planning.paths.time_law import timed
 from truearm.planning.paths.trajectory import Trajectory
-from truearm.robots import load_robot
 from truearm.simulation.twin import Twin
 from truearm.simulation.twin_joint import JointTruth
 

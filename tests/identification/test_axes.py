@@ -14,6 +14,7 @@ from truearm.errors import InputError
 from truearm.identification.axes.analysis import AxisAnalysis, analyse
 from truearm.identification.axes.circles import AxisProblem, axis_circles
 from truearm.identification.axes.fit import NORMAL_95, fit_axes
+from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of
 from truearm.modeling.chain import Array
@@ -21,7 +22,6 @@ from truearm.modeling.conversion import converted
 from truearm.modeling.lines import base_and_flange, frame_between, joint_axes
 from truearm.modeling.parameters import FreeParameters
 from truearm.modeling.transform import IDENTITY
-from truearm.robots import load_robot
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import Twin, measure
 from truearm.simulation.twin_joint import JointTruth

@@ -11,11 +11,11 @@ import pytest
 from truearm.identification.solving.componentwise import least_absolute
 from truearm.identification.solving.problem import Problem
 from truearm.identification.solving.solver import solve
+from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.parameters import FreeParameters
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY
-from truearm.robots import load_robot
 from truearm.simulation.twin import Twin, measure
 
 

@@ -13,12 +13,12 @@ from tests.simulated import more_of
 from truearm.identification.solving.fit import Fit, Status, identify
 from truearm.identification.solving.models import MODELS
 from truearm.identification.solving.redundancy import Redundancy
+from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of
 from truearm.modeling.conversion import CONVERSIONS, converted
 from truearm.modeling.formats import dh_table
 from truearm.modeling.robot import Robot
-from truearm.robots import load_robot
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import Twin, measure
 

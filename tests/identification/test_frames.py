@@ -9,9 +9,9 @@ from tests.simulated import campaign
 from truearm.errors import InputError
 from truearm.identification.solving.fit import place
 from truearm.identification.start_values.frames import initial_frames
+from truearm.library import library, load_robot
 from truearm.measurement.statistics import errors_of
 from truearm.modeling.transform import Transform, quaternion_from_rotation
-from truearm.robots import library, load_robot
 
 
 @pytest.mark.parametrize("name", library())
@@ -79,8 +79,8 @@ def test_orientation_readings_place_an_arm_of_two_joints() -> None:
 def test_a_calibrated_arm_is_placed_to_its_noise() -> None:
     _, data = campaign("ur5", 40, 1e-4, 3, truth="nominal")
     errors = errors_of(place(load_robot("ur5"), data).robot, data)
-    assert errors.position_spread is not None
-    assert errors.position_spread.rms == pytest.approx(np.sqrt(3) * 1e-4, rel=0.15)
+    assert errors.position is not None
+    assert errors.position.rms == pytest.approx(np.sqrt(3) * 1e-4, rel=0.15)
 
 
 def test_data_without_positions_are_refused() -> None:

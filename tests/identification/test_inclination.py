@@ -11,10 +11,10 @@ from numpy.testing import assert_allclose
 from tests.tilting import JOINTS, TRUTH, tilting_katana
 
 from truearm.identification.inclinometers.inclination import inclination_derivatives, inclinations_of, link_ends
+from truearm.library import load_robot
 from truearm.modeling.chain import Array
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
-from truearm.robots import load_robot
 from truearm.simulation.inclinometer import inclinations
 from truearm.simulation.twin import Twin
 

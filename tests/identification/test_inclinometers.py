@@ -13,13 +13,13 @@ from truearm.errors import InputError
 from truearm.identification.inclinometers.fit import TiltingFit, calibrate_tilting
 from truearm.identification.solving.fit import identify
 from truearm.identification.solving.models import MODELS
+from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.inclinometer import InclinometerReadings, Pairs, deviation_of_change
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import rotation_from_quaternion
 from truearm.planning.choosing.inclinometer import TiltingPlan, plan_tilting
-from truearm.robots import load_robot
 from truearm.simulation.inclinometer import compare, inclinations, measure_pairs
 from truearm.simulation.twin import Twin, measure
 

@@ -9,8 +9,8 @@ from tests.katana import katana
 
 from truearm.errors import InputError
 from truearm.identification.solving.influence import Influence, influence
+from truearm.library import load_robot
 from truearm.modeling.chain import Array
-from truearm.robots import load_robot
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import Twin
 from truearm.studies.katana import NAMES, PERTURBATIONS

@@ -14,10 +14,10 @@ from truearm.identification.judging.advice import check_fit
 from truearm.identification.solving.bounds import Bounds
 from truearm.identification.solving.fit import Fit, identify
 from truearm.identification.solving.models import MODELS, Model
+from truearm.library import load_robot
 from truearm.measurement.checks import check_data
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.parts import Payload
-from truearm.robots import load_robot
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import measure
 from truearm.simulation.twin_joint import JointTruth

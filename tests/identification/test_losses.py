@@ -10,7 +10,7 @@ import pytest
 from truearm.identification.solving.fit import Status, identify
 from truearm.identification.solving.losses import Loss, norms_of, robust_scale, weights
 from truearm.identification.solving.models import MODELS
-from truearm.robots import load_robot
+from truearm.library import load_robot
 from truearm.simulation.devices import measured_with, named_device
 from truearm.simulation.truths import truth_twin
 

@@ -11,11 +11,11 @@ from truearm.identification.solving.fit import identify
 from truearm.identification.solving.models import MODELS
 from truearm.identification.solving.problem import Problem
 from truearm.identification.solving.solver import solve
+from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
-from truearm.robots import load_robot
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import Twin, measure
 

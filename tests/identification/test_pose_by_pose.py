@@ -55,7 +55,7 @@ def with_set(robot: Robot, vector: Array) -> Robot:
 
 
 def mean_error(robot: Robot, data: Dataset) -> float:
-    spread = errors_of(robot, data).position_spread
+    spread = errors_of(robot, data).position
     assert spread is not None
     return spread.mean
 
@@ -173,9 +173,9 @@ def test_the_scale_of_the_mean_is_the_one_that_fits_best(method: Method) -> None
     scale = float(along @ taken / (along @ along))
     np.testing.assert_allclose(taken, scale * along, rtol=0, atol=1e-15)
     assert scale > 1.2
-    best = np.sum(errors_of(found.robot, data).position ** 2)
+    best = np.sum(errors_of(found.robot, data).position_errors ** 2)
     for other in (0.99 * scale, 1.01 * scale, 1.0):
-        assert np.sum(errors_of(with_set(katana(), start + other * along), data).position ** 2) > best
+        assert np.sum(errors_of(with_set(katana(), start + other * along), data).position_errors ** 2) > best
 
 
 @pytest.mark.parametrize("combination", ["mean", "scaled-mean", "best-pose"])

@@ -11,8 +11,8 @@ from truearm.errors import InputError
 from truearm.identification.solving.bounds import Bounds
 from truearm.identification.solving.fit import Fit, Redundant, Status, identify
 from truearm.identification.solving.models import MODELS
+from truearm.library import library, load_robot
 from truearm.measurement.statistics import errors_of
-from truearm.robots import library, load_robot
 
 GEOMETRIC = {m.name: m for m in MODELS}["geometric"]
 

@@ -9,17 +9,17 @@ from functools import cache
 import numpy as np
 import pytest
 
-from truearm.calibration import calibrate
 from truearm.errors import InputError
 from truearm.identification.choosing.selection import Selection, select
 from truearm.identification.solving.bounds import Bounds
 from truearm.identification.solving.fit import identify
 from truearm.identification.solving.models import MODELS
+from truearm.jobs.calibrate import calibrate
+from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of
 from truearm.modeling.parts import LinkMass, Payload
 from truearm.modeling.robot import Robot
-from truearm.robots import load_robot
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import Twin, measure
 from truearm.simulation.twin_joint import JointTruth
@@ -89,7 +89,7 @@ def test_what_is_only_elastic_stays_as_good() -> None:
     chosen = select(arm(), data)
     errors = []
     for model in (chosen.model, ELASTIC):
-        spread = errors_of(identify(arm(), data, model).robot, unseen).position_spread
+        spread = errors_of(identify(arm(), data, model).robot, unseen).position
         assert spread is not None
         errors.append(spread.mean)
     assert errors[0] <= 1.05 * errors[1]

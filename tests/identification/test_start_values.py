@@ -13,12 +13,12 @@ from truearm.identification.solving.fit import Status, identify
 from truearm.identification.solving.models import FRAMES, MODELS
 from truearm.identification.solving.redundancy import gauge_freedoms
 from truearm.identification.start_values.from_readings import start_from_readings, unanchored
+from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
-from truearm.robots import load_robot
 from truearm.simulation.devices import DEVICES, measured_with, named_device
 from truearm.simulation.devices.device import recorded
 from truearm.simulation.truths import truth_twin
@@ -341,6 +341,8 @@ def test_readings_that_the_model_cannot_follow_do_not_overrule_the_priors(device
     assert max(moved) < 3.0  # believed to the letter, they moved lengths by more than ten
     assert fit.excess > 5.0
     residual = errors_of(fit.robot, data)
-    off = np.concatenate([residual.position.reshape(-1), residual.length if residual.length is not None else []])
+    off = np.concatenate(
+        [residual.position_errors.reshape(-1), residual.length_errors if residual.length_errors is not None else []]
+    )
     sigma = named_device(device).sigma
     assert fit.excess == pytest.approx(np.sqrt(np.nanmean(off**2)) / sigma, rel=0.4)

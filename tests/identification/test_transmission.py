@@ -10,9 +10,9 @@ import pytest
 from truearm.identification.judging.transmission import check_transmission, periodic_errors
 from truearm.identification.solving.fit import Fit, identify
 from truearm.identification.solving.models import MODELS
+from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.robot import Robot
-from truearm.robots import load_robot
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import measure
 from truearm.simulation.twin_joint import JointTruth

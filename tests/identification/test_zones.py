@@ -11,10 +11,10 @@ from truearm.errors import InputError
 from truearm.identification.choosing.zones import Zones, identify_zones
 from truearm.identification.solving.fit import identify
 from truearm.identification.solving.models import MODELS
+from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
-from truearm.robots import load_robot
 from truearm.simulation.devices import measured_with, named_device
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import Twin, measure

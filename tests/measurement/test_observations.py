@@ -9,13 +9,13 @@ import pytest
 
 from truearm.errors import InputError
 from truearm.identification.solving.problem import SETUP, Problem
+from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.observations import OBSERVATIONS, compared
 from truearm.modeling.chain import Array
 from truearm.modeling.parameters import FreeParameters
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
-from truearm.robots import load_robot
 from truearm.simulation.truths import joint_truths
 from truearm.simulation.twin import Twin
 

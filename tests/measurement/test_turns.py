@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from truearm.library import load_robot
 from truearm.measurement.circles import fit_circle
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.turns import find_runs, turn_of
 from truearm.modeling.chain import Array
-from truearm.robots import load_robot
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import Twin, measure
 from truearm.simulation.twin_joint import JointTruth

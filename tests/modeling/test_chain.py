@@ -8,13 +8,13 @@ import pytest
 from numpy.testing import assert_allclose
 from tests.modeling.pinocchio_oracle import PinocchioChain
 
+from truearm.library import library, load_robot
 from truearm.modeling.chain import Array, Chain, Element, Motion
 from truearm.modeling.conventions import CONVENTIONS, Convention, JointKind
 from truearm.modeling.effects import EFFECTS, Effect
 from truearm.modeling.parts import Joint
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
-from truearm.robots import library, load_robot
 
 MOTIONS: tuple[Motion, ...] = get_args(Motion)
 CONFIGURATIONS = 7

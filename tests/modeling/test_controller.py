@@ -11,6 +11,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from truearm.errors import InputError
+from truearm.library import library, load_robot
 from truearm.modeling.chain import Array
 from truearm.modeling.controller import AS_THE_MODEL, Controller
 from truearm.modeling.conversion import CONVERSIONS, converted
@@ -18,7 +19,6 @@ from truearm.modeling.formats.robot_file import read_robot, robot_text
 from truearm.modeling.formats.urdf import read_urdf, urdf_text
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
-from truearm.robots import library, load_robot
 
 FANUC = Controller(signs=(1, 1, -1, -1, -1, -1), couplings={3: {2: 1.0}})
 HALF = 0.7071067811865476

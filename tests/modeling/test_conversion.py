@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 from tests.modeling.test_chain import random_frame, random_robot
 
 from truearm.errors import InputError
+from truearm.library import library, load_robot
 from truearm.modeling.chain import Array, Chain
 from truearm.modeling.conventions import CONVENTIONS, Convention, JointKind
 from truearm.modeling.conventions.cpc import published_direction
@@ -17,7 +18,6 @@ from truearm.modeling.loads import joint_loads
 from truearm.modeling.parts import Joint, LinkMass, Payload
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
-from truearm.robots import library, load_robot
 from truearm.simulation.twin import Twin
 
 COMMON_NORMALS = ("standard-dh", "modified-dh", "s-model")

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from truearm.errors import InputError
+from truearm.library import library, load_robot
 from truearm.modeling.chain import Array
 from truearm.modeling.conventions import JointKind
 from truearm.modeling.formats.dh_csv import dh_csv, read_dh_csv
@@ -18,7 +19,6 @@ from truearm.modeling.formats.dh_table import DHConvention, DHTable, dh_table
 from truearm.modeling.parts import Joint
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
-from truearm.robots import library, load_robot
 
 FORMS: tuple[DHConvention, ...] = get_args(DHConvention)
 KINDS: tuple[JointKind, ...] = get_args(JointKind)

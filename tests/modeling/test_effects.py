@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from truearm.library import load_robot
 from truearm.modeling.effects import EFFECTS, Effect
 from truearm.modeling.effects.backlash import SEATED
 from truearm.modeling.parts import LinkMass, Payload
 from truearm.modeling.postures import Postures, approach_of
 from truearm.modeling.robot import Robot
-from truearm.robots import load_robot
 from truearm.simulation.truths import joint_truths
 from truearm.simulation.twin import Twin
 from truearm.simulation.twin_joint import JointTruth

@@ -11,13 +11,13 @@ from scipy.optimize import brentq
 from tests.modeling.test_effects import NAMES, loaded_arm
 
 from truearm.errors import InputError
+from truearm.library import load_robot
 from truearm.modeling.chain import Array
 from truearm.modeling.effects import EFFECTS
 from truearm.modeling.effects.backlash import SEATED
 from truearm.modeling.loads import joint_loads
 from truearm.modeling.parts import LinkMass, Payload
 from truearm.modeling.robot import Robot
-from truearm.robots import load_robot
 
 
 @pytest.mark.parametrize("effects", [*((effect.name,) for effect in EFFECTS), NAMES], ids="+".join)

@@ -16,6 +16,7 @@ from numpy.testing import assert_allclose
 from tests.modeling.test_chain import random_frame, random_robot
 
 from truearm.errors import InputError
+from truearm.library import library, load_robot
 from truearm.modeling.chain import Array
 from truearm.modeling.conventions import CONVENTIONS, Convention
 from truearm.modeling.formats import python_template
@@ -25,7 +26,6 @@ from truearm.modeling.formats.export import FORMATS, exported
 from truearm.modeling.parts import Joint, LinkMass, Payload, Tool
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY, Transform
-from truearm.robots import library, load_robot
 
 TABLES: Mapping[str, TableConvention] = {"dh": "standard-dh", "mdh": "modified-dh", "hayati": "hayati"}
 ELASTIC = ("compliance",)

@@ -12,12 +12,12 @@ import pytest
 from ruamel.yaml import YAML
 
 from truearm.errors import InputError
+from truearm.library import load_robot
 from truearm.modeling.chain import Array
 from truearm.modeling.fixtures import Fixture, FixtureKind
 from truearm.modeling.formats.robot_file import read_robot, robot_text
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
-from truearm.robots import load_robot
 
 TURNED = (math.cos(0.4), math.sin(0.4) * 0.6, 0.0, math.sin(0.4) * 0.8)
 IRB120 = load_robot("irb120")

@@ -13,6 +13,7 @@ from tests.modeling.pinocchio_oracle import PinocchioChain
 from tests.modeling.test_effects import NAMES, loaded_arm
 
 from truearm.errors import InputError
+from truearm.library import load_robot
 from truearm.modeling.chain import Array
 from truearm.modeling.inverse import inverse
 from truearm.modeling.inverse.branches import BRANCHES, branch_rule
@@ -20,7 +21,6 @@ from truearm.modeling.inverse.solutions import PoseStatus
 from truearm.modeling.parts import Joint, LinkMass, Payload
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform, rotation_vector
-from truearm.robots import load_robot
 from truearm.simulation.truths import joint_truths
 from truearm.simulation.twin import Twin
 

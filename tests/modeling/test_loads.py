@@ -9,13 +9,13 @@ from tests.modeling.pinocchio_oracle import Body, PinocchioChain
 from tests.modeling.test_chain import random_frame, random_robot, random_unit
 
 from truearm.errors import InputError
+from truearm.library import library, load_robot
 from truearm.modeling.chain import Array, Chain, Direction, Element, across, axis_of
 from truearm.modeling.conventions import CONVENTIONS, Convention, JointKind
 from truearm.modeling.loads import joint_loads
 from truearm.modeling.parts import GRAVITY, Joint, LinkMass, Payload
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
-from truearm.robots import library, load_robot
 
 CONFIGURATIONS = 7
 WITH_MASSES = [name for name in library() if load_robot(name).masses]

@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from truearm.errors import InputError
+from truearm.library import load_robot
 from truearm.modeling.effects import EFFECTS
 from truearm.modeling.formats.robot_file import RobotFile, read_robot, robot_from_file, robot_text
 from truearm.modeling.parts import Payload, Tool
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
-from truearm.robots import load_robot
 from truearm.units import SHOWN_AS, to_si, written
 
 PLAIN = """\

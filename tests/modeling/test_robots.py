@@ -7,12 +7,12 @@ import pytest
 from numpy.testing import assert_allclose
 
 from truearm.errors import InputError
+from truearm.library import library, load_robot, urdf_source
 from truearm.modeling.chain import Array
 from truearm.modeling.conventions import parallel_joints_without_beta
 from truearm.modeling.formats.robot_file import read_robot, robot_text
 from truearm.modeling.formats.urdf import urdf_text
 from truearm.modeling.robot import Robot
-from truearm.robots import library, load_robot, urdf_source
 
 IDS = ("irb120", "irb1600", "katana450", "kr5", "li3", "lrmate200ic", "puma560", "ur10", "ur5")
 

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from truearm.errors import InputError
+from truearm.library import library, load_robot
 from truearm.modeling.chain import Array, Chain
 from truearm.modeling.conventions import CONVENTIONS, Convention, JointKind
 from truearm.modeling.formats.robot_file import read_robot, robot_text
@@ -19,7 +20,6 @@ from truearm.modeling.formats.urdf import calibrated_urdf, read_urdf, roll_pitch
 from truearm.modeling.parts import Joint, LinkMass
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
-from truearm.robots import library, load_robot
 
 # A UR5 as ROS writes it: rounded right angles, a world link, a fixed tool0, and a sensor beside the chain.
 UR_LIKE = b"""<?xml version="1.0" ?>

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from truearm.errors import InputError
+from truearm.library import load_robot
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
 from truearm.planning.constraints.clearance import smallest_clearance
 from truearm.planning.constraints.constraints import Constraints, allowed, read_constraints
-from truearm.robots import load_robot
 from truearm.simulation.truths import STATION, truth_twin
 
 HEAD = {"truearm": "truearm-constraints/1", "units": {"length": "mm", "angle": "deg"}}

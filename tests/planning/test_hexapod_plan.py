@@ -14,6 +14,7 @@ from truearm.identification.hexapod.campaign import Campaign, touching, two_step
 from truearm.identification.hexapod.placements import identify_placements, in_one_frame
 from truearm.identification.solving.fit import identify
 from truearm.identification.solving.models import MODELS
+from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.hexapod.geometry import DEVICE, triangle
 from truearm.measurement.hexapod.kinematics import leg_lengths
@@ -27,7 +28,6 @@ from truearm.planning.hexapod.clearance import arm_links, clearance
 from truearm.planning.hexapod.reachable import Reachable, reachable
 from truearm.planning.hexapod.steps import steps_text
 from truearm.planning.hexapod.tool import with_cups
-from truearm.robots import load_robot
 from truearm.simulation.hexapod.session import joined
 from truearm.simulation.hexapod.simulated import ballbar
 from truearm.simulation.twin import Twin, measure
@@ -199,9 +199,9 @@ def test_the_final_calibration_sees_all_and_a_tracker_is_better_away_from_the_fi
     from_fixture = replace(seen, position=(seen.position - np.array(frame.translation)) @ frame.rotation)
     tracker = identify(robot, measure(twin, robot.random_configurations(50, rng), 2e-5, rng), ELASTIC)
     away = np.linalg.norm(from_fixture.position - [0.15, 0.087, 0.245], axis=1) > 0.25
-    by_tracker = np.linalg.norm(errors_of(tracker.robot, seen).position[away], axis=1)
-    by_device = np.linalg.norm(errors_of(done.final.robot, from_fixture).position[away], axis=1)
-    nominal = np.linalg.norm(errors_of(robot, seen).position, axis=1)
+    by_tracker = np.linalg.norm(errors_of(tracker.robot, seen).position_errors[away], axis=1)
+    by_device = np.linalg.norm(errors_of(done.final.robot, from_fixture).position_errors[away], axis=1)
+    nominal = np.linalg.norm(errors_of(robot, seen).position_errors, axis=1)
     assert by_tracker.mean() < by_device.mean() < nominal.mean() / 3
     # the frame by the readings at the cups, as the document finds it
     touched = done.frame_by(done.final.robot, "1").frame

@@ -11,10 +11,10 @@ import pytest
 from tests.tilting import DEGREE, RESOLUTION
 
 from truearm.errors import InputError
+from truearm.library import load_robot
 from truearm.measurement.inclinometer import deviation_of_change
 from truearm.modeling.chain import Array
 from truearm.planning.choosing.inclinometer import TiltingPlan, plan_tilting
-from truearm.robots import load_robot
 
 DEVIATION = deviation_of_change(RESOLUTION)
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from truearm.errors import InputError
+from truearm.library import load_robot
 from truearm.modeling.inverse import inverse
 from truearm.modeling.parts import Joint
 from truearm.modeling.robot import Robot
 from truearm.planning.poses.iso9283 import PLANES, Cube
 from truearm.planning.poses.largest_cube import largest_cube
-from truearm.robots import load_robot
 
 CUBE = Cube((0.4, 0.1, 0.3), 0.2)
 

@@ -12,6 +12,7 @@ from scipy.optimize import least_squares
 from tests.modeling.pinocchio_oracle import PinocchioChain
 
 from truearm.errors import InputError
+from truearm.library import load_robot
 from truearm.modeling.chain import Array
 from truearm.modeling.inverse.pose_solver import Orientation
 from truearm.modeling.parts import Joint
@@ -22,7 +23,6 @@ from truearm.planning.paths.paths import Circle, Line
 from truearm.planning.paths.time_law import timed
 from truearm.planning.paths.trajectory import Trajectory
 from truearm.planning.poses.tip import Tip
-from truearm.robots import load_robot
 
 TILTED = Transform((0.4, -0.2, 0.7), (0.8, 0.0, 0.6, 0.0))
 

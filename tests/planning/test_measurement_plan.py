@@ -10,6 +10,7 @@ import pytest
 from truearm.errors import InputError
 from truearm.identification.solving.fit import identify
 from truearm.identification.solving.models import MODELS
+from truearm.library import load_robot
 from truearm.planning.choosing.measurement_plan import (
     APPROACH,
     MeasurementPlan,
@@ -21,7 +22,6 @@ from truearm.planning.choosing.ordering import short_order
 from truearm.planning.choosing.prediction import predict
 from truearm.planning.choosing.sensitivity import sensitivity
 from truearm.planning.constraints.constraints import Constraints
-from truearm.robots import load_robot
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import measure
 

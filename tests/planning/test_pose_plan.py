@@ -10,11 +10,11 @@ import pytest
 from tests.modeling.pinocchio_oracle import PinocchioChain
 
 from truearm.errors import InputError
+from truearm.library import load_robot
 from truearm.modeling.transform import Transform
 from truearm.planning.choosing.ordering import all_moving_order, smallest_moves
 from truearm.planning.poses.iso9283 import PLANES, Cube
 from truearm.planning.poses.pose_plan import plan_poses
-from truearm.robots import load_robot
 
 ARMS = {
     "katana450": Cube((0.3, 0.0, 0.2), 0.25),

@@ -17,6 +17,7 @@ import pytest
 from truearm.identification.solving.fit import Redundant, identify, place
 from truearm.identification.solving.losses import Loss
 from truearm.identification.solving.models import MODELS
+from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of
 from truearm.modeling.robot import Robot
@@ -25,7 +26,7 @@ from truearm.notices import Notice
 from truearm.reporting.numbers import significant
 from truearm.reporting.page import json_for_script
 from truearm.reporting.report import Report, report_html
-from truearm.robots import load_robot
+from truearm.results.calibration import Calibration
 from truearm.simulation.twin import Twin, measure
 
 HOSTILE: Final = "</script><b>"
@@ -66,7 +67,7 @@ def made(
     redundancy: Redundant = "prior",
     noise: float = 5e-5,
     outlier: bool = False,
-) -> Report:
+) -> Calibration:
     data = readings(names, poses, noise)
     order = np.random.default_rng(0).permutation(data.configurations)
     training, held_out = order[:train], order[train:]
@@ -79,7 +80,7 @@ def made(
     first = data.of_configurations(training)
     fit = identify(robot, first, MODEL_BY_NAME[model], loss=loss, redundancy=redundancy)
     judged = data.of_configurations(held_out) if len(held_out) else first
-    return Report(
+    return Calibration(
         fit=fit,
         data=data,
         training=training,
@@ -135,7 +136,7 @@ class Page(HTMLParser):
 
 
 @cache
-def page(report: Report) -> Page:
+def page(report: Calibration) -> Page:
     return Page(report_html(report))
 
 
@@ -210,7 +211,7 @@ def test_errors_are_those_of_the_statistics() -> None:
     assert report.validation is not None
     shown = cells(report_html(report))[:24]
     expected = []
-    for kind in ("position_spread", "orientation_spread"):
+    for kind in ("position", "orientation"):
         for errors in (report.nominal, report.validation, report.train):
             spread = getattr(errors, kind)
             expected += [spread.mean, spread.rms, spread.p95, spread.max]
@@ -222,7 +223,7 @@ def test_errors_are_those_of_the_statistics() -> None:
 def test_the_first_figure_is_the_held_out_error() -> None:
     report = made()
     assert report.validation is not None
-    before, after = report.nominal.position_spread, report.validation.position_spread
+    before, after = report.nominal.position, report.validation.position
     assert before is not None
     assert after is not None
     text = page(report).text
@@ -356,7 +357,7 @@ def test_exact_data_can_be_drawn() -> None:
 def test_workspace_is_in_the_base_frame_in_mm() -> None:
     report = made()
     cloud = page(report).figures["workspace"]["data"][0]
-    part = report.judged_part
+    part = Report(report).judged_part
     shown = np.array([cloud["x"], cloud["y"], cloud["z"]]).T
     at_origin = replace(report.fit.robot, base_quaternion=(1.0, 0.0, 0.0, 0.0)).with_values(
         {f"base_{axis}": 0.0 for axis in ("x", "y", "z", "rx", "ry", "rz")}
@@ -365,13 +366,13 @@ def test_workspace_is_in_the_base_frame_in_mm() -> None:
     expected = predicted[part.target, part.configuration] * 1e3
     assert np.abs(shown - expected).max() < 0.5  # noise and rounding
     assert report.validation is not None
-    errors = np.linalg.norm(report.validation.position, axis=1) * 1e3
+    errors = np.linalg.norm(report.validation.position_errors, axis=1) * 1e3
     assert cloud["marker"]["color"] == pytest.approx(errors, rel=5e-3)
     assert [row[0] for row in cloud["customdata"]] == [part.labels[i] for i in part.configuration]
     before, same, own = (
         button["args"][0] for button in page(report).figures["workspace"]["layout"]["updatemenus"][0]["buttons"]
     )
-    nominal = np.linalg.norm(report.nominal.position, axis=1) * 1e3
+    nominal = np.linalg.norm(report.nominal.position_errors, axis=1) * 1e3
     assert before["marker.color"][0] == pytest.approx(nominal, rel=5e-3)
     assert before["marker.cmax"] == same["marker.cmax"] > own["marker.cmax"]
 
@@ -383,7 +384,7 @@ def test_residuals_are_means_over_targets_in_measuring_order() -> None:
     assert training["x"] == sorted((report.training + 1).tolist())
     assert held_out["x"] == sorted((report.held_out + 1).tolist())
     errors = errors_of(report.fit.robot, report.data)
-    means = np.linalg.norm(errors.position, axis=1).reshape(-1, 3).mean(axis=1) * 1e3
+    means = np.linalg.norm(errors.position_errors, axis=1).reshape(-1, 3).mean(axis=1) * 1e3
     for trace in (training, held_out):
         assert trace["y"] == pytest.approx(means[np.array(trace["x"]) - 1], rel=1e-3)
 

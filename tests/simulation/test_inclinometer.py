@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from truearm.library import load_robot
 from truearm.modeling.parts import Joint, Payload
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
-from truearm.robots import load_robot
 from truearm.simulation.inclinometer import inclinations
 from truearm.simulation.twin import Twin
 from truearm.simulation.twin_joint import JointTruth

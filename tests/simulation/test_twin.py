@@ -13,12 +13,12 @@ import pytest
 from numpy.testing import assert_allclose
 
 from truearm.errors import InputError
+from truearm.library import library, load_robot
 from truearm.measurement import inclinometer
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import GRAVITY, Joint, LinkMass, Payload
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
-from truearm.robots import library, load_robot
 from truearm.simulation import twin as twin_module
 from truearm.simulation import twin_body, twin_joint
 from truearm.simulation.truths import truth_twin

@@ -7,10 +7,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from truearm.errors import InputError
+from truearm.library import load_robot
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY
-from truearm.robots import load_robot
 from truearm.simulation.twin import Twin
 from truearm.validation.pose_accuracy import pose_errors, repeatability
 from truearm.validation.sphere_test import sphere_test

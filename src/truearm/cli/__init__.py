@@ -22,6 +22,7 @@ from truearm.cli.ik import ik
 from truearm.cli.importing import app as importing
 from truearm.cli.library import robots, show
 from truearm.cli.lines import lines
+from truearm.cli.options import CommandError, Commands
 from truearm.cli.plan import plan
 from truearm.cli.simulate import simulate
 from truearm.cli.starting import demo, example, new_robot
@@ -35,7 +36,7 @@ from truearm.version import __version__
 # a busy one. NumPy reads this when it is first imported, which is after here.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-app = typer.Typer(
+app = Commands(
     name="truearm",
     help="Make a serial robot accurate: identify the real robot from measurements and prove how good it is.",
     no_args_is_help=True,
@@ -91,7 +92,7 @@ def main() -> None:
             app(prog_name="truearm")
         finally:
             sys.stdout.flush()
-    except InputError as error:
+    except (InputError, CommandError) as error:
         _end(f"truearm: {error}")
     except BrokenPipeError:  # whoever read the output has seen enough
         _drop_output()

@@ -30,10 +30,10 @@ def axes(
     """
     import json as text
 
-    from truearm.calibration import load_data
     from truearm.files import refuse_overwriting, writable_folder, write_files
     from truearm.identification.axes.analysis import analyse
-    from truearm.robots import load_robot, urdf_source
+    from truearm.jobs.load_data import load_data
+    from truearm.library import load_robot, urdf_source
 
     if frame not in ("instrument", "robot"):
         raise InputError("there is no such frame", where="--frame", came=frame, allowed="instrument, robot")

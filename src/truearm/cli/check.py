@@ -6,14 +6,17 @@ from typing import Annotated
 
 import typer
 
-from truearm.cli.output import Json, print_json, progress
+from truearm.cli.output import Json, print_json, print_record, progress
 
 
 def check(
-    data: Annotated[str, typer.Argument(metavar="DATA.csv", help="Measurements in the canonical CSV.")],
-    robot: Annotated[
-        str | None, typer.Argument(metavar="[ROBOT]", help="A library id, a robot file or a URDF.", show_default=False)
-    ] = None,
+    files: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="[ROBOT] DATA.csv",
+            help="A library id, a robot file or a URDF, where wanted; measurements in the canonical CSV.",
+        ),
+    ],
     device: Annotated[
         str | None,
         typer.Option(metavar="NAME", help="The instrument, of 'truearm devices': its range.", show_default=False),
@@ -24,24 +27,18 @@ def check(
 
     With ROBOT, also units, joint order and signs, limits, and readings that are far off; with --device its range.
     """
-    from truearm.calibration import check as run
-    from truearm.calibration import load_data
+    from truearm.errors import InputError
+    from truearm.jobs.check import check as run
 
+    if len(files) > 2:
+        raise InputError(
+            "one robot and one file of measurements at most", parameter="files", came=f"{len(files)} names"
+        )
+    robot, data = files if len(files) == 2 else (None, files[0])
     with progress() as say:
         say("checking")
-        loaded = load_data(data)
-        notices = run(loaded, robot, device)
+        checked = run(robot, data, device=device)
     if json:
-        print_json(
-            {
-                "configurations": loaded.configurations,
-                "targets": list(loaded.targets),
-                "warnings": [{"code": n.code, "message": n.message} for n in notices],
-            }
-        )
-        return
-    typer.echo(f"{data}: {loaded.configurations} configurations, targets {', '.join(loaded.targets)}")
-    for notice in notices:
-        typer.echo(f"Warning ({notice.code}): {notice.message}")
-    if not notices:
-        typer.echo("Nothing looks wrong.")
+        print_json(checked.summary())
+    else:
+        print_record(checked)

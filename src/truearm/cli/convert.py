@@ -15,9 +15,9 @@ def convert(
 ) -> None:
     """Write a robot in another kinematic convention, every pose the same."""
     from truearm.files import write_new_text
+    from truearm.library import load_robot
     from truearm.modeling.conversion import converted
     from truearm.modeling.formats.robot_file import robot_text
-    from truearm.robots import load_robot
 
     made = converted(load_robot(robot), convention)
     write_new_text(out, robot_text(made))

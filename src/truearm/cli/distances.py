@@ -21,7 +21,7 @@ def distances(
     """Judge a robot by the distances between all pairs of measured points; no common frame is needed."""
     import numpy as np
 
-    from truearm.calibration import validate
+    from truearm.jobs.validate import validate
     from truearm.measurement.readers.canonical import read_csv
     from truearm.validation.pair_distances import pair_distances
 
@@ -29,7 +29,7 @@ def distances(
     errors = validate(robot_file, readings, payload=read_payload(payload), gravity=read_gravity(gravity))
     seen = readings.has_position
     measured = readings.position[seen]
-    found = pair_distances(measured + errors.position[seen], measured, readings.configuration[seen])
+    found = pair_distances(measured + errors.errors.position_errors[seen], measured, readings.configuration[seen])
     edges = np.round(found.edges * 1e3, 9).tolist()
     summary: dict[str, Any] = {
         "configurations": readings.configurations,

@@ -28,8 +28,8 @@ def export(
 ) -> None:
     """Write a robot for other programs, and say what the format cannot hold."""
     from truearm.files import write_new_text
+    from truearm.library import load_robot
     from truearm.modeling.formats.export import exported
-    from truearm.robots import load_robot
 
     loaded = load_robot(robot)
     made = exported(loaded, format_)

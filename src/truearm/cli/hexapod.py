@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from truearm.cli.options import Commands
 from truearm.cli.output import Json, print_json
 from truearm.errors import InputError
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from truearm.modeling.chain import Array
     from truearm.modeling.transform import Transform
 
-app = typer.Typer(
+app = Commands(
     no_args_is_help=True, help="Measure poses with one ballbar between three cups on the tool and three on the base."
 )
 
@@ -162,12 +163,12 @@ def plan(
 ) -> None:
     """Plan which configurations of a robot can be measured with the fixture at one place."""
     from truearm.files import refuse_overwriting, writable_file, write_text
+    from truearm.library import load_robot, urdf_source
     from truearm.measurement.hexapod.poses import distinct, poses
     from truearm.measurement.hexapod.sheet import sheet_csv
     from truearm.planning.hexapod.reachable import reachable
     from truearm.planning.hexapod.steps import steps_text
     from truearm.planning.hexapod.tool import with_cups
-    from truearm.robots import load_robot, urdf_source
     from truearm.units import sized_si
 
     place = _fixture(fixture)
@@ -219,11 +220,11 @@ def world_frame(
 
     import numpy as np
 
+    from truearm.library import load_robot
     from truearm.measurement.hexapod.geometry import DEVICE, side_names
     from truearm.measurement.hexapod.touches import read_touches
     from truearm.measurement.hexapod.world_frame import world_frame as fitted
     from truearm.planning.hexapod.tool import with_cups
-    from truearm.robots import load_robot
     from truearm.units import sized_si
 
     device = replace(DEVICE, reach=sized_si(reach, "mm", "--range"))

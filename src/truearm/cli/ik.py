@@ -52,11 +52,11 @@ def ik(
 ) -> None:
     """Find the joint readings that bring a robot to poses, with its calibration and joint effects."""
     from truearm.files import writable_folder, write_text
+    from truearm.library import load_robot
     from truearm.measurement.readers.poses import read_poses
     from truearm.modeling.formats.joint_table import joints_csv
     from truearm.modeling.inverse import inverse
     from truearm.modeling.transform import rotation_from_quaternion
-    from truearm.robots import load_robot
 
     writable_folder(out.parent)
     if position_only and axis_only:

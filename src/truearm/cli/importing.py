@@ -7,9 +7,10 @@ from typing import Annotated
 
 import typer
 
+from truearm.cli.options import Commands
 from truearm.errors import InputError
 
-app = typer.Typer(help="Turn measurement files into the canonical CSV.", no_args_is_help=True)
+app = Commands(help="Turn measurement files into the canonical CSV.", no_args_is_help=True)
 
 
 @app.command()

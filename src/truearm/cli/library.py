@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 def robots(json: Json = False) -> None:
     """List the robots of the library."""
-    from truearm.robots import library, load_robot
+    from truearm.library import library, load_robot
 
     found = [load_robot(robot_id) for robot_id in library()]
     if json:
@@ -32,8 +32,8 @@ def show(
     json: Json = False,
 ) -> None:
     """Show a robot: its joints, its reach at zero, what is known about it."""
+    from truearm.library import load_robot
     from truearm.modeling.parts import GRAVITY
-    from truearm.robots import load_robot
 
     loaded = load_robot(robot)
     content = _content(loaded)

@@ -43,11 +43,11 @@ def lines(
     """Test a robot along seven directions of a box, and compensate it off-line through its joint errors."""
     import numpy as np
 
-    from truearm.calibration import load_data
     from truearm.compensation.inverse_errors import fake_targets
     from truearm.files import writable_file, write_text
+    from truearm.jobs.load_data import load_data
+    from truearm.library import load_robot
     from truearm.planning.poses.seven_lines import readings, seven_lines
-    from truearm.robots import load_robot
     from truearm.simulation.truths import truth_twin
     from truearm.units import from_si, sized_si
     from truearm.validation.line_test import from_data, on_twin, summary

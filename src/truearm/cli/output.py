@@ -5,9 +5,14 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+from truearm.cli.options import spelled
+
+if TYPE_CHECKING:
+    from truearm.results.record import Record
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output and nothing else there.")]
 
@@ -30,12 +35,7 @@ def progress() -> Iterator[Callable[[str], None]]:
         yield lambda words: status.update(words)
 
 
-def error_line(summary: dict[str, Any]) -> str:
-    """Return the statistics of one set of errors as a line."""
-    parts = []
-    kinds = (("position_mm", "mm"), ("orientation_mrad", "mrad"), ("length_mm", "mm of length"))
-    for key, unit in kinds:
-        if key in summary:
-            s = summary[key]
-            parts.append(f"mean {s['mean']:.3f}  rms {s['rms']:.3f}  95 % {s['p95']:.3f}  max {s['max']:.3f} {unit}")
-    return "   ".join(parts) if parts else "no readings"
+def print_record(record: Record) -> None:
+    """Print a result in words and figures."""
+    for line in record.lines():
+        typer.echo(spelled(line))

@@ -59,8 +59,11 @@ def plan(
 
     import numpy as np
 
-    from truearm.calibration import check_joints, load_data, named_model
     from truearm.files import refuse_overwriting, writable_file, write_files
+    from truearm.identification.solving.models import named_model
+    from truearm.jobs.load_data import load_data
+    from truearm.library import load_robot, urdf_source
+    from truearm.measurement.checks import check_joints
     from truearm.planning.choosing.measurement_plan import (
         device_candidates,
         plan_measurements,
@@ -70,7 +73,6 @@ def plan(
     from truearm.planning.choosing.plan_table import plan_csv
     from truearm.planning.constraints.constraints import read_constraints
     from truearm.reporting.plan_report import answer, plan_html
-    from truearm.robots import load_robot, urdf_source
     from truearm.simulation.devices import named_device
     from truearm.units import sized_si
 

@@ -46,8 +46,8 @@ def simulate(
     from truearm.cli.output import progress
     from truearm.errors import InputError
     from truearm.files import refuse_overwriting, writable_file, write_text
+    from truearm.library import load_robot, urdf_source
     from truearm.measurement.readers.canonical import csv_text
-    from truearm.robots import load_robot, urdf_source
     from truearm.simulation.devices import measured_with, named_device
     from truearm.simulation.truths import truth_twin
     from truearm.simulation.twin import measure

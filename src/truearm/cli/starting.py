@@ -14,20 +14,20 @@ def demo(
     ),
 ) -> None:
     """Run the main job on a built-in digital twin of an ABB IRB 120: calibrate it and correct a program."""
-    from truearm.cli.calibrate import exit_unless_finished, print_calibration
     from truearm.cli.compensate import print_checked, print_correction
-    from truearm.cli.output import progress
+    from truearm.cli.output import print_record, progress
     from truearm.demonstration import demonstration
 
     with progress() as say:
         shown = demonstration(out, say)
-    print_calibration(shown.calibration)
+    print_record(shown.calibration)
     if shown.correction is not None:
         print_correction(shown.correction)
         print_checked(shown.correction)
         typer.echo(f"The corrected program is in {out / 'corrected'}, with a report of its own, compensation.html.")
     typer.echo(f"The report is {out / 'report.html'}; open it in a browser.")
-    exit_unless_finished(shown.calibration)
+    if not shown.calibration.finished:
+        raise typer.Exit(3)
 
 
 def example(folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder to write into.")]) -> None:

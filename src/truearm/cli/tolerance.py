@@ -33,8 +33,8 @@ def tolerance(
     import numpy as np
 
     from truearm.compensation.inverse_errors import design
+    from truearm.library import load_robot
     from truearm.modeling.conversion import converted
-    from truearm.robots import load_robot
     from truearm.validation.tolerances import checked_depth, errors_of_tolerance, flange_error, joint_tolerances
 
     loaded = load_robot(robot)

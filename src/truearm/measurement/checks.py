@@ -14,8 +14,10 @@ from typing import Final, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.errors import InputError
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
+from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 
 Suspicion = Literal["outliers", "targets-swapped", "target-mistaken"]
@@ -310,6 +312,32 @@ def _moved(data: Dataset) -> list[Notice]:
             "configurations out or measure them again.",
         )
     ]
+
+
+def check_joints(robot: Robot, data: Dataset) -> None:
+    """Refuse data whose joints are not the robot's.
+
+    Raises
+    ------
+    InputError
+        Naming the counts, or the joint whose unit does not fit.
+    """
+    if data.joints.shape[1] != len(robot.joints):
+        raise InputError(
+            "the number of joints differs from the robot's",
+            where=data.source,
+            came=f"{data.joints.shape[1]} joint columns",
+            allowed=f"{len(robot.joints)} ({robot.name})",
+            cure="Give one column joint_i for each joint of the robot, base first.",
+        )
+    for number, (joint, kind) in enumerate(zip(robot.joints, data.joint_kinds, strict=True), 1):
+        if joint.kind != kind:
+            units = {"revolute": "deg or rad", "prismatic": "mm, m, um or in"}
+            raise InputError(
+                f"joint {number} of {robot.name} is {joint.kind}, but its column has a unit of a {kind} joint",
+                where=f"{data.source}, column joint_{number}",
+                allowed=units[joint.kind],
+            )
 
 
 # -- bookkeeping -------------------------------------------------------------------------------------------

@@ -41,50 +41,52 @@ class Errors:
     ----------
     configurations
         Number of configurations judged.
-    position
+    position_errors
         Predicted minus measured position of each reading [m], ``(readings, 3)``, NaN where nothing was read.
-    orientation
+    orientation_errors
         Rotation vector from the measured to the predicted orientation [rad], likewise; None without any. A target
         that the robot knows only as a point has no orientation to be judged.
-    length
+    length_errors
         Predicted minus measured distance from a fixture, or height over one [m], ``(readings,)``, NaN where none was
         read; None without any.
     """
 
     configurations: int
-    position: Array
-    orientation: Array | None
-    length: Array | None = None
+    position_errors: Array
+    orientation_errors: Array | None
+    length_errors: Array | None = None
 
     @property
     def position_norms(self) -> Array:
         """Error of each position that was read [m]."""
-        return _norms(self.position)
+        return _norms(self.position_errors)
 
     @property
     def orientation_norms(self) -> Array:
         """Error of each orientation that was read [rad]."""
-        return _norms(self.orientation) if self.orientation is not None else np.zeros(0)
+        return _norms(self.orientation_errors) if self.orientation_errors is not None else np.zeros(0)
 
     @property
     def length_norms(self) -> Array:
         """Error of each distance or height that was read, without sign [m]."""
-        return np.zeros(0) if self.length is None else np.abs(self.length[np.isfinite(self.length)])
+        return (
+            np.zeros(0) if self.length_errors is None else np.abs(self.length_errors[np.isfinite(self.length_errors)])
+        )
 
     @property
-    def position_spread(self) -> Spread | None:
+    def position(self) -> Spread | None:
         """Statistics over single readings [m], None without any."""
         norms = self.position_norms
         return Spread.of(norms) if len(norms) else None
 
     @property
-    def orientation_spread(self) -> Spread | None:
+    def orientation(self) -> Spread | None:
         """Statistics over single readings [rad], None without any."""
         norms = self.orientation_norms
         return Spread.of(norms) if len(norms) else None
 
     @property
-    def length_spread(self) -> Spread | None:
+    def length(self) -> Spread | None:
         """Statistics over single distances and heights [m], None without any."""
         norms = self.length_norms
         return Spread.of(norms) if len(norms) else None

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Final
 
+from truearm.errors import InputError
 from truearm.modeling.chain import Chain, Element, Motion
 from truearm.modeling.conventions import JointKind
 from truearm.modeling.transform import fixed_rotation
+from truearm.units import as_number, sized_si
 
 #: Standard gravity, with the base's z upwards [m/s^2].
 GRAVITY: Final = (0.0, 0.0, -9.80665)
@@ -85,8 +88,51 @@ class Payload:
 
     @property
     def text(self) -> str:
-        """As the option ``--payload`` takes it."""
+        """As :meth:`of_text` reads it."""
         return ",".join([f"{self.mass:.15g}kg", *(f"{v * 1e3:.15g}mm" for v in self.cog)])
+
+    @classmethod
+    def of_text(cls, text: str, parameter: str = "payload") -> Payload:
+        """Return the payload that a text such as ``2.7kg,50mm,25mm,100mm`` names, units always given.
+
+        Raises
+        ------
+        InputError
+            If a part is missing or has no unit, or the mass is negative.
+        """
+        parts = text.split(",")
+        if len(parts) != 4:
+            raise InputError(
+                "a mass and the three coordinates of its centre of gravity belong here",
+                parameter=parameter,
+                came=text,
+                allowed="2.7kg,50mm,25mm,100mm",
+            )
+        mass, x, y, z = (
+            _quantity(part, units, parameter)
+            for part, units in zip(parts, (_MASSES, _LENGTHS, _LENGTHS, _LENGTHS), strict=True)
+        )
+        if mass < 0.0:
+            raise InputError("a mass cannot be negative", parameter=parameter, came=parts[0])
+        return cls(mass, (x, y, z))
+
+
+_MASSES: Final = ("kg", "g")
+_LENGTHS: Final = ("mm", "m")
+
+
+def _quantity(text: str, units: tuple[str, ...], parameter: str) -> float:
+    match = re.fullmatch(r"\s*(?P<number>[^a-zA-Z]*(?:[eE][-+0-9]+)?)\s*(?P<unit>[a-zA-Z]*)\s*", text)
+    number = None if match is None else as_number(match["number"].strip())
+    if match is None or number is None or match["unit"] not in units:
+        raise InputError(
+            "a number with its unit belongs here" if number is None else "no unit is given that fits here",
+            parameter=parameter,
+            came=text,
+            allowed=" or ".join(f"{'2.7' if units is _MASSES else '50'}{unit}" for unit in units),
+            cure="Units are never guessed: write 2.7kg,50mm,25mm,100mm.",
+        )
+    return sized_si(number, match["unit"], parameter=parameter, came=text)
 
 
 NO_PAYLOAD: Final = Payload()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -11,13 +10,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.identification.choosing.selection import Selection
-from truearm.identification.solving.fit import Fit
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import Errors
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import GRAVITY
-from truearm.notices import Notice
 from truearm.reporting.drawing import Figure
 from truearm.reporting.figures import correlation_map, histogram, residuals, workspace
 from truearm.reporting.page import page
@@ -30,6 +26,7 @@ from truearm.reporting.tables import (
     spread_rows,
     strongest_pairs,
 )
+from truearm.results.calibration import Calibration
 
 _FRAMES: Final = ("base", "target", "fixture")
 #: A reading whose weight is less than this share of the median weight was not believed.
@@ -38,72 +35,47 @@ _DOUBTED: Final = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """What a report tells about.
+    """What the page shows of a calibration: its tables and pictures.
 
     Attributes
     ----------
-    fit
-        Made from the training part alone.
-    data
-        All readings.
-    training, held_out
-        Indices of the configurations of each part; `held_out` may be empty.
-    nominal
-        Errors of the uncalibrated robot on the held-out part; on the training part if nothing was held out.
-    train
-        Errors of the calibrated robot on the training part.
-    validation
-        Errors of the calibrated robot on the held-out part; None if nothing was held out.
-    warnings
-        What to know about the result.
-    command
-        How to run it again.
-    history
-        What was done, in one line with the hash of the data.
-    selection
-        How the model was chosen, if it was not named.
+    calibration
+        What it tells about.
     """
 
-    fit: Fit
-    data: Dataset
-    training: NDArray[np.intp]
-    held_out: NDArray[np.intp]
-    nominal: Errors
-    train: Errors
-    validation: Errors | None
-    warnings: Sequence[Notice]
-    command: str
-    history: str
-    selection: Selection | None = None
+    calibration: Calibration
 
     @property
     def judged(self) -> Errors:
-        """Errors of the calibrated robot on the part that `nominal` is about."""
-        return self.train if self.validation is None else self.validation
+        """Errors of the calibrated robot on the part that the nominal one is judged on."""
+        run = self.calibration
+        return run.train if run.validation is None else run.validation
 
     @cached_property
     def judged_part(self) -> Dataset:
         """The readings of that part."""
-        return self.data.of_configurations(self.training if self.validation is None else self.held_out)
+        run = self.calibration
+        return run.data.of_configurations(run.training if run.validation is None else run.held_out)
 
     @property
     def position(self) -> tuple[SpreadRow, ...]:
         """Position errors [mm]: before and after, then those of the training part."""
-        return spread_rows(self.nominal, self.train, self.validation, "position")
+        return spread_rows(self.calibration.nominal, self.calibration.train, self.calibration.validation, "position")
 
     @property
     def orientation(self) -> tuple[SpreadRow, ...]:
         """Orientation errors [mrad], likewise; empty where none was read."""
-        return spread_rows(self.nominal, self.train, self.validation, "orientation")
+        return spread_rows(self.calibration.nominal, self.calibration.train, self.calibration.validation, "orientation")
 
     @property
     def length(self) -> tuple[SpreadRow, ...]:
         """Errors of distances and heights [mm], likewise; empty where none was read."""
-        return spread_rows(self.nominal, self.train, self.validation, "length")
+        return spread_rows(self.calibration.nominal, self.calibration.train, self.calibration.validation, "length")
 
     def figures(self) -> dict[str, Figure]:
         """Return the pictures by the name of their place on the page."""
-        nominal, judged = self.nominal, self.judged
+        run, judged = self.calibration, self.judged
+        nominal = run.nominal
         drawn = {}
         if len(judged.position_norms):
             drawn["position-histogram"] = histogram(
@@ -119,16 +91,16 @@ class Report:
             )
         if np.isfinite(_millimetres(judged)).any():
             drawn["workspace"] = workspace(self.judged_part, self._tips(), _millimetres(nominal), _millimetres(judged))
-        parts = [("training", self.training, _millimetres(self.train))]
-        if self.validation is not None:
-            parts.append(("held out", self.held_out, _millimetres(self.validation)))
-        drawn["residuals"] = residuals(self.data, parts, self._doubted())
-        drawn["correlations"] = correlation_map(self.fit)
+        parts = [("training", run.training, _millimetres(run.train))]
+        if run.validation is not None:
+            parts.append(("held out", run.held_out, _millimetres(run.validation)))
+        drawn["residuals"] = residuals(run.data, parts, self._doubted())
+        drawn["correlations"] = correlation_map(run.fit)
         return drawn
 
     def _tips(self) -> Array:
         """Return where the target of each judged reading is, in the robot's base frame [m], ``(readings, 3)``."""
-        part, robot = self.judged_part, self.fit.robot
+        part, robot = self.judged_part, self.calibration.fit.robot
         seen = robot.loaded(part.postures)
         tips = np.array([robot.poses(seen, name)[0] for name in part.targets])
         base = robot.base
@@ -139,21 +111,22 @@ class Report:
 
         The weights of ``l1`` are 1 over the residual, so a weight says something only beside the others.
         """
-        weight = self.fit.weight
+        weight = self.calibration.fit.weight
         doubted: NDArray[np.bool_] = weight < _DOUBTED * np.nanmedian(weight)
         return doubted
 
 
-def report_html(report: Report) -> str:
+def report_html(calibration: Calibration) -> str:
     """Return the report as one HTML page that holds its scripts and data."""
-    fit = report.fit
+    report, fit = Report(calibration), calibration.fit
     rows = parameter_rows(fit)
     return page(
         "report.html.jinja",
         report.figures(),
         report=report,
+        run=calibration,
         fit=fit,
-        source=Path(report.data.source).name,
+        source=Path(calibration.data.source).name,
         robot_rows=[row for row in rows if row.group not in _FRAMES],
         frame_rows=[row for row in rows if row.group in _FRAMES],
         parameter_sentence=parameter_sentence(rows),
@@ -167,5 +140,9 @@ def report_html(report: Report) -> str:
 
 def _millimetres(errors: Errors) -> Array:
     """Return the error of each position, distance or height, NaN where none was read."""
-    norms: Array = np.linalg.norm(errors.position, axis=1) * 1e3
-    return norms if errors.length is None else np.where(np.isfinite(norms), norms, np.abs(errors.length) * 1e3)
+    norms: Array = np.linalg.norm(errors.position_errors, axis=1) * 1e3
+    return (
+        norms
+        if errors.length_errors is None
+        else np.where(np.isfinite(norms), norms, np.abs(errors.length_errors) * 1e3)
+    )

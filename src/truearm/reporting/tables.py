@@ -65,9 +65,9 @@ def spread_rows(nominal: Errors, train: Errors, validation: Errors | None, kind:
     for part, robot, errors in cases:
         spread: Spread | None
         spread, norms = {
-            "position": (errors.position_spread, errors.position_norms),
-            "orientation": (errors.orientation_spread, errors.orientation_norms),
-            "length": (errors.length_spread, errors.length_norms),
+            "position": (errors.position, errors.position_norms),
+            "orientation": (errors.orientation, errors.orientation_norms),
+            "length": (errors.length, errors.length_norms),
         }[kind]
         if spread is not None:
             figures = (spread.mean * 1e3, spread.rms * 1e3, spread.p95 * 1e3, spread.max * 1e3)

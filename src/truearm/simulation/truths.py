@@ -10,12 +10,12 @@ import numpy as np
 
 from truearm.errors import InputError, nearest_names
 from truearm.files import exists
+from truearm.library import load_robot
 from truearm.modeling.chain import Array
 from truearm.modeling.effects.fourier import HARMONICS
 from truearm.modeling.parts import NO_PAYLOAD, Payload, Tool
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform, rotation_from_quaternion
-from truearm.robots import load_robot
 from truearm.simulation.twin import Twin
 from truearm.simulation.twin_joint import PERFECT, Contact, JointTruth
 

@@ -9,11 +9,11 @@ from typing import Any, Final
 
 import numpy as np
 
+from truearm.library import load_robot
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import Payload
 from truearm.reporting.drawing import AFTER, BEFORE, Figure, axis, figure
 from truearm.reporting.numbers import rounded_to
-from truearm.robots import load_robot
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import Twin
 from truearm.simulation.twin_joint import PERFECT, JointTruth

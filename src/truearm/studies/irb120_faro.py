@@ -13,6 +13,7 @@ from truearm.errors import InputError
 from truearm.identification.choosing.selection import AUTO, select
 from truearm.identification.solving.fit import identify
 from truearm.identification.solving.models import FRAMES, MODELS, Model
+from truearm.library import load_robot
 from truearm.measurement.checks import constellation
 from truearm.measurement.dataset import Dataset, IntArray
 from truearm.measurement.readers.matrices import read_matrices
@@ -22,7 +23,6 @@ from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
 from truearm.reporting.drawing import AFTER, BEFORE, axis, figure
 from truearm.reporting.numbers import rounded
-from truearm.robots import load_robot
 from truearm.studies.irb120_remainder import Remainder, cause_table, instrument_table, left_over, remainder_table
 from truearm.studies.parallel_axes import without_beta
 from truearm.studies.study import Picture, Row, Study, Table

@@ -10,6 +10,7 @@ from typing import Final
 
 import numpy as np
 
+from truearm.library import load_robot
 from truearm.measurement.hexapod.geometry import DEVICE, triangle
 from truearm.measurement.hexapod.kinematics import leg_lengths
 from truearm.measurement.hexapod.poses import poses
@@ -20,7 +21,6 @@ from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform, rigid_motion
 from truearm.planning.hexapod.reachable import Reachable, reachable
 from truearm.planning.hexapod.tool import with_cups
-from truearm.robots import load_robot
 from truearm.simulation.hexapod.session import SetUp, measure_poses, set_up
 from truearm.simulation.hexapod.simulated import ballbar
 from truearm.simulation.twin import Twin

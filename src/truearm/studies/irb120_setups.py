@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from truearm.identification.solving.fit import identify
 from truearm.identification.solving.models import Model
+from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import Payload
@@ -18,7 +19,6 @@ from truearm.modeling.robot import Robot
 from truearm.planning.choosing.exchange import most_telling, most_telling_number
 from truearm.planning.choosing.observability import O1
 from truearm.planning.choosing.sensitivity import sensitivity
-from truearm.robots import load_robot
 from truearm.simulation.devices.artefacts import PLANAR_ARTEFACT, SPATIAL_ARTEFACT, Artefact
 from truearm.simulation.devices.device import shown
 from truearm.simulation.devices.jogging import postures_at, site

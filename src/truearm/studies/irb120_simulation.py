@@ -12,6 +12,7 @@ import numpy as np
 from truearm.identification.solving.bounds import Bounds
 from truearm.identification.solving.fit import Redundant, identify
 from truearm.identification.solving.models import MODELS
+from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import Spread, errors_of
 from truearm.modeling.chain import Array
@@ -19,7 +20,6 @@ from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
 from truearm.reporting.drawing import AFTER, BEFORE, axis, figure, logarithmic_axis
 from truearm.reporting.numbers import rounded
-from truearm.robots import load_robot
 from truearm.simulation.truths import STATION, truth_twin
 from truearm.simulation.twin import Twin, measure
 from truearm.simulation.twin_joint import JointTruth

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from truearm.library import load_robot
 from truearm.measurement.hexapod.geometry import DEVICE
 from truearm.modeling.chain import Array
 from truearm.modeling.inverse import inverse
@@ -17,7 +18,6 @@ from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY
 from truearm.reporting.drawing import AFTER, BEFORE, Figure, axis, figure
 from truearm.reporting.numbers import rounded_to
-from truearm.robots import load_robot
 from truearm.simulation.hexapod.simulated import ballbar
 from truearm.simulation.twin import Twin
 from truearm.studies.irb120_worn import calibrated, in_base, in_region, tracked, worn_twin

@@ -10,9 +10,9 @@ from typing import Final
 import numpy as np
 
 from truearm.identification.solving.models import MODELS, Model
+from truearm.library import load_robot
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
-from truearm.robots import load_robot
 from truearm.simulation.twin import Twin
 from truearm.simulation.twin_joint import PERFECT
 

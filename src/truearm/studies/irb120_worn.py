@@ -10,11 +10,11 @@ import numpy as np
 
 from truearm.identification.solving.fit import identify
 from truearm.identification.solving.models import MODELS
+from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY
-from truearm.robots import load_robot
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import Twin, measure
 from truearm.simulation.twin_joint import PERFECT

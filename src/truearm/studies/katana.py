@@ -11,6 +11,7 @@ from typing import Final, Literal
 import numpy as np
 
 from truearm.identification.inclinometers.fit import TiltingFit, calibrate_tilting
+from truearm.library import load_robot
 from truearm.measurement.inclinometer import deviation_of_change
 from truearm.modeling.chain import Array
 from truearm.modeling.postures import Postures
@@ -19,7 +20,6 @@ from truearm.modeling.transform import IDENTITY, Transform
 from truearm.planning.choosing.inclinometer import plan_tilting
 from truearm.planning.poses.iso9283 import Cube
 from truearm.planning.poses.largest_cube import largest_cube
-from truearm.robots import load_robot
 from truearm.simulation.inclinometer import compare, measure_pairs
 from truearm.simulation.twin import Twin
 from truearm.simulation.twin_joint import JointTruth

@@ -13,6 +13,7 @@ from truearm.compensation.inverse_errors import fake_targets
 from truearm.identification.axes.circles import axis_circles
 from truearm.identification.axes.fit import NORMAL_95, AxisFit, fit_axes
 from truearm.identification.solving.redundancy import Redundancy
+from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
 from truearm.modeling.conversion import converted
@@ -21,7 +22,6 @@ from truearm.modeling.transform import IDENTITY
 from truearm.planning.poses.seven_lines import DIRECTIONS, SevenLines, readings, seven_lines
 from truearm.reporting.drawing import AFTER, BEFORE, axis, figure
 from truearm.reporting.numbers import rounded_to
-from truearm.robots import load_robot
 from truearm.simulation.twin import Twin, measure
 from truearm.studies.study import Picture, Row, Study, Table
 from truearm.validation.line_test import LineErrors, on_twin, reduction

@@ -13,13 +13,13 @@ from truearm.identification.solving.bounds import Bounds, bound_vectors
 from truearm.identification.solving.componentwise import least_absolute
 from truearm.identification.solving.problem import Problem
 from truearm.identification.solving.solver import solve
+from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
 from truearm.modeling.parameters import FreeParameters
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY, Transform
 from truearm.planning.paths.paths import Hermite
-from truearm.robots import load_robot
 from truearm.simulation.devices.calibration_table import CalibrationTable
 from truearm.simulation.twin import Twin, directions
 from truearm.simulation.twin_joint import JointTruth

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from truearm.identification.hexapod.campaign import touching
 from truearm.identification.solving.problem import Problem
 from truearm.identification.solving.solver import solve
+from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.hexapod.geometry import DEVICE
 from truearm.measurement.hexapod.world_frame import WorldFrame, world_frame
@@ -23,7 +24,6 @@ from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform, rotation_from_quaternion, rotation_vector
 from truearm.planning.constraints.constraints import Constraints, allowed
 from truearm.planning.hexapod.tool import with_cups
-from truearm.robots import load_robot
 from truearm.simulation.twin import Twin
 from truearm.simulation.twin_joint import JointTruth
 from truearm.validation.pair_distances import PairDistances, pair_distances

@@ -19,8 +19,8 @@ from truearm.compensation.programs.fanuc_ls import FANUC_LS
 from truearm.compensation.programs.fanuc_ls.configuration import configuration
 from truearm.compensation.programs.program import Configuration, Division, Program, Skipped, Source
 from truearm.errors import InputError
+from truearm.library import load_robot
 from truearm.modeling.inverse.branches import BRANCHES, branch_rule
-from truearm.robots import load_robot
 
 SAMPLES = Path(__file__).parent / "samples" / "fanuc_ls"
 HALF = (-pi, pi)

@@ -26,9 +26,9 @@ from truearm.compensation.programs.program import ANY_POSTURE, Division, Edit, P
 from truearm.compensation.programs.rapid import RAPID
 from truearm.compensation.programs.rapid.data import configuration
 from truearm.errors import InputError
+from truearm.library import load_robot
 from truearm.modeling.inverse.branches import BRANCHES, branch_rule
 from truearm.modeling.transform import Transform
-from truearm.robots import load_robot
 
 SAMPLES = Path(__file__).parent / "samples" / "rapid"
 NO_AXES = "[9E+09,9E+09,9E+09,9E+09,9E+09,9E+09]"

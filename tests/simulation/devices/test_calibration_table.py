@@ -11,10 +11,10 @@ import pytest
 from truearm.errors import InputError
 from truearm.identification.solving.fit import identify, place
 from truearm.identification.solving.models import MODELS
+from truearm.library import load_robot
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY, Transform
-from truearm.robots import load_robot
 from truearm.simulation.devices.calibration_table import CalibrationTable, rectangular_grid
 from truearm.simulation.twin import Twin, directions, measure
 from truearm.simulation.twin_joint import JointTruth

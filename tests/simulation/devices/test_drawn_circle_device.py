@@ -13,10 +13,10 @@ from truearm.identification.solving.fit import identify
 from truearm.identification.solving.models import MODELS
 from truearm.identification.solving.redundancy import gauge_freedoms
 from truearm.identification.start_values.from_readings import start_from_readings
+from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.readers.canonical import csv_text, read_csv
 from truearm.modeling.transform import Transform
-from truearm.robots import load_robot
 from truearm.simulation.devices import measured_with, named_device
 from truearm.simulation.devices.pencil import DRAWN_CIRCLE
 from truearm.simulation.twin import Twin

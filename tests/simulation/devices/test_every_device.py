@@ -14,13 +14,13 @@ from truearm.errors import InputError
 from truearm.identification.solving.fit import Status, identify
 from truearm.identification.solving.models import MODELS
 from truearm.identification.solving.redundancy import gauge_freedoms
+from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.readers.canonical import csv_text, read_csv
 from truearm.measurement.statistics import errors_of
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
-from truearm.robots import load_robot
 from truearm.simulation.devices import DEVICES, measured_with, named_device
 from truearm.simulation.truths import joint_truths, truth_twin
 from truearm.simulation.twin import Twin

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.robot import Robot
-from truearm.robots import load_robot
 from truearm.simulation.devices.device import Arm, Device, measured_with
 from truearm.simulation.devices.lengths import BALLBAR
 from truearm.simulation.truths import truth_twin

@@ -144,7 +144,7 @@ def select(
                 small=_ROUGH,
             )
             judged = errors_of(fit.robot, held_out)
-            spread = judged.position_spread or judged.length_spread
+            spread = judged.position or judged.length
             errors.append(np.nan if spread is None else spread.mean)
         return np.array(errors)
 

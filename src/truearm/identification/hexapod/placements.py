@@ -77,4 +77,4 @@ def in_one_frame(robot: Robot, places: Sequence[Dataset]) -> tuple[Dataset, ...]
 def _place(robot: Robot, data: Dataset) -> tuple[Array, Array]:
     """Return rotation and origin of the frame in the robot's world in which the readings are nearest to the model."""
     seen = data.has_position
-    return rigid_motion(data.position[seen], (data.position + errors_of(robot, data).position)[seen])
+    return rigid_motion(data.position[seen], (data.position + errors_of(robot, data).position_errors)[seen])

@@ -198,8 +198,8 @@ def _unlike_its_readings(fit: Fit, data: Dataset) -> list[Notice]:
 
 def _off(errors: Errors) -> Array:
     """Return how far off each position, distance or height is [m], NaN where there is none."""
-    off: Array = np.linalg.norm(errors.position, axis=1)
-    return off if errors.length is None else np.where(np.isfinite(off), off, np.abs(errors.length))
+    off: Array = np.linalg.norm(errors.position_errors, axis=1)
+    return off if errors.length_errors is None else np.where(np.isfinite(off), off, np.abs(errors.length_errors))
 
 
 def _misfit(robot: Robot, data: Dataset) -> float:
@@ -297,7 +297,7 @@ def _far_off(robot: Robot, data: Dataset) -> list[Suspect]:
     geometric = next(m for m in MODELS if m.name == "geometric")
     fit = identify(robot, data, geometric, loss="cauchy")
     errors = errors_of(fit.robot, data)
-    off = np.linalg.norm(errors.position, axis=1)
+    off = np.linalg.norm(errors.position_errors, axis=1)
     allowed = max(_FAR_AT_LEAST, _FAR * float(np.nanmedian(off)))
     doubted = np.flatnonzero(np.nan_to_num(off) > allowed)
     if len(doubted) == 0:

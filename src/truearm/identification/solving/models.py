@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
+from truearm.errors import InputError, did_you_mean
 from truearm.modeling.parameters import FreeParameters, Group
 from truearm.modeling.robot import Robot
 
@@ -73,3 +74,24 @@ MODELS: Final = (
         ("compliance", "hardening", "fourier", "backlash", "approach"),
     ),
 )
+
+
+def named_model(name: str) -> Model:
+    """Return the model of this name.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    for model in MODELS:
+        if model.name == name:
+            return model
+    names = [model.name for model in MODELS]
+    raise InputError(
+        "there is no model of this name",
+        parameter="model",
+        came=name,
+        allowed=", ".join(names),
+        cure=did_you_mean(name, names),
+    )

@@ -12,6 +12,8 @@ from truearm.files import exists
 from truearm.modeling.formats.robot_file import read_robot
 from truearm.modeling.robot import Robot
 
+#: How much of a file is looked at to tell what it is [bytes].
+_BEGINNING: Final = 4096
 _URDF: Final = re.compile(r".*\.(?:urdf|xml|xacro)", re.I | re.S)
 
 
@@ -51,7 +53,7 @@ def load_robot(robot: str | Path) -> Robot:
     text = str(robot)
     choice = f"a library id ({', '.join(library())}), a robot file or a URDF"
     if not text.strip():
-        raise InputError("no robot is given", where="ROBOT", came=text, allowed=choice)
+        raise InputError("no robot is given", parameter="robot", came=text, allowed=choice)
     if text in library():
         return read_robot(Path(str(files(__package__) / f"{text}.yaml")))
     source = urdf_source(robot)
@@ -65,8 +67,17 @@ def load_robot(robot: str | Path) -> Robot:
     near = nearest_names(text, library())
     raise InputError(
         "there is no such robot",
-        where="ROBOT",
+        parameter="robot",
         came=text,
         allowed=choice,
         cure=f"Did you mean {' or '.join(near)}?" if near else "Run 'truearm robots' for the library.",
     )
+
+
+def is_robot(name: str | Path) -> bool:
+    """Return whether a name is a library id, a URDF, or a file that begins as robot files do."""
+    path = Path(name)
+    if exists(path) and path.is_file() and urdf_source(name) is None:
+        with path.open("rb") as stream:
+            return re.search(rb"^truearm: *truearm-robot/", stream.read(_BEGINNING), re.M) is not None
+    return str(name) in library() or urdf_source(name) is not None

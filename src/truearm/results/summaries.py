@@ -1,4 +1,4 @@
-"""Results as JSON holds them, in mm and mrad."""
+"""Figures as JSON and the command show them, in mm and mrad."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ def errors_summary(errors: Errors) -> dict[str, Any]:
     """Return error statistics in mm and mrad, as JSON holds them."""
     made: dict[str, Any] = {"configurations": errors.configurations}
     for key, spread, scale in (
-        ("position_mm", errors.position_spread, 1e3),
-        ("orientation_mrad", errors.orientation_spread, 1e3),
-        ("length_mm", errors.length_spread, 1e3),
+        ("position_mm", errors.position, 1e3),
+        ("orientation_mrad", errors.orientation, 1e3),
+        ("length_mm", errors.length, 1e3),
     ):
         if spread is not None:
             made[key] = _scaled(spread, scale)
@@ -46,3 +46,14 @@ def _scaled(spread: Spread, scale: float) -> dict[str, float]:
         "p95": spread.p95 * scale,
         "max": spread.max * scale,
     }
+
+
+def error_line(errors: Errors) -> str:
+    """Return the statistics of one set of errors as a line."""
+    parts = []
+    kinds = ((errors.position, "mm"), (errors.orientation, "mrad"), (errors.length, "mm of length"))
+    for spread, unit in kinds:
+        if spread is not None:
+            mean, rms, p95, largest = (value * 1e3 for value in (spread.mean, spread.rms, spread.p95, spread.max))
+            parts.append(f"mean {mean:.3f}  rms {rms:.3f}  95 % {p95:.3f}  max {largest:.3f} {unit}")
+    return "   ".join(parts) if parts else "no readings"

@@ -1,0 +1,86 @@
+"""How the command names what jobs call by their parameters."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Callable
+from contextvars import ContextVar
+from typing import Any, TypeVar
+
+import typer
+from typer.core import TyperArgument, TyperCommand
+
+from truearm.errors import InputError, with_parameters
+
+C = TypeVar("C", bound=Callable[..., Any])
+
+#: The command that runs.
+_running: ContextVar[typer.Context | None] = ContextVar("_running", default=None)
+
+#: Parameters that say where results go or how they are printed: running again elsewhere is the same run.
+_OUTPUT = {"out": "DIR", "json": None}
+
+
+class CommandError(Exception):
+    """What a command ends with: a message that names its options."""
+
+
+class Command(TyperCommand):
+    """A command whose refusals name its options, where those of jobs name their parameters.
+
+    The parameters of a command's function are called like those of its job.
+    """
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command; a refusal of the job is told in the words of the command line."""
+        mark = _running.set(ctx)
+        try:
+            return super().invoke(ctx)
+        except InputError as error:
+            raise CommandError(spelled(error.told(_option))) from error
+        finally:
+            _running.reset(mark)
+
+
+class Commands(typer.Typer):
+    """A group of commands that are all a :class:`Command`."""
+
+    def command(self, name: str | None = None, **how: Any) -> Callable[[C], C]:
+        """Add a command."""
+        return super().command(name, cls=Command, **how)
+
+
+def spelled(text: str) -> str:
+    """Return a text of the library with options of the running command instead of parameters in backticks."""
+    return with_parameters(text, lambda name, value: f"{_option(name)} {value}" if value else _option(name))
+
+
+def command_line() -> str:
+    """Return the running command as it can be typed again: what was given, and a place for where results go."""
+    context = _running.get()
+    if context is None:
+        return ""
+    words, end = context.command_path.split(), list[str]()
+    for parameter in context.command.params:
+        name, value = parameter.name or "", context.params.get(parameter.name or "")
+        if isinstance(parameter, TyperArgument):
+            words += map(str, value if isinstance(value, list | tuple) else [value])
+        elif name in _OUTPUT:
+            end = [max(parameter.opts, key=len), str(_OUTPUT[name])] if _OUTPUT[name] else end
+        elif value is True:
+            words.append(max(parameter.opts, key=len))
+        elif value is not None and value is not False and value != parameter.get_default(context):
+            for entry in value if isinstance(value, list | tuple) else [value]:
+                words += [max(parameter.opts, key=len), str(entry)]
+    return shlex.join([*words, *end])
+
+
+def _option(name: str) -> str:
+    """Return how the running command calls a parameter of a job."""
+    context = _running.get()
+    for parameter in context.command.params if context is not None else ():
+        if parameter.name == name and isinstance(parameter, TyperArgument):
+            return str(parameter.metavar or name)
+        if parameter.name == name:
+            return max(parameter.opts, key=len)
+    return f"--{name.replace('_', '-')}"

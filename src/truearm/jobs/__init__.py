@@ -1,0 +1,19 @@
+"""One function a job: the one door for Python, the command, and whatever is built on them.
+
+A job takes objects, arrays or paths and plain keywords, refuses what it cannot use with an
+:class:`~truearm.errors.InputError` that names the parameter, and returns a frozen record. It is named like its file,
+and listed in :data:`JOBS`, from which :mod:`truearm` imports it.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+#: Every job, in the order of the work.
+JOBS: Final = (
+    "load_robot",
+    "load_data",
+    "check",
+    "calibrate",
+    "validate",
+)

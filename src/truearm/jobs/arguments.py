@@ -1,0 +1,174 @@
+"""What jobs accept, and how they refuse the rest: every refusal names the parameter."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from numbers import Integral, Real
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from truearm.errors import InputError, did_you_mean
+from truearm.library import is_robot, load_robot
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.readers.canonical import read_csv
+from truearm.modeling.parts import Payload
+from truearm.modeling.robot import Robot
+
+T = TypeVar("T")
+
+
+def robot_argument(robot: object, parameter: str = "robot") -> Robot:
+    """Return the robot that was given, or that a library id, robot file or URDF names."""
+    if isinstance(robot, Robot):
+        return robot
+    if isinstance(robot, str | Path):
+        try:
+            return load_robot(robot)
+        except InputError as error:
+            error.parameter = error.parameter or parameter
+            raise
+    raise _wrong_kind("a robot belongs here", robot, parameter, "a Robot, a library id, a robot file or a URDF")
+
+
+def data_argument(data: object, parameter: str = "data") -> Dataset:
+    """Return the dataset that was given, or that a canonical CSV file holds."""
+    if isinstance(data, Dataset):
+        return data
+    if isinstance(data, str | Path):
+        path = path_argument(data, parameter)
+        if is_robot(data):
+            raise InputError(
+                "this is a robot, and measurements belong here",
+                parameter=parameter,
+                came=str(data),
+                allowed="a canonical CSV file",
+                cure="The robot comes first, then the measurements.",
+            )
+        try:
+            return read_csv(path)
+        except InputError as error:
+            error.parameter = error.parameter or parameter
+            raise
+    raise _wrong_kind("measurements belong here", data, parameter, "a Dataset, or a canonical CSV file")
+
+
+def path_argument(path: object, parameter: str) -> Path:
+    """Return a path that was given as a text or a path."""
+    if isinstance(path, str | Path) and "\0" not in str(path):
+        if str(path):
+            return Path(path)
+        raise InputError("no file is given", parameter=parameter, came=str(path))
+    raise _wrong_kind("a path belongs here", path, parameter, "a text or a pathlib.Path")
+
+
+def payload_argument(payload: object, parameter: str = "payload") -> Payload | None:
+    """Return the payload that was given, or that a text such as ``2.7kg,50mm,25mm,100mm`` names; None for None."""
+    if payload is None or isinstance(payload, Payload):
+        return payload
+    if isinstance(payload, str):
+        return Payload.of_text(payload, parameter)
+    raise _wrong_kind("a payload belongs here", payload, parameter, "a Payload, or a text: 2.7kg,50mm,25mm,100mm")
+
+
+def gravity_argument(gravity: object, parameter: str = "gravity") -> tuple[float, float, float] | None:
+    """Return the acceleration of free fall that was given [m/s^2]; None for None."""
+    if gravity is None:
+        return None
+    values = numbers_argument(gravity, parameter, 3, "0,0,-9.81 for a robot that stands, in m/s^2")
+    return values[0], values[1], values[2]
+
+
+def numbers_argument(values: object, parameter: str, count: int, allowed: str) -> tuple[float, ...]:
+    """Return `count` finite numbers."""
+    if isinstance(values, str | bytes) or not isinstance(values, Iterable):
+        raise _wrong_kind(f"{count} numbers belong here", values, parameter, allowed)
+    found = [*values]
+    if len(found) != count:
+        raise InputError(f"{count} numbers belong here", parameter=parameter, came=f"{len(found)}", allowed=allowed)
+    return tuple(number_argument(value, parameter) for value in found)
+
+
+def whole_argument(value: object, parameter: str, lowest: int = 0, highest: int | None = None) -> int:
+    """Return a whole number within limits."""
+    span = f"{lowest} or more" if highest is None else f"{lowest} to {highest}"
+    if isinstance(value, bool | np.bool_) or not isinstance(value, Integral):
+        raise _wrong_kind("a whole number belongs here", value, parameter, span)
+    number = int(value)
+    if number < lowest or (highest is not None and number > highest):
+        raise InputError("the number is out of range", parameter=parameter, came=number, allowed=span)
+    return number
+
+
+def number_argument(value: object, parameter: str, lowest: float = -math.inf, allowed: str | None = None) -> float:
+    """Return a finite number, `lowest` or more."""
+    span = allowed or ("a finite number" if lowest == -math.inf else f"a finite number, {lowest:g} or more")
+    if isinstance(value, bool | np.bool_) or not isinstance(value, Real):
+        raise _wrong_kind("a number belongs here", value, parameter, span)
+    number = float(value)
+    if not math.isfinite(number) or number < lowest:
+        raise InputError("the number cannot be used", parameter=parameter, came=number, allowed=span)
+    return number
+
+
+def flag_argument(value: object, parameter: str) -> bool:
+    """Return True or False."""
+    if isinstance(value, bool | np.bool_):
+        return bool(value)
+    raise _wrong_kind("yes or no belongs here", value, parameter, "True, False")
+
+
+def choice_argument(value: object, parameter: str, known: Mapping[str, T], what: str | None = None) -> T:
+    """Return what a name stands for, of those that are known.
+
+    Parameters
+    ----------
+    what
+        What it is the name of, for the message; the parameter if None.
+    """
+    if not isinstance(value, str):
+        raise _wrong_kind("a name belongs here", value, parameter, ", ".join(known))
+    if value in known:
+        return known[value]
+    raise InputError(
+        f"there is no {what or parameter} of this name",
+        parameter=parameter,
+        came=value,
+        allowed=", ".join(known),
+        cure=did_you_mean(value, known),
+    )
+
+
+def choices_argument(values: object, parameter: str, known: Collection[str], what: str) -> tuple[str, ...]:
+    """Return a sequence of names of those that are known."""
+    if isinstance(values, str | bytes) or not isinstance(values, Sequence):
+        raise _wrong_kind("a sequence of names belongs here", values, parameter, ", ".join(known))
+    return tuple(choice_argument(value, parameter, {name: name for name in known}, what) for value in values)
+
+
+def python_call(job: str, /, *given: object, **keywords: object) -> str:
+    """Return the call of a job in Python, objects by the kind they are; keywords that are None are left out."""
+    words = [_written(value) for value in given]
+    words += [f"{name}={_written(value)}" for name, value in keywords.items() if value is not None]
+    return f"truearm.{job}({', '.join(words)})"
+
+
+def _written(value: object) -> str:
+    if isinstance(value, Path):
+        return repr(str(value))
+    if isinstance(value, Payload):
+        return repr(value.text)
+    plain = value is None or isinstance(value, str | bool | int | float | tuple | list)
+    return repr(value) if plain else type(value).__name__.upper()
+
+
+def _wrong_kind(what: str, came: object, parameter: str, allowed: str) -> InputError:
+    text = repr(came) if isinstance(came, str | bytes | int | float | None) else f"an object of type {kind_of(came)}"
+    return InputError(what, parameter=parameter, came=came if isinstance(came, str) else text, allowed=allowed)
+
+
+def kind_of(came: Any) -> str:
+    """Return the name of an object's type, for messages."""
+    return type(came).__name__

@@ -1,0 +1,312 @@
+"""From measurements to a calibrated robot: load, check, split, fit, judge, write."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Sequence
+from numbers import Integral
+from pathlib import Path
+from typing import Final, Literal, get_args
+
+import numpy as np
+
+from truearm.errors import InputError, nearest_names
+from truearm.files import read_bytes, refuse_overwriting, writable_folder
+from truearm.identification.choosing.selection import AUTO, select
+from truearm.identification.judging.advice import check_fit
+from truearm.identification.judging.arrival_lag import check_arrival_lag
+from truearm.identification.judging.transmission import check_transmission
+from truearm.identification.solving.bounds import Bounds, read_bounds
+from truearm.identification.solving.fit import Redundant, identify, place
+from truearm.identification.solving.losses import LOSSES, Loss
+from truearm.identification.solving.models import FRAMES, MODELS, Model
+from truearm.jobs.arguments import (
+    choice_argument,
+    choices_argument,
+    data_argument,
+    gravity_argument,
+    kind_of,
+    path_argument,
+    payload_argument,
+    python_call,
+    robot_argument,
+    whole_argument,
+)
+from truearm.jobs.check import notices_of
+from truearm.library import urdf_source
+from truearm.measurement.checks import check_joints
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.statistics import Errors, errors_of
+from truearm.measurement.table_motion import without_table_motion
+from truearm.modeling.effects import EFFECTS
+from truearm.modeling.parts import Payload
+from truearm.modeling.robot import Robot
+from truearm.notices import Notice
+from truearm.results.calibration import RESULT_FILES, Calibration
+from truearm.version import __version__
+
+Train = int | Literal["all"] | None
+
+#: Every model that can be asked for by name; None chooses.
+_MODELS: Final[dict[str, Model | None]] = {m.name: m for m in (FRAMES, *MODELS)} | {AUTO: None}
+
+
+def calibrate(
+    robot: Robot | str | Path,
+    data: Dataset | str | Path,
+    *,
+    out: str | Path | None = None,
+    model: str = "geometric",
+    train: Train = None,
+    seed: int = 0,
+    loss: Loss = "linear",
+    redundancy: Redundant = "prior",
+    bounds: Bounds | str | Path | None = None,
+    effects: Sequence[str] = (),
+    payload: Payload | str | None = None,
+    gravity: Sequence[float] | None = None,
+    command: str | None = None,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Calibration:
+    """Calibrate a robot and judge it on configurations the fit has not seen.
+
+    Parameters
+    ----------
+    robot
+        A robot, or what :func:`truearm.load_robot` takes. Its parameter values are the start.
+    data
+        Readings, or a canonical CSV file.
+    out
+        Folder for calibrated.yaml, result.json, report.html and calibrated.urdf; None writes nothing, see
+        :meth:`Calibration.save`.
+    model
+        One of :data:`truearm.identification.solving.models.MODELS` by name; ``frames``, which leaves the robot as it is
+        and finds base, targets and fixtures alone, a tool's tip for example; or ``auto``: the joint effects that
+        cross-validation on the training part says the data can carry.
+    train
+        How many configurations to train on, drawn with `seed`; the rest is held out. None is 70 %; ``all`` holds
+        nothing out.
+    seed
+        Of the split: training is the first `train` of ``numpy.random.default_rng(seed).permutation(n)``.
+    loss
+        ``linear``, ``huber``, ``cauchy`` or ``l1``.
+    redundancy
+        ``prior`` or ``drop``, see :func:`truearm.identification.solving.fit.identify`.
+    bounds
+        Limits of parameter values, or a bounds file.
+    effects
+        Joint effects to add to the model, of :data:`truearm.modeling.effects.EFFECTS` by name.
+    payload, gravity
+        What the robot carried (an object, or a text such as ``2.7kg,50mm,25mm,100mm``) and free fall in its base frame
+        [m/s^2], see :meth:`truearm.Robot.with_payload`.
+    command
+        How to run it again, for the report; None writes the call in Python.
+    progress
+        Called with a few words at each step.
+
+    Raises
+    ------
+    InputError
+        For anything that cannot be used, with a message that says what to do.
+    """
+    named = choice_argument(model, "model", _MODELS)
+    effects = choices_argument(effects, "effects", [effect.name for effect in EFFECTS], "effect")
+    if effects and named is None:
+        raise InputError(
+            "the model auto chooses its effects itself",
+            parameter="effects",
+            came=effects[0],
+            cure="Name another model.",
+        )
+    choice_argument(loss, "loss", {name: name for name in LOSSES})
+    choice_argument(redundancy, "redundancy", {name: name for name in get_args(Redundant)})
+    seed = whole_argument(seed, "seed")
+    payload, fall = payload_argument(payload), gravity_argument(gravity)
+    told = command or python_call(
+        "calibrate",
+        robot,
+        data,
+        model=model,
+        train=train,
+        seed=seed,
+        loss=loss,
+        redundancy=redundancy,
+        bounds=bounds,
+        effects=list(effects) or None,
+        payload=payload,
+        gravity=fall,
+    )
+    folder = None if out is None else _folder(path_argument(out, "out"), robot, data, bounds)
+    progress("reading the robot")
+    source = urdf_source(robot) if isinstance(robot, str | Path) else None
+    urdf = None if source is None else read_bytes(source[0])
+    nominal_robot = robot_argument(robot).with_payload(payload, fall)
+    progress("reading the data")
+    digest = ""
+    if isinstance(data, str | Path):
+        digest = f" (sha256 {hashlib.sha256(read_bytes(path_argument(data, 'data'))).hexdigest()[:12]})"
+    readings = data_argument(data)
+    bounds_file = str(bounds) if isinstance(bounds, str | Path) else "bounds"
+    if isinstance(bounds, str | Path):
+        bounds = read_bounds(path_argument(bounds, "bounds"))
+    check_joints(nominal_robot, readings)
+    n = readings.configurations
+    count = _train_count(train, n, readings.source)
+    order = np.random.default_rng(seed).permutation(n)
+    training, held_out = order[:count], order[count:]
+    if not readings.has_reading.any():
+        raise InputError("there is no reading at all", where=readings.source, cure="Fill in x, y and z, or distance.")
+    if readings.fixture is None and not readings.has_position.any():
+        raise InputError("there is no position reading at all", where=readings.source, cure="Fill in x, y and z.")
+    _check_split(readings.of_configurations(training), readings.of_configurations(held_out))
+
+    progress("checking the data")
+    noticed = notices_of(readings, nominal_robot)
+    readings = without_table_motion(readings)
+    first = readings.of_configurations(training)
+    second = readings.of_configurations(held_out) if len(held_out) else None
+    selection = None
+    if named is None:
+        selection = select(
+            nominal_robot,
+            first,
+            loss=loss,
+            redundancy=redundancy,
+            bounds=bounds,
+            bounds_file=bounds_file,
+            seed=seed,
+            progress=progress,
+        )
+    chosen: Model = selection.model if named is None and selection is not None else named.also(effects)  # type: ignore[union-attr]
+    progress("placing the nominal robot")
+    nominal = place(nominal_robot, first, loss)
+    progress(f"identifying the {chosen.name} model on {count} configurations")
+    fit = identify(
+        nominal_robot, first, chosen, loss=loss, redundancy=redundancy, bounds=bounds, bounds_file=bounds_file
+    )
+    progress("judging it")
+    judged = first if second is None else second
+    validation = None if second is None else errors_of(fit.robot, second)
+    before = errors_of(nominal.robot, judged)
+    history = (
+        f"calibrated by truearm {__version__}: model {' + '.join([chosen.name, *effects])},"
+        f" {count} of {n} configurations of {Path(readings.source).name}{digest}, seed {seed}, loss {loss},"
+        f" redundancy {redundancy}"
+    )
+    calibration = Calibration(
+        fit=fit,
+        nominal=before,
+        train=errors_of(fit.robot, first),
+        validation=validation,
+        warnings=(
+            *_check_proof(before, validation),
+            *check_fit(fit),
+            *noticed,
+            *check_arrival_lag(fit, readings),
+            *check_transmission(fit, first),
+        ),
+        data=readings,
+        training=training,
+        held_out=held_out,
+        command=told,
+        history=history,
+        urdf=urdf,
+        selection=selection,
+    )
+    if folder is not None:
+        calibration.save(folder, progress)
+    return calibration
+
+
+def _folder(out: Path, robot: object, data: object, bounds: object) -> Path:
+    """Make sure that results can be written and overwrite nothing that is read, before any long work."""
+    writable_folder(out)
+    inputs = [Path(given) for given in (data, bounds) if isinstance(given, str | Path)]
+    if isinstance(robot, str | Path):
+        source = urdf_source(robot)
+        inputs.append(Path(robot) if source is None else source[0])
+    for name in RESULT_FILES:
+        refuse_overwriting(out / name, inputs)
+    return out
+
+
+def _check_split(training: Dataset, held_out: Dataset) -> None:
+    """Refuse a held-out part that holds nothing, or readings of targets that the training part does not place."""
+    if held_out.configurations and not held_out.has_reading.any():
+        raise InputError(
+            "the held-out part has no reading at all",
+            where=held_out.source,
+            cure="Lower `train`, change `seed`, or measure again where readings are missing.",
+        )
+    places = training.has_position if training.fixture is None else training.has_reading
+    placed = set(training.target[places].tolist())
+    fixtures = set(training.against[training.has_reading].tolist())
+    for part, name in ((training, "training"), (held_out, "held-out")):
+        for index in dict.fromkeys(part.against[part.has_reading].tolist()):
+            if index not in fixtures:
+                alone = training.fixtures[index] if index >= 0 else ""
+                near = nearest_names(alone, [n for n in training.fixtures if n != alone], 1) if alone else []
+                raise InputError(
+                    f"a fixture of the {name} part was not measured in the training part",
+                    where=training.source,
+                    came=alone or "the instrument's own frame",
+                    cure=f"Did you mean {near[0]}?" if near else "Raise `train`, change `seed`, or leave it out.",
+                )
+        for index in dict.fromkeys(part.target[part.has_reading].tolist()):
+            if index not in placed:
+                raise InputError(
+                    f"a target of the {name} part has no position in the training part",
+                    where=training.source,
+                    came=training.targets[index],
+                    cure="Raise `train`, change `seed`, or leave the target out.",
+                )
+
+
+def _train_count(train: object, n: int, where: str) -> int:
+    if train == "all":
+        return n
+    if n < 2:
+        raise InputError(
+            "one configuration cannot be split into training and held-out parts",
+            where=where,
+            cure="Measure more, or use `train=all`.",
+        )
+    if train is None:
+        return round(0.7 * n)
+    if isinstance(train, bool) or not isinstance(train, Integral):
+        raise InputError(
+            "a number of configurations belongs here",
+            parameter="train",
+            came=train if isinstance(train, str | float | bool) else kind_of(train),
+            allowed="a whole number, or all",
+        )
+    if not 1 <= train < n:
+        raise InputError(
+            "the number of training configurations must leave some to judge by",
+            parameter="train",
+            came=int(train),
+            allowed=f"1 to {n - 1}, or all ({where} has {n} configurations)",
+        )
+    return int(train)
+
+
+def _check_proof(before: Errors, after: Errors | None) -> list[Notice]:
+    """Say if there is no proof, or if it speaks against the calibration."""
+    if after is None:
+        return [
+            Notice(
+                "nothing-held-out",
+                "Nothing was held out: the errors are those of the training readings and flatter the model. "
+                "Leave `train` out to see the error on configurations the fit has not seen.",
+            )
+        ]
+    old, new = before.position or before.length, after.position or after.length
+    if old is None or new is None or new.mean <= old.mean:
+        return []
+    return [
+        Notice(
+            "not-better",
+            "On configurations the fit has not seen, the calibrated robot is no better than the nominal one: "
+            "there are too few readings for this model, or something is wrong with them.",
+        )
+    ]

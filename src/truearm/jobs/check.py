@@ -1,0 +1,59 @@
+"""What is wrong with measurements before they are believed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from truearm.errors import InputError
+from truearm.identification.judging.plausibility import check_against
+from truearm.jobs.arguments import choice_argument, data_argument, robot_argument
+from truearm.measurement.checks import check_data, check_joints, check_range
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.table_motion import without_table_motion
+from truearm.modeling.robot import Robot
+from truearm.notices import Notice
+from truearm.results.data_check import DataCheck
+
+
+def check(
+    robot: Robot | Dataset | str | Path | None, data: Dataset | str | Path | None = None, *, device: str | None = None
+) -> DataCheck:
+    """Say what is wrong with measurements before they are believed.
+
+    Parameters
+    ----------
+    robot
+        The nominal robot, or what :func:`truearm.load_robot` takes. With it, units, joint order and signs, limits and
+        single readings are checked too. It may be left out: ``check(data)``, or None.
+    data
+        Readings, or a canonical CSV file.
+    device
+        Name of the instrument, of ``truearm.devices()``; with it, readings beyond its range are named.
+
+    Raises
+    ------
+    InputError
+        If the robot or the data cannot be used, or their joints do not belong together.
+    """
+    if data is None:
+        if robot is None:
+            raise InputError(
+                "no measurements are given", parameter="data", allowed="a Dataset, or a canonical CSV file"
+            )
+        robot, data = None, robot
+    data = data_argument(data)
+    return DataCheck(data, notices_of(data, None if robot is None else robot_argument(robot), device))
+
+
+def notices_of(data: Dataset, robot: Robot | None = None, device: str | None = None) -> tuple[Notice, ...]:
+    """Return one notice for each kind of fault; none for believable data."""
+    ranged: tuple[Notice, ...] = ()
+    if device is not None:
+        from truearm.simulation.devices import DEVICES  # with its inverse kinematics, only where it is asked for
+
+        ranged = tuple(check_range(data, choice_argument(device, "device", {d.name: d for d in DEVICES})))
+    if robot is None:
+        return (*ranged, *check_data(data))
+    check_joints(robot, data)
+    against, suspects = check_against(robot, without_table_motion(data))
+    return (*ranged, *check_data(data, suspects), *against)

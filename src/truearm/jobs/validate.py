@@ -1,0 +1,71 @@
+"""The errors of a calibrated robot on new measurements."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from truearm.errors import InputError
+from truearm.jobs.arguments import data_argument, gravity_argument, payload_argument, robot_argument
+from truearm.measurement.checks import check_joints
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.statistics import errors_of
+from truearm.modeling.parts import Payload
+from truearm.modeling.robot import Robot
+from truearm.results.validation import Validation
+
+
+def validate(
+    robot: Robot | str | Path,
+    data: Dataset | str | Path,
+    *,
+    payload: Payload | str | None = None,
+    gravity: Sequence[float] | None = None,
+) -> Validation:
+    """Judge a calibrated robot on new data taken in the same frames.
+
+    Parameters
+    ----------
+    robot
+        A calibrated robot, or its file.
+    data
+        Readings, or a canonical CSV file.
+    payload, gravity
+        What the robot carried (an object, or a text such as ``2.7kg,50mm,25mm,100mm``) and free fall in its base frame
+        [m/s^2] this time, if they differ from the calibration.
+
+    Raises
+    ------
+    InputError
+        If the robot has no targets, or the data name others.
+    """
+    robot, data = robot_argument(robot), data_argument(data)
+    if not robot.targets:
+        raise InputError(
+            "the robot has no targets, so it cannot say where the instrument should have seen them",
+            where=robot.name,
+            cure="Use the calibrated.yaml that 'truearm calibrate' wrote: it holds base and targets.",
+        )
+    check_joints(robot, data)
+    robot = robot.with_payload(payload_argument(payload), gravity_argument(gravity))
+    if data.temperature is None and any(effect.warmed for effect in robot.effects):
+        raise InputError(
+            "the robot was calibrated with its temperature, and the data do not say theirs",
+            where=data.source,
+            cure="Add the column temperature [degC].",
+        )
+    identified = {p.group for p in robot.parameters.values() if p.deviation is not None}
+    if data.anchored and robot.fixtures and identified and "base" not in identified:
+        raise InputError(
+            "the robot was calibrated without any instrument's frame, so it does not know where this one stands",
+            where=data.source,
+            cure="Place it first: calibrate the calibrated robot with `model=frames`, or compare distances with "
+            "'truearm distances'.",
+        )
+    for name in data.targets:
+        robot.target(name)
+    for name in data.fixtures:
+        robot.fixture(name)
+    if not data.has_reading.any():
+        raise InputError("there is no reading at all", where=data.source, cure="Fill in x, y and z, or distance.")
+    return Validation(data.source, errors_of(robot, data))

@@ -1,0 +1,1 @@
+"""Frozen records of what was found: reports and commands read them and copy nothing."""

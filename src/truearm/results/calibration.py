@@ -1,0 +1,181 @@
+"""A finished calibration: the fit, and the proof on configurations it has not seen."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.files import writable_folder, write_files
+from truearm.identification.choosing.selection import Selection
+from truearm.identification.solving.fit import Fit, Status
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.statistics import Errors
+from truearm.modeling.formats.robot_file import robot_text
+from truearm.modeling.robot import Robot
+from truearm.notices import Notice
+from truearm.results.record import Record, notice_lines
+from truearm.results.summaries import error_line, errors_summary, selection_summary
+from truearm.units import SHOWN_AS, from_si
+
+#: What a calibration writes into its folder.
+RESULT_FILES: Final = ("calibrated.yaml", "result.json", "report.html", "calibrated.urdf")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Calibration(Record):
+    """A finished calibration: the fit, and the proof on configurations it has not seen.
+
+    Attributes
+    ----------
+    fit
+        Made from the training part alone.
+    nominal
+        Errors of the uncalibrated robot on the held-out part, base and targets fitted on the training part. If
+        nothing was held out, on the training part.
+    train
+        Errors of the calibrated robot on the training part.
+    validation
+        Errors of the calibrated robot on the held-out part; None if nothing was held out.
+    warnings
+        What to know about the result, in plain words.
+    data
+        All readings.
+    training, held_out
+        Indices of the configurations of each part.
+    command
+        How to run it again.
+    history
+        What was done, in one line with the hash of the data.
+    urdf
+        The user's own URDF, if that is where the robot came from.
+    selection
+        How the model was chosen; None if it was named.
+    """
+
+    fit: Fit
+    nominal: Errors
+    train: Errors
+    validation: Errors | None
+    warnings: tuple[Notice, ...]
+    data: Dataset
+    training: NDArray[np.intp]
+    held_out: NDArray[np.intp]
+    command: str
+    history: str
+    urdf: bytes | None = None
+    selection: Selection | None = None
+
+    @cached_property
+    def robot(self) -> Robot:
+        """The calibrated robot, base and targets included."""
+        return replace(self.fit.robot, history=(*self.fit.robot.history, self.history), tools={}, truths={})
+
+    @property
+    def status(self) -> Status:
+        """How the fit ended."""
+        return self.fit.status
+
+    @property
+    def finished(self) -> bool:
+        """Whether the fit came to an end that its figures can be believed of: converged, or with a value at a bound."""
+        return self.status in (Status.CONVERGED, Status.AT_BOUND)
+
+    def summary(self) -> dict[str, Any]:
+        """Return the figures as ``result.json`` begins with them: errors in mm and mrad."""
+        return {
+            "status": self.status.value,
+            "warnings": [{"code": n.code, "message": n.message} for n in self.warnings],
+            "nominal": errors_summary(self.nominal),
+            "train": errors_summary(self.train),
+            "validation": None if self.validation is None else errors_summary(self.validation),
+        }
+
+    def result(self) -> dict[str, Any]:
+        """Return what ``result.json`` holds: the summary and every parameter."""
+        return {
+            "truearm": "truearm-result/1",
+            **self.summary(),
+            "command": self.command,
+            "history": self.history,
+            "model": {"name": self.fit.model.name, "effects": list(self.fit.model.effects)},
+            "parameters": list(self._parameters()),
+            **({} if self.selection is None else {"selection": selection_summary(self.selection)}),
+        }
+
+    def lines(self) -> list[str]:
+        """Return the figures people look for, the held-out error first."""
+        text = []
+        if self.validation is not None:
+            text.append(f"On {self.validation.configurations} configurations the fit has not seen:")
+            text.append(f"  nominal     {error_line(self.nominal)}")
+            text.append(f"  calibrated  {error_line(self.validation)}")
+            text.append(f"On the {self.train.configurations} training configurations:")
+        else:
+            text.append(f"Nothing was held out; on the {self.train.configurations} training configurations:")
+            text.append(f"  nominal     {error_line(self.nominal)}")
+        text.append(f"  calibrated  {error_line(self.train)}")
+        if self.selection is not None:
+            text.append(f"Chosen model: {self.fit.model.summary}")
+        if self.fit.model.name == "frames":
+            text += self._target_lines()
+        text.append(f"Status: {self.status.value}. {self.status.advice}")
+        return text + notice_lines(self.warnings)
+
+    def _target_lines(self) -> list[str]:
+        """Return where the targets are on the flange, with their deviations."""
+        text = []
+        for target in self.robot.targets:
+            found = [self.robot.parameters[target.parameter(axis)] for axis in "xyz"]
+            place = ", ".join(f"{p.value * 1e3:.3f}" for p in found)
+            known = ", ".join("?" if p.deviation is None else f"{p.deviation * 1e3:.2g}" for p in found)
+            text.append(f"Target {target.name} on the flange: ({place}) mm, deviations ({known}) mm")
+        return text
+
+    def _parameters(self) -> Sequence[dict[str, Any]]:
+        rows = []
+        for p in self.robot.parameters.values():
+            unit = SHOWN_AS[p.unit]
+            rows.append(
+                {
+                    "name": p.name,
+                    "unit": unit,
+                    "nominal": from_si(p.nominal, unit),
+                    "value": from_si(p.value, unit),
+                    "deviation": None if p.deviation is None else from_si(p.deviation, unit),
+                    "informed": p.informed,
+                    "status": self.fit.parameter_status(p.name),
+                }
+            )
+        return rows
+
+    def save(self, folder: str | Path, progress: Callable[[str], None] = lambda _: None) -> tuple[Path, ...]:
+        """Write ``calibrated.yaml``, ``result.json``, ``report.html`` and ``calibrated.urdf`` into a folder.
+
+        An earlier result stays until the new files are complete on disk; only then are they put in its place.
+
+        Returns
+        -------
+        The files written.
+        """
+        from truearm.modeling.formats.urdf import calibrated_urdf, urdf_text
+        from truearm.reporting.report import report_html
+
+        folder = writable_folder(Path(folder))
+        progress("drawing the report")
+        urdf = calibrated_urdf(self.urdf, self.robot)[0] if self.urdf else urdf_text(self.robot)[0]
+        files: dict[str, str | bytes] = {
+            "calibrated.yaml": robot_text(self.robot),
+            "result.json": json.dumps(self.result(), indent=2, allow_nan=False) + "\n",
+            "report.html": report_html(self),
+            "calibrated.urdf": urdf,
+        }
+        progress("writing the files")
+        write_files(folder, files)
+        return tuple(folder / name for name in files)

@@ -1,0 +1,40 @@
+"""What was found wrong with measurements."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from truearm.measurement.dataset import Dataset
+from truearm.notices import Notice
+from truearm.results.record import Record, notice_lines
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DataCheck(Record):
+    """What was found wrong with measurements.
+
+    Attributes
+    ----------
+    data
+        The measurements.
+    warnings
+        One notice for each kind of fault; none for believable data.
+    """
+
+    data: Dataset
+    warnings: tuple[Notice, ...]
+
+    def summary(self) -> dict[str, Any]:
+        """Return it as JSON holds it."""
+        return {
+            "configurations": self.data.configurations,
+            "targets": list(self.data.targets),
+            "warnings": [{"code": n.code, "message": n.message} for n in self.warnings],
+        }
+
+    def lines(self) -> list[str]:
+        """Return what the command prints."""
+        data = self.data
+        text = [f"{data.source}: {data.configurations} configurations, targets {', '.join(data.targets)}"]
+        return text + (notice_lines(self.warnings) or ["Nothing looks wrong."])

@@ -1,0 +1,49 @@
+"""How a robot agrees with measurements it was not identified from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from truearm.measurement.statistics import Errors, Spread
+from truearm.results.record import Record
+from truearm.results.summaries import error_line, errors_summary
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Validation(Record):
+    """Errors of a robot on measurements.
+
+    Attributes
+    ----------
+    source
+        The measurements, for messages.
+    errors
+        Predicted minus measured, reading by reading.
+    """
+
+    source: str
+    errors: Errors
+
+    @property
+    def position(self) -> Spread | None:
+        """Statistics of position errors over single readings [m]; None where no position was read."""
+        return self.errors.position
+
+    @property
+    def orientation(self) -> Spread | None:
+        """Statistics of orientation errors over single readings [rad]; None where no orientation was read."""
+        return self.errors.orientation
+
+    @property
+    def length(self) -> Spread | None:
+        """Statistics of errors of distances and heights [m]; None where none was read."""
+        return self.errors.length
+
+    def summary(self) -> dict[str, Any]:
+        """Return it as JSON holds it, in mm and mrad."""
+        return errors_summary(self.errors)
+
+    def lines(self) -> list[str]:
+        """Return what the command prints."""
+        return [f"On {self.errors.configurations} configurations of {self.source}:", f"  {error_line(self.errors)}"]

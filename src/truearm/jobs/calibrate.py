@@ -280,7 +280,7 @@ def _train_count(train: object, n: int, where: str) -> int:
             came=train if isinstance(train, str | float | bool) else kind_of(train),
             allowed="a whole number, or all",
         )
-    if not 1 <= train < n:
+    if not 1 <= int(train) < n:
         raise InputError(
             "the number of training configurations must leave some to judge by",
             parameter="train",

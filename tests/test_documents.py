@@ -1,18 +1,31 @@
-"""Every example in README and guide is run: console sessions with their output, Python blocks, captioned files."""
+"""Every example in README and guide is run: console sessions with their output, Python blocks, captioned files.
+
+Commands of truearm and Python blocks run in this process, which is many times faster than a process for each; other
+commands and pipelines go to the shell.
+"""
 
 from __future__ import annotations
 
+import io
 import os
 import re
+import shlex
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import chdir, contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
 
 import pytest
 
+from truearm.cli import main
+
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs" / "guide").glob("*.md"))]
+PAGES = [*DOCUMENTS, ROOT / "CHANGELOG.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
 BLOCK = re.compile(r"^(?P<indent> *)```(?P<kind>\S+(?: \S+)?)\n(?P<body>.*?)^(?P=indent)```$", re.M | re.S)
+#: A command of truearm alone, perhaps in a folder: no pipeline, no other program.
+ALONE = re.compile(r"(?:cd (?P<folder>\S+) && )?truearm (?P<words>[^|&;<>$`]*)")
 
 
 def blocks(document: Path) -> list[tuple[str, str]]:
@@ -29,22 +42,64 @@ def fits(shown: str, came: str) -> bool:
     return re.fullmatch(r"\s*.*?\s*".join(parts), " ".join(came.split()), re.S) is not None
 
 
+@contextmanager
+def arguments(words: list[str]) -> Iterator[None]:
+    before = sys.argv
+    sys.argv = words
+    try:
+        yield
+    finally:
+        sys.argv = before
+
+
+def run_command(command: str, folder: Path) -> tuple[int, str]:
+    """Return the exit code of a command, and what it printed."""
+    alone = ALONE.fullmatch(command.strip())
+    if alone is None:
+        environment = {**os.environ, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
+        done = subprocess.run(["sh", "-c", command], cwd=folder, env=environment, capture_output=True, text=True)
+        return done.returncode, done.stdout + done.stderr
+    code, out, err = 0, io.StringIO(), io.StringIO()
+    words = ["truearm", *shlex.split(alone["words"])]
+    with chdir(folder / (alone["folder"] or "")), arguments(words), redirect_stdout(out), redirect_stderr(err):
+        try:
+            main()
+        except SystemExit as end:
+            assert isinstance(end.code, int | None), end.code
+            code = end.code or 0
+    return code, out.getvalue() + err.getvalue()
+
+
 def run_session(session: str, folder: Path) -> None:
-    environment = {**os.environ, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
     commands = re.split(r"^\$ ", session.replace("\\\n", " "), flags=re.M)[1:]
     assert commands
     for entry in commands:
         command, _, shown = entry.partition("\n")
         code = re.search(r"^\[exit (\d+)\]\n", shown, re.M)
-        done = subprocess.run(["sh", "-c", command], cwd=folder, env=environment, capture_output=True, text=True)
-        assert done.returncode == (int(code[1]) if code else 0), f"{command}\n{done.stdout}{done.stderr}"
+        came, printed = run_command(command, folder)
+        assert came == (int(code[1]) if code else 0), f"{command}\n{printed}"
         shown = shown.replace(code[0], "") if code else shown
         if shown.strip():
-            assert fits(shown, done.stdout + done.stderr), f"{command} printed:\n{done.stdout}{done.stderr}"
+            assert fits(shown, printed), f"{command} printed:\n{printed}"
+
+
+def run_python(body: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Run a block; comment lines below a print say a line of what it prints."""
+    out, known = io.StringIO(), set(sys.modules)
+    with monkeypatch.context() as patch, chdir(folder), redirect_stdout(out):
+        patch.syspath_prepend(str(folder))
+        exec(compile(body, "example", "exec"), {"__name__": "example"})
+    for name in set(sys.modules) - known:
+        if getattr(sys.modules[name], "__file__", None) == str(folder / f"{name}.py"):
+            del sys.modules[name]  # an example's own module
+    printed = out.getvalue().splitlines()
+    for shown in re.findall(r"^(?:print\(.*|\))\n((?:# .*\n)+)|^(?: +print\(.*|    \))\n((?:# .*\n)+)", body, re.M):
+        for line in "".join(shown).splitlines():
+            assert any(fits(line[2:], each) for each in printed), f"{line}\nis not in\n{out.getvalue()}"
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda p: p.name)
-def test_the_examples_run_as_shown(document: Path, tmp_path: Path) -> None:
+def test_the_examples_run_as_shown(document: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     ran = 0
     for kind, body in blocks(document):
         if kind.startswith("{code-block}"):
@@ -57,14 +112,13 @@ def test_the_examples_run_as_shown(document: Path, tmp_path: Path) -> None:
             run_session(body, tmp_path)
             ran += 1
         elif kind == "python":
-            done = subprocess.run([sys.executable, "-c", body], cwd=tmp_path, capture_output=True, text=True)
-            assert done.returncode == 0, done.stderr
+            run_python(body, tmp_path, monkeypatch)
             ran += 1
     if document.name != "results.md":
         assert ran
 
 
 def test_every_relative_link_leads_somewhere() -> None:
-    for document in [*DOCUMENTS, ROOT / "CONTRIBUTING.md", *(ROOT / "docs").glob("*.md")]:
+    for document in PAGES:
         for link in re.findall(r"\]\(([^)#:]+)\)", document.read_text()):
             assert (document.parent / link).exists(), f"{document.name}: {link}"

@@ -74,10 +74,10 @@ class Residuals(Record):
         return len(self.norm)
 
     def __iter__(self) -> Iterator[Residual]:
-        columns = (self.configuration, self.target, self.part, self.kind)
-        names = zip(*(column.tolist() for column in columns), strict=True)
-        for name, error, norm in zip(names, self.error, self.norm.tolist(), strict=True):
-            yield Residual(*name, error, norm)
+        columns = (self.configuration, self.target, self.part, self.kind, self.norm)
+        rows = zip(*(column.tolist() for column in columns), strict=True)
+        for (configuration, target, part, kind, norm), error in zip(rows, self.error, strict=True):
+            yield Residual(configuration, target, part, kind, error, norm)
 
     def lines(self) -> list[str]:
         """Return the largest of them, worst first."""

@@ -8,7 +8,7 @@ import math
 import re
 import typing
 from collections.abc import Iterator
-from dataclasses import fields
+from dataclasses import fields, is_dataclass
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -141,6 +141,7 @@ def test_every_job_is_on_the_page(job: str) -> None:
 def test_the_result_is_frozen_and_speaks_for_itself(job: str, folder: Path) -> None:
     result = function(job)(**EXAMPLES[job](folder))
     assert isinstance(result, Record | Robot | Dataset)
+    assert is_dataclass(result)
     assert 0 < len(repr(result)) <= 2000
     with pytest.raises(AttributeError):
         setattr(result, fields(result)[0].name, None)

@@ -65,8 +65,7 @@ def run_command(command: str, folder: Path) -> tuple[int, str]:
         try:
             main()
         except SystemExit as end:
-            assert isinstance(end.code, int | None), end.code
-            code = end.code or 0
+            code = int(end.code or 0)
     return code, out.getvalue() + err.getvalue()
 
 
@@ -83,12 +82,12 @@ def run_session(session: str, folder: Path) -> None:
             assert fits(shown, printed), f"{command} printed:\n{printed}"
 
 
-def run_python(body: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Run a block; comment lines below a print say a line of what it prints."""
+def run_python(body: str, names: dict[str, object], folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Run a block after those before it; comment lines below a print are lines of what it prints."""
     out, known = io.StringIO(), set(sys.modules)
     with monkeypatch.context() as patch, chdir(folder), redirect_stdout(out):
         patch.syspath_prepend(str(folder))
-        exec(compile(body, "example", "exec"), {"__name__": "example"})
+        exec(compile(body, "example", "exec"), names)
     for name in set(sys.modules) - known:
         if getattr(sys.modules[name], "__file__", None) == str(folder / f"{name}.py"):
             del sys.modules[name]  # an example's own module
@@ -100,7 +99,7 @@ def run_python(body: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda p: p.name)
 def test_the_examples_run_as_shown(document: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    ran = 0
+    ran, names = 0, dict[str, object]()
     for kind, body in blocks(document):
         if kind.startswith("{code-block}"):
             caption, _, content = body.partition("\n")
@@ -112,7 +111,9 @@ def test_the_examples_run_as_shown(document: Path, tmp_path: Path, monkeypatch: 
             run_session(body, tmp_path)
             ran += 1
         elif kind == "python":
-            run_python(body, tmp_path, monkeypatch)
+            if document.name != "notebook.md":  # elsewhere every block stands for itself
+                names = {}
+            run_python(body, names, tmp_path, monkeypatch)
             ran += 1
     if document.name != "results.md":
         assert ran
@@ -120,5 +121,55 @@ def test_the_examples_run_as_shown(document: Path, tmp_path: Path, monkeypatch: 
 
 def test_every_relative_link_leads_somewhere() -> None:
     for document in PAGES:
-        for link in re.findall(r"\]\(([^)#:]+)\)", document.read_text()):
-            assert (document.parent / link).exists(), f"{document.name}: {link}"
+        for link, anchor in re.findall(r"\]\(([^)#:\s]*)(#[^)\s]+)?\)", document.read_text()):
+            page = document.parent / link if link else document
+            assert page.exists(), f"{document.name}: {link}"
+            if anchor:
+                assert anchor[1:] in anchors_of(page), f"{document.name}: {link}{anchor}"
+
+
+def anchors_of(page: Path) -> set[str]:
+    """Return what links can point to: the headings, in small letters, blanks as hyphens, no signs."""
+    headings = re.findall(r"^#+ (.+)$", page.read_text(), re.M)
+    return {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def test_every_page_stands_in_the_index() -> None:
+    index = (ROOT / "docs" / "index.md").read_text()
+    for page in [*DOCUMENTS[1:], *(ROOT / "docs").glob("*.md")]:
+        name = page.relative_to(ROOT / "docs").with_suffix("").as_posix()
+        if name != "index":
+            assert f"({name}.md)" in index, f"{name} has no line in the index"
+            assert f"\n{name}\n" in index, f"{name} is in no list of pages"
+
+
+def test_pages_that_can_be_skipped_say_so_themselves_and_in_the_index() -> None:
+    lines = (ROOT / "docs" / "index.md").read_text().splitlines()
+    for page in DOCUMENTS[1:]:
+        entry = next(line for line in lines if f"(guide/{page.name})" in line)
+        says_so = page.read_text().splitlines()[2].startswith("*You can skip this page")
+        assert says_so == ("*(special)*" in entry), page.name
+
+
+def test_every_word_of_the_glossary_leads_to_a_page_that_uses_it() -> None:
+    entries = re.split(r"^## ", (ROOT / "docs" / "glossary.md").read_text(), flags=re.M)[1:]
+    words = [entry.splitlines()[0] for entry in entries]
+    assert words == sorted(words, key=str.lower)
+    for entry in entries:
+        assert re.search(r"\]\((guide/|architecture|#)", entry), f"{entry.splitlines()[0]} leads nowhere"
+
+
+#: "Lomb 1976", "Holland and Welsch (1977)", "Li et al. 2016", "Mooring, 1983": the last name and the year.
+CITATION = re.compile(r"\b([A-Z][A-Za-z-]+)(?: et al\.| and others)?,? \(?((?:18|19|20)\d\d)\b")
+
+
+def test_every_source_that_is_cited_stands_in_the_bibliography() -> None:
+    entries = re.split(r"\n(?=- |\n)", (ROOT / "docs" / "bibliography.md").read_text())
+    sources = ROOT / "src" / "truearm"
+    cited = 0
+    for file in sorted([*sources.rglob("*.py"), *sources.rglob("*.yaml"), *(ROOT / "docs" / "guide").glob("*.md")]):
+        text = re.sub(r"\s+#?\s*", " ", file.read_text())
+        for name, year in CITATION.findall(text):
+            cited += 1
+            assert any(name in entry and year in entry for entry in entries), f"{file.name}: {name} {year}"
+    assert cited > 40

@@ -24,6 +24,6 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     if skipped:
         terminalreporter.section("MEASURED DATA ARE MISSING", sep="!", red=True, bold=True)
         terminalreporter.line(
-            f"{len(skipped)} tests on real robots were skipped: nothing above says how well measured robots are calibrated."
-            " Name the folder of the data in TRUEARM_DATA."
+            f"{len(skipped)} tests on real robots were skipped: nothing above says how well measured robots are"
+            " calibrated. Name the folder of the data in TRUEARM_DATA."
         )

@@ -173,3 +173,13 @@ def test_every_source_that_is_cited_stands_in_the_bibliography() -> None:
             cited += 1
             assert any(name in entry and year in entry for entry in entries), f"{file.name}: {name} {year}"
     assert cited > 40
+
+
+def test_every_file_that_the_architecture_names_is_there() -> None:
+    places = [*(ROOT / "src").rglob("*"), *(ROOT / "tests").rglob("*.py")]
+    files = [place.relative_to(ROOT).as_posix() for place in places]
+    text = (ROOT / "docs" / "architecture.md").read_text()
+    named = set(re.findall(r"[\w/]*\w\.py\b|\b[a-z]\w+(?:/\w+)*/(?=[`\s,])", text))
+    assert len(named) > 60
+    for name in named:
+        assert any(file.endswith(f"/{name.rstrip('/')}") for file in files), name

@@ -21,8 +21,17 @@ import pytest
 from truearm.cli import main
 
 ROOT = Path(__file__).parents[1]
-DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs" / "guide").glob("*.md"))]
-PAGES = [*DOCUMENTS, ROOT / "CHANGELOG.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+GUIDE = sorted((ROOT / "docs" / "guide").glob("*.md"))
+DOCUMENTS = [ROOT / "README.md", ROOT / "docs" / "api.md", *GUIDE]
+#: Pages that are one session from top to bottom; elsewhere every block of Python stands for itself.
+SESSIONS = ("api.md", "notebook.md")
+PAGES = [
+    ROOT / "README.md",
+    *GUIDE,
+    ROOT / "CHANGELOG.md",
+    ROOT / "CONTRIBUTING.md",
+    *sorted((ROOT / "docs").glob("*.md")),
+]
 BLOCK = re.compile(r"^(?P<indent> *)```(?P<kind>\S+(?: \S+)?)\n(?P<body>.*?)^(?P=indent)```$", re.M | re.S)
 #: A command of truearm alone, perhaps in a folder: no pipeline, no other program.
 ALONE = re.compile(r"(?:cd (?P<folder>\S+) && )?truearm (?P<words>[^|&;<>$`]*)")
@@ -111,7 +120,7 @@ def test_the_examples_run_as_shown(document: Path, tmp_path: Path, monkeypatch: 
             run_session(body, tmp_path)
             ran += 1
         elif kind == "python":
-            if document.name != "notebook.md":  # elsewhere every block stands for itself
+            if document.name not in SESSIONS:
                 names = {}
             run_python(body, names, tmp_path, monkeypatch)
             ran += 1
@@ -136,7 +145,7 @@ def anchors_of(page: Path) -> set[str]:
 
 def test_every_page_stands_in_the_index() -> None:
     index = (ROOT / "docs" / "index.md").read_text()
-    for page in [*DOCUMENTS[1:], *(ROOT / "docs").glob("*.md")]:
+    for page in [*GUIDE, *(ROOT / "docs").glob("*.md")]:
         name = page.relative_to(ROOT / "docs").with_suffix("").as_posix()
         if name != "index":
             assert f"({name}.md)" in index, f"{name} has no line in the index"
@@ -145,7 +154,7 @@ def test_every_page_stands_in_the_index() -> None:
 
 def test_pages_that_can_be_skipped_say_so_themselves_and_in_the_index() -> None:
     lines = (ROOT / "docs" / "index.md").read_text().splitlines()
-    for page in DOCUMENTS[1:]:
+    for page in GUIDE:
         entry = next(line for line in lines if f"(guide/{page.name})" in line)
         says_so = page.read_text().splitlines()[2].startswith("*You can skip this page")
         assert says_so == ("*(special)*" in entry), page.name
@@ -177,7 +186,7 @@ def test_every_source_that_is_cited_stands_in_the_bibliography() -> None:
 
 def test_every_file_that_the_architecture_names_is_there() -> None:
     places = [*(ROOT / "src").rglob("*"), *(ROOT / "tests").rglob("*.py")]
-    files = [place.relative_to(ROOT).as_posix() for place in places]
+    files = [f"/{place.relative_to(ROOT).as_posix()}" for place in places]
     text = (ROOT / "docs" / "architecture.md").read_text()
     named = set(re.findall(r"[\w/]*\w\.py\b|\b[a-z]\w+(?:/\w+)*/(?=[`\s,])", text))
     assert len(named) > 60

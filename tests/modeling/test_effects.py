@@ -18,6 +18,9 @@ from truearm.simulation.truths import joint_truths
 from truearm.simulation.twin import Twin
 from truearm.simulation.twin_joint import JointTruth
 
+#: Effects at which the robot file refuses negative values and the Python file computes something: told in words here, so
+#: that an attribute that is forgotten or changed by mistake shows.
+SPRINGS_AND_PLAYS = {"compliance", "backlash", "bearing-compliance", "clearance", "clearance-linear-contact"}
 #: All together; of clearance in one form, and the twin knows temperatures where warm-up knows only an order.
 NAMES = tuple(effect.name for effect in EFFECTS if effect.name not in ("clearance-linear-contact", "warm-up"))
 

@@ -2,9 +2,10 @@
 
 It begins with the elastic model. Each round adds, one at a time, every effect that is not there yet, and judges by
 5-fold cross-validation on the training part. An effect is tried if it is selectable, if the robot has what it moves,
-and if the data tell what it depends on: the order of the configurations, the temperature, loads. The best of those whose gain is larger than its own standard error, over
-the paired differences of the folds, stays; the search ends where there is none (the rule of one standard error:
-Breiman and others 1984, "Classification and Regression Trees", section 3.4.3).
+and if the data tell what it depends on: the order of the configurations, the temperature, loads. The best of those
+whose gain is larger than its own standard error, over the paired differences of the folds, stays; the search ends where
+there is none (the rule of one standard error: Breiman and others 1984, "Classification and Regression Trees", section
+3.4.3).
 """
 
 from __future__ import annotations

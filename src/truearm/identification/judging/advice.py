@@ -85,9 +85,7 @@ def check_fit(fit: Fit) -> list[Notice]:
             )
         )
     far = [
-        p.name
-        for p in robot.parameters.values()
-        if p.group in _KINEMATIC and abs(p.value - p.nominal) > _FAR * p.prior
+        p.name for p in robot.parameters.values() if p.group in _KINEMATIC and abs(p.value - p.nominal) > _FAR * p.prior
     ]
     if far:
         found.append(

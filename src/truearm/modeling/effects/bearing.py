@@ -27,10 +27,7 @@ class BearingCompliance(LinearEffect):
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """One a turning joint."""
-        return tuple(
-            self.parameter(f"bearing_compliance_{i + 1}", "rad/(N m)", 1e-4)
-            for i in self.layout.turning
-        )
+        return tuple(self.parameter(f"bearing_compliance_{i + 1}", "rad/(N m)", 1e-4) for i in self.layout.turning)
 
     def shapes(self, at: Postures) -> Rates:
         """Return the moments across the axes."""

@@ -39,10 +39,7 @@ class Clearance(Effect):
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """One angle a turning joint."""
-        return tuple(
-            self.parameter(f"clearance_{i + 1}", "rad", _PRIOR)
-            for i in self.layout.turning
-        )
+        return tuple(self.parameter(f"clearance_{i + 1}", "rad", _PRIOR) for i in self.layout.turning)
 
     def contact(self, x: Array, y: Array) -> tuple[Array, Array]:
         """Return sine and cosine of the contact angle, signed like the moments x and y, as far as it is seated."""

@@ -16,7 +16,8 @@ from truearm.modeling.chain import Array
 from truearm.modeling.controller import AS_THE_MODEL, Controller
 from truearm.modeling.conversion import CONVERSIONS, converted
 from truearm.modeling.formats.robot_file import read_robot, robot_text
-from truearm.modeling.formats.urdf import read_urdf, urdf_text
+from truearm.modeling.formats.urdf import read_urdf
+from truearm.modeling.formats.urdf_writing import urdf_text
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 

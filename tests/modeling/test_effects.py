@@ -183,7 +183,7 @@ def test_it_depends_on_what_it_says(effect: type[Effect]) -> None:
 
     def matters(**changed: np.ndarray) -> bool:
         """Whether the effect moves the arm otherwise in other circumstances."""
-        return bool(np.abs(robot.poses(replace(at, **changed))[0] - robot.poses(at)[0]).max() > 1e-9)  # type: ignore[arg-type]
+        return bool(np.abs(robot.poses(replace(at, **changed))[0] - robot.poses(at)[0]).max() > 1e-9)
 
     assert matters(wrench=2.0 * at.wrench) == effect.loaded
     assert matters(approach=-at.approach, number=at.number[::-1]) == effect.ordered
@@ -246,9 +246,12 @@ NAMED_ELSEWHERE = {
 def spelled_lists(source: str, names: frozenset[str]) -> Iterator[int]:
     """Return the lines of lists that spell the name of a joint effect, and of tables that spell several."""
     for node in ast.walk(ast.parse(source)):
-        entries = node.elts if isinstance(node, ast.Tuple | ast.List | ast.Set) else []
         if isinstance(node, ast.Dict):
             entries = [*(key for key in node.keys if key is not None), *node.values]
+        elif isinstance(node, ast.Tuple | ast.List | ast.Set):
+            entries = node.elts
+        else:
+            continue
         spelled = sum(isinstance(entry, ast.Constant) and entry.value in names for entry in entries)
         if spelled >= (2 if isinstance(node, ast.Dict) else 1):
             yield node.lineno

@@ -15,7 +15,7 @@ from truearm.modeling.formats.dh_table import DHRow, DHTable, TableConvention
 from truearm.modeling.formats.model_json import model_json
 from truearm.modeling.formats.python_file import python_text
 from truearm.modeling.formats.remarks import comments, first_frame_said, frames, left_out, masses_left_out
-from truearm.modeling.formats.urdf import urdf_text
+from truearm.modeling.formats.urdf_writing import urdf_text
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY
 from truearm.units import from_si, to_si

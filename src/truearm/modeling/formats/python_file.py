@@ -17,7 +17,7 @@ import numpy as np
 from truearm.modeling.chain import Array, across, axis_of
 from truearm.modeling.effects.linear_contact import LinearContactClearance
 from truearm.modeling.formats.collapsed import collapsed
-from truearm.modeling.formats.urdf import roll_pitch_yaw
+from truearm.modeling.formats.urdf_tree import roll_pitch_yaw
 from truearm.modeling.robot import Robot
 
 _WIDTH: Final = 118

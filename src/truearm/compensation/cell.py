@@ -121,7 +121,7 @@ class Placed:
     controller
         What its controller has, in its flange or base frame; None if only the program can say.
     identified
-        Where it really is, in the identified flange or base; None if nobody knows.
+        Where it really is, in the identified flange or base; None if it is not known.
     """
 
     controller: Transform | None
@@ -146,7 +146,7 @@ def read_cell(robot: Robot, tools: Path | None, frames: Path | None) -> Cell:
     Parameters
     ----------
     robot
-        Calibrated; its base and targets are meant by ``world`` and ``target``.
+        Calibrated; ``world`` and ``target`` refer to its base and targets.
     tools, frames
         Files of the schema above, of which the tools or the frames are taken; None for none.
 

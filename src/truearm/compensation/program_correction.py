@@ -249,7 +249,7 @@ class _ResolvedProgram:
         return np.asarray(usable[np.unique(evenly)])
 
     def tips_with(self, rows: NDArray[np.intp], base: Array, flange: Array) -> tuple[Array, Array]:
-        """Return tips of targets in the controller's base frame, before and after correction, of those that were found."""
+        """Return tips of targets in the controller's base frame, before and after correction, where found."""
         if not len(rows):
             return np.zeros((0, 4, 4)), np.zeros((0, 4, 4))
         found = self._found(rows, base, flange)

@@ -56,6 +56,7 @@ def provenance(programs: Sequence[Program], cell: Cell, kind: Kind) -> Provenanc
     if known and missing:
         raise InputError(
             f"only some of the {kind}s in use have a real place in the file",
+            parameter=f"{kind}s",
             where=needed[missing[0]],
             came=missing[0] or own,
             cure=f"Give it one too, or none of them: without any, {without}.",
@@ -105,6 +106,7 @@ def _undefined(program: Program, name: str, names: list[str], kind: str, known: 
     near = nearest_names(name, known)
     return InputError(
         f"this {kind} is used and never defined",
+        parameter=f"{kind}s",
         where=place(program, target),
         came=target.tool if kind == "tool" else target.frame,
         cure=(f"Did you mean {' or '.join(near)}? " if near else "")

@@ -41,7 +41,7 @@ def test_an_exported_robot_holds_its_text(tmp_path: Path) -> None:
 
 def test_axes_that_a_table_cannot_hold_are_refused() -> None:
     robot = truearm.load_robot("irb120").with_values({"alpha_3": 1e-3, "beta_3": 1e-3})
-    with pytest.raises(InputError, match=r"nearly parallel.*`format=hayati`") as refusal:
+    with pytest.raises(InputError, match=r"nearly parallel.*take the convention hayati") as refusal:
         truearm.export(robot, "dh")
     assert refusal.value.parameter == "robot"
 

@@ -133,7 +133,7 @@ class ProgramTarget:
         Names of the tool and of the work object, base or user frame that hold; empty for the flange and the robot's
         own base.
     configuration
-        The posture meant.
+        In which posture the target is reached.
     parent
         Index of the target that this one is an offset from, None for none. A target and its parent have the same tool
         and frame.

@@ -30,7 +30,7 @@ _NOWHERE: Final = (0, 0)
 
 
 class Going(NamedTuple):
-    """A move: where it ends and what it passes, as far as that is told, and the stretch of the text whose TCP holds.
+    """A move: where it ends and what it passes, as far as that is known, and the stretch of the text whose TCP holds.
 
     Moves of one `number` follow each other.
     """

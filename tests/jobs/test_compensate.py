@@ -106,7 +106,7 @@ def test_refusals_name_the_parameter(program: Path) -> None:
         ({"split": 0.5}, "split", r"cannot be split by this distance; got '500 mm'; allowed: 0.001 to 100 mm"),
     ):
         with pytest.raises(InputError, match=said) as refusal:
-            truearm.compensate(robot, [program], **keywords)  # type: ignore[arg-type]
+            truearm.compensate(robot, [program], **keywords)
         assert refusal.value.parameter == parameter
     with pytest.raises(InputError, match="not calibrated") as refusal:
         truearm.compensate("irb120", [program])

@@ -11,7 +11,7 @@ import pytest
 from pydantic import BaseModel
 
 from truearm.compensation.cell import CellFile
-from truearm.compensation.program_files import Record
+from truearm.compensation.program_files import CorrectionRecord
 from truearm.errors import InputError
 from truearm.files import exists, is_one_line, read_bytes, read_yaml, validated, write_files, write_text
 from truearm.identification.solving.bounds import Bounds
@@ -134,7 +134,7 @@ def test_not_one_line(text: str) -> None:
 
 # -- what pydantic finds, in plain words
 
-SCHEMAS: list[type[BaseModel]] = [RobotFile, CellFile, Bounds, Constraints, MappingFile, Record]
+SCHEMAS: list[type[BaseModel]] = [RobotFile, CellFile, Bounds, Constraints, MappingFile, CorrectionRecord]
 BOUNDS = {"truearm": "truearm-bounds/1", "units": {"length": "mm", "angle": "deg"}}
 ALLOWED = {"truearm": "truearm-constraints/1", "units": {"length": "mm", "angle": "deg"}}
 
@@ -194,7 +194,11 @@ ALLOWED = {"truearm": "truearm-constraints/1", "units": {"length": "mm", "angle"
             ALLOWED | {"moments": {1: "up"}},
             "moments.1: this is not known here; got 'up'; allowed: positive",
         ),
-        (Record, {"truearm": "truearm-corrected/1", "original_sha256": "x"}, "program: this entry is missing"),
+        (
+            CorrectionRecord,
+            {"truearm": "truearm-corrected/1", "original_sha256": "x"},
+            "program: this entry is missing",
+        ),
     ],
 )
 def test_entries_that_do_not_fit_are_told_in_plain_words(
@@ -270,7 +274,7 @@ FILES: dict[type[BaseModel], dict[str, object]] = {
         "joints": {"columns": ["q1"], "unit": "deg"},
         "sigma": {"value": 0.01, "unit": "mm"},
     },
-    Record: {
+    CorrectionRecord: {
         "truearm": "truearm-corrected/1",
         "program": "p",
         "language": "krl",

@@ -33,7 +33,7 @@ _DRAWN: Final = {"m": 0.20e-3, "rad": math.radians(0.07)}
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """Position errors on unseen configurations [m], of one seed. Noise and wrong masses are in those from `noisy` on.
+    """Position errors on unseen configurations [m], of one seed.
 
     Attributes
     ----------

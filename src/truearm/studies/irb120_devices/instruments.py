@@ -21,11 +21,11 @@ from truearm.simulation.twin import Twin
 from truearm.studies.irb120 import ELASTIC
 from truearm.studies.irb120_devices.twin import Truth
 
-#: What no reading tells: base against joint 1, tool against joint 6, slides along parallel axes, sag of joint 1.
+#: What no instrument sees: base against joint 1, tool against joint 6, slides along parallel axes, sag of joint 1.
 _CONVENTIONS = frozenset(
     {"alpha_1", "a_1", "d_1", "theta_offset_1", "theta_offset_6", "d_6", "d_2", "d_3", "compliance_1"}
 )
-#: What a target on axis 6 alone does not tell apart either.
+#: What a target on axis 6 alone does not separate either.
 _ON_AXIS_6 = frozenset({"alpha_6", "a_6", "compliance_6"})
 
 
@@ -49,7 +49,7 @@ class Accuracy:
     gauges
         What nobody measured: ``base``, ``size``.
     unobservable
-        What its readings leave open of the arm itself, beside what no reading tells, as combinations.
+        What its readings leave open of the arm itself, beside what no instrument sees, as combinations.
     numbers
         How many numbers it read.
     """

@@ -74,7 +74,7 @@ class Ways:
     three_places
         At three, frames of the places and model found in turn.
     by_touches
-        The same, each place by the readings at its cups and the model from the first place.
+        The same, each place by the joint positions at its cups and the model from the first place.
     by_touches_in_turn
         The same again and again, each time with the model found before.
     four_cups

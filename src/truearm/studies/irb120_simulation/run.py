@@ -40,7 +40,7 @@ class Outcome:
     before, exact
         Of the nominal robot and of the identified one, errors of Tables 2.6 and 2.7.
     payload_as_printed
-        With the payload told in the true flange frame.
+        With the payload as it is in the true flange frame.
     drawn_before, drawn_exact
         As the first two, errors drawn anew.
     no_beta

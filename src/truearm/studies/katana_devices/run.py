@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 import numpy as np
+from truearm.studies.katana_circle import PENCIL, motions, paths
 
 from truearm.compensation.trajectories import corrected
 from truearm.errors import InputError
@@ -29,7 +30,6 @@ from truearm.simulation.devices.pencil import DRAWN_CIRCLE, PencilCircle
 from truearm.simulation.devices.tracker import TRACKER, Tracker
 from truearm.simulation.twin import Twin
 from truearm.studies.katana import NOISE, TIP, inclined, katana, published, twin
-from truearm.studies.katana_circle import PENCIL, motions, paths
 
 #: Where the robot stands before an instrument at the origin: 2.6 m away (the Optotrak sees from 2 to 7 m), turned.
 _STANDS: Final = Transform((2.5, 0.2, -0.7), (0.5**0.5, 0.0, 0.0, 0.5**0.5))

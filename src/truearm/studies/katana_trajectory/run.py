@@ -9,14 +9,13 @@ from typing import Final
 import numpy as np
 
 from truearm.compensation.trajectories import corrected, path_error
-from truearm.errors import InputError
 from truearm.identification.solving.pose_by_pose import least_squares
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.planning.paths.joint_motion import JointMotion, joint_motion
-from truearm.planning.paths.paths import Circle, Line
+from truearm.planning.paths.paths import Circle
 from truearm.planning.paths.time_law import timed
 from truearm.planning.paths.trajectory import Trajectory
 from truearm.planning.poses.pose_plan import plan_poses
@@ -175,27 +174,6 @@ def _causes() -> Mapping[str, Robot]:
         "tilting, full gap": only("compliance", "clearance", "backlash", gap=2.0),
         "tilting and geometry of Table 3.2": knowing(published("standard", PENCIL), TILTING),
     }
-
-
-def paths(step: float) -> tuple[Trajectory, Trajectory]:
-    """Return the circle of section 5.5.1 and its diameter, with a time between samples [s]."""
-    circle, line = (timed(path, SPEED, _RAMP, step) for path in (Circle.through(*_POINTS), Line(*_LINE)))
-    return circle, line
-
-
-def motions(
-    robot: Robot, circle: Trajectory, line: Trajectory, rng: np.random.Generator
-) -> tuple[JointMotion, JointMotion]:
-    """Return motions along both paths from a posture drawn at random, far from singular ones."""
-    top = int(np.argmin(np.linalg.norm(circle.position - line.position[0], axis=1)))
-    while True:
-        try:
-            motion = joint_motion(robot, circle, target=TIP, seed=robot.random_configurations(1, rng)[0])
-            if motion.singular_value.min() < _REGULAR:
-                continue
-            return motion, joint_motion(robot, line, target=TIP, seed=motion.joints[top])
-        except InputError:  # beyond a limit, or no way round: another posture
-            continue
 
 
 def _samples(truth: Twin, motion: JointMotion, rng: np.random.Generator) -> Dataset:

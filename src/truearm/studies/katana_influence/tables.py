@@ -1,44 +1,31 @@
-"""Patel, sections 3.5 to 3.7: what each parameter does to the tip, and whether identification gains by knowing it."""
+"""Tables of the study katana-influence: our figures beside those of Patel's sections 3.5 to 3.7."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 import numpy as np
 
 from truearm.identification.solving.influence import influence
-from truearm.planning.poses.pose_plan import POSES
-from truearm.reporting.drawing import AFTER, BEFORE, axis, figure
-from truearm.reporting.influence_figures import influence_figure
-from truearm.reporting.numbers import rounded
-from truearm.studies.katana import (
-    DOCUMENT_NAMES,
-    NAMES,
-    NOISE,
-    PERTURBATIONS,
-    QUANTITIES,
-    TIP,
-    katana,
-    workspace_cube,
-)
-from truearm.studies.katana_pose_by_pose import (
+from truearm.identification.solving.pose_by_pose import Combination
+from truearm.studies.katana.pose_errors import QUANTITIES, Quantity
+from truearm.studies.katana.robot import DOCUMENT_NAMES, NAMES, PERTURBATIONS, TIP, katana
+from truearm.studies.katana_influence.run import (
     COMBINATIONS,
-    FULL,
-    GEOMETRY,
-    INFLUENCE,
-    JOINT,
-    NORM,
-    OTHER,
+    METHODS,
+    ONE_POSE_METHODS,
+    TRUTHS,
+    AngleUnit,
     InfluenceRun,
-    run_influence,
+    Method,
+    Truth,
 )
-from truearm.studies.study import Picture, Row, Study, Table
+from truearm.studies.study import Row, Table
 
 #: Table 3.4: before, simultaneous, influence-based.
-_TABLE_34: Final = {
+_TABLE_34: Final[Mapping[Quantity, tuple[float, float, float]]] = {
     "dX": (0.63, 0.28, 0.18),
     "dY": (0.44, 0.13, 0.10),
     "dZ": (0.85, 0.25, 0.16),
@@ -50,90 +37,47 @@ _TABLE_34: Final = {
 _THETA_2, _ALPHA_2 = 0.34, 0.59  # section 3.6 [mm, share]
 #: The document's robot is another one in other poses.
 _SIMILAR: Final = 0.25
-_UNSEEN: Final = 200
+
+#: Robots and methods in words.
+TRUTH_WORDS: Final[Mapping[Truth, str]] = {
+    "table 3.2": "Table 3.2",
+    "table 3.3": "Table 3.3",
+    "tilting": "Table 3.2 and tilting joints",
+}
+METHOD_WORDS: Final[Mapping[Method, str]] = {
+    "nominal": "before",
+    "minimum norm": "minimum norm, pose by pose",
+    "influence": "influence-based, pose by pose",
+    "least squares": "joint least squares",
+}
+#: Why lengths change as they do, by the unit of angles beside lengths in mm.
+_LENGTH_WORDS: Final[Mapping[AngleUnit, str]] = {
+    "rad": "Where 1 rad and 1 mm count alike, the smallest step turns joints and leaves lengths as they are, whatever"
+    " they are in truth.",
+    "deg": "Changes of the printed size, 0.001 to 0.010 mm, come out if angles are counted in deg. Either way they are"
+    " made by the units and say nothing about how long the links are.",
+}
+_COMBINATION_WORDS: Final[Mapping[Combination, str]] = {
+    "mean": "mean of the sets",
+    "scaled-mean": "mean, scaled to fit best",
+    "best-pose": "best single set",
+}
 
 
-def study(seeds: int, progress: Callable[[str], None], count: int = POSES, unseen: int = _UNSEEN) -> Study:
-    """Run the study.
-
-    Parameters
-    ----------
-    seeds
-        How many: of the orientations at the poses, of the unseen configurations and of the noise.
-    progress
-        Called with a few words at each step.
-    count
-        Poses to calibrate with.
-    unseen
-        Configurations to judge by.
-    """
-    progress("looking for the largest cube")
-    cube = workspace_cube()
-    runs = []
-    for seed in range(seeds):
-        progress(f"seed {seed + 1} of {seeds}")
-        runs.append(run_influence(seed, cube, count, unseen))
-
-    def left(robot: str, method: str) -> float:
-        return float(np.median([run.unseen[robot, method] for run in runs]))
-
-    beaten = all(left(robot, INFLUENCE) > left(robot, JOINT) for robot in (FULL, GEOMETRY, OTHER))
-    verdict = (
-        "Influence-based identification does not beat joint least squares on any of the robots tried"
-        if beaten
-        else "Influence-based identification beats joint least squares on one of the robots tried"
-    )
-    return Study(
-        name="katana-influence",
-        title="Influence-based identification of a Katana 450",
-        source="D. Patel, doctoral thesis on the Katana 450, sections 3.5 to 3.7, Figure 3.8, Tables 3.2 to 3.4",
-        answer=f"{verdict}: on unseen poses of a geometric robot (Table 3.2) it leaves"
-        f" {left(GEOMETRY, INFLUENCE):.3f} mm, minimum norm {left(GEOMETRY, NORM):.3f} mm, joint least squares"
-        f" {left(GEOMETRY, JOINT):.4f} mm; where joints tilt as well {left(FULL, INFLUENCE):.3f},"
-        f" {left(FULL, NORM):.3f} and {left(FULL, JOINT):.3f} mm. One pose sees 3 combinations of the 17"
-        " parameters, so the set that explains it holds a fraction of the errors, and so does the mean of the sets."
-        " Weighting by influence changes which fraction. Several printed figures contradict each other.",
-        seeds=seeds,
-        tables=(
-            _influences(runs),
-            _printed(runs, "Before calibration", 0, "before"),
-            _printed(runs, "After simultaneous identification", 1, JOINT),
-            _printed(runs, "After influence-based identification", 2, INFLUENCE),
-            _methods(runs),
-            _combinations(runs),
-            _contradictions(runs),
-        ),
-        pictures=(
-            Picture(
-                "influence",
-                "Influence of each parameter, as in Figure 3.8",
-                "How far the tip moves if one parameter is off by +0.05 deg or +0.1 mm: average over the poses of the"
-                " first seed, and range. Names are the document's; those of the tool link, alpha 5 and d 6, are y and z"
-                " of the tip in truearm.",
-                influence_figure(replace(runs[0].influence, names=DOCUMENT_NAMES)),
-            ),
-            _picture(runs),
-        ),
-        notes=(
-            f"The poses are ours, because the document does not print its own: {count} points on the diagonal planes of"
-            f" the largest cube in front of the arm (side {cube.side * 1e3:.0f} mm), each in another orientation.",
-            f"Readings are the tip's positions with {NOISE * 1e3:g} mm of noise a coordinate, in a known base frame."
-            " Errors are judged against the twin's true poses. Unseen configurations are drawn evenly from all that"
-            " the limits allow.",
-            "Pose by pose follows equations 3.6 to 3.8 until 0.01 mm is left. J^T/(J J^T) is the step of least norm,"
-            " which depends on units: rad and mm as in the document. The coefficient C, which is not printed, is 0.5;"
-            " it changes the number of iterations and not where they end.",
-            "The document does not say how one set is made of those of all poses. The mean is shown; two more ways are"
-            " in a table of their own, and neither comes near to joint least squares.",
-            "Orientations are ZXZ angles by atan2. Nothing but positions is identified from, as in the document.",
-        ),
+def all_tables(runs: Sequence[InfluenceRun]) -> tuple[Table, ...]:
+    """Return the tables of the study."""
+    return (
+        _influences(runs),
+        _table_34(runs, "Before calibration", 0, "nominal"),
+        _table_34(runs, "After simultaneous identification", 1, "least squares"),
+        _table_34(runs, "After influence-based identification", 2, "influence"),
+        _methods(runs),
+        _combinations(runs),
+        _contradictions(runs),
     )
 
 
-# -- tables ------------------------------------------------------------------------------------------------
-
-
-def _influences(runs: list[InfluenceRun]) -> Table:
+def _influences(runs: Sequence[InfluenceRun]) -> Table:
     def means(name: str) -> list[float]:
         return [1e3 * float(run.influence.mean[DOCUMENT_NAMES.index(name)]) for run in runs]
 
@@ -201,7 +145,7 @@ def _influences(runs: list[InfluenceRun]) -> Table:
     )
 
 
-def _printed(runs: list[InfluenceRun], title: str, column: int, method: str) -> Table:
+def _table_34(runs: Sequence[InfluenceRun], title: str, column: int, method: Method) -> Table:
     why = {
         0: "Tables 3.2, 4.3 and 4.4 together do not make as large an error as was measured before calibration. What"
         " else was wrong (base frame, inverse kinematics of the controller) is not printed.",
@@ -213,7 +157,7 @@ def _printed(runs: list[InfluenceRun], title: str, column: int, method: str) -> 
         Row(
             f"|{quantity}|, mean",
             unit,
-            [run.poses[FULL, method][quantity] for run in runs],
+            [run.left["tilting", method].poses[quantity] for run in runs],
             _TABLE_34[quantity][column],
             "Table 3.4",
             relative=_SIMILAR,
@@ -226,7 +170,7 @@ def _printed(runs: list[InfluenceRun], title: str, column: int, method: str) -> 
             Row(
                 "|dP|, mean, by the document's own method",
                 "mm",
-                [run.poses[FULL, NORM]["dP"] for run in runs],
+                [run.left["tilting", "minimum norm"].poses["dP"] for run in runs],
                 _TABLE_34["dP"][1],
                 "Table 3.4",
                 relative=_SIMILAR,
@@ -237,42 +181,47 @@ def _printed(runs: list[InfluenceRun], title: str, column: int, method: str) -> 
     if column == 0:
         rows += [
             Row(
-                f"|dP|, mean, {name}, joints that do not tilt",
+                f"|dP|, mean, {TRUTH_WORDS[truth]}, joints that do not tilt",
                 "mm",
-                [run.poses[name, method]["dP"] for run in runs],
+                [run.left[truth, method].poses["dP"] for run in runs],
                 _TABLE_34["dP"][0],
                 "Table 3.4",
                 relative=_SIMILAR,
             )
-            for name in (GEOMETRY, OTHER)
+            for truth in TRUTHS
+            if truth != "tilting"
         ]
     return Table(
         title,
         "Mean absolute errors over the poses of a twin with the geometry of Table 3.2 and the tilting joints of"
         " Tables 4.3 and 4.4, which the document's robot had as well"
-        + (f": {method}" if column else "")
+        + (f": {METHOD_WORDS[method]}" if column else "")
         + ". A quarter is allowed: the poses are others.",
         tuple(rows),
     )
 
 
-def _methods(runs: list[InfluenceRun]) -> Table:
+def _methods(runs: Sequence[InfluenceRun]) -> Table:
     rows = []
-    for robot in (GEOMETRY, OTHER, FULL):
-        for method in ("before", NORM, INFLUENCE, JOINT):
-            rows.append(Row(f"{robot}: {method}", "mm", [run.unseen[robot, method] for run in runs]))
+    for truth in TRUTHS:
+        words = TRUTH_WORDS[truth]
+        for method in METHODS:
+            rows.append(Row(f"{words}: {METHOD_WORDS[method]}", "mm", [run.left[truth, method].unseen for run in runs]))
         rows.append(
             Row(
-                f"{robot}: influence-based over joint least squares",
+                f"{words}: influence-based over joint least squares",
                 "times",
-                [run.unseen[robot, INFLUENCE] / run.unseen[robot, JOINT] for run in runs],
+                [run.left[truth, "influence"].unseen / run.left[truth, "least squares"].unseen for run in runs],
             )
         )
     rows.append(
         Row(
-            f"{GEOMETRY}: influence-based over minimum norm",
+            f"{TRUTH_WORDS['table 3.2']}: influence-based over minimum norm",
             "%",
-            [100 * run.unseen[GEOMETRY, INFLUENCE] / run.unseen[GEOMETRY, NORM] for run in runs],
+            [
+                100 * run.left["table 3.2", "influence"].unseen / run.left["table 3.2", "minimum norm"].unseen
+                for run in runs
+            ],
             round(100 * 0.21 / 0.38),
             "Table 3.4",
             relative=_SIMILAR,
@@ -287,24 +236,23 @@ def _methods(runs: list[InfluenceRun]) -> Table:
     )
 
 
-def _combinations(runs: list[InfluenceRun]) -> Table:
-    words = {"mean": "mean of the sets", "scaled-mean": "mean, scaled to fit best", "best-pose": "best single set"}
+def _combinations(runs: Sequence[InfluenceRun]) -> Table:
     return Table(
         "Three ways to make one set of those of all poses",
         "Mean |dP| on the unseen poses of the geometric robot of Table 3.2.",
         tuple(
             Row(
-                f"{method}: {words[combination]}",
+                f"{METHOD_WORDS[method]}: {_COMBINATION_WORDS[combination]}",
                 "mm",
                 [run.combined[method, combination] for run in runs],
             )
-            for method in (NORM, INFLUENCE)
+            for method in ONE_POSE_METHODS
             for combination in COMBINATIONS
         ),
     )
 
 
-def _contradictions(runs: list[InfluenceRun]) -> Table:
+def _contradictions(runs: Sequence[InfluenceRun]) -> Table:
     floor = {
         column: math.sqrt(sum(_TABLE_34[quantity][column] ** 2 for quantity in ("dX", "dY", "dZ"))) for column in (1, 2)
     }
@@ -346,18 +294,7 @@ def _contradictions(runs: list[InfluenceRun]) -> Table:
                     absolute=0.0095,
                     explanation=why,
                 )
-                for unit, why in (
-                    (
-                        "rad",
-                        "Where 1 rad and 1 mm count alike, the smallest step turns joints and leaves lengths as they"
-                        " are, whatever they are in truth.",
-                    ),
-                    (
-                        "deg",
-                        "Changes of the printed size, 0.001 to 0.010 mm, come out if angles are counted in deg."
-                        " Either way they are made by the units and say nothing about how long the links are.",
-                    ),
-                )
+                for unit, why in _LENGTH_WORDS.items()
             ),
             Row(
                 "|dPhi|, |dTheta| and |dPsi| of Table 4.5 less those of Table 3.4, largest",
@@ -368,28 +305,3 @@ def _contradictions(runs: list[InfluenceRun]) -> Table:
             ),
         ),
     )
-
-
-def _picture(runs: list[InfluenceRun]) -> Picture:
-    robots = (GEOMETRY, OTHER, FULL)
-    methods = ("before", NORM, INFLUENCE, JOINT)
-    colours = (BEFORE, "#8a6d1d", "#b3261e", AFTER)
-    traces = [
-        {
-            "type": "bar",
-            "name": method,
-            "x": list(robots),
-            "y": rounded(np.array([np.median([run.unseen[robot, method] for run in runs]) for robot in robots]), 4),
-            "marker": {"color": colour, "line": {"width": 0}},
-            "hovertemplate": f"%{{x}}, {method}: %{{y}} mm<extra></extra>",
-        }
-        for method, colour in zip(methods, colours, strict=True)
-    ]
-    drawn = figure(
-        traces,
-        380,
-        xaxis={**axis("the truth"), "type": "category"},
-        yaxis={**axis("mean |dP| on unseen poses [mm]"), "rangemode": "tozero"},
-        barmode="group",
-    )
-    return Picture("methods", "What each method leaves", "Median over the seeds.", drawn)

@@ -7,10 +7,6 @@ from collections.abc import Callable, Sequence
 from typing import Final
 
 import numpy as np
-
-from truearm.reporting.drawing import AFTER, BEFORE, Figure, axis, figure, logarithmic_axis
-from truearm.reporting.numbers import rounded
-from truearm.simulation.devices.artefacts import MARKERS
 from truearm.studies.katana_campaigns import (
     DOCUMENT,
     LOW_COST,
@@ -23,6 +19,10 @@ from truearm.studies.katana_campaigns import (
     Start,
     run_devices,
 )
+
+from truearm.reporting.drawing import AFTER, BEFORE, Figure, axis, figure, logarithmic_axis
+from truearm.reporting.numbers import rounded
+from truearm.simulation.devices.artefacts import MARKERS
 from truearm.studies.study import Picture, Row, Study, Table
 
 #: Table 4.6, mean and largest |dP| of ten uncalibrated points [mm].

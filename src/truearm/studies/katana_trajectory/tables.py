@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Final
 
 import numpy as np
+from truearm.studies.katana_circle import FAST, MODELS, SAMPLES, SOURCES, SPEED, CircleRun, run_circle
 
 from truearm.modeling.chain import Array
 from truearm.planning.poses.pose_plan import POSES
@@ -13,7 +14,6 @@ from truearm.reporting.drawing import AFTER, BEFORE, COLOURS, Figure, axis, figu
 from truearm.reporting.numbers import rounded
 from truearm.reporting.planning_figures import joint_trajectories
 from truearm.studies.katana import katana
-from truearm.studies.katana_circle import FAST, MODELS, SAMPLES, SOURCES, SPEED, CircleRun, run_circle
 from truearm.studies.study import Picture, Row, Study, Table
 
 #: Section 5.5.1, mean distance from the path [mm].

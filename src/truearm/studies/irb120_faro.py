@@ -148,7 +148,6 @@ def study(
             f"auto runs at {searches[0]} and {searches[1]} seeds at most ({_AUTO} and {many} configurations), for its"
             " time." + (f" It chose {'; '.join(chosen)}." if chosen else ""),
         ),
-        measured=True,
     )
 
 

@@ -6,11 +6,17 @@ from typing import Final
 
 from truearm.planning.poses.pose_plan import POSES
 from truearm.studies import Progress
-from truearm.studies.katana.robot import NOISE, workspace_cube
-from truearm.studies.katana_influence.pictures import all_pictures
-from truearm.studies.katana_influence.run import TRUTHS, Method, Truth, run_influence
-from truearm.studies.katana_influence.tables import all_tables
-from truearm.studies.seeds import middle, over_seeds
+from truearm.studies.katana.robot import NOISE
+from truearm.studies.katana_influence.pictures import influence_picture, methods_picture
+from truearm.studies.katana_influence.run import TRUTHS, Method, Truth, run
+from truearm.studies.katana_influence.tables import (
+    combinations_table,
+    contradictions_table,
+    errors_table,
+    influences_table,
+    methods_table,
+)
+from truearm.studies.seeds import median_of
 from truearm.studies.study import Study
 
 _UNSEEN: Final = 200
@@ -30,12 +36,11 @@ def study(seeds: int, progress: Progress, count: int = POSES, unseen: int = _UNS
     unseen
         Configurations to judge by.
     """
-    progress("looking for the largest cube")
-    cube = workspace_cube()
-    runs = over_seeds(seeds, progress, lambda seed: run_influence(seed.number, cube, count, unseen))
+    found = run(seeds, progress, count, unseen)
+    outcomes = found.outcomes
 
     def left(truth: Truth, method: Method) -> float:
-        return middle(runs, lambda run: run.left[truth, method].unseen)
+        return median_of(outcomes, lambda one: one.left[truth, method].unseen)
 
     beaten = all(left(truth, "influence") > left(truth, "least squares") for truth in TRUTHS)
     verdict = (
@@ -55,11 +60,20 @@ def study(seeds: int, progress: Progress, count: int = POSES, unseen: int = _UNS
         " parameters, so the set that explains it holds a fraction of the errors, and so does the mean of the sets."
         " Weighting by influence changes which fraction. Several printed figures contradict each other.",
         seeds=seeds,
-        tables=all_tables(runs),
-        pictures=all_pictures(runs),
+        tables=(
+            influences_table(outcomes),
+            errors_table(outcomes, "Before calibration", 0, "nominal"),
+            errors_table(outcomes, "After simultaneous identification", 1, "least squares"),
+            errors_table(outcomes, "After influence-based identification", 2, "influence"),
+            methods_table(outcomes),
+            combinations_table(outcomes),
+            contradictions_table(outcomes),
+        ),
+        pictures=(influence_picture(outcomes[0]), methods_picture(outcomes)),
         notes=(
             f"The poses are ours, because the document does not print its own: {count} points on the diagonal planes of"
-            f" the largest cube in front of the arm (side {cube.side * 1e3:.0f} mm), each in another orientation.",
+            f" the largest cube in front of the arm (side {found.cube.side * 1e3:.0f} mm), each in another"
+            " orientation.",
             f"Readings are the tip's positions with {NOISE * 1e3:g} mm of noise a coordinate, in a known base frame."
             " Errors are judged against the twin's true poses. Unseen configurations are drawn evenly from all that"
             " the limits allow.",

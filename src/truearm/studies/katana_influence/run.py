@@ -16,6 +16,7 @@ from truearm.modeling.robot import Robot
 from truearm.planning.poses.iso9283 import Cube
 from truearm.planning.poses.pose_plan import plan_poses
 from truearm.simulation.twin import Twin, measure
+from truearm.studies import Progress
 from truearm.studies.katana.pose_errors import Quantity, pose_errors, tip_poses, true_poses
 from truearm.studies.katana.robot import (
     CHAPTER_5_CUBE,
@@ -26,8 +27,10 @@ from truearm.studies.katana.robot import (
     UNITS,
     katana,
     published,
+    workspace_cube,
 )
 from truearm.studies.katana.tilting import TILTING, twin
+from truearm.studies.seeds import Seed, over_seeds
 
 #: The robots that are calibrated: geometry of Table 3.2 with joints that tilt, of Table 3.2 alone, of Table 3.3 alone.
 Truth = Literal["tilting", "table 3.2", "table 3.3"]
@@ -60,7 +63,7 @@ class Left:
 
 
 @dataclass(frozen=True, eq=False)
-class InfluenceRun:
+class Outcome:
     """What one seed gives.
 
     Attributes
@@ -85,12 +88,46 @@ class InfluenceRun:
     lengths: Mapping[AngleUnit, float]
 
 
-def run_influence(seed: int, cube: Cube, count: int, unseen: int) -> InfluenceRun:
-    """Calibrate three twins from `count` poses in a cube, and judge there and at `unseen` configurations."""
-    rng = np.random.default_rng(seed)
+@dataclass(frozen=True, eq=False)
+class Run:
+    """The whole study.
+
+    Attributes
+    ----------
+    cube
+        Where the poses are.
+    outcomes
+        Of the seeds.
+    """
+
+    cube: Cube
+    outcomes: tuple[Outcome, ...]
+
+
+def run(seeds: int, progress: Progress, count: int, unseen: int) -> Run:
+    """Calibrate three twins by every method, once a seed.
+
+    Parameters
+    ----------
+    seeds
+        How many: of the orientations at the poses, of the unseen configurations and of the noise.
+    progress
+        Called with a few words at each step.
+    count
+        Poses to calibrate with.
+    unseen
+        Configurations to judge by.
+    """
+    progress("looking for the largest cube")
+    cube = workspace_cube()
+    return Run(cube, over_seeds(seeds, progress, lambda seed: _one(seed, cube, count, unseen)))
+
+
+def _one(seed: Seed, cube: Cube, count: int, unseen: int) -> Outcome:
+    rng = seed.generator()
     nominal = katana()
     joints, central = (
-        plan_poses(nominal, c, target=TIP, count=count, seed=seed).joints for c in (cube, CHAPTER_5_CUBE)
+        plan_poses(nominal, c, target=TIP, count=count, seed=seed.number).joints for c in (cube, CHAPTER_5_CUBE)
     )
     others = nominal.random_configurations(unseen, rng)
     truths: dict[Truth, Twin] = {  # in the order in which their noise is drawn
@@ -120,7 +157,7 @@ def run_influence(seed: int, cube: Cube, count: int, unseen: int) -> InfluenceRu
             robot = _pose_by_pose(one, nominal, data, combination)
             combined[one, combination] = float(pose_errors(tip_poses(robot, others), elsewhere)["dP"].mean())
     standard, other = published("standard").poses(joints, TIP)[0], published("influence").poses(joints, TIP)[0]
-    return InfluenceRun(
+    return Outcome(
         influence=influence(nominal, joints, NAMES, TIP, PERTURBATIONS),
         chapter_5=influence(nominal, central, NAMES, TIP, PERTURBATIONS),
         left=left,

@@ -18,8 +18,8 @@ from truearm.studies.katana_influence.run import (
     ONE_POSE_METHODS,
     TRUTHS,
     AngleUnit,
-    InfluenceRun,
     Method,
+    Outcome,
     Truth,
 )
 from truearm.studies.study import Row, Table
@@ -64,22 +64,11 @@ _COMBINATION_WORDS: Final[Mapping[Combination, str]] = {
 }
 
 
-def all_tables(runs: Sequence[InfluenceRun]) -> tuple[Table, ...]:
-    """Return the tables of the study."""
-    return (
-        _influences(runs),
-        _table_34(runs, "Before calibration", 0, "nominal"),
-        _table_34(runs, "After simultaneous identification", 1, "least squares"),
-        _table_34(runs, "After influence-based identification", 2, "influence"),
-        _methods(runs),
-        _combinations(runs),
-        _contradictions(runs),
-    )
+def influences_table(outcomes: Sequence[Outcome]) -> Table:
+    """Show how far the tip moves if one parameter is off, beside what section 3.6 prints."""
 
-
-def _influences(runs: Sequence[InfluenceRun]) -> Table:
     def means(name: str) -> list[float]:
-        return [1e3 * float(run.influence.mean[DOCUMENT_NAMES.index(name)]) for run in runs]
+        return [1e3 * float(one.influence.mean[DOCUMENT_NAMES.index(name)]) for one in outcomes]
 
     second, third = (DOCUMENT_NAMES.index(f"theta {i}") for i in (2, 3))
     bent = influence(katana(), np.radians([[0.0, 0.0, 0.0, 80.0, 0.0]]), NAMES, TIP, PERTURBATIONS)
@@ -100,7 +89,7 @@ def _influences(runs: Sequence[InfluenceRun]) -> Table:
         Row(
             "theta 2, average in a cube of 250 mm about the circle of chapter 5",
             "mm",
-            [1e3 * float(run.chapter_5.mean[second]) for run in runs],
+            [1e3 * float(one.chapter_5.mean[second]) for one in outcomes],
             _THETA_2,
             "section 3.6",
             relative=0.1,
@@ -121,13 +110,13 @@ def _influences(runs: Sequence[InfluenceRun]) -> Table:
         Row(
             "theta 2, smallest",
             "mm",
-            [1e3 * float(run.influence.least[second]) for run in runs],
+            [1e3 * float(one.influence.least[second]) for one in outcomes],
             explanation="As the document says, theta 3 at its greatest is more than theta 2 at its smallest.",
         ),
         Row(
             "theta 3, greatest",
             "mm",
-            [1e3 * float(run.influence.greatest[third]) for run in runs],
+            [1e3 * float(one.influence.greatest[third]) for one in outcomes],
         ),
         Row("theta 3, at theta 4 = 80 deg and all others 0", "mm", [1e3 * float(bent.mean[third])]),
         Row(
@@ -145,7 +134,8 @@ def _influences(runs: Sequence[InfluenceRun]) -> Table:
     )
 
 
-def _table_34(runs: Sequence[InfluenceRun], title: str, column: int, method: Method) -> Table:
+def errors_table(outcomes: Sequence[Outcome], title: str, column: int, method: Method) -> Table:
+    """Set errors at the poses beside a column of Table 3.4."""
     why = {
         0: "Tables 3.2, 4.3 and 4.4 together do not make as large an error as was measured before calibration. What"
         " else was wrong (base frame, inverse kinematics of the controller) is not printed.",
@@ -157,7 +147,7 @@ def _table_34(runs: Sequence[InfluenceRun], title: str, column: int, method: Met
         Row(
             f"|{quantity}|, mean",
             unit,
-            [run.left["tilting", method].poses[quantity] for run in runs],
+            [one.left["tilting", method].poses[quantity] for one in outcomes],
             _TABLE_34[quantity][column],
             "Table 3.4",
             relative=_SIMILAR,
@@ -170,7 +160,7 @@ def _table_34(runs: Sequence[InfluenceRun], title: str, column: int, method: Met
             Row(
                 "|dP|, mean, by the document's own method",
                 "mm",
-                [run.left["tilting", "minimum norm"].poses["dP"] for run in runs],
+                [one.left["tilting", "minimum norm"].poses["dP"] for one in outcomes],
                 _TABLE_34["dP"][1],
                 "Table 3.4",
                 relative=_SIMILAR,
@@ -183,7 +173,7 @@ def _table_34(runs: Sequence[InfluenceRun], title: str, column: int, method: Met
             Row(
                 f"|dP|, mean, {TRUTH_WORDS[truth]}, joints that do not tilt",
                 "mm",
-                [run.left[truth, method].poses["dP"] for run in runs],
+                [one.left[truth, method].poses["dP"] for one in outcomes],
                 _TABLE_34["dP"][0],
                 "Table 3.4",
                 relative=_SIMILAR,
@@ -201,17 +191,20 @@ def _table_34(runs: Sequence[InfluenceRun], title: str, column: int, method: Met
     )
 
 
-def _methods(runs: Sequence[InfluenceRun]) -> Table:
+def methods_table(outcomes: Sequence[Outcome]) -> Table:
+    """Set the methods side by side on unseen poses."""
     rows = []
     for truth in TRUTHS:
         words = TRUTH_WORDS[truth]
         for method in METHODS:
-            rows.append(Row(f"{words}: {METHOD_WORDS[method]}", "mm", [run.left[truth, method].unseen for run in runs]))
+            rows.append(
+                Row(f"{words}: {METHOD_WORDS[method]}", "mm", [one.left[truth, method].unseen for one in outcomes])
+            )
         rows.append(
             Row(
                 f"{words}: influence-based over joint least squares",
                 "times",
-                [run.left[truth, "influence"].unseen / run.left[truth, "least squares"].unseen for run in runs],
+                [one.left[truth, "influence"].unseen / one.left[truth, "least squares"].unseen for one in outcomes],
             )
         )
     rows.append(
@@ -219,8 +212,8 @@ def _methods(runs: Sequence[InfluenceRun]) -> Table:
             f"{TRUTH_WORDS['table 3.2']}: influence-based over minimum norm",
             "%",
             [
-                100 * run.left["table 3.2", "influence"].unseen / run.left["table 3.2", "minimum norm"].unseen
-                for run in runs
+                100 * one.left["table 3.2", "influence"].unseen / one.left["table 3.2", "minimum norm"].unseen
+                for one in outcomes
             ],
             round(100 * 0.21 / 0.38),
             "Table 3.4",
@@ -236,7 +229,8 @@ def _methods(runs: Sequence[InfluenceRun]) -> Table:
     )
 
 
-def _combinations(runs: Sequence[InfluenceRun]) -> Table:
+def combinations_table(outcomes: Sequence[Outcome]) -> Table:
+    """Show three ways to make one set of those of all poses."""
     return Table(
         "Three ways to make one set of those of all poses",
         "Mean |dP| on the unseen poses of the geometric robot of Table 3.2.",
@@ -244,7 +238,7 @@ def _combinations(runs: Sequence[InfluenceRun]) -> Table:
             Row(
                 f"{METHOD_WORDS[method]}: {_COMBINATION_WORDS[combination]}",
                 "mm",
-                [run.combined[method, combination] for run in runs],
+                [one.combined[method, combination] for one in outcomes],
             )
             for method in ONE_POSE_METHODS
             for combination in COMBINATIONS
@@ -252,7 +246,8 @@ def _combinations(runs: Sequence[InfluenceRun]) -> Table:
     )
 
 
-def _contradictions(runs: Sequence[InfluenceRun]) -> Table:
+def contradictions_table(outcomes: Sequence[Outcome]) -> Table:
+    """Show which printed figures contradict each other."""
     floor = {
         column: math.sqrt(sum(_TABLE_34[quantity][column] ** 2 for quantity in ("dX", "dY", "dZ"))) for column in (1, 2)
     }
@@ -278,7 +273,7 @@ def _contradictions(runs: Sequence[InfluenceRun]) -> Table:
             Row(
                 "Tables 3.2 and 3.3 predict positions apart by, mean",
                 "mm",
-                [run.apart for run in runs],
+                [one.apart for one in outcomes],
                 _TABLE_34["dP"][1] + _TABLE_34["dP"][2],
                 "Table 3.4",
                 absolute=0.01,
@@ -288,7 +283,7 @@ def _contradictions(runs: Sequence[InfluenceRun]) -> Table:
                 Row(
                     f"largest change of a length by minimum norm, angles in {unit} and lengths in mm",
                     "mm",
-                    [run.lengths[unit] for run in runs],
+                    [one.lengths[unit] for one in outcomes],
                     0.010,
                     "Table 3.2",
                     absolute=0.0095,

@@ -6,11 +6,19 @@ from typing import Final
 
 from truearm.planning.poses.pose_plan import POSES
 from truearm.studies import Progress
-from truearm.studies.katana.robot import NOISE, workspace_cube
-from truearm.studies.katana_tilting.pictures import all_pictures
-from truearm.studies.katana_tilting.run import run_tilting
-from truearm.studies.katana_tilting.tables import ASKED, all_tables
-from truearm.studies.seeds import middle, over_seeds
+from truearm.studies.katana.robot import NOISE
+from truearm.studies.katana_tilting.pictures import errors_picture, poses_picture
+from truearm.studies.katana_tilting.run import run
+from truearm.studies.katana_tilting.tables import (
+    ASKED,
+    constants_table,
+    contradictions_table,
+    errors_table,
+    methods_table,
+    shares_table,
+    unseen_table,
+)
+from truearm.studies.seeds import median_of
 from truearm.studies.study import Study
 
 _UNSEEN: Final = 200
@@ -31,11 +39,11 @@ def study(seeds: int, progress: Progress, count: int = POSES, unseen: int = _UNS
     unseen
         Configurations to judge by.
     """
-    progress("looking for the largest cube")
-    cube = workspace_cube()
-    runs = over_seeds(seeds, progress, lambda seed: run_tilting(seed.number, cube, count, unseen))
-    conventional = middle(runs, lambda run: run.left["conventional"].mean)
-    tilting = middle(runs, lambda run: run.left["two-stage"].mean)
+    found = run(seeds, progress, count, unseen)
+    outcomes = found.outcomes
+    conventional = median_of(outcomes, lambda one: one.left["conventional"].mean)
+    tilting = median_of(outcomes, lambda one: one.left["two-stage"].mean)
+    share = median_of(outcomes, lambda one: one.ratio("two-stage"))
     return Study(
         name="katana-tilting",
         title="A Katana 450 whose joints tilt",
@@ -43,12 +51,19 @@ def study(seeds: int, progress: Progress, count: int = POSES, unseen: int = _UNS
         " Table 3.2",
         answer=f"On unseen poses the conventional calibration leaves {conventional:.3f} mm on average, and"
         f" {tilting:.3f} mm are left if clearance, backlash and stiffness are found by inclinometers first:"
-        f" {middle(runs, lambda run: run.ratio('two-stage')):.1f} % (asked: at most {ASKED:g} %, the document has"
+        f" {share:.1f} % (asked: at most {ASKED:g} %, the document has"
         " 25 %). The inclinometers give back the constants of Tables 4.3 and 4.4. Identifying everything at once, from"
         " the poses alone, does as well on this robot.",
         seeds=seeds,
-        tables=all_tables(runs),
-        pictures=all_pictures(runs, cube),
+        tables=(
+            shares_table(outcomes),
+            *(errors_table(outcomes, column) for column in range(3)),
+            unseen_table(outcomes),
+            methods_table(outcomes),
+            constants_table(outcomes),
+            contradictions_table(),
+        ),
+        pictures=(poses_picture(found.cube, outcomes[0]), errors_picture(outcomes)),
         notes=(
             "The twin has the geometry of Table 3.2 and the constants of Tables 4.3 and 4.4. It lets the arm sag until"
             " moments and deflections agree, and its backlash jumps where a moment changes its sign. Identification"

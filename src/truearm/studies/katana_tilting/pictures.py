@@ -10,28 +10,26 @@ from truearm.planning.poses.iso9283 import Cube
 from truearm.reporting.drawing import AFTER, BEFORE, axis, figure, logarithmic_axis
 from truearm.reporting.numbers import rounded
 from truearm.reporting.planning_figures import pose_cube
-from truearm.studies.katana_tilting.run import COLUMNS, TiltingRun
+from truearm.studies.katana_tilting.run import COLUMNS, Outcome
 from truearm.studies.katana_tilting.tables import METHOD_WORDS
 from truearm.studies.study import Picture
 
 
-def all_pictures(runs: Sequence[TiltingRun], cube: Cube) -> tuple[Picture, ...]:
-    """Return the pictures of the study; the poses are in `cube`."""
-    return (
-        Picture(
-            "poses",
-            "The poses, as in Figure 4.8",
-            f"First seed: the largest cube in front of the arm (side {cube.side * 1e3:.0f} mm), its diagonal planes"
-            " and the poses on them; tails show the direction of the tip. The construction is ours: the document"
-            " does not print its poses.",
-            pose_cube(runs[0].plan),
-        ),
-        _errors(runs),
+def poses_picture(cube: Cube, first: Outcome) -> Picture:
+    """Draw the poses of one seed in their cube, as in Figure 4.8."""
+    return Picture(
+        "poses",
+        "The poses, as in Figure 4.8",
+        f"First seed: the largest cube in front of the arm (side {cube.side * 1e3:.0f} mm), its diagonal planes and the"
+        " poses on them; tails show the direction of the tip. The construction is ours: the document does not print its"
+        " poses.",
+        pose_cube(first.plan),
     )
 
 
-def _errors(runs: Sequence[TiltingRun]) -> Picture:
-    errors = {method: np.concatenate([run.left[method].unseen["dP"] for run in runs]) for method in COLUMNS}
+def errors_picture(outcomes: Sequence[Outcome]) -> Picture:
+    """Draw how errors on unseen poses are distributed."""
+    errors = {method: np.concatenate([one.left[method].unseen["dP"] for one in outcomes]) for method in COLUMNS}
     low, high = 1e-3, 3.0
     edges = np.geomspace(low, high, 61)
     traces = [

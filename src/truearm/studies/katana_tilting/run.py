@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final, Literal
 
-import numpy as np
-
 from truearm.identification.inclinometers.fit import TILTING as EFFECTS
 from truearm.identification.inclinometers.fit import TiltingFit
 from truearm.identification.solving.pose_by_pose import influence_based, least_squares, minimum_norm
@@ -16,9 +14,11 @@ from truearm.modeling.robot import Robot
 from truearm.planning.poses.iso9283 import Cube
 from truearm.planning.poses.pose_plan import PosePlan, plan_poses
 from truearm.simulation.twin import measure
+from truearm.studies import Progress
 from truearm.studies.katana.pose_errors import Quantity, pose_errors, tip_poses, true_poses
-from truearm.studies.katana.robot import NAMES, NOISE, PERTURBATIONS, TIP, UNITS, katana, published
+from truearm.studies.katana.robot import NAMES, NOISE, PERTURBATIONS, TIP, UNITS, katana, published, workspace_cube
 from truearm.studies.katana.tilting import TILTING, tilting_from_inclinometers, twin, with_tilting
+from truearm.studies.seeds import Seed, over_seeds
 
 _BASE: Final = tuple(f"base_{axis}" for axis in ("x", "y", "z", "rx", "ry", "rz"))
 
@@ -61,7 +61,7 @@ class Left:
 
 
 @dataclass(frozen=True, eq=False)
-class TiltingRun:
+class Outcome:
     """What one seed gives.
 
     Attributes
@@ -83,11 +83,46 @@ class TiltingRun:
         return 100 * (self.left[method].mean / self.left["conventional"].mean)
 
 
-def run_tilting(seed: int, cube: Cube, count: int, unseen: int) -> TiltingRun:
-    """Calibrate a twin from `count` poses in a cube by every method, and judge there and at `unseen` configurations."""
-    rng = np.random.default_rng(seed)
+@dataclass(frozen=True, eq=False)
+class Run:
+    """The whole study.
+
+    Attributes
+    ----------
+    cube
+        Where the poses are.
+    outcomes
+        Of the seeds.
+    """
+
+    cube: Cube
+    outcomes: tuple[Outcome, ...]
+
+
+def run(seeds: int, progress: Progress, count: int, unseen: int) -> Run:
+    """Calibrate a twin by every method, once a seed.
+
+    Parameters
+    ----------
+    seeds
+        How many: of the orientations at the poses, of the postures for the inclinometers, of the unseen
+        configurations and of the noise.
+    progress
+        Called with a few words at each step.
+    count
+        Poses to calibrate with.
+    unseen
+        Configurations to judge by.
+    """
+    progress("looking for the largest cube")
+    cube = workspace_cube()
+    return Run(cube, over_seeds(seeds, progress, lambda seed: _one(seed, cube, count, unseen)))
+
+
+def _one(seed: Seed, cube: Cube, count: int, unseen: int) -> Outcome:
+    rng = seed.generator()
     nominal, truth = katana(), twin(published("standard"))
-    plan = plan_poses(nominal, cube, target=TIP, count=count, seed=seed)
+    plan = plan_poses(nominal, cube, target=TIP, count=count, seed=seed.number)
     others = nominal.random_configurations(unseen, rng)
     data = measure(truth, plan.joints, NOISE, rng)
     fit = tilting_from_inclinometers(nominal, truth, rng)
@@ -111,4 +146,4 @@ def run_tilting(seed: int, cube: Cube, count: int, unseen: int) -> TiltingRun:
         )
         for method, robot in found.items()
     }
-    return TiltingRun(plan, fit, left)
+    return Outcome(plan, fit, left)

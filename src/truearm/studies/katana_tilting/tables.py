@@ -10,7 +10,7 @@ import numpy as np
 
 from truearm.studies.katana.pose_errors import QUANTITIES, Quantity
 from truearm.studies.katana.tilting import BACKLASH, CLEARANCE, STIFFNESS, TILTING, compliance
-from truearm.studies.katana_tilting.run import COLUMNS, METHODS, Method, TiltingRun
+from truearm.studies.katana_tilting.run import COLUMNS, METHODS, Method, Outcome
 from truearm.studies.study import Row, Table
 
 _Printed = Mapping[Quantity, tuple[float, float, float]]
@@ -66,19 +66,8 @@ METHOD_WORDS: Final[Mapping[Method, str]] = {
 }
 
 
-def all_tables(runs: Sequence[TiltingRun]) -> tuple[Table, ...]:
-    """Return the tables of the study."""
-    return (
-        _shares(runs),
-        *(_table_45(runs, column) for column in range(3)),
-        _table_46(runs),
-        _methods(runs),
-        _constants(runs),
-        _contradictions(),
-    )
-
-
-def _shares(runs: Sequence[TiltingRun]) -> Table:
+def shares_table(outcomes: Sequence[Outcome]) -> Table:
+    """Show what share of the conventional calibration's error is left."""
     before, conventional, tilting = np.mean(_TABLE_46, axis=0).tolist()
     return Table(
         "What is left of the conventional calibration's error on unseen poses",
@@ -88,7 +77,7 @@ def _shares(runs: Sequence[TiltingRun]) -> Table:
             Row(
                 METHOD_WORDS["two-stage"],
                 "%",
-                [run.ratio("two-stage") for run in runs],
+                [one.ratio("two-stage") for one in outcomes],
                 round(100 * tilting / conventional),
                 "Table 4.6",
                 relative=_SIMILAR,
@@ -96,14 +85,14 @@ def _shares(runs: Sequence[TiltingRun]) -> Table:
                 " For the 0.12 mm that are left on the real robot the document names control, encoders, temperature.",
             ),
             *(
-                Row(METHOD_WORDS[method], "%", [run.ratio(method) for run in runs])
+                Row(METHOD_WORDS[method], "%", [one.ratio(method) for one in outcomes])
                 for method in METHODS
                 if method.startswith("at once")
             ),
             Row(
                 "before any calibration",
                 "%",
-                [run.ratio("nominal") for run in runs],
+                [one.ratio("nominal") for one in outcomes],
                 round(100 * before / conventional),
                 "Table 4.6",
                 relative=_SIMILAR,
@@ -112,13 +101,14 @@ def _shares(runs: Sequence[TiltingRun]) -> Table:
     )
 
 
-def _table_45(runs: Sequence[TiltingRun], column: int) -> Table:
+def errors_table(outcomes: Sequence[Outcome], column: int) -> Table:
+    """Set errors at the poses beside a column of Table 4.5."""
     method = COLUMNS[column]
     rows = [
         Row(
             f"|{quantity}|, {name}",
             QUANTITIES[quantity],
-            [float(statistic(run.left[method].poses[quantity])) for run in runs],
+            [float(statistic(one.left[method].poses[quantity])) for one in outcomes],
             printed[quantity][column],
             "Table 4.5",
             relative=_SIMILAR,
@@ -160,8 +150,9 @@ def _why(column: int, name: str, quantity: Quantity) -> str:
     return ""
 
 
-def _table_46(runs: Sequence[TiltingRun]) -> Table:
-    count = len(runs[0].left["nominal"].unseen["dP"])
+def unseen_table(outcomes: Sequence[Outcome]) -> Table:
+    """Set errors on unseen poses beside Table 4.6."""
+    count = len(outcomes[0].left["nominal"].unseen["dP"])
     rows = []
     for column, method in enumerate(COLUMNS):
         printed = [row[column] for row in _TABLE_46]
@@ -170,7 +161,7 @@ def _table_46(runs: Sequence[TiltingRun]) -> Table:
                 Row(
                     f"{METHOD_WORDS[method]}, {name}",
                     "mm",
-                    [float(statistic(run.left[method].unseen["dP"])) for run in runs],
+                    [float(statistic(one.left[method].unseen["dP"])) for one in outcomes],
                     round(float(statistic(printed)), 3),
                     "Table 4.6",
                     relative=_SIMILAR,
@@ -186,27 +177,30 @@ def _table_46(runs: Sequence[TiltingRun]) -> Table:
     )
 
 
-def _methods(runs: Sequence[TiltingRun]) -> Table:
+def methods_table(outcomes: Sequence[Outcome]) -> Table:
+    """Set the methods side by side on unseen poses."""
     why: Mapping[Method, str] = {
         "base free": "Six more unknowns for where the robot stands take up some of the tilting at the poses"
         " that were used, and carry it to where it does not belong.",
         "at once": "On this twin 118 poses tell tilting and geometry apart without inclinometers.",
-        "tilting known": "No better than with constants from the inclinometers: what is left comes from the poses' own noise and"
-        " from backlash near zero moment, which the model rounds off and the twin does not.",
-        "minimum norm": "The mean of the sets that explain single poses is too short, with tilting compensated as without: see"
-        " the study katana-influence.",
+        "tilting known": "No better than with constants from the inclinometers: what is left comes from the poses' own"
+        " noise and from backlash near zero moment, which the model rounds off and the twin does not.",
+        "minimum norm": "The mean of the sets that explain single poses is too short, with tilting compensated as"
+        " without: see the study katana-influence.",
     }
     return Table(
         "The methods side by side, on unseen poses",
         "Mean |dP|. Geometry by joint least squares unless something else is said.",
         tuple(
-            Row(METHOD_WORDS[method], "mm", [run.left[method].mean for run in runs], explanation=why.get(method, ""))
+            Row(
+                METHOD_WORDS[method], "mm", [one.left[method].mean for one in outcomes], explanation=why.get(method, "")
+            )
             for method in METHODS
         ),
     )
 
 
-def _constants(runs: Sequence[TiltingRun]) -> Table:
+def constants_table(outcomes: Sequence[Outcome]) -> Table:
     """Set the constants of the first stage beside the printed ones, which are the truth here."""
     rows = []
     for effect, unit, printed, source in (
@@ -216,7 +210,7 @@ def _constants(runs: Sequence[TiltingRun]) -> Table:
     ):
         for joint, truth in enumerate(printed, 1):
             name = f"{'compliance' if effect == 'stiffness' else effect}_{joint}"
-            found = [run.tilting.robot.parameters[name] for run in runs]
+            found = [one.tilting.robot.parameters[name] for one in outcomes]
             deviations = [p.deviation or 0.0 for p in found]
             if effect == "stiffness":
                 values = [compliance(p.value) for p in found]
@@ -239,8 +233,8 @@ def _constants(runs: Sequence[TiltingRun]) -> Table:
             )
     within = [
         abs(p.value - TILTING[name]) <= 2 * (p.deviation or 0.0)
-        for run in runs
-        for name, p in run.tilting.robot.parameters.items()
+        for one in outcomes
+        for name, p in one.tilting.robot.parameters.items()
         if name in TILTING
     ]
     rows.append(
@@ -260,7 +254,8 @@ def _constants(runs: Sequence[TiltingRun]) -> Table:
     )
 
 
-def _contradictions() -> Table:
+def contradictions_table() -> Table:
+    """Show which printed figures contradict each other."""
     rows = []
     for column, name in enumerate(("before calibration", "conventional", "with tilting")):
         least = math.sqrt(sum(_AVERAGE[quantity][column] ** 2 for quantity in ("dX", "dY", "dZ")))

@@ -8,14 +8,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-
-from truearm.identification.solving.fit import identify, place
-from truearm.identification.solving.models import MODELS
-from truearm.measurement.dataset import Dataset
-from truearm.modeling.chain import Array
-from truearm.modeling.robot import Robot
-from truearm.simulation.devices.calibration_table import CalibrationTable, rectangular_grid
-from truearm.simulation.twin import Twin
 from truearm.studies.li import (
     BEYOND,
     BOUNDS,
@@ -39,6 +31,14 @@ from truearm.studies.li import (
     truth,
     verification,
 )
+
+from truearm.identification.solving.fit import identify, place
+from truearm.identification.solving.models import MODELS
+from truearm.measurement.dataset import Dataset
+from truearm.modeling.chain import Array
+from truearm.modeling.robot import Robot
+from truearm.simulation.devices.calibration_table import CalibrationTable, rectangular_grid
+from truearm.simulation.twin import Twin
 
 _GEOMETRIC: Final = next(model for model in MODELS if model.name == "geometric")
 TOGETHER: Final = "all three together"

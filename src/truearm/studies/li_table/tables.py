@@ -6,11 +6,11 @@ from collections.abc import Callable
 from typing import Final
 
 import numpy as np
+from truearm.studies.li import TILTS
+from truearm.studies.li_run import ALONE, COMPONENTS, METHODS, THEIRS, TOGETHER, UNBOUNDED, LiRun, run_table
 
 from truearm.reporting.drawing import AFTER, BEFORE, COLOURS, axis, figure
 from truearm.reporting.numbers import rounded
-from truearm.studies.li import TILTS
-from truearm.studies.li_run import ALONE, COMPONENTS, METHODS, THEIRS, TOGETHER, UNBOUNDED, LiRun, run_table
 from truearm.studies.study import Picture, Row, Study, Table
 
 _UNSEEN: Final = 200

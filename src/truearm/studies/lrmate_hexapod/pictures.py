@@ -7,11 +7,11 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from truearm.studies.lrmate import Judgement
 
 from truearm.modeling.chain import Array
 from truearm.reporting.drawing import AFTER, BEFORE, COLOURS, Figure, axis, figure
 from truearm.reporting.numbers import rounded, rounded_to
-from truearm.studies.lrmate import Judgement
 from truearm.studies.study import Picture
 from truearm.validation.pair_distances import PairDistances
 

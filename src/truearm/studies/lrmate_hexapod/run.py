@@ -8,21 +8,6 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-
-from truearm.identification.hexapod.campaign import Campaign, two_steps
-from truearm.identification.solving.fit import identify
-from truearm.identification.solving.models import MODELS
-from truearm.measurement.hexapod.poses import HexapodPose, poses
-from truearm.measurement.hexapod.sheet import PlannedRow
-from truearm.measurement.hexapod.world_frame import world_frame
-from truearm.modeling.chain import Array
-from truearm.modeling.postures import Postures
-from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform, rotation_vector
-from truearm.planning.choosing.measurement_plan import plan_measurements
-from truearm.planning.hexapod.reachable import Reachable, reachable
-from truearm.simulation.hexapod.simulated import ballbar
-from truearm.simulation.twin import Twin, measure
 from truearm.studies.lrmate import (
     BACK_DOWN,
     FIXTURE,
@@ -38,6 +23,21 @@ from truearm.studies.lrmate import (
     standing_in,
     touches,
 )
+
+from truearm.identification.hexapod.campaign import Campaign, two_steps
+from truearm.identification.solving.fit import identify
+from truearm.identification.solving.models import MODELS
+from truearm.measurement.hexapod.poses import HexapodPose, poses
+from truearm.measurement.hexapod.sheet import PlannedRow
+from truearm.measurement.hexapod.world_frame import world_frame
+from truearm.modeling.chain import Array
+from truearm.modeling.postures import Postures
+from truearm.modeling.robot import Robot
+from truearm.modeling.transform import Transform, rotation_vector
+from truearm.planning.choosing.measurement_plan import plan_measurements
+from truearm.planning.hexapod.reachable import Reachable, reachable
+from truearm.simulation.hexapod.simulated import ballbar
+from truearm.simulation.twin import Twin, measure
 
 _ELASTIC: Final = next(model for model in MODELS if model.name == "elastic")
 _TRACKER: Final = 50

@@ -6,11 +6,11 @@ from collections.abc import Callable
 from typing import Final
 
 import numpy as np
-
 from truearm.studies.lrmate import allowed_configurations, drawn_twin, invented_twin, unseen
 from truearm.studies.lrmate_campaign import campaign_of, station
 from truearm.studies.lrmate_pictures import away_pictures, distance_pictures
 from truearm.studies.lrmate_tables import all_tables, mean_away, mean_error
+
 from truearm.studies.study import Study
 
 _CONFIGURATIONS: Final = 9905

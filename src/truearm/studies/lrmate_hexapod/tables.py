@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
 import numpy as np
+from truearm.studies.lrmate_campaign import Outcome, Station
 
 from truearm.measurement.hexapod.geometry import DEVICE
 from truearm.modeling.chain import Array
-from truearm.studies.lrmate_campaign import Outcome, Station
 from truearm.studies.study import Row, Table
 
 #: Around the reference point (text on Figure 4.7), and what counts as away from it [m].

@@ -1,92 +1,60 @@
-"""A Katana twin calibrated with one instrument after the other, for the study katana-devices."""
+"""One seed of the study katana-devices: a Katana twin calibrated with one instrument after the other."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
-from truearm.studies.katana_circle import PENCIL, motions, paths
 
-from truearm.compensation.trajectories import corrected
 from truearm.errors import InputError
 from truearm.identification.solving.fit import Fit, identify, place
 from truearm.identification.solving.models import MODELS
 from truearm.identification.solving.redundancy import gauge_freedoms
-from truearm.measurement.circles import fit_circle
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
-from truearm.modeling.parts import Tool
 from truearm.modeling.robot import Robot
-from truearm.modeling.transform import IDENTITY, Transform, rigid_motion
-from truearm.planning.paths.joint_motion import JointMotion
-from truearm.planning.paths.trajectory import Trajectory
-from truearm.simulation.devices import DEVICES, Device, measured_with
-from truearm.simulation.devices.artefacts import MARKERS, PLANAR_ARTEFACT, SPATIAL_ARTEFACT, Artefact
-from truearm.simulation.devices.hexapod_poses import HEXAPOD
+from truearm.modeling.transform import rigid_motion
+from truearm.simulation.devices import Device, measured_with
+from truearm.simulation.devices.artefacts import MARKERS
 from truearm.simulation.devices.known_points import TOUCH_UP
 from truearm.simulation.devices.pencil import DRAWN_CIRCLE, PencilCircle
-from truearm.simulation.devices.tracker import TRACKER, Tracker
 from truearm.simulation.twin import Twin
-from truearm.studies.katana import NOISE, TIP, inclined, katana, published, twin
-
-#: Where the robot stands before an instrument at the origin: 2.6 m away (the Optotrak sees from 2 to 7 m), turned.
-_STANDS: Final = Transform((2.5, 0.2, -0.7), (0.5**0.5, 0.0, 0.0, 0.5**0.5))
-_POINT: Final = Tool({TIP: (0.0, 0.0, PENCIL)})
-#: The attachment of chapters 3 and 4, whose end is the point that the document's tables are of.
-_ATTACHMENT: Final = Tool({TIP: (0.0, 0.0, 0.0)})
-_REFLECTORS: Final = {TIP: (0.0, 0.0, PENCIL), "left": (0.08, 0.0, 0.05), "right": (-0.08, 0.0, 0.05)}
-#: The circle of section 5.5.1 in the base frame [m].
-_MIDDLE: Final = (0.0, -0.3, 0.1392893)
-_RADIUS: Final = 0.1
-_CONE: Final = float(np.deg2rad(45.0))
-_DRAWN_AT_RANDOM: Final = 10_000
-_TIME: Final = 0.2  # s, between points of the circle that are looked at
-
-OPTOTRAK, TRACKED, CAMERAS = (
-    "three active markers (Optotrak)",
-    "laser tracker, one reflector seen within 45 deg",
-    "optical CMM of 0.060 mm",
+from truearm.studies import Progress
+from truearm.studies.katana.robot import TIP, katana, published
+from truearm.studies.katana.tilting import tilting_from_inclinometers, twin
+from truearm.studies.katana_devices.page import Corrector, Pages, drawn_pages
+from truearm.studies.katana_devices.setup import (
+    ATTACHMENT,
+    DOCUMENT,
+    LOW_COST,
+    MIDDLE,
+    PLACE,
+    POINT,
+    RADIUS,
+    REFLECTORS,
+    STARTS,
+    USED,
+    VIEWS,
+    Counts,
+    DocumentInstrument,
+    Start,
+    View,
 )
-LOW_COST: Final = "low-cost set-up: touch-up and drawn circle"
-#: The document's instruments with their configurations: 118 poses (section 3.4), 30 points (section 3.3).
-DOCUMENT: Final[Mapping[str, tuple[Device, int]]] = {
-    OPTOTRAK: (replace(MARKERS, sigma=NOISE, tool=_ATTACHMENT), 118),
-    f"{OPTOTRAK}, 30 points": (replace(MARKERS, sigma=NOISE, tool=_ATTACHMENT), 30),
-    f"{TRACKED}, 30 points": (replace(TRACKER, within=_CONE, tool=_ATTACHMENT), 30),
-    f"{CAMERAS}, 30 points": (replace(SPATIAL_ARTEFACT, sigma=6e-5, tool=_ATTACHMENT), 30),
-}
-#: The hexapod's tool has to take whole poses, which five joints cannot.
-USED: Final = tuple(device for device in DEVICES if device.name != HEXAPOD.name)
+from truearm.studies.seeds import Seed, over_seeds
+
+_DRAWN_AT_RANDOM: Final = 10_000
 _TRIES: Final = 10
-Start = Literal["geometry alone", "tilting first"]
-STARTS: Final[tuple[Start, ...]] = ("geometry alone", "tilting first")
 _GEOMETRIC: Final = next(model for model in MODELS if model.name == "geometric")
 
 
 @dataclass(frozen=True)
-class Counts:
-    """How much is measured and judged.
+class Errors:
+    """Mean and largest of some errors [mm]; NaN where there is nothing to compare with."""
 
-    Attributes
-    ----------
-    registry
-        Configurations of each device of the registry but the two of the low-cost set-up.
-    touched, drawn
-        Contacts of the touch-up, and points of the drawn circles.
-    unseen
-        Configurations to judge by.
-    """
-
-    registry: int = 48
-    touched: int = 24
-    drawn: int = 72
-    unseen: int = 100
-
-    def of(self, device: Device) -> int:
-        """Return how many configurations a device of the registry gets."""
-        return {TOUCH_UP.name: self.touched, DRAWN_CIRCLE.name: self.drawn}.get(device.name, self.registry)
+    mean: float
+    largest: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,116 +66,130 @@ class Reached:
     configurations
         How many were measured.
     own
-        Mean and largest error on unseen configurations in the instrument's own frame [mm]; NaN where it has none.
+        On unseen configurations in the instrument's own frame; NaN where it has none.
     moved
         Likewise after the best rigid motion of all predictions.
     size
         By how much predicted lengths are too long [1].
-    trusted
+    gauge
         What nobody measured: the base, the size.
-    unseen
-        Parameters that predictions need and the readings do not tell.
+    unobservable
+        Parameters that predictions need and the instrument does not determine.
     """
 
     configurations: int
-    own: tuple[float, float]
-    moved: tuple[float, float]
+    own: Errors
+    moved: Errors
     size: float
-    trusted: tuple[str, ...]
-    unseen: tuple[str, ...]
+    gauge: tuple[str, ...]
+    unobservable: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
-class OnPage:
-    """The circle of section 5.5.1 as the twin went round it.
+class OfDocument:
+    """One of the document's instruments.
 
     Attributes
     ----------
-    along
-        Angle round the circle [deg], ``(n,)``.
-    outward, height
-        What the page shows beside a circle of the right size about the line's own middle, in its own plane [mm].
-    distance
-        How far the tip truly was from where it should be at that moment [mm].
-    moved
-        Likewise after the best rigid motion.
+    from_nominal
+        Distances between what it measured and the nominal robot where it stands.
+    reached
+        By start.
     """
 
-    along: Array
-    outward: Array
-    height: Array
-    distance: Array
-    moved: Array
-
-    @property
-    def seen(self) -> float:
-        """Mean distance from the circle as the page shows it [mm]."""
-        return float(np.hypot(self.outward, self.height).mean())
+    from_nominal: Errors
+    reached: Mapping[Start, Reached]
 
 
 @dataclass(frozen=True, eq=False)
-class DeviceRun:
-    """What one seed gives: by instrument and by how it was calibrated.
+class Outcome:
+    """What one seed gives.
 
     Attributes
     ----------
-    before
+    before_optotrak, before_markers
         The nominal robot with base and tool fitted to the document's markers, and to the registry's on the pencil.
-    read
-        Mean and largest distance of what an instrument reads from the nominal robot where it stands [mm].
+    document
+        The document's instruments.
     reached
-        By instrument and start.
-    sees
+        By name of the instrument, and by start.
+    views
         Share of random configurations that an instrument sees [%].
     pages
-        The circle by what it was corrected with.
+        The circle on the page.
     """
 
-    before: Mapping[str, Reached]
-    read: Mapping[str, tuple[float, float]]
+    before_optotrak: Reached
+    before_markers: Reached
+    document: Mapping[DocumentInstrument, OfDocument]
     reached: Mapping[tuple[str, Start], Reached]
-    sees: Mapping[str, float]
-    pages: Mapping[tuple[str, str], OnPage]
+    views: Mapping[View, float]
+    pages: Pages
 
 
-def run_devices(seed: int, counts: Counts) -> DeviceRun:
-    """Calibrate a twin with every instrument, judge it elsewhere and on the circle."""
-    rng = np.random.default_rng(seed)
+def run(seeds: int, progress: Progress, counts: Counts) -> tuple[Outcome, ...]:
+    """Calibrate a twin with every instrument, judge it elsewhere and on the circle, once a seed.
+
+    Parameters
+    ----------
+    seeds
+        How many: of the configurations, of the noise, and of the posture in which the circle is drawn.
+    progress
+        Called with a few words at each step.
+    counts
+        How much is measured and judged.
+    """
+    return over_seeds(seeds, progress, lambda seed: _one(seed, counts))
+
+
+def _one(seed: Seed, counts: Counts) -> Outcome:
+    rng = seed.generator()
     nominal = katana()
-    fit = inclined(nominal, twin(published("standard")), rng)
+    fit = tilting_from_inclinometers(nominal, twin(published("standard")), rng)
     starts: dict[Start, Robot] = {"geometry alone": nominal, "tilting first": fit.robot}
     others = nominal.random_configurations(counts.unseen, rng)
-    at_end, with_pencil = (_standing(published("standard"), places) for places in (_ATTACHMENT.targets, _REFLECTORS))
+    at_end, with_pencil = (_placed(published("standard"), places) for places in (ATTACHMENT.targets, REFLECTORS))
     end, tip = (truth.frames(others)[TIP][:, :3, 3] for truth in (at_end, with_pencil))
-    before, reached, fits = {}, {}, {}
 
-    def judge(what: str, data: Dataset, true: Array) -> None:
-        data = replace(data, sigma=None, sigma_rot=None)
-        if what in (OPTOTRAK, MARKERS.name):
-            before[what] = _reached(place(nominal, data), data, others, true)
-        for name, start in starts.items():
-            found = fits[what, name] = identify(start, data, _GEOMETRIC)
-            reached[what, name] = _reached(found, data, others, true)
+    def before(data: Dataset, true: Array) -> Reached:
+        data = _without_deviations(data)
+        return _reached(place(nominal, data), data, others, true)
 
-    read = {}
-    for what, (device, count) in DOCUMENT.items():
+    def fitted(data: Dataset) -> dict[Start, Fit]:
+        return {name: identify(start, _without_deviations(data), _GEOMETRIC) for name, start in starts.items()}
+
+    document = {}
+    for name, (device, count) in DOCUMENT.items():
         data = _measured(device, nominal, at_end, count, rng)
-        judge(what, data, end)
-        apart = data.position - nominal.with_frames(_STANDS, _ATTACHMENT.targets).poses(data.joints, TIP)[0]
-        read[what] = _mean_and_largest(np.linalg.norm(apart, axis=1))
-    low_cost = []
+        apart = data.position - nominal.with_frames(PLACE, ATTACHMENT.targets).poses(data.joints, TIP)[0]
+        reached = {start: _reached(found, data, others, end) for start, found in fitted(data).items()}
+        document[name] = OfDocument(_errors(np.linalg.norm(apart, axis=1)), reached)
+        if name == "optotrak":
+            before_optotrak = before(data, end)
+    campaigns = {}
     for device in USED:
-        led = device if device.tool is None else replace(device, tool=_POINT)
+        led = device if device.tool is None else replace(device, tool=POINT)
         if isinstance(led, PencilCircle):
-            led = replace(led, centre=_MIDDLE, radius=_RADIUS)
-        data = _measured(led, nominal, with_pencil, counts.of(device), rng)
-        judge(device.name, data, tip)
-        if device.name in (TOUCH_UP.name, DRAWN_CIRCLE.name):
-            low_cost.append(data)
-    judge(LOW_COST, together(*low_cost), tip)
-    corrections = {(what, name): fits[what, name] for what in (MARKERS.name, LOW_COST) for name in STARTS}
-    sees = _seen(nominal, nominal.random_configurations(_DRAWN_AT_RANDOM, rng))
-    return DeviceRun(before, read, reached, sees, _pages(corrections, rng))
+            led = replace(led, centre=MIDDLE, radius=RADIUS)
+        campaigns[device.name] = _measured(led, nominal, with_pencil, counts.of(device), rng)
+    campaigns[LOW_COST] = together(campaigns[TOUCH_UP.name], campaigns[DRAWN_CIRCLE.name])
+    fits = {(name, start): found for name, data in campaigns.items() for start, found in fitted(data).items()}
+    correctors: tuple[Corrector, ...] = ("markers", "low-cost")
+    corrections = {(name, start): fits[name, start] for name in correctors for start in STARTS}
+    views = _views(nominal, nominal.random_configurations(_DRAWN_AT_RANDOM, rng))
+    return Outcome(
+        before_optotrak=before_optotrak,
+        before_markers=before(campaigns[MARKERS.name], tip),
+        document=document,
+        reached={key: _reached(found, campaigns[key[0]], others, tip) for key, found in fits.items()},
+        views=views,
+        pages=drawn_pages(corrections, rng),
+    )
+
+
+def _without_deviations(data: Dataset) -> Dataset:
+    """Return data whose deviations are estimated from what the fit leaves."""
+    return replace(data, sigma=None, sigma_rot=None)
 
 
 def together(first: Dataset, second: Dataset) -> Dataset:
@@ -247,22 +229,15 @@ def _measured(device: Device, nominal: Robot, truth: Twin, count: int, rng: np.r
     return measured_with(device, nominal, truth, count, rng)
 
 
-def _standing(robot: Robot, places: Mapping[str, tuple[float, float, float]]) -> Twin:
-    return twin(robot.with_frames(_STANDS, places))
+def _placed(robot: Robot, places: Mapping[str, tuple[float, float, float]]) -> Twin:
+    return twin(robot.with_frames(PLACE, places))
 
 
-def _seen(nominal: Robot, joints: Array) -> dict[str, float]:
+def _views(nominal: Robot, joints: Array) -> dict[View, float]:
     """Return what share of configurations instruments see [%]."""
-    looking: dict[str, tuple[Tracker | Artefact, Mapping[str, tuple[float, float, float]]]] = {
-        TRACKED: (replace(TRACKER, within=_CONE), _POINT.targets),
-        "laser tracker, three reflectors seen within 30 deg": (TRACKER, _REFLECTORS),
-        PLANAR_ARTEFACT.name: (PLANAR_ARTEFACT, _POINT.targets),
-        SPATIAL_ARTEFACT.name: (SPATIAL_ARTEFACT, _POINT.targets),
-        OPTOTRAK: (MARKERS, _POINT.targets),
-    }
     return {
-        what: 100 * float(device.visible(nominal.with_frames(_STANDS, places), joints).any(axis=1).mean())
-        for what, (device, places) in looking.items()
+        view: 100 * float(device.visible(nominal.with_frames(PLACE, places), joints).any(axis=1).mean())
+        for view, (device, places) in VIEWS.items()
     }
 
 
@@ -274,53 +249,14 @@ def _reached(fit: Fit, data: Dataset, joints: Array, true: Array) -> Reached:
     spread, truly = (places - places.mean(axis=0) for places in (predicted @ R.T, true))
     return Reached(
         data.configurations,
-        _mean_and_largest(own),
-        _mean_and_largest(np.linalg.norm(predicted @ R.T + p - true, axis=1)),
+        _errors(own),
+        _errors(np.linalg.norm(predicted @ R.T + p - true, axis=1)),
         float(np.sum(spread * truly) / np.sum(truly * truly)) - 1.0,
         gauge_freedoms(data),
         fit.unseen,
     )
 
 
-def _pages(fits: Mapping[tuple[str, Start], Fit], rng: np.random.Generator) -> dict[tuple[str, str], OnPage]:
-    """Let the twin draw the circle of section 5.5.1, by the nominal robot and by calibrated ones."""
-    circle, line = paths(_TIME)
-    motion = motions(katana(PENCIL), circle, line, rng)[0]
-    truth = twin(published("standard").with_frames(IDENTITY, _POINT.targets))
-    found = {("before", ""): _drawn(truth, motion.joints, motion, circle, rng)}
-    for (what, name), fit in fits.items():
-        commanded = corrected(fit.robot, motion, _in_base(fit, circle.position), TIP).joints
-        found[what, name] = _drawn(truth, commanded, motion, circle, rng)
-    return found
-
-
-def _in_base(fit: Fit, path: Array) -> Array:
-    """Return a path of the true base in the base that was found; without an anchor the base is taken as found."""
-    if not any(p.group == "base" for p in fit.free.parameters):
-        return path
-    base = fit.robot.base
-    in_world = path @ _STANDS.rotation.T + _STANDS.translation
-    return np.asarray((in_world - np.array(base.translation)) @ base.rotation)
-
-
-def _drawn(truth: Twin, joints: Array, motion: JointMotion, circle: Trajectory, rng: np.random.Generator) -> OnPage:
-    went = truth.postures(joints, velocity=motion.velocity, acceleration=motion.acceleration)
-    tip = np.array([posture.targets[TIP][:3, 3] for posture in went])
-    line = fit_circle(tip)
-    outward, height = (
-        1e3 * (v + DRAWN_CIRCLE.sigma * rng.standard_normal(len(tip)))
-        for v in (line.radius - _RADIUS + line.radial, line.axial)
-    )
-    R, p = rigid_motion(tip, circle.position)
-    return OnPage(
-        along=360 * circle.distance / circle.distance[-1],
-        outward=outward,
-        height=height,
-        distance=1e3 * np.linalg.norm(tip - circle.position, axis=1),
-        moved=1e3 * np.linalg.norm(tip @ R.T + p - circle.position, axis=1),
-    )
-
-
-def _mean_and_largest(errors: Array) -> tuple[float, float]:
-    """Return both in millimetres."""
-    return 1e3 * float(errors.mean()), 1e3 * float(errors.max())
+def _errors(errors: Array) -> Errors:
+    """Return mean and largest of errors [m]."""
+    return Errors(1e3 * float(errors.mean()), 1e3 * float(errors.max()))

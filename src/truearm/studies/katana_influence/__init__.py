@@ -61,7 +61,7 @@ def study(seeds: int, progress: Progress, count: int = POSES, unseen: int = _UNS
         " Weighting by influence changes which fraction. Several printed figures contradict each other.",
         seeds=seeds,
         tables=(
-            influences_table(outcomes),
+            influences_table(found),
             errors_table(outcomes, "Before calibration", 0, "nominal"),
             errors_table(outcomes, "After simultaneous identification", 1, "least squares"),
             errors_table(outcomes, "After influence-based identification", 2, "influence"),

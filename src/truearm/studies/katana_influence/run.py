@@ -96,11 +96,14 @@ class Run:
     ----------
     cube
         Where the poses are.
+    bent
+        Influence at theta 4 = 80 deg and all others 0.
     outcomes
         Of the seeds.
     """
 
     cube: Cube
+    bent: Influence
     outcomes: tuple[Outcome, ...]
 
 
@@ -120,7 +123,8 @@ def run(seeds: int, progress: Progress, count: int, unseen: int) -> Run:
     """
     progress("looking for the largest cube")
     cube = workspace_cube()
-    return Run(cube, over_seeds(seeds, progress, lambda seed: _one(seed, cube, count, unseen)))
+    bent = influence(katana(), np.radians([[0.0, 0.0, 0.0, 80.0, 0.0]]), NAMES, TIP, PERTURBATIONS)
+    return Run(cube, bent, over_seeds(seeds, progress, lambda seed: _one(seed, cube, count, unseen)))
 
 
 def _one(seed: Seed, cube: Cube, count: int, unseen: int) -> Outcome:

@@ -6,12 +6,9 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-import numpy as np
-
-from truearm.identification.solving.influence import influence
 from truearm.identification.solving.pose_by_pose import Combination
 from truearm.studies.katana.pose_errors import QUANTITIES, Quantity
-from truearm.studies.katana.robot import DOCUMENT_NAMES, NAMES, PERTURBATIONS, TIP, katana
+from truearm.studies.katana.robot import DOCUMENT_NAMES
 from truearm.studies.katana_influence.run import (
     COMBINATIONS,
     METHODS,
@@ -20,6 +17,7 @@ from truearm.studies.katana_influence.run import (
     AngleUnit,
     Method,
     Outcome,
+    Run,
     Truth,
 )
 from truearm.studies.study import Row, Table
@@ -64,14 +62,14 @@ _COMBINATION_WORDS: Final[Mapping[Combination, str]] = {
 }
 
 
-def influences_table(outcomes: Sequence[Outcome]) -> Table:
+def influences_table(found: Run) -> Table:
     """Show how far the tip moves if one parameter is off, beside what section 3.6 prints."""
+    outcomes, bent = found.outcomes, found.bent
 
     def means(name: str) -> list[float]:
         return [1e3 * float(one.influence.mean[DOCUMENT_NAMES.index(name)]) for one in outcomes]
 
     second, third = (DOCUMENT_NAMES.index(f"theta {i}") for i in (2, 3))
-    bent = influence(katana(), np.radians([[0.0, 0.0, 0.0, 80.0, 0.0]]), NAMES, TIP, PERTURBATIONS)
     others = [
         name for name in DOCUMENT_NAMES if (name != "theta 2" and name[0] not in "ad") or name.startswith("alpha")
     ]

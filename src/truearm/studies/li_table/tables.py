@@ -1,101 +1,47 @@
-"""Li et al.: an arm of three joints calibrated by touching a table, beside their figures and other ways to fit."""
+"""Tables of the study li-table: our figures beside those of Li et al."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping, Sequence
 from typing import Final
 
-import numpy as np
-from truearm.studies.li import TILTS
-from truearm.studies.li_run import ALONE, COMPONENTS, METHODS, THEIRS, TOGETHER, UNBOUNDED, LiRun, run_table
+from truearm.studies.li_table.arm import TILTS, Tilt
+from truearm.studies.li_table.run import ALONE, MEASURES, METHODS, SURFACES, Alone, Left, Method, Outcome, Surface
+from truearm.studies.study import Row, Table
 
-from truearm.reporting.drawing import AFTER, BEFORE, COLOURS, axis, figure
-from truearm.reporting.numbers import rounded
-from truearm.studies.study import Picture, Row, Study, Table
-
-_UNSEEN: Final = 200
 #: Table 4: mean error at the verification points [mm], and improvement [percent].
-_TABLE_4: Final = {"normal": (16.436, 38.789), "roll": (19.099, 28.866), "pitch": (22.207, 17.292)}
+_TABLE_4: Final[Mapping[Tilt, tuple[float, float]]] = {
+    "normal": (16.436, 38.789),
+    "roll": (19.099, 28.866),
+    "pitch": (22.207, 17.292),
+}
 _BEFORE: Final = 26.850
 #: Table 6 and Figure 10: "from 32.1 % to as much as 53.0 %" for normal and roll, "no effect" for pitch [percent].
-_TABLE_6: Final = {"normal": 42.55, "roll": 42.55, "pitch": 0.0}
+_TABLE_6: Final[Mapping[Tilt, float]] = {"normal": 42.55, "roll": 42.55, "pitch": 0.0}
 _HALF_RANGE: Final = 10.45
 
-
-def study(seeds: int, progress: Callable[[str], None], unseen: int = _UNSEEN) -> Study:
-    """Run the study.
-
-    Parameters
-    ----------
-    seeds
-        How many: of true parameters, play, noise and unseen points.
-    progress
-        Called with a few words at each step.
-    unseen
-        Points about the table to judge by.
-    """
-    runs = []
-    for seed in range(seeds):
-        progress(f"seed {seed + 1} of {seeds}")
-        runs.append(run_table(seed, unseen))
-
-    def of(*name: str) -> tuple[float, ...]:
-        return tuple(run.figures[name] for run in runs)
-
-    def middle(*name: str) -> float:
-        return float(np.median(of(*name)))
-
-    return Study(
-        name="li-table",
-        title="A calibration table touched by an arm of three joints",
-        source="K.-L. Li, W.-T. Yang, K.-Y. Chan and P.-C. Lin, SpringerPlus 5 (2016) 1771",
-        answer="With play in the joints the document's fit takes the twin from"
-        f" {middle('play', 'points', 'before'):.1f} mm to {middle('play', 'points', 'normal'):.1f},"
-        f" {middle('play', 'points', 'roll'):.1f} and {middle('play', 'points', 'pitch'):.1f} mm (normal, roll, pitch),"
-        " where it has 26.9 mm before and 16.4, 19.1 and 22.2 mm after. Its bounds are what makes one table enough:"
-        f" about the level table its fit leaves {middle('play', 'normal', THEIRS):.1f} mm, least squares without bounds"
-        f" {middle('play', 'normal', UNBOUNDED):.1f} mm. Without play these are"
-        f" {middle('no play', 'normal', THEIRS):.2f} and {middle('no play', 'normal', UNBOUNDED):.1f} mm.",
-        seeds=seeds,
-        tables=(
-            _verification(of),
-            _trajectories(of),
-            _geometry_alone(of),
-            _ways(of, "play", "With play"),
-            _ways(of, "no play", "Without play"),
-            _two_sums(of),
-            _alone(of),
-            _mistakes(of),
-        ),
-        pictures=(_picture(runs[0]),),
-        notes=(
-            "INVENTED, because the document's Tables 2 to 6 and its figures are lost: all dimensions of the arm, the"
-            " size and place of the table, the verification points and the trajectory.",
-            "The truth is invented as well: every DH parameter is off by 75 to 100 % of the document's bounds (5 mm and"
-            " 2 deg), drawn until the geometry alone errs by 20 to 22 mm at the verification points, and every joint"
-            " has play of 2.5 deg either way. The size of the play is chosen so that about as much is left after the"
-            " normal table as in the document: that row is no proof, the others follow.",
-            "33 holes, 24 on a circle and 9 on a straight path, tilted by 11.7 deg in roll or 11.8 deg in pitch. The"
-            " tip is put there by hand, so the play of each joint lies either way. A camera of 0.28 mm (95 %) captures"
-            " the holes in the robot's base frame: base and tip are known, the twelve DH deviations are free.",
-            "Verification as in the document: the calibrated model computes the readings, the twin moves from point to"
-            " point with them, and its true tip is compared with the point.",
-            "|X - X'| is taken as the distance of each point; what the sum of components gives stands beside it. The"
-            " document chooses absolute values for their physical meaning, not against mistakes; what they do against"
-            " mistakes is our addition.",
-            "The document's model has no beta between the parallel axes 2 and 3, nor has the twin. Where base and tip"
-            " are free the model of the library is used, beta included, with priors of the size of the bounds.",
-            "The printed improvements do not quite follow from the printed errors: 26.850 to 16.436 mm are 38.786 %,"
-            " not 38.789, and 26.850 to 19.099 mm are 28.868 %, not 28.866.",
-        ),
-    )
+#: What is fitted to, how, and what is found without camera, in words.
+SURFACE_WORDS: Final[Mapping[Surface, str]] = {
+    "normal": "normal",
+    "roll": "roll",
+    "pitch": "pitch",
+    "together": "all three together",
+}
+METHOD_WORDS: Final[Mapping[Method, str]] = {
+    "distances": "sum of distances, bounded (the document's)",
+    "components": "sum of components, bounded",
+    "squares": "least squares, bounded",
+    "unbounded": "least squares, unbounded",
+}
+_ALONE_WORDS: Final[Mapping[Alone, str]] = {
+    "placed": "before, base and tip found",
+    "identified": "bounded distances, base and tip free",
+}
 
 
-_Figures = Callable[..., tuple[float, ...]]
-
-
-def _verification(of: _Figures) -> Table:
-    why = {
+def verification_table(outcomes: Sequence[Outcome]) -> Table:
+    """Show errors at the verification points, beside Table 4."""
+    why: Mapping[Tilt, str] = {
         "normal": "The play is sized for this row.",
         "roll": "",
         "pitch": "On the twin the three tables do equally well: play that lies either way by chance at each hole does"
@@ -105,7 +51,7 @@ def _verification(of: _Figures) -> Table:
         Row(
             f"after, {tilt} table",
             "mm",
-            of("play", "points", tilt),
+            [float(one.following.after[tilt].points.mean()) for one in outcomes],
             mean,
             "Table 4",
             relative=0.2,
@@ -114,7 +60,14 @@ def _verification(of: _Figures) -> Table:
         for tilt, (mean, _) in _TABLE_4.items()
     ]
     gains = [
-        Row(f"improvement, {tilt} table", "%", of("play", "points, gain", tilt), gain, "Table 4", absolute=10.0)
+        Row(
+            f"improvement, {tilt} table",
+            "%",
+            [one.following.gain_at_points(tilt) for one in outcomes],
+            gain,
+            "Table 4",
+            absolute=10.0,
+        )
         for tilt, (_, gain) in _TABLE_4.items()
     ]
     return Table(
@@ -122,12 +75,19 @@ def _verification(of: _Figures) -> Table:
         "Mean error at six points that were not touched, before and after the document's fit: sum of distances under"
         " bounds of 5 mm and 2 deg, from one table each.",
         (
-            Row("before", "mm", of("play", "points", "before"), _BEFORE, "Table 4", relative=0.2),
+            Row(
+                "before",
+                "mm",
+                [float(one.following.before.points.mean()) for one in outcomes],
+                _BEFORE,
+                "Table 4",
+                relative=0.2,
+            ),
             *after,
             Row(
-                f"after, {TOGETHER}",
+                f"after, {SURFACE_WORDS['together']}",
                 "mm",
-                of("play", "points", TOGETHER),
+                [float(one.following.after["together"].points.mean()) for one in outcomes],
                 explanation="99 holes instead of 33. What is left is the play, which no geometry can follow.",
             ),
             *gains,
@@ -135,7 +95,7 @@ def _verification(of: _Figures) -> Table:
                 Row(
                     f"DH parameters at a bound, {tilt} table",
                     "of 12",
-                    of("at bounds", tilt),
+                    [one.at_bounds[tilt] for one in outcomes],
                     explanation="The fit pushes geometry as far as it may, to follow play that is not geometry."
                     if tilt == "normal"
                     else "",
@@ -146,7 +106,8 @@ def _verification(of: _Figures) -> Table:
     )
 
 
-def _trajectories(of: _Figures) -> Table:
+def trajectory_table(outcomes: Sequence[Outcome]) -> Table:
+    """Show errors along the other trajectory, beside Table 6."""
     return Table(
         "Another trajectory",
         "Cubic sections through five other points, followed by the calibrated model's readings. The document prints"
@@ -157,20 +118,27 @@ def _trajectories(of: _Figures) -> Table:
             Row(
                 "largest error before",
                 "mm",
-                of("play", "path, largest", "before"),
+                [float(one.following.before.path.max()) for one in outcomes],
                 30.0,
                 "Figures 6 and 7",
                 relative=0.2,
                 explanation='"Almost 3 cm". With 26.9 mm on average elsewhere the document\'s error hardly changes'
                 " along a path. Here it jumps wherever a joint turns back and its play changes sides.",
             ),
-            Row("mean error before", "mm", of("play", "path", "before")),
-            *(Row(f"mean error after, {tilt}", "mm", of("play", "path", tilt)) for tilt in (*TILTS, TOGETHER)),
+            Row("mean error before", "mm", [float(one.following.before.path.mean()) for one in outcomes]),
+            *(
+                Row(
+                    f"mean error after, {SURFACE_WORDS[surface]}",
+                    "mm",
+                    [float(one.following.after[surface].path.mean()) for one in outcomes],
+                )
+                for surface in SURFACES
+            ),
             *(
                 Row(
                     f"improvement, {tilt} table",
                     "%",
-                    of("play", "path, gain", tilt),
+                    [one.following.gain_on_path(tilt) for one in outcomes],
                     _TABLE_6[tilt],
                     "Table 6, Figure 10",
                     absolute=_HALF_RANGE,
@@ -181,17 +149,25 @@ def _trajectories(of: _Figures) -> Table:
     )
 
 
-def _geometry_alone(of: _Figures) -> Table:
+def geometry_table(outcomes: Sequence[Outcome]) -> Table:
+    """Show errors of geometry alone, off by more than the bounds."""
     return Table(
         "Geometry alone, beyond the bounds",
         "The same without play, every DH parameter off by one to two times the bounds, drawn until the arm errs at the"
         " verification points as the document's does.",
         (
-            Row("before", "mm", of("beyond", "points", "before"), _BEFORE, "Table 4", relative=0.2),
+            Row(
+                "before",
+                "mm",
+                [float(one.beyond.before.points.mean()) for one in outcomes],
+                _BEFORE,
+                "Table 4",
+                relative=0.2,
+            ),
             Row(
                 "largest error before, other trajectory",
                 "mm",
-                of("beyond", "path, largest", "before"),
+                [float(one.beyond.before.path.max()) for one in outcomes],
                 30.0,
                 "Figures 6 and 7",
                 relative=0.2,
@@ -201,7 +177,7 @@ def _geometry_alone(of: _Figures) -> Table:
                 Row(
                     f"after, {tilt} table",
                     "mm",
-                    of("beyond", "points", tilt),
+                    [float(one.beyond.after[tilt].points.mean()) for one in outcomes],
                     mean,
                     "Table 4",
                     relative=0.2,
@@ -218,53 +194,72 @@ def _geometry_alone(of: _Figures) -> Table:
     )
 
 
-def _ways(of: _Figures, case: str, title: str) -> Table:
-    words = {
-        "play": "Points of one plane cannot tell twelve parameters: without bounds these follow the play wherever it"
-        " leads, and the arm is worse than before.",
-        "no play": "The points of the level table lie in one plane at right angles to axis 1: some combinations of"
-        " parameters are as good as unseen, and camera noise of 0.14 mm a coordinate decides about them.",
-    }
+def play_table(outcomes: Sequence[Outcome]) -> Table:
+    """Set ways to fit side by side, joints having play."""
+    return _ways(
+        "With play",
+        [one.play for one in outcomes],
+        "Points of one plane cannot tell twelve parameters: without bounds these follow the play wherever it leads, and"
+        " the arm is worse than before.",
+    )
+
+
+def no_play_table(outcomes: Sequence[Outcome]) -> Table:
+    """Set ways to fit side by side, joints having no play."""
+    return _ways(
+        "Without play",
+        [one.no_play for one in outcomes],
+        "The points of the level table lie in one plane at right angles to axis 1: some combinations of parameters are"
+        " as good as unseen, and camera noise of 0.14 mm a coordinate decides about them.",
+    )
+
+
+def _ways(title: str, lefts: Sequence[Left], why_unbounded: str) -> Table:
     return Table(
         f"{title}: ways to fit",
         "Mean distance between true tip and prediction at unseen points in a box of 160 x 200 x 100 mm about the table."
         " Bounds of 5 mm and 2 deg, or none.",
         (
-            Row("before", "mm", of(case, "before")),
+            Row("before", "mm", [left.before for left in lefts]),
             *(
                 Row(
-                    f"{tilt}: {method}",
+                    f"{SURFACE_WORDS[surface]}: {METHOD_WORDS[method]}",
                     "mm",
-                    of(case, tilt, method),
-                    explanation=words[case] if (tilt, method) == ("normal", UNBOUNDED) else "",
+                    [left.after[surface, method] for left in lefts],
+                    explanation=why_unbounded if (surface, method) == ("normal", "unbounded") else "",
                 )
-                for tilt in (*TILTS, TOGETHER)
+                for surface in SURFACES
                 for method in METHODS
             ),
         ),
     )
 
 
-def _two_sums(of: _Figures) -> Table:
+def measures_table(outcomes: Sequence[Outcome]) -> Table:
+    """Show what two ways to read |X - X'| give."""
     return Table(
         "Two readings of |X - X'|",
         "Equation 4 per point at the 33 holes of the level table, with play: as the distance, and as the sum of the"
         " three absolute components. Each fit is the better one by its own measure.",
         tuple(
-            Row(f"{measure}, fit by {method}", "mm", of("sum", measure, method))
-            for measure in ("distances", "components")
-            for method in (THEIRS, COMPONENTS)
+            Row(f"{measure}, fit by {METHOD_WORDS[by]}", "mm", [one.sums[measure, by] for one in outcomes])
+            for measure in MEASURES
+            for by in MEASURES
         ),
     )
 
 
-def _alone(of: _Figures) -> Table:
+def alone_table(outcomes: Sequence[Outcome]) -> Table:
+    """Show what the table is worth without a camera."""
     rows = []
     for tilt in TILTS:
         for name in ALONE:
-            rows.append(Row(f"{tilt}: {name}, other points of the table", "mm", of("alone, table", tilt, name)))
-            rows.append(Row(f"{tilt}: {name}, about the table", "mm", of("alone, around", tilt, name)))
-            rows.append(Row(f"{tilt}: {name}, error of the table's normal", "deg", of("alone, tilt", tilt, name)))
+            words, found = f"{tilt}: {_ALONE_WORDS[name]}", [one.without_camera[tilt, name] for one in outcomes]
+            rows += [
+                Row(f"{words}, other points of the table", "mm", [one.table for one in found]),
+                Row(f"{words}, about the table", "mm", [one.around for one in found]),
+                Row(f"{words}, error of the table's normal", "deg", [one.normal for one in found]),
+            ]
     return Table(
         "The table alone, no camera",
         "The document's outlook: if the table is exact, no camera is needed. Readings are then positions in the table's"
@@ -275,41 +270,19 @@ def _alone(of: _Figures) -> Table:
     )
 
 
-def _mistakes(of: _Figures) -> Table:
+def mistakes_table(outcomes: Sequence[Outcome]) -> Table:
+    """Show what three mistaken holes do to each fit."""
     return Table(
         "Three holes of 33 mistaken",
         "Rolled table, no play; three readings belong to the hole after the one that is noted. Mean error at the unseen"
         " points about the table. The document does not look at mistakes.",
         tuple(
             Row(
-                method,
+                METHOD_WORDS[method],
                 "mm",
-                of("mistaken", "roll", method),
-                explanation="Absolute values hardly notice them." if method == THEIRS else "",
+                [one.mistaken[method] for one in outcomes],
+                explanation="Absolute values hardly notice them." if method == "distances" else "",
             )
             for method in METHODS
         ),
-    )
-
-
-def _picture(run: LiRun) -> Picture:
-    colours = {"before": BEFORE, TOGETHER: AFTER} | dict(zip(TILTS, COLOURS, strict=True))
-    traces = [
-        {
-            "type": "scatter",
-            "mode": "lines+markers",
-            "name": name,
-            "x": list(range(1, len(errors) + 1)),
-            "y": rounded(errors, 4),
-            "line": {"color": colours[name]},
-            "marker": {"size": 4},
-        }
-        for name, errors in run.along.items()
-    ]
-    drawn = figure(traces, 340, xaxis=axis("point of the trajectory"), yaxis=axis("error [mm]"))
-    return Picture(
-        "trajectory",
-        "Along the other trajectory",
-        "First seed, with play: the twin sent along it by the nominal arm, and by the arm calibrated on each table.",
-        drawn,
     )

@@ -36,8 +36,9 @@ BOUNDS: Final = Bounds.model_validate(
 _SIZE: Final = {"m": 5e-3, "rad": math.radians(2.0)}
 #: Deviation of a coordinate of the camera system, 0.28 mm at 95 % [m]: how well it captures the holes of the table.
 CAMERA: Final = 0.28e-3 / 1.96
+Tilt = Literal["normal", "roll", "pitch"]
 #: Roll and pitch of the document [rad].
-TILTS: Final[Mapping[str, tuple[float, float]]] = {
+TILTS: Final[Mapping[Tilt, tuple[float, float]]] = {
     "normal": (0.0, 0.0),
     "roll": (math.radians(11.7), 0.0),
     "pitch": (0.0, math.radians(11.8)),
@@ -75,7 +76,7 @@ def truth(
     """
     share, error = off
     points = verification()
-    joints = _sent_to(nominal, points)
+    joints = _joints_at(nominal, points)
     while True:
         values = {
             p.name: p.value + _SIZE[p.unit] * float(rng.uniform(*share) * rng.choice((-1.0, 1.0)))
@@ -86,7 +87,7 @@ def truth(
             return Twin(robot)
 
 
-def playing(twin: Twin) -> Twin:
+def with_play(twin: Twin) -> Twin:
     """Return the twin with play in every joint."""
     numbers = range(1, len(twin.robot.joints) + 1)
     return replace(twin, joints={number: JointTruth(hysteresis=PLAY) for number in numbers})
@@ -100,12 +101,12 @@ def board() -> Array:
     return np.concatenate([circle, line])
 
 
-def tables(points: Array) -> dict[str, CalibrationTable]:
+def tables(points: Array) -> dict[Tilt, CalibrationTable]:
     """Return the table with some points, tilted in the document's three ways."""
     return {name: CalibrationTable(points, PLACE).tilted(*tilt) for name, tilt in TILTS.items()}
 
 
-def by_hand(table: CalibrationTable, twin: Twin, rng: np.random.Generator) -> Dataset:
+def touched_by_hand(table: CalibrationTable, twin: Twin, rng: np.random.Generator) -> Dataset:
     """Touch every point with the tip put there by hand: each joint's play lies either way, by chance."""
     approach = rng.choice((-1.0, 1.0), (len(table.points), len(twin.robot.joints)))
     return table.touched_by(twin, START, CAMERA, rng, approach=approach)
@@ -132,30 +133,30 @@ def at_bounds(nominal: Robot, fitted: Robot) -> int:
 
 
 def around_the_table(nominal: Robot, count: int, rng: np.random.Generator) -> Array:
-    """Return the nominal arm's readings ``(count, joints)`` at points drawn from a box about the table."""
-    return _sent_to(nominal, np.array(PLACE.translation) + rng.uniform(-1.0, 1.0, (count, 3)) * _BOX)
+    """Return the nominal arm's joints ``(count, joints)`` at points drawn from a box about the table."""
+    return _joints_at(nominal, np.array(PLACE.translation) + rng.uniform(-1.0, 1.0, (count, 3)) * _BOX)
 
 
-def truly(twin: Twin, joints: Array, rng: np.random.Generator) -> Array:
-    """Return where the tip truly is at readings ``(n, joints)``, each joint's play lying either way [m], ``(n, 3)``."""
-    return _true(twin, joints, rng.choice((-1.0, 1.0), joints.shape))
+def true_positions(twin: Twin, joints: Array, rng: np.random.Generator) -> Array:
+    """Return where the tip is at joints ``(n, joints)``, each joint's play lying either way [m], ``(n, 3)``."""
+    return _tip_of(twin, joints, rng.choice((-1.0, 1.0), joints.shape))
 
 
 def following_errors(fitted: Robot, twin: Twin, points: Array) -> Array:
     """Return how far the true tip is from points that a robot is sent to in turn [mm], ``(n,)``.
 
-    As the document verifies: readings are those at which the fitted robot is on each point.
+    As the document verifies: the joints are those at which the fitted robot is on each point.
     """
-    joints = _sent_to(fitted, points)
-    return np.asarray(1e3 * np.linalg.norm(_true(twin, joints, directions(joints)) - points, axis=1))
+    joints = _joints_at(fitted, points)
+    return np.asarray(1e3 * np.linalg.norm(_tip_of(twin, joints, directions(joints)) - points, axis=1))
 
 
-def _sent_to(robot: Robot, points: Array) -> Array:
-    """Return the readings at which a robot believes its tip to be on points ``(n, 3)`` [m], ``(n, joints)``."""
+def _joints_at(robot: Robot, points: Array) -> Array:
+    """Return the joints at which a model has its tip on points ``(n, 3)`` [m], ``(n, joints)``."""
     return CalibrationTable(points).touched_by(Twin(robot), START, 0.0, np.random.default_rng(0)).joints
 
 
-def _true(twin: Twin, joints: Array, approach: Array) -> Array:
+def _tip_of(twin: Twin, joints: Array, approach: Array) -> Array:
     return np.array([posture.targets[TIP][:3, 3] for posture in twin.postures(joints, approach=approach)])
 
 
@@ -177,13 +178,13 @@ def other_waypoints() -> Array:
     return np.array(PLACE.translation) + 1e-3 * np.array(corners)
 
 
-def believed() -> Robot:
+def library_arm() -> Robot:
     """Return the library's arm, beta included, with priors of the size of the document's bounds."""
     return replace(load_robot("li3"), priors=_SIZE)
 
 
-def mistaken(data: Dataset, rng: np.random.Generator) -> Dataset:
-    """Return the readings with three of the positions noted for the hole before the one that was touched."""
+def with_mistakes(data: Dataset, rng: np.random.Generator) -> Dataset:
+    """Return the data with three of the positions noted for the hole before the one that was touched."""
     wrong = rng.choice(np.arange(1, len(data.position)), 3, replace=False)
     position = data.position.copy()
     position[wrong] = data.position[wrong - 1]

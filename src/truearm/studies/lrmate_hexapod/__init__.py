@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Final
 
-import numpy as np
-
-from truearm.studies.lrmate import allowed_configurations, drawn_twin, invented_twin, unseen
-from truearm.studies.lrmate_campaign import campaign_of, station
-from truearm.studies.lrmate_pictures import away_pictures, distance_pictures
-from truearm.studies.lrmate_tables import all_tables, mean_away, mean_error
+from truearm.studies import Progress
+from truearm.studies.lrmate_hexapod.pictures import away_pictures, distance_pictures
+from truearm.studies.lrmate_hexapod.run import Model, run
+from truearm.studies.lrmate_hexapod.tables import (
+    errors_tables,
+    frames_table,
+    near_and_away_table,
+    orientations_table,
+    others_table,
+    signs_table,
+    steps_table,
+)
+from truearm.studies.seeds import median_of
 from truearm.studies.study import Study
 
 _CONFIGURATIONS: Final = 9905
@@ -18,9 +24,7 @@ _CONFIGURATIONS: Final = 9905
 _OTHERS: Final = 500
 
 
-def study(
-    seeds: int, progress: Callable[[str], None], configurations: int = _CONFIGURATIONS, others: int = _OTHERS
-) -> Study:
+def study(seeds: int, progress: Progress, configurations: int = _CONFIGURATIONS, others: int = _OTHERS) -> Study:
     """Run the study.
 
     Parameters
@@ -35,28 +39,15 @@ def study(
     others
         To judge each of the other robots by.
     """
-    progress("planning")
-    common = station()
-    progress(f"moving the twin to {configurations} configurations")
-    joints = allowed_configurations(common.robot, configurations, np.random.default_rng(0))
-    twin = invented_twin(common.robot)
-    truth = unseen(common.robot, twin, joints)
-    outcomes = []
-    for seed in range(seeds):
-        progress(f"seed {seed + 1} of {seeds}")
-        outcomes.append(campaign_of(common, twin, truth, seed))
-    drawn = []
-    for seed in range(seeds):
-        progress(f"other robot {seed + 1} of {seeds}")
-        other = drawn_twin(common.robot, seed)
-        drawn.append(campaign_of(common, other, unseen(common.robot, other, joints[:others]), seed))
+    found = run(seeds, progress, configurations, others)
+    outcomes, drawn = found.outcomes, found.others
 
-    def mean(name: str) -> float:
-        return float(np.median([1e3 * o.judgements[name].position.mean() for o in outcomes]))
+    def mean(model: Model) -> float:
+        return median_of(outcomes, lambda one: 1e3 * one.judgements[model].mean)
 
-    printed = [1e3 * mean_error(o, "final") for o in drawn]
-    worse = sum(mean_error(o, "final") > mean_error(o, "preliminary") for o in drawn)
-    better = sum(mean_away(o, "tracker") < mean_away(o, "final found") for o in drawn)
+    printed = [1e3 * one.judgements["final"].mean for one in drawn]
+    worse = sum(one.judgements["final"].mean > one.judgements["preliminary"].mean for one in drawn)
+    better = sum(one.mean_away("tracker") < one.mean_away("final found") for one in drawn)
     return Study(
         name="lrmate-hexapod",
         title="A FANUC LR Mate 200iC calibrated with one ballbar",
@@ -71,11 +62,16 @@ def study(
         f" for {better} of {seeds} other robots. Chapter 4 prints no identified parameters, so this robot is"
         " invented: its nominal errors, and how much no model describes, were chosen; the rest follows.",
         seeds=seeds,
-        tables=all_tables(common, outcomes, drawn),
-        pictures=(
-            *away_pictures(outcomes[0].judgements, truth.front_up, outcomes[0].away),
-            *distance_pictures(outcomes[0].judgements),
+        tables=(
+            steps_table(found),
+            frames_table(outcomes),
+            *errors_tables(outcomes),
+            signs_table(outcomes),
+            orientations_table(outcomes),
+            near_and_away_table(outcomes),
+            others_table(drawn),
         ),
+        pictures=(*away_pictures(outcomes[0]), *distance_pictures(outcomes[0])),
         notes=(
             "The truth in the robot file is one of 5457 random draws: the one whose nominal errors come nearest to"
             " Tables 4.3 and 4.4. The rows of the nominal model show how near; they are no result.",

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from truearm.modeling.chain import Array
 from truearm.reporting.drawing import AFTER, BEFORE, COLOURS, Figure, axis, figure
 from truearm.reporting.numbers import rounded, rounded_to
-from truearm.studies.lrmate import Judgement
+from truearm.studies.lrmate_hexapod.run import Model, Outcome
 from truearm.studies.study import Picture
 from truearm.validation.pair_distances import PairDistances
 
@@ -24,41 +21,28 @@ _DISTANCE: Final = "distance from the reference point [mm]"
 _ERROR: Final = "position error [mm]"
 
 
-def away_pictures(
-    judgements: Mapping[str, Judgement], front_up: NDArray[np.bool_], away: Array
-) -> tuple[Picture, Picture, Picture]:
-    """Draw position errors against the distance from the calibrated region [m].
-
-    Parameters
-    ----------
-    judgements
-        By model.
-    front_up
-        Which configurations are front/up, ``(n,)``.
-    away
-        Distance of each from the reference point [m], ``(n,)``.
-    """
+def away_pictures(first: Outcome) -> tuple[Picture, Picture, Picture]:
+    """Draw position errors of one seed against the distance from the calibrated region."""
     return (
-        _bands(judgements, away),
-        _scattered(
-            "preliminary", "Preliminary calibration, base by three cups (Figure 4.7a)", judgements, front_up, away
-        ),
-        _scattered("final", "Final calibration, base by three cups (Figure 4.7b)", judgements, front_up, away),
+        _bands(first),
+        _scattered("preliminary", "Preliminary calibration, base by three cups (Figure 4.7a)", first),
+        _scattered("final", "Final calibration, base by three cups (Figure 4.7b)", first),
     )
 
 
-def _bands(judgements: Mapping[str, Judgement], away: Array) -> Picture:
-    band = np.floor(away / _BAND).astype(int)
+def _bands(first: Outcome) -> Picture:
+    band = np.floor(first.away / _BAND).astype(int)
     drawn = [number for number in range(band.max() + 1) if np.sum(band == number) >= _FEW]
     traces: list[Figure] = []
-    for name, words, colour, dash in (
+    shown: tuple[tuple[Model, str, str, str], ...] = (
         ("preliminary", "preliminary, base by three cups", COLOURS[0], "dot"),
         ("final", "final, base by three cups", COLOURS[0], "solid"),
         ("preliminary found", "preliminary, base and cups found", AFTER, "dot"),
         ("final found", "final, base and cups found", AFTER, "solid"),
         ("tracker", "tracker", COLOURS[1], "solid"),
-    ):
-        errors = judgements[name].position
+    )
+    for name, words, colour, dash in shown:
+        errors = first.judgements[name].position
         traces.append(
             {
                 "type": "scatter",
@@ -79,9 +63,8 @@ def _bands(judgements: Mapping[str, Judgement], away: Array) -> Picture:
     )
 
 
-def _scattered(
-    name: str, title: str, judgements: Mapping[str, Judgement], front_up: NDArray[np.bool_], away: Array
-) -> Picture:
+def _scattered(name: Model, title: str, first: Outcome) -> Picture:
+    away, front_up = first.away, first.front_up
     every = max(1, -(-len(away) // _POINTS))
     traces: list[Figure] = [
         {
@@ -89,7 +72,7 @@ def _scattered(
             "mode": "markers",
             "name": words,
             "x": rounded_to(1e3 * away[chosen][::every], 1),
-            "y": rounded_to(1e3 * judgements[name].position[chosen][::every], 4),
+            "y": rounded_to(1e3 * first.judgements[name].position[chosen][::every], 4),
             "marker": {"color": colour, "size": 4},
             "hovertemplate": "%{x:.0f} mm away: %{y:.3f} mm<extra></extra>",
         }
@@ -104,8 +87,13 @@ def _scattered(
     )
 
 
-def distance_pictures(judgements: Mapping[str, Judgement]) -> tuple[Picture, ...]:
+def distance_pictures(first: Outcome) -> tuple[Picture, ...]:
     """Draw the histograms of distance errors of both calibrations as printed, and of a tracker's."""
+    shown: tuple[tuple[Model, str], ...] = (
+        ("preliminary", "preliminary calibration, base by three cups (Figure 4.8a)"),
+        ("final", "final calibration, base by three cups (Figure 4.8b)"),
+        ("tracker", "tracker"),
+    )
     return tuple(
         Picture(
             f"distances-{name.replace(' ', '-')}",
@@ -113,19 +101,15 @@ def distance_pictures(judgements: Mapping[str, Judgement]) -> tuple[Picture, ...
             "Predicted minus true, of all pairs and of those in which both are front/up; first seed.",
             figure(
                 [
-                    _steps("all pairs", BEFORE, judgements[name].pairs),
-                    _steps("both front/up", AFTER, judgements[name].pairs_front_up),
+                    _steps("all pairs", BEFORE, first.judgements[name].pairs),
+                    _steps("both front/up", AFTER, first.judgements[name].pairs_front_up),
                 ],
                 340,
                 xaxis=axis("distance error [mm]"),
                 yaxis=axis("share of the pairs per mm"),
             ),
         )
-        for name, words in (
-            ("preliminary", "preliminary calibration, base by three cups (Figure 4.8a)"),
-            ("final", "final calibration, base by three cups (Figure 4.8b)"),
-            ("tracker", "tracker"),
-        )
+        for name, words in shown
     )
 
 

@@ -9,38 +9,38 @@ import numpy as np
 
 from truearm.measurement.hexapod.geometry import DEVICE
 from truearm.modeling.chain import Array
-from truearm.studies.lrmate_campaign import Outcome, Station
+from truearm.studies.lrmate_hexapod.run import FrameModel, Model, Outcome, Run
 from truearm.studies.study import Row, Table
 
-#: Around the reference point (text on Figure 4.7), and what counts as away from it [m].
+#: Around the reference point (text on Figure 4.7) [m].
 _NEAR: Final = 0.2
-_AWAY: Final = 0.4
 #: Tables 4.3 to 4.6: mean, standard deviation, maximum [mm].
-_Figures = Mapping[str, tuple[float, float, float]]
-_TABLE_4_3: Final[_Figures] = {
+_Three = tuple[float, float, float]
+_Printed = Mapping[Model, _Three]
+_TABLE_4_3: Final[_Printed] = {
     "nominal": (1.355, 1.029, 5.197),
     "preliminary": (0.517, 0.219, 1.223),
     "final": (0.796, 0.275, 1.630),
     "tracker": (0.156, 0.067, 0.490),
 }
-_TABLE_4_4: Final[_Figures] = {
+_TABLE_4_4: Final[_Printed] = {
     "nominal": (0.873, 0.416, 2.717),
     "preliminary": (0.479, 0.214, 1.039),
     "final": (0.697, 0.253, 1.406),
 }
-_TABLE_4_5: Final[_Figures] = {
+_TABLE_4_5: Final[_Printed] = {
     "nominal": (1.062, 0.960, 7.873),
     "preliminary": (0.318, 0.219, 1.706),
     "final": (0.400, 0.244, 1.666),
     "tracker": (0.110, 0.083, 0.803),
 }
-_TABLE_4_6: Final[_Figures] = {
+_TABLE_4_6: Final[_Printed] = {
     "nominal": (0.595, 0.511, 4.963),
     "preliminary": (0.384, 0.237, 1.231),
     "final": (0.456, 0.243, 1.394),
 }
 #: Models by the names used here, in words.
-_MODELS: Final = {
+_MODELS: Final[Mapping[Model, str]] = {
     "nominal": "nominal, base known",
     "preliminary": "preliminary, base by three cups",
     "final": "final, base by three cups",
@@ -48,76 +48,58 @@ _MODELS: Final = {
     "final found": "final, base and cups found",
     "tracker": "tracker, 50 positions",
 }
+#: Models that look for the fixture's frame, in words.
+_FRAME_WORDS: Final[Mapping[FrameModel, str]] = {
+    "nominal": "nominal model",
+    "final found": "final model, base and cups found",
+}
+_CALIBRATED: Final[tuple[Model, ...]] = ("preliminary", "final", "preliminary found", "final found", "tracker")
 _STATISTICS: Final = ("mean", "standard deviation", "maximum")
 
 
-# -- figures -----------------------------------------------------------------------------------------------
-
-
-def _position(outcome: Outcome, name: str) -> tuple[float, ...]:
+def _position(outcome: Outcome, name: Model) -> _Three:
     return _spread(outcome.judgements[name].position)
 
 
-def _position_front_up(outcome: Outcome, name: str) -> tuple[float, ...]:
+def _position_front_up(outcome: Outcome, name: Model) -> _Three:
     return _spread(outcome.judgements[name].position[outcome.front_up])
 
 
-def _pairs(outcome: Outcome, name: str) -> tuple[float, ...]:
+def _pairs(outcome: Outcome, name: Model) -> _Three:
     pairs = outcome.judgements[name].pairs
     return pairs.mean, pairs.deviation, pairs.maximum
 
 
-def _pairs_front_up(outcome: Outcome, name: str) -> tuple[float, ...]:
+def _pairs_front_up(outcome: Outcome, name: Model) -> _Three:
     pairs = outcome.judgements[name].pairs_front_up
     return pairs.mean, pairs.deviation, pairs.maximum
 
 
-def _spread(errors: Array) -> tuple[float, ...]:
+def _spread(errors: Array) -> _Three:
     return float(errors.mean()), float(errors.std()), float(errors.max())
 
 
-def mean_error(outcome: Outcome, name: str) -> float:
-    """Return the mean position error of a model [m]."""
-    return float(outcome.judgements[name].position.mean())
-
-
-def mean_away(outcome: Outcome, name: str) -> float:
-    """Return the same beyond 400 mm from the reference point."""
-    return float(outcome.judgements[name].position[outcome.away > _AWAY].mean())
-
-
-def all_tables(common: Station, outcomes: Sequence[Outcome], drawn: Sequence[Outcome]) -> tuple[Table, ...]:
-    """Return the tables of the study.
-
-    Parameters
-    ----------
-    common
-        The plan.
-    outcomes, drawn
-        Of the robot file's truth, and of other robots, one a seed.
-    """
+def errors_tables(outcomes: Sequence[Outcome]) -> tuple[Table, ...]:
+    """Set the errors of every model beside Tables 4.3 to 4.6."""
     return (
-        _steps(common, outcomes),
-        _frames(outcomes),
         _errors("4.3", "all configurations", "position", outcomes, _position, _TABLE_4_3),
         _errors("4.4", "front/up only", "position", outcomes, _position_front_up, _TABLE_4_4),
         _errors("4.5", "all pairs", "distance", outcomes, _pairs, _TABLE_4_5),
         _errors("4.6", "pairs of front/up", "distance", outcomes, _pairs_front_up, _TABLE_4_6),
-        _signs(outcomes),
-        _orientations(outcomes),
-        _by_distance(outcomes),
-        _other_robots(drawn),
     )
 
 
-# -- tables ------------------------------------------------------------------------------------------------
-
-
-def _steps(station: Station, outcomes: Sequence[Outcome]) -> Table:
-    def count(of: str, front: bool) -> list[int]:
-        return [sum(o.front[row] == front for row in getattr(o.campaign, of)) for o in outcomes]
-
-    farthest = [1e3 * float(np.abs(o.campaign.sides - DEVICE.base).max()) for o in outcomes]
+def steps_table(found: Run) -> Table:
+    """Show what the two steps measured."""
+    station, outcomes = found.station, found.outcomes
+    front_up, back_down = (
+        {
+            "first": [sum(one.front[row] == front for row in one.campaign.first) for one in outcomes],
+            "second": [sum(one.front[row] == front for row in one.campaign.second) for one in outcomes],
+        }
+        for front in (True, False)
+    )
+    farthest = [1e3 * float(np.abs(one.campaign.sides - DEVICE.base).max()) for one in outcomes]
     return Table(
         "The two steps",
         "What the robot reaches with the fixture where it stands, and what the ballbar can measure: the six lengths"
@@ -133,30 +115,32 @@ def _steps(station: Station, outcomes: Sequence[Outcome]) -> Table:
                 absolute=2,
                 explanation="Each pose once with flip and once without. The document counts some poses three times.",
             ),
-            Row("of these measured or tried", "", [len(o.front) for o in outcomes], 61, "section 4.4"),
-            Row("front/up among them", "", [sum(o.front) for o in outcomes], 46, "section 4.4"),
+            Row("of these measured or tried", "", [len(one.front) for one in outcomes], 61, "section 4.4"),
+            Row("front/up among them", "", [sum(one.front) for one in outcomes], 46, "section 4.4"),
             Row(
                 "largest error of a base distance", "mm", farthest, explanation="Usually below 1 mm, says the document."
             ),
             Row(
                 "first step: front/up measured",
                 "",
-                count("first", True),
+                front_up["first"],
                 46,
                 "section 4.4",
                 absolute=4,
                 explanation="A few of them are more than 1 mm off with this invented robot.",
             ),
-            Row("first step: back/down measured", "", count("first", False), 0, "section 4.4", absolute=2),
-            Row("second step: front/up measured", "", count("second", True), 0, "section 4.4", absolute=4),
-            Row("second step: back/down measured", "", count("second", False), 15, "section 4.4", absolute=2),
-            Row("never in range", "", [len(o.campaign.out_of_range) for o in outcomes], 0, "section 4.4", absolute=1),
+            Row("first step: back/down measured", "", back_down["first"], 0, "section 4.4", absolute=2),
+            Row("second step: front/up measured", "", front_up["second"], 0, "section 4.4", absolute=4),
+            Row("second step: back/down measured", "", back_down["second"], 15, "section 4.4", absolute=2),
+            Row(
+                "never in range", "", [len(one.campaign.out_of_range) for one in outcomes], 0, "section 4.4", absolute=1
+            ),
         ),
     )
 
 
-def _frames(outcomes: Sequence[Outcome]) -> Table:
-    gain = [100.0 * (1.0 - mean_error(o, "final") / o.plain) for o in outcomes]
+def frames_table(outcomes: Sequence[Outcome]) -> Table:
+    """Show the fixture's frame that three cups give."""
     return Table(
         "World frame from three cups",
         "The robot touches the cups with one cup of its tool and its model says where they are. The correction lays the"
@@ -165,7 +149,7 @@ def _frames(outcomes: Sequence[Outcome]) -> Table:
             Row(
                 "gain by the correction, mean error of the final model",
                 "%",
-                gain,
+                [one.gain for one in outcomes],
                 15.0,
                 "section 4.2",
                 absolute=5.0,
@@ -174,14 +158,21 @@ def _frames(outcomes: Sequence[Outcome]) -> Table:
                 " the other robots below it is as often a loss.",
             ),
             *(
-                Row(f"frame by the {words}, {what}", unit, [scale * getattr(o, of)[name] for o in outcomes])
-                for name, words in (("nominal", "nominal model"), ("final found", "final model, base and cups found"))
-                for what, of, unit, scale in (("shift", "shift", "mm", 1e3), ("turn", "tilt", "deg", np.degrees(1.0)))
+                row
+                for model, words in _FRAME_WORDS.items()
+                for row in (
+                    Row(f"frame by the {words}, shift", "mm", [1e3 * one.frames[model].shift for one in outcomes]),
+                    Row(
+                        f"frame by the {words}, turn",
+                        "deg",
+                        [float(np.degrees(1.0)) * one.frames[model].turn for one in outcomes],
+                    ),
+                )
             ),
             Row(
                 "final, ten more rounds of touching and identifying, mean error",
                 "mm",
-                [1e3 * o.repeated for o in outcomes],
+                [1e3 * one.repeated for one in outcomes],
                 explanation="Holding the base, identifying, and looking for the base again is no iteration that"
                 " settles: what is wrong with the base goes into the robot and from there into the base. The document"
                 " calls its identification stable after four iterations; it does not say that the frame was found again"
@@ -196,8 +187,8 @@ def _errors(
     of_what: str,
     kind: str,
     outcomes: Sequence[Outcome],
-    figures: Callable[[Outcome, str], tuple[float, ...]],
-    published: _Figures,
+    figures: Callable[[Outcome, Model], _Three],
+    published: _Printed,
 ) -> Table:
     rows = []
     for name, words in _MODELS.items():
@@ -223,12 +214,12 @@ def _errors(
     )
 
 
-#: Why a figure differs, or what it means: by table, model and statistic.
 _TAIL: Final = (
     "A base held at a wrong place is made up for by the robot's parameters, near the fixture. What that does far away"
     " depends on the robot: see the spread of the other robots below."
 )
-_REASONS: Final[Mapping[tuple[str, str, str], str]] = {
+#: Why a figure differs, or what it means: by table, model and statistic.
+_REASONS: Final[Mapping[tuple[str, Model, str], str]] = {
     ("4.3", "preliminary", "maximum"): _TAIL,
     ("4.3", "final", "standard deviation"): _TAIL,
     ("4.3", "final", "maximum"): _TAIL,
@@ -241,41 +232,43 @@ _REASONS: Final[Mapping[tuple[str, str, str], str]] = {
 }
 
 
-def _signs(outcomes: Sequence[Outcome]) -> Table:
+#: Figure 4.8: share of positive distance errors [%] by model, and why ours differs.
+_POSITIVE: Final[tuple[tuple[Model, float | None, str], ...]] = (
+    (
+        "preliminary",
+        60.0,
+        "The document does not say what it subtracts from what; the other way round it is 100 % minus ours. With other"
+        " robots the share is anything, see below.",
+    ),
+    ("final", 86.0, "A base held at a wrong place scales the robot; in which direction depends on the robot."),
+    ("preliminary found", None, ""),
+    ("final found", None, ""),
+    ("tracker", None, ""),
+)
+
+
+def signs_table(outcomes: Sequence[Outcome]) -> Table:
+    """Show how many distances are too long, beside Figure 4.8."""
     return Table(
         "Positive distance errors (Figure 4.8)",
         "Predicted minus true. Where nearly all distances are too long, or too short, the robot is scaled.",
         tuple(
             Row(
-                f"{_MODELS[name]}",
+                _MODELS[name],
                 "%",
-                [100.0 * o.judgements[name].pairs.positive for o in outcomes],
+                [100.0 * one.judgements[name].pairs.positive for one in outcomes],
                 published,
                 "section 4.4" if published else "",
                 absolute=15.0,
                 explanation=why,
             )
-            for name, published, why in (
-                (
-                    "preliminary",
-                    60.0,
-                    "The document does not say what it subtracts from what; the other way round it is 100 % minus ours."
-                    " With other robots the share is anything, see below.",
-                ),
-                (
-                    "final",
-                    86.0,
-                    "A base held at a wrong place scales the robot; in which direction depends on the robot.",
-                ),
-                ("preliminary found", None, ""),
-                ("final found", None, ""),
-                ("tracker", None, ""),
-            )
+            for name, published, why in _POSITIVE
         ),
     )
 
 
-def _orientations(outcomes: Sequence[Outcome]) -> Table:
+def orientations_table(outcomes: Sequence[Outcome]) -> Table:
+    """Show orientation errors."""
     return Table(
         "Orientation errors, all configurations",
         "Angle between the predicted and the true flange. The document measures positions only.",
@@ -283,7 +276,7 @@ def _orientations(outcomes: Sequence[Outcome]) -> Table:
             Row(
                 f"{words}: {statistic}",
                 "deg",
-                [float(np.degrees(_spread(o.judgements[name].orientation)[place])) for o in outcomes],
+                [float(np.degrees(_spread(one.judgements[name].orientation)[place])) for one in outcomes],
             )
             for name, words in _MODELS.items()
             for place, statistic in ((0, "mean"), (2, "maximum"))
@@ -291,10 +284,11 @@ def _orientations(outcomes: Sequence[Outcome]) -> Table:
     )
 
 
-def _by_distance(outcomes: Sequence[Outcome]) -> Table:
+def near_and_away_table(outcomes: Sequence[Outcome]) -> Table:
+    """Show errors near the fixture and away from it, beside Figure 4.7."""
     rows = []
-    for name in ("preliminary", "final", "preliminary found", "final found", "tracker"):
-        near = [o.judgements[name].position[(o.away < _NEAR) & o.front_up] for o in outcomes]
+    for name in _CALIBRATED:
+        near = [one.judgements[name].position[(one.away < _NEAR) & one.front_up] for one in outcomes]
         rows.append(
             Row(
                 f"{_MODELS[name]}: largest within 200 mm, front/up",
@@ -305,9 +299,9 @@ def _by_distance(outcomes: Sequence[Outcome]) -> Table:
                 relative=0.5,
             )
         )
-    for name in ("preliminary", "final", "preliminary found", "final found", "tracker"):
+    for name in _CALIBRATED:
         rows.append(
-            Row(f"{_MODELS[name]}: mean beyond 400 mm", "mm", [1e3 * mean_away(o, name) for o in outcomes]),
+            Row(f"{_MODELS[name]}: mean beyond 400 mm", "mm", [1e3 * one.mean_away(name) for one in outcomes]),
         )
     return Table(
         "Near the fixture and away from it (Figure 4.7)",
@@ -316,9 +310,11 @@ def _by_distance(outcomes: Sequence[Outcome]) -> Table:
     )
 
 
-def _other_robots(drawn: Sequence[Outcome]) -> Table:
-    def ratio(over: str, under: str) -> list[float]:
-        return [mean_error(o, over) / mean_error(o, under) for o in drawn]
+def others_table(drawn: Sequence[Outcome]) -> Table:
+    """Show the same of other robots."""
+
+    def ratio(over: Model, under: Model) -> list[float]:
+        return [one.judgements[over].mean / one.judgements[under].mean for one in drawn]
 
     return Table(
         "Other robots",
@@ -329,7 +325,7 @@ def _other_robots(drawn: Sequence[Outcome]) -> Table:
                 Row(
                     f"{_MODELS[name]}: mean",
                     "mm",
-                    [1e3 * mean_error(o, name) for o in drawn],
+                    [1e3 * one.judgements[name].mean for one in drawn],
                     _TABLE_4_3[name][0] if name in _TABLE_4_3 else None,
                     "section 4.4" if name == "tracker" else "Table 4.3" if name in _TABLE_4_3 else "",
                     relative=0.5,
@@ -340,7 +336,7 @@ def _other_robots(drawn: Sequence[Outcome]) -> Table:
                 )
                 for name in _MODELS
             ),
-            Row("frame by the nominal model, shift", "mm", [1e3 * o.shift["nominal"] for o in drawn]),
+            Row("frame by the nominal model, shift", "mm", [1e3 * one.frames["nominal"].shift for one in drawn]),
             Row(
                 "final over preliminary, base by three cups",
                 "",
@@ -363,13 +359,13 @@ def _other_robots(drawn: Sequence[Outcome]) -> Table:
             Row(
                 "final, base and cups found, over tracker, beyond 400 mm",
                 "",
-                [mean_away(o, "final found") / mean_away(o, "tracker") for o in drawn],
+                [one.mean_away("final found") / one.mean_away("tracker") for one in drawn],
                 explanation="Above 1 for every robot for which the tracker is the better one away from the fixture.",
             ),
             Row(
                 "gain by the correction",
                 "%",
-                [100 * (1 - mean_error(o, "final") / o.plain) for o in drawn],
+                [one.gain for one in drawn],
                 15.0,
                 "section 4.2",
                 absolute=5.0,
@@ -377,12 +373,12 @@ def _other_robots(drawn: Sequence[Outcome]) -> Table:
             Row(
                 "positive distance errors, final, base by three cups",
                 "%",
-                [100.0 * o.judgements["final"].pairs.positive for o in drawn],
+                [100.0 * one.judgements["final"].pairs.positive for one in drawn],
                 86.0,
                 "section 4.4",
                 absolute=15.0,
                 explanation="Mostly far from one half, to either side.",
             ),
-            Row("never in range", "", [len(o.campaign.out_of_range) for o in drawn], 0, "section 4.4", absolute=1),
+            Row("never in range", "", [len(one.campaign.out_of_range) for one in drawn], 0, "section 4.4", absolute=1),
         ),
     )

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +13,7 @@ import pytest
 
 from truearm.errors import InputError
 from truearm.reporting.drawing import axis, figure
-from truearm.studies import STUDIES, run_study
+from truearm.studies import STUDIES, Entry, run_study
 from truearm.studies.regions import IRB120
 from truearm.studies.seeds import Seed, median_of, over_seeds
 from truearm.studies.study import Picture, Row, Study, Table, number
@@ -131,13 +133,15 @@ def test_a_region_is_drawn_from_evenly() -> None:
     assert drawn.mean(axis=0) == pytest.approx((low + high) / 2, abs=0.1)
 
 
-def test_every_study_names_a_module_that_has_it() -> None:
-    from importlib import import_module
+@pytest.mark.parametrize("entry", STUDIES, ids=[entry.name for entry in STUDIES])
+def test_every_study_is_a_folder_that_runs_and_shows(entry: Entry) -> None:
+    assert callable(import_module(entry.module).study)
+    assert all(find_spec(f"{entry.module}.{part}") for part in ("run", "tables", "pictures"))
 
+
+def test_studies_are_listed_by_name() -> None:
     names = [entry.name for entry in STUDIES]
     assert names == sorted(names)
-    for entry in STUDIES:
-        assert callable(import_module(entry.module).study)
 
 
 def test_an_unknown_study_is_refused_with_the_nearest_names() -> None:

@@ -98,10 +98,9 @@ def part(measured_data: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_the_measured_robot(part: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(irb120_faro, "_EFFECTS", ("bearing-compliance",))
-    monkeypatch.setattr(irb120_faro, "_TOGETHER", ("bearing-compliance", "hardening", "warm-up"))
-    study = irb120_faro.study(1, silent, part, many=100, searches=(0, 0))
+def test_the_measured_robot(part: Path) -> None:
+    one, together = ("bearing-compliance",), ("bearing-compliance", "hardening", "warm-up")
+    study = irb120_faro.study(1, silent, part, many=100, searches=(0, 0), effects=one, together=together)
     found = medians(study)
     document = study.tables[0].title
     assert found[document, "elastic, no beta: mean"] == pytest.approx(0.146, rel=0.25)

@@ -31,6 +31,11 @@ class Command(TyperCommand):
     The parameters of a command's function are called like those of its job.
     """
 
+    def collect_usage_pieces(self, ctx: Any) -> list[str]:
+        """Return the arguments as their metavar has them: [ROBOT] may be left out."""
+        named = [str(p.metavar) for p in self.params if isinstance(p, TyperArgument) and p.metavar]
+        return ["[OPTIONS]", *named]
+
     def invoke(self, ctx: Any) -> Any:
         """Run the command; a refusal of the job is told in the words of the command line."""
         mark = _running.set(ctx)
@@ -67,12 +72,17 @@ def command_line() -> str:
             words += map(str, value if isinstance(value, list | tuple) else [value])
         elif name in _OUTPUT:
             end = [max(parameter.opts, key=len), str(_OUTPUT[name])] if _OUTPUT[name] else end
-        elif value is True:
+        elif value is True and _given(context, name):
             words.append(max(parameter.opts, key=len))
-        elif value is not None and value is not False and value != parameter.get_default(context):
+        elif value is not None and value is not False and _given(context, name):
             for entry in value if isinstance(value, list | tuple) else [value]:
                 words += [max(parameter.opts, key=len), str(entry)]
     return shlex.join([*words, *end])
+
+
+def _given(context: typer.Context, name: str) -> bool:
+    source = context.get_parameter_source(name)
+    return source is not None and source.name != "DEFAULT"
 
 
 def _option(name: str) -> str:
@@ -80,7 +90,7 @@ def _option(name: str) -> str:
     context = _running.get()
     for parameter in context.command.params if context is not None else ():
         if parameter.name == name and isinstance(parameter, TyperArgument):
-            return str(parameter.metavar or name)
+            return str(parameter.metavar or name).strip("[]")
         if parameter.name == name:
             return max(parameter.opts, key=len)
     return f"--{name.replace('_', '-')}"

@@ -25,8 +25,8 @@ from truearm.simulation.devices.jogging import postures_at, site
 from truearm.simulation.devices.tracker import TRACKER, Tracker, positions
 from truearm.simulation.truths import STATION, truth_twin
 from truearm.simulation.twin import Twin
-from truearm.studies.irb120_twin import ELASTIC, Truth, driven, running_out
-from truearm.studies.parallel_axes import without_beta
+from truearm.studies.irb120 import ELASTIC, without_beta
+from truearm.studies.irb120_devices.twin import Truth, driven, running_out
 
 Point = tuple[float, float, float]
 
@@ -130,6 +130,25 @@ class Calibrated:
         return _errors(self.robot, self.setup, truth)
 
 
+@dataclass(frozen=True)
+class Shares:
+    """What an instrument sees [percent].
+
+    Attributes
+    ----------
+    seen
+        Of all configurations.
+    several
+        Two reflectors or more, of those that are seen; None for an instrument without reflectors.
+    back
+        The side of a plate that is seen less often, of those that are seen; None without a plate.
+    """
+
+    seen: float
+    several: float | None
+    back: float | None
+
+
 def twin_of(setup: Setup, truth: str) -> Twin:
     """Return the twin with one of the robot file's truths and gears that run out, carrying what the set-up does."""
     twin = running_out(truth_twin(driven(), truth, np.random.default_rng(0)))
@@ -147,20 +166,20 @@ def visible_configurations(setup: Setup, count: int, rng: np.random.Generator) -
     return shown(_seen_by(setup), count, rng, setup.device.visible, setup.device.name)
 
 
-def shares(setup: Setup, count: int, rng: np.random.Generator) -> dict[str, float]:
-    """Return of how many of random configurations something is seen, and what, in percent."""
+def shares(setup: Setup, count: int, rng: np.random.Generator) -> Shares:
+    """Return of how many of random configurations something is seen, and what."""
     robot = _seen_by(setup)
     joints = robot.random_configurations(count, rng)
     seen = setup.device.visible(robot, joints)
-    found = {"of all configurations": float(seen.any(axis=1).mean())}
+    several, back = None, None
     if isinstance(setup.device, Tracker):
-        found["of these, with two reflectors or more"] = float((seen.sum(axis=1) > 1).sum() / seen.any(axis=1).sum())
+        several = 100.0 * float((seen.sum(axis=1) > 1).sum() / seen.any(axis=1).sum())
     elif setup.device is PLANAR_ARTEFACT:
         joints = joints[seen[:, 0]]
         place, rotation = robot.poses(joints, robot.targets[0].name)
-        back = float((np.einsum("ni,ni->n", rotation[:, :, 1], place) < 0.0).mean())
-        found["of these, the side seen less often"] = min(back, 1.0 - back)
-    return {what: 100.0 * share for what, share in found.items()}
+        share = float((np.einsum("ni,ni->n", rotation[:, :, 1], place) < 0.0).mean())
+        back = 100.0 * min(share, 1.0 - share)
+    return Shares(100.0 * float(seen.any(axis=1).mean()), several, back)
 
 
 def calibrate(
@@ -225,22 +244,22 @@ def _seen_by(setup: Setup) -> Robot:
 
 
 def _rows(setup: Setup, joints: Array, seen: NDArray[np.bool_], *, tool_known: bool = False) -> tuple[Array, Array]:
-    """Return what each configuration would tell, of the nests that are seen, and what is known beforehand."""
+    """Return the rows of the nests that are seen at each configuration, and what is known beforehand."""
     robot = ELASTIC.prepared(without_beta(driven()).with_payload(setup.payload).with_frames(STATION, setup.nests))
-    told = sensitivity(robot, Postures(joints), ELASTIC.free(robot), _ABOUT)
+    rows = sensitivity(robot, Postures(joints), ELASTIC.free(robot), _ABOUT)
     counted = np.repeat(np.broadcast_to(seen, (len(joints), len(setup.nests))), 3, axis=1)
-    told = replace(told, rows=told.rows * counted[..., None])
-    free = told.free.parameters
-    among = [k for k in told.told_apart(setup.configurations) if not (tool_known and free[k].group == "target")]
-    return np.ascontiguousarray(told.rows[..., among]), told.known[np.ix_(among, among)]
+    rows = replace(rows, rows=rows.rows * counted[..., None])
+    free = rows.free.parameters
+    among = [k for k in rows.told_apart(setup.configurations) if not (tool_known and free[k].group == "target")]
+    return np.ascontiguousarray(rows.rows[..., among]), rows.known[np.ix_(among, among)]
 
 
 def _read(setup: Setup, twin: Twin, joints: Array, seen: NDArray[np.bool_], rng: np.random.Generator) -> Dataset:
     device, robot = setup.device, _seen_by(setup)
     if isinstance(device, Tracker):
         return positions(robot, twin, joints, seen, device.sigma, rng, setup.name)
-    carrying = replace(twin, robot=twin.robot.with_frames(twin.robot.base, device.tool.targets if device.tool else {}))
-    return device.read(robot, carrying, joints, device.sigma, rng)
+    loaded = replace(twin, robot=twin.robot.with_frames(twin.robot.base, device.tool.targets if device.tool else {}))
+    return device.read(robot, loaded, joints, device.sigma, rng)
 
 
 def _nest(robot: Robot, setup: Setup, joints: Array, nest: str) -> Array:

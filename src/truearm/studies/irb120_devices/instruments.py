@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,13 +18,14 @@ from truearm.modeling.robot import Robot
 from truearm.modeling.transform import rigid_motion
 from truearm.simulation.devices import Device, measured_with, named_device
 from truearm.simulation.twin import Twin
-from truearm.studies.irb120_twin import ELASTIC, Truth
+from truearm.studies.irb120 import ELASTIC
+from truearm.studies.irb120_devices.twin import Truth
 
-#: What no reading tells: base against joint 1, tool against joint 6, slides along parallel axes, sag of joint 1.
+#: What no instrument sees: base against joint 1, tool against joint 6, slides along parallel axes, sag of joint 1.
 _CONVENTIONS = frozenset(
     {"alpha_1", "a_1", "d_1", "theta_offset_1", "theta_offset_6", "d_6", "d_2", "d_3", "compliance_1"}
 )
-#: What a target on axis 6 alone does not tell apart either.
+#: What a target on axis 6 alone does not separate either.
 _ON_AXIS_6 = frozenset({"alpha_6", "a_6", "compliance_6"})
 
 
@@ -35,28 +37,31 @@ class Accuracy:
     ----------
     device
         The instrument.
+    configurations
+        How many it measured.
     anchored
         Whether it says where the robot stands. Where it does not, errors are those left by the best rigid motion.
     before, after
         Position errors of its own targets at unseen configurations [m], of the nominal robot in the frames that the
         same readings give it, and of the identified one.
     sized
-        Of the identified robot, but for a change of size as well.
-    trusted
+        Of the identified robot, a change of size taken out as well.
+    gauges
         What nobody measured: ``base``, ``size``.
-    unseen
-        What its readings leave open of the arm itself, beside what no reading tells, as combinations.
+    unobservable
+        What its readings leave open of the arm itself, beside what no instrument sees, as combinations.
     numbers
         How many numbers it read.
     """
 
     device: Device
+    configurations: int
     anchored: bool
     before: Array
     after: Array
     sized: Array
-    trusted: tuple[str, ...]
-    unseen: tuple[str, ...]
+    gauges: tuple[str, ...]
+    unobservable: tuple[str, ...]
     numbers: int
 
 
@@ -68,7 +73,7 @@ def accuracy(
     Parameters
     ----------
     nominal
-        Carries what the twin does.
+        With the payload of the twin.
     count
         Number of configurations.
     """
@@ -82,23 +87,37 @@ def accuracy(
         before, after = _moved(before, truly), _moved(after, truly)
     return Accuracy(
         device,
+        count,
         data.anchored,
         _lengths(before - truly),
         _lengths(after - truly),
         _lengths(_resized(after, truly) - truly),
         gauge_freedoms(data),
-        _unseen(fit, data),
+        _unobservable(fit, data),
         sum(int(np.isfinite(v).sum()) for v in (data.position, data.distance, data.height) if v is not None)
         + 3 * int(data.has_orientation.sum()),
     )
 
 
+@dataclass(frozen=True)
+class ToolErrors:
+    """How far off a tool centre point is that was found by touching one point, by the number of touches [m].
+
+    Attributes
+    ----------
+    nominal, calibrated, true
+        Found on the nominal robot, on one that a tracker calibrated, and on the true one.
+    """
+
+    nominal: Mapping[int, float]
+    calibrated: Mapping[int, float]
+    true: Mapping[int, float]
+
+
 def tool_alone(
     nominal: Robot, twin: Twin, truth: Truth, touches: tuple[int, ...], rng: np.random.Generator
-) -> dict[str, dict[int, float]]:
-    """Return how far off a tool centre point is that was found by touching one point [m].
-
-    It is found on the nominal robot, on one that a tracker calibrated, and on the true one, by number of touches.
+) -> ToolErrors:
+    """Return how far off a tool centre point is that was found by touching one point.
 
     The right answer for a robot that errs is the tool centre point with which it errs least: the mean of where the true
     tip is, seen from the flange that the robot believes in.
@@ -108,20 +127,21 @@ def tool_alone(
     data = measured_with(point, nominal, twin, max(touches), rng)
     tip = _targets(point, twin)["tip"]
     compliance = {f"compliance_{number}": joint.compliance for number, joint in twin.joints.items()}
-    robots = {
-        "nominal": place(nominal, with_tracker).robot,
-        "calibrated": identify(nominal, with_tracker, ELASTIC).robot,
-        "true": twin.robot.with_effects(("compliance",)).with_values(compliance),
-    }
-    error: dict[str, dict[int, float]] = {}
-    for name, robot in robots.items():
+
+    def errors(robot: Robot) -> dict[int, float]:
         origin, rotation = robot.poses(truth.joints)
         right = np.einsum("nji,nj->ni", rotation, truth.places(tip) - origin).mean(axis=0)
-        error[name] = {}
-        for count in touches:
-            found = identify(robot, data.of_configurations(range(count)), FRAMES).robot
-            error[name][count] = float(np.linalg.norm(_points(found)["tip"] - right))
-    return error
+        found = {
+            count: _points(identify(robot, data.of_configurations(range(count)), FRAMES).robot)["tip"]
+            for count in touches
+        }
+        return {count: float(np.linalg.norm(place - right)) for count, place in found.items()}
+
+    return ToolErrors(
+        nominal=errors(place(nominal, with_tracker).robot),
+        calibrated=errors(identify(nominal, with_tracker, ELASTIC).robot),
+        true=errors(twin.robot.with_effects(("compliance",)).with_values(compliance)),
+    )
 
 
 def _targets(device: Device, twin: Twin) -> dict[str, tuple[float, ...]]:
@@ -152,7 +172,7 @@ def _resized(points: Array, places: Array) -> Array:
     return np.asarray(centre + x * float(np.sum(x * (places - centre)) / np.sum(x * x)))
 
 
-def _unseen(fit: Fit, data: Dataset) -> tuple[str, ...]:
+def _unobservable(fit: Fit, data: Dataset) -> tuple[str, ...]:
     found = np.array([fit.robot.values[name] for name in fit.free.names])
     # The deviations are declared; the others are never asked for.
     noise = {observation.name: 1.0 for observation in OBSERVATIONS}

@@ -9,19 +9,16 @@ from typing import Final
 
 import numpy as np
 
-from truearm.identification.solving.models import MODELS, Model
 from truearm.library import load_robot
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.simulation.twin import Twin
 from truearm.simulation.twin_joint import PERFECT
+from truearm.studies import regions
 
-#: Lowest and highest joint readings [deg]: section 2.5; upper ends of joints 2 and 3 are the robot's own limits.
-_REGION: Final = ((-90, 0, -80, -150, -90, -180), (90, 110, 70, 150, 90, 180))
 #: Sine a turn of each joint, amplitude and phase [deg]: the smallest that with the compliances of Table 2.7 leaves the
 #: angular errors of Table 2.3 (study irb120-axes).
 _RUN_OUT: Final = {1: (0.004, 150), 2: (0.032, 0), 3: (0.028, 195), 4: (0.044, 315), 5: (0.049, 270), 6: (0.061, 210)}
-ELASTIC: Final[Model] = next(model for model in MODELS if model.name == "elastic")
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +51,7 @@ class Truth:
 def driven() -> Robot:
     """Return the nominal IRB 120 with the limits within which the document drives it."""
     robot = load_robot("irb120")
-    low, high = np.radians(_REGION).tolist()
+    low, high = (limits.tolist() for limits in regions.IRB120.limits)
     joints = zip(robot.joints, low, high, strict=True)
     return replace(robot, joints=tuple(replace(joint, limits=(a, b)) for joint, a, b in joints))
 

@@ -1,52 +1,16 @@
-"""Tables and pictures of the document's three set-ups, for the study irb120-devices."""
+"""Tables of the document's three set-ups."""
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Final
+from collections.abc import Callable, Sequence
 
-import numpy as np
-
-from truearm.modeling.chain import Array
-from truearm.reporting.drawing import COLOURS, axis, figure, scene_axis
-from truearm.reporting.numbers import rounded, rounded_to
-from truearm.studies.irb120_setups import SETUPS
-from truearm.studies.study import Picture, Row, Table
-
-#: Figures [mm, percent, counts] of every seed, by what they are of.
-Found = defaultdict[tuple[str, ...], list[float]]
-
-#: Set-ups in which a model without compliance is tried.
-RIGID: Final = ("tracker", "spatial artefact")
+from truearm.measurement.statistics import Spread
+from truearm.studies.irb120_devices.run import SPHERES, Outcome, SetupOutcome, looked_at
+from truearm.studies.irb120_devices.setups import SETUPS
+from truearm.studies.study import Row, Table
 
 
-@dataclass(frozen=True)
-class Sphere:
-    """A ballbar test of section 2.6.3: who was tested, where the bar hung, what came out [mm]."""
-
-    setup: str
-    nest: str
-    points: int
-    mean: float
-    std: float
-    max: float
-    table: str
-
-
-SPHERES: Final = (
-    Sphere("tracker", "1", 123, -0.105, 0.091, 0.327, "2.12"),
-    Sphere("planar artefact", "1", 123, 0.022, 0.110, 0.250, "2.12"),
-    Sphere("tracker", "2", 95, -0.148, 0.118, 0.437, "2.12"),
-    Sphere("planar artefact", "2", 95, -0.048, 0.135, 0.363, "2.12"),
-    Sphere("spatial artefact", "1", 108, 0.091, 0.126, 0.328, "2.13"),
-    Sphere("spatial artefact", "3", 90, 0.146, 0.130, 0.385, "2.13"),
-)
-_CONFIGURATIONS: Final = {setup.name: setup.configurations for setup in SETUPS}
-
-
-def before(found: Found) -> Table:
+def before_table(outcomes: Sequence[Outcome]) -> Table:
     """Return the errors of the nominal robot."""
     rows = []
     for setup in SETUPS:
@@ -54,7 +18,7 @@ def before(found: Found) -> Table:
             Row(
                 f"{setup.name}: mean",
                 "mm",
-                found[setup.name, "before"],
+                [1e3 * one.setups[setup.name].before.mean for one in outcomes],
                 setup.before,
                 "section 2.6.2",
                 relative=0.25,
@@ -68,7 +32,7 @@ def before(found: Found) -> Table:
                 else "",
             )
         )
-        rows.append(Row(f"{setup.name}: maximum", "mm", found[setup.name, "before", "max"]))
+        rows.append(Row(f"{setup.name}: maximum", "mm", [1e3 * one.setups[setup.name].before.max for one in outcomes]))
     return Table(
         "Before calibration (Figures 2.9 to 2.11)",
         "Twins with the errors of Tables 2.6 to 2.11, each as its own set-up found them. Positions of the three nests.",
@@ -76,7 +40,7 @@ def before(found: Found) -> Table:
     )
 
 
-def after(found: Found) -> Table:
+def after_table(outcomes: Sequence[Outcome]) -> Table:
     """Return the errors after calibration with the document's numbers of configurations."""
     rows = []
     for setup in SETUPS:
@@ -85,7 +49,7 @@ def after(found: Found) -> Table:
             Row(
                 f"{setup.name}, {setup.configurations} configurations: mean",
                 "mm",
-                found[setup.name, "after"],
+                [1e3 * one.setups[setup.name].after.mean for one in outcomes],
                 setup.after,
                 "section 2.6.2",
                 relative=0.25,
@@ -100,7 +64,7 @@ def after(found: Found) -> Table:
             Row(
                 f"{setup.name}: maximum",
                 "mm",
-                found[setup.name, "after", "max"],
+                [1e3 * one.setups[setup.name].after.max for one in outcomes],
                 0.5,
                 "section 2.7",
                 relative=0.4,
@@ -113,17 +77,21 @@ def after(found: Found) -> Table:
         Row(
             "tracker, all three reflectors at every configuration: mean",
             "mm",
-            found["tracker", "all reflectors"],
+            _figures(outcomes, "tracker", lambda setup: setup.all_reflectors, _mean),
             explanation="As if their cones were open all round: it falls to about what the cameras leave.",
         ),
         *(
-            Row(f"{setup.name}, configurations drawn by chance: mean", "mm", found[setup.name, "by chance"])
+            Row(
+                f"{setup.name}, configurations drawn by chance: mean",
+                "mm",
+                _figures(outcomes, setup.name, lambda made: made.by_chance, _mean),
+            )
             for setup in SETUPS
         ),
         Row(
             "tracker, no compliance in the model: mean",
             "mm",
-            found["tracker", "geometric"],
+            _figures(outcomes, "tracker", lambda setup: setup.rigid, _mean),
             0.4,
             "section 2.7",
             relative=0.25,
@@ -133,14 +101,18 @@ def after(found: Found) -> Table:
         Row(
             "tracker, no compliance in the model: maximum",
             "mm",
-            found["tracker", "geometric", "max"],
+            _figures(outcomes, "tracker", lambda setup: setup.rigid, _max),
             1.0,
             "section 2.7",
             relative=0.25,
         ),
         *(
-            Row(f"spatial artefact, no compliance in the model: {what}", "mm", found["spatial artefact", *key])
-            for what, key in (("mean", ("geometric",)), ("maximum", ("geometric", "max")))
+            Row(
+                f"spatial artefact, no compliance in the model: {what}",
+                "mm",
+                _figures(outcomes, "spatial artefact", lambda setup: setup.rigid, figure),
+            )
+            for what, figure in (("mean", _mean), ("maximum", _max))
         ),
     ]
     return Table(
@@ -151,18 +123,37 @@ def after(found: Found) -> Table:
     )
 
 
-def crossed(found: Found) -> Table:
+def _figures(
+    outcomes: Sequence[Outcome],
+    name: str,
+    spread: Callable[[SetupOutcome], Spread | None],
+    figure: Callable[[Spread], float],
+) -> list[float]:
+    """Return a figure of every seed [mm] for the set-up of this name."""
+    found = [spread(one.setups[name]) for one in outcomes]
+    return [1e3 * figure(errors) for errors in found if errors is not None]
+
+
+def _mean(errors: Spread) -> float:
+    return errors.mean
+
+
+def _max(errors: Spread) -> float:
+    return errors.max
+
+
+def crossed_table(outcomes: Sequence[Outcome]) -> Table:
     """Return calibrations in one set-up judged where another sees."""
     names = [setup.name for setup in SETUPS]
     rows = [
         Row(
             f"calibrated with the {one}, judged where the {other} sees: {what}",
             "mm",
-            found[("crossed", one, other, *key)],
+            [1e3 * figure(made.crossed[one, other]) for made in outcomes],
         )
         for one in names
         for other in names
-        for what, key in (("mean", ()), ("maximum", ("max",)))
+        for what, figure in (("mean", _mean), ("maximum", _max))
     ]
     return Table(
         "Calibrated with one, judged with another",
@@ -172,11 +163,11 @@ def crossed(found: Found) -> Table:
     )
 
 
-def spheres(found: Found) -> Table:
+def spheres_table(outcomes: Sequence[Outcome]) -> Table:
     """Return the ballbar tests."""
     rows = []
     for sphere in SPHERES:
-        key = ("sphere", sphere.setup, sphere.nest)
+        missed = [further.spheres[sphere] for further in looked_at(outcomes)]
         first = sphere is SPHERES[0]
         what = f"{sphere.setup}, nest {sphere.nest}, {sphere.points} points"
         tracked = sphere.setup == "tracker"
@@ -185,7 +176,7 @@ def spheres(found: Found) -> Table:
             Row(
                 f"{what}: mean",
                 "mm",
-                found[(*key, "mean")],
+                [one.mean for one in missed],
                 sphere.mean,
                 source,
                 absolute=0.15,
@@ -198,7 +189,7 @@ def spheres(found: Found) -> Table:
             Row(
                 f"{what}: standard deviation",
                 "mm",
-                found[(*key, "std")],
+                [one.std for one in missed],
                 sphere.std,
                 source,
                 relative=0.4,
@@ -206,7 +197,7 @@ def spheres(found: Found) -> Table:
                 if tracked
                 else "",
             ),
-            Row(f"{what}: maximum", "mm", found[(*key, "max")], sphere.max, source, relative=0.5),
+            Row(f"{what}: maximum", "mm", [one.max for one in missed], sphere.max, source, relative=0.5),
         ]
     return Table(
         "Ballbar on a sphere of 300 mm (Figures 2.13 to 2.16)",
@@ -217,26 +208,30 @@ def spheres(found: Found) -> Table:
     )
 
 
-def visible(found: Found) -> Table:
+def visible_table(outcomes: Sequence[Outcome]) -> Table:
     """Return which share of configurations each set-up sees."""
     rows = []
-    for name, _, what in (key for key in found if len(key) == 3 and key[1] == "share"):
-        back = what.endswith("less often")
-        rows.append(
-            Row(
-                f"{name}, {what}",
-                "%",
-                found[name, "share", what],
-                20.0 if back else None,
-                "section 2.5.4" if back else "",
-                absolute=10.0,
-                explanation="In the document the back is visible in one of five. That depends on where the cameras"
-                " stand and how the plate is turned on the flange; here both sides are alike, since joint 6 turns all"
-                " round. Arm and hoses, which hide the back, are not asked."
-                if back
-                else "",
+    for setup in SETUPS:
+        seen = [one.setups[setup.name].shares for one in outcomes]
+        several = [share.several for share in seen if share.several is not None]
+        back = [share.back for share in seen if share.back is not None]
+        rows.append(Row(f"{setup.name}, of all configurations", "%", [share.seen for share in seen]))
+        if several:
+            rows.append(Row(f"{setup.name}, of these, with two reflectors or more", "%", several))
+        if back:
+            rows.append(
+                Row(
+                    f"{setup.name}, of these, the side seen less often",
+                    "%",
+                    back,
+                    20.0,
+                    "section 2.5.4",
+                    absolute=10.0,
+                    explanation="In the document the back is visible in one of five. That depends on where the cameras"
+                    " stand and how the plate is turned on the flange; here both sides are alike, since joint 6 turns"
+                    " all round. Arm and hoses, which hide the back, are not asked.",
+                )
             )
-        )
     return Table(
         "What is seen",
         "Tracker: a reflector within 30 deg of where it looks. Plate: its normal, either way, within 15 deg, so that"
@@ -245,13 +240,13 @@ def visible(found: Found) -> Table:
     )
 
 
-def numbers(found: Found) -> Table:
+def numbers_table(outcomes: Sequence[Outcome]) -> Table:
     """Return how many configurations O1 asks for."""
     rows = [
         Row(
             f"{setup.name}, nests measured on the tool beforehand",
             "",
-            found[setup.name, "number", "tool known"],
+            [one.setups[setup.name].number_tool_known for one in outcomes],
             float(setup.configurations),
             "sections 2.5.3 to 2.5.5",
             relative=0.25,
@@ -262,60 +257,15 @@ def numbers(found: Found) -> Table:
         for setup in SETUPS
     ]
     rows += [
-        Row(f"{setup.name}, nests found with the robot", "", found[setup.name, "number", "tool free"])
+        Row(
+            f"{setup.name}, nests found with the robot",
+            "",
+            [one.setups[setup.name].number_tool_free for one in outcomes],
+        )
         for setup in SETUPS
     ]
     return Table(
         "How many configurations O1 chooses (section 2.5.2)",
         "Configurations are added, exchanged and removed while O1 rises.",
         tuple(rows),
-    )
-
-
-# -- pictures ----------------------------------------------------------------------------------------------
-
-
-def places_picture(shown: Mapping[str, Array]) -> Picture:
-    """Return where nests were measured (Figure 2.7)."""
-    traces = [
-        {
-            "type": "scatter3d",
-            "mode": "markers",
-            "name": f"{name}, {len(places)}",
-            **{letter: rounded_to(places[:, k], 4) for k, letter in enumerate("xyz")},
-            "marker": {"size": 4, "color": colour},
-        }
-        for (name, places), colour in zip(shown.items(), COLOURS, strict=True)
-    ]
-    scene = {f"{letter}axis": scene_axis(f"{letter} [m]") for letter in "xyz"} | {"aspectmode": "data"}
-    return Picture(
-        "places",
-        "Where nest 1 was (Figure 2.7)",
-        "Configurations chosen by O1 among those that the set-up sees, first seed, seen from the instrument.",
-        figure(traces, 460, scene=scene),
-    )
-
-
-def errors_picture(pooled: Mapping[str, list[Array]]) -> Picture:
-    """Return histograms of the errors after calibration (Figures 2.9 to 2.11)."""
-    edges = np.linspace(0.0, 0.6, 41)
-    traces = []
-    for (name, errors), colour in zip(pooled.items(), COLOURS, strict=True):
-        every = np.concatenate(errors)
-        share = 100.0 * np.histogram(np.clip(every, 0.0, edges[-1]), edges)[0] / len(every)
-        traces.append(
-            {
-                "type": "scatter",
-                "mode": "lines",
-                "name": f"{name}, {_CONFIGURATIONS[name]} configurations",
-                "x": rounded(0.5 * (edges[:-1] + edges[1:]), 4),
-                "y": rounded(share, 4),
-                "line": {"color": colour, "shape": "hvh"},
-            }
-        )
-    return Picture(
-        "errors",
-        "Errors after calibration (Figures 2.9 to 2.11)",
-        "Of the nests at unseen configurations, gears that run out, all seeds together; larger errors in the last bin.",
-        figure(traces, 340, xaxis=axis("position error [mm]"), yaxis=axis("share [%]")),
     )

@@ -41,7 +41,7 @@ def tip_poses(robot: Robot, q: Array | Postures) -> tuple[Array, Array]:
 
 
 def true_poses(truth: Twin, joints: Array) -> tuple[Array, Array]:
-    """Return where a twin's tip truly is: positions ``(n, 3)`` and rotations ``(n, 3, 3)``."""
+    """Return the true poses of a twin's tip: positions ``(n, 3)`` and rotations ``(n, 3, 3)``."""
     frames = np.array([posture.targets[TIP] for posture in truth.postures(joints)])
     return frames[:, :3, 3], frames[:, :3, :3]
 

@@ -128,7 +128,7 @@ class Outcome:
 
 
 def run(seeds: int, progress: Progress, counts: Counts) -> tuple[Outcome, ...]:
-    """Calibrate a twin with every instrument, judge it elsewhere and on the circle, once a seed.
+    """Calibrate a twin with every instrument, compare it elsewhere and on the circle, once a seed.
 
     Parameters
     ----------
@@ -158,14 +158,15 @@ def _one(seed: Seed, counts: Counts) -> Outcome:
     def fitted(data: Dataset) -> dict[Start, Fit]:
         return {name: identify(start, _without_deviations(data), _GEOMETRIC) for name, start in starts.items()}
 
-    document = {}
-    for name, (device, count) in DOCUMENT.items():
-        data = _measured(device, nominal, at_end, count, rng)
-        apart = data.position - nominal.with_frames(PLACE, ATTACHMENT.targets).poses(data.joints, TIP)[0]
-        reached = {start: _reached(found, data, others, end) for start, found in fitted(data).items()}
-        document[name] = OfDocument(_errors(np.linalg.norm(apart, axis=1)), reached)
-        if name == "optotrak":
-            before_optotrak = before(data, end)
+    in_place = nominal.with_frames(PLACE, ATTACHMENT.targets)
+    printed = {name: _measured(device, nominal, at_end, count, rng) for name, (device, count) in DOCUMENT.items()}
+    document = {
+        name: OfDocument(
+            from_nominal=_errors(np.linalg.norm(data.position - in_place.poses(data.joints, TIP)[0], axis=1)),
+            reached={start: _reached(found, data, others, end) for start, found in fitted(data).items()},
+        )
+        for name, data in printed.items()
+    }
     campaigns = {}
     for device in USED:
         led = device if device.tool is None else replace(device, tool=POINT)
@@ -178,7 +179,7 @@ def _one(seed: Seed, counts: Counts) -> Outcome:
     corrections = {(name, start): fits[name, start] for name in correctors for start in STARTS}
     views = _views(nominal, nominal.random_configurations(_DRAWN_AT_RANDOM, rng))
     return Outcome(
-        before_optotrak=before_optotrak,
+        before_optotrak=before(printed["optotrak"], end),
         before_markers=before(campaigns[MARKERS.name], tip),
         document=document,
         reached={key: _reached(found, campaigns[key[0]], others, tip) for key, found in fits.items()},
@@ -242,7 +243,7 @@ def _views(nominal: Robot, joints: Array) -> dict[View, float]:
 
 
 def _reached(fit: Fit, data: Dataset, joints: Array, true: Array) -> Reached:
-    """Judge a robot by true places ``(n, 3)`` of its tip in the world."""
+    """Compare a robot with the true places ``(n, 3)`` of its tip in the world."""
     predicted = fit.robot.poses(joints, TIP)[0]
     R, p = rigid_motion(predicted, true)
     own = np.linalg.norm(predicted - true, axis=1) if data.anchored else np.full(len(true), np.nan)

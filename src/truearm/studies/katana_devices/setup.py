@@ -1,4 +1,4 @@
-"""Where the Katana of the study katana-devices stands, what it carries, and what it is measured with."""
+"""The set-up of the study katana-devices: place and tools of the Katana, and the instruments."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One seed of the study li-table: the twin touches tables, is fitted in several ways, and is judged."""
+"""One seed of the study li-table: the twin touches tables, is fitted in several ways, and compared with the fits."""
 
 from __future__ import annotations
 

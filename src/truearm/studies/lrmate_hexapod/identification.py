@@ -48,7 +48,7 @@ class Cups:
         return world_frame(robot.poses(self.touches, TOUCHING)[0], self.sides)
 
     def placed(self, robot: Robot) -> Robot:
-        """Return the robot standing in the fixture's frame, where its own model finds the cups."""
+        """Return the robot with the fixture's frame as its world, where its own model finds the cups."""
         found = self.frame_by(robot)
         return rebased(robot, found.frame if self.corrected else found.plain)
 

@@ -49,7 +49,7 @@ def test_json_is_what_the_file_holds(truearm: Truearm, quick: None, tmp_path: Pa
         (("irb120-sim",), "NAME: there is no such study"),
         (("irb120-faro",), "--data: this study needs measured data"),
         (("irb120-faro", "--data", "nowhere"), "a file of the measured data is missing"),
-        (("irb120-axes", "--data", "nowhere"), "--data: this study simulates its data; got 'nowhere'. Leave --data out."),
+        (("irb120-axes", "--data", "nowhere"), "--data: this study simulates its data; got 'nowhere'. Leave --data"),
     ],
 )
 def test_refusals(truearm: Truearm, tmp_path: Path, words: tuple[str, ...], said: str) -> None:

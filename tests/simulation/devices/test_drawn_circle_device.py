@@ -20,7 +20,7 @@ from truearm.modeling.transform import Transform
 from truearm.simulation.devices import measured_with, named_device
 from truearm.simulation.devices.pencil import DRAWN_CIRCLE
 from truearm.simulation.twin import Twin
-from truearm.studies.katana import katana, published
+from truearm.studies.katana.robot import katana, published
 
 GEOMETRIC = next(model for model in MODELS if model.name == "geometric")
 STANDS = Transform((1.0, -0.4, 0.3), (0.8, 0.0, 0.6, 0.0))

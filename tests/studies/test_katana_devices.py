@@ -18,7 +18,7 @@ from truearm.studies.study import Study
 
 @pytest.fixture(scope="module")
 def found() -> Study:
-    return study(1, lambda _: None, Counts(registry=16, touched=16, drawn=72, unseen=20))
+    return study(1, lambda _: None, Counts(registry=16, touched=16, drawn=24, unseen=20))
 
 
 def value(found: Study, table: str, what: str) -> float:

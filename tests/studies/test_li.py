@@ -17,6 +17,7 @@ from truearm.studies.li_table.arm import (
     truth,
     verification,
 )
+from truearm.studies.li_table.run import Followed, Following
 from truearm.studies.li_table.tables import METHOD_WORDS, SURFACE_WORDS
 from truearm.studies.study import Row, Study, Table
 
@@ -65,6 +66,14 @@ def test_a_robot_that_knows_itself_follows() -> None:
     twin = truth(arm(), np.random.default_rng(1))
     assert following_errors(twin.robot, twin, verification()).max() < 1e-6
     assert 20.0 < following_errors(arm(), twin, verification()).mean() < 22.0
+
+
+def test_gains_are_those_of_the_mean_errors() -> None:
+    before = Followed(points=np.array([1.0, 3.0]), path=np.array([2.0, 8.0]))
+    after = Followed(points=np.array([0.5, 0.5]), path=np.array([0.0, 6.0]))
+    following = Following(before, {"roll": after})
+    assert following.gain_at_points("roll") == pytest.approx(75.0)
+    assert following.gain_on_path("roll") == pytest.approx(40.0)
 
 
 def test_with_play(found: Study) -> None:

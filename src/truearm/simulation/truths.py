@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from truearm.errors import InputError, nearest_names
+from truearm.errors import InputError, did_you_mean
 from truearm.files import exists
 from truearm.library import load_robot
 from truearm.modeling.chain import Array
@@ -68,13 +68,12 @@ def truth_twin(robot: Robot, truth: str, rng: np.random.Generator) -> Twin:
         return Twin(stationed(robot.with_values(drawn), tool), joint_truths(robot), _contact(robot))
     if not Path(truth).suffix and not exists(Path(truth)):
         known = truth_names(robot)
-        near = nearest_names(truth, known)
         raise InputError(
             f"{robot.name} has no truth of this name",
-            where="--truth",
+            parameter="truth",
             came=truth,
             allowed=f"{', '.join(known)}, or a robot file",
-            cure=f"Did you mean {' or '.join(near)}?" if near else None,
+            cure=did_you_mean(truth, known),
         )
     other = load_robot(truth)
     if [j.kind for j in other.joints] != [j.kind for j in robot.joints]:
@@ -111,6 +110,7 @@ def joint_truths(robot: Robot) -> dict[int, JointTruth]:
             gear=sines(number),
             hysteresis=of("approach", number),
             growth=of("thermal_growth", number),
+            warm_up=of("warm_up", number),
         )
         for number in range(1, len(robot.joints) + 1)
     }

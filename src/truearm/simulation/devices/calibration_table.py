@@ -128,6 +128,7 @@ class CalibrationTable:
         n = len(self.points)
         wanted = self.in_world + rng.normal(0.0, 1.0, (n, 3)) * noise
         q = np.tile(np.asarray(start, float), (n, 1))
+        conditions.setdefault("number", np.arange(float(n)))
         if "approach" not in conditions:
             conditions["approach"] = np.zeros(q.shape)
             if any(truth.hysteresis for truth in twin.joints.values()):
@@ -145,7 +146,7 @@ class CalibrationTable:
             position=self.points,
             sigma=np.full(n, noise) if noise > 0 else None,
             approach=conditions["approach"],
-            number=np.arange(float(n)),
+            number=conditions["number"],
             temperature=conditions.get("temperature"),
             wrench=conditions.get("wrench"),
         )

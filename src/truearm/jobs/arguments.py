@@ -61,7 +61,9 @@ def path_argument(path: object, parameter: str) -> Path:
         if str(path):
             return Path(path)
         raise InputError("no file is given", parameter=parameter, came=str(path))
-    raise _wrong_kind("a path belongs here", path, parameter, "a text or a pathlib.Path")
+    raise _wrong_kind(
+        "a path belongs here", path, parameter, "the path of a file or folder, as a text or a pathlib.Path"
+    )
 
 
 def payload_argument(payload: object, parameter: str = "payload") -> Payload | None:

@@ -12,6 +12,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.errors import InputError, did_you_mean
 from truearm.files import writable_folder, write_files
 from truearm.identification.choosing.selection import Selection
 from truearm.identification.solving.fit import Fit, Status
@@ -21,6 +22,7 @@ from truearm.modeling.formats.robot_file import robot_text
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.results.record import Record, notice_lines
+from truearm.results.residuals import Part, Residuals, residuals_of
 from truearm.results.summaries import error_line, errors_summary, selection_summary
 from truearm.units import SHOWN_AS, from_si
 
@@ -127,6 +129,44 @@ class Calibration(Record):
             text += self._target_lines()
         text.append(f"Status: {self.status.value}. {self.status.advice}")
         return text + notice_lines(self.warnings)
+
+    def residuals(self) -> Residuals:
+        """Return what the calibrated robot leaves of every reading: training first, then held out."""
+        parts: list[tuple[Part, Dataset, Errors]] = [
+            ("training", self.data.of_configurations(self.training), self.train)
+        ]
+        if self.validation is not None:
+            parts.append(("held out", self.data.of_configurations(self.held_out), self.validation))
+        return residuals_of(parts)
+
+    def plot(self, picture: str = "residuals") -> Any:
+        """Return one of the report's pictures as a ``plotly.graph_objects.Figure``, to be shown or changed.
+
+        Parameters
+        ----------
+        picture
+            ``residuals`` (configuration by configuration), ``workspace``, ``correlations``, and
+            ``position-histogram``, ``orientation-histogram`` or ``length-histogram`` where such readings were held out.
+
+        Raises
+        ------
+        InputError
+            If the calibration has no such picture.
+        """
+        import plotly.graph_objects as go
+
+        from truearm.reporting.report import Report
+
+        drawn = Report(self).figures()
+        if not isinstance(picture, str) or picture not in drawn:
+            raise InputError(
+                "the calibration has no such picture",
+                parameter="picture",
+                came=picture if isinstance(picture, str) else type(picture).__name__,
+                allowed=", ".join(drawn),
+                cure=did_you_mean(picture, drawn) if isinstance(picture, str) else None,
+            )
+        return go.Figure(data=drawn[picture]["data"], layout=drawn[picture]["layout"])
 
     def _target_lines(self) -> list[str]:
         """Return where the targets are on the flange, with their deviations."""

@@ -22,8 +22,17 @@ from truearm.version import __version__
 if TYPE_CHECKING:
     from truearm.jobs.calibrate import calibrate
     from truearm.jobs.check import check
+    from truearm.jobs.devices import devices
+    from truearm.jobs.distances import distances
+    from truearm.jobs.import_circle import import_circle
+    from truearm.jobs.import_matrices import import_matrices
+    from truearm.jobs.import_table import import_table
+    from truearm.jobs.inverse import inverse
     from truearm.jobs.load_data import load_data
     from truearm.jobs.load_robot import load_robot
+    from truearm.jobs.plan import plan
+    from truearm.jobs.robots import robots
+    from truearm.jobs.simulate import simulate
     from truearm.jobs.validate import validate
     from truearm.measurement.dataset import Dataset
     from truearm.modeling.parameters import Parameter
@@ -41,8 +50,17 @@ __all__ = [
     "__version__",
     "calibrate",
     "check",
+    "devices",
+    "distances",
+    "import_circle",
+    "import_matrices",
+    "import_table",
+    "inverse",
     "load_data",
     "load_robot",
+    "plan",
+    "robots",
+    "simulate",
     "validate",
 ]
 

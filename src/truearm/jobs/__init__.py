@@ -13,7 +13,16 @@ from typing import Final
 JOBS: Final = (
     "load_robot",
     "load_data",
+    "import_table",
+    "import_matrices",
+    "import_circle",
     "check",
     "calibrate",
     "validate",
+    "distances",
+    "plan",
+    "simulate",
+    "inverse",
+    "robots",
+    "devices",
 )

@@ -314,8 +314,8 @@ def _moved(data: Dataset) -> list[Notice]:
         Notice(
             "reference-moved",
             f"Reference points moved by up to {float(np.nanmax(off)) * 1e3:.2f} mm ({', '.join(names)}; "
-            f"{counted(len(where), 'configuration')}: {_listed([data.labels[c] for c in where])}). The robot's table or "
-            "the instrument moved: where three points moved together the motion is removed, elsewhere leave these "
+            f"{counted(len(where), 'configuration')}: {_listed([data.labels[c] for c in where])}). The robot's table "
+            "or the instrument moved: where three points moved together the motion is removed, elsewhere leave these "
             "configurations out or measure them again.",
         )
     ]
@@ -385,9 +385,9 @@ def _duplicates(data: Dataset) -> list[Notice]:
     return [
         Notice(
             "duplicates",
-            f"{counted(len(found), 'reading')} {'repeats' if len(found) == 1 else 'repeat'} another one to the last digit "
-            f"(target at configurations): {_listed(found)}. Rows were copied, or the instrument stood still: remove what "
-            "is there twice, it counts twice.",
+            f"{counted(len(found), 'reading')} repeat{'s' if len(found) == 1 else ''} another one to the last digit "
+            f"(target at configurations): {_listed(found)}. Rows were copied, or the instrument stood still: remove "
+            f"{'it, it counts' if len(found) == 1 else 'them, they count'} twice.",
         )
     ]
 

@@ -16,6 +16,7 @@ from truearm.modeling.effects.fourier import HARMONICS
 from truearm.modeling.parts import NO_PAYLOAD, Payload, Tool
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform, rotation_from_quaternion
+from truearm.notices import counted
 from truearm.simulation.twin import Twin
 from truearm.simulation.twin_joint import PERFECT, Contact, JointTruth
 
@@ -31,7 +32,7 @@ def truth_names(robot: Robot) -> tuple[str, ...]:
     return ("nominal", "random", *robot.truths)
 
 
-def truth_twin(robot: Robot, truth: str, rng: np.random.Generator) -> Twin:
+def truth_twin(robot: Robot, truth: Robot | str | Path, rng: np.random.Generator) -> Twin:
     """Return the twin of a robot.
 
     Parameters
@@ -40,7 +41,7 @@ def truth_twin(robot: Robot, truth: str, rng: np.random.Generator) -> Twin:
         The nominal robot.
     truth
         ``nominal``; ``random``, geometry and joint zeros drawn from their priors; the name of one of the robot
-        file's truths; or a robot file, whose own base and targets are used if it has targets.
+        file's truths; or a robot or its file, whose own base and targets are used if it has targets.
     rng
         For ``random``.
 
@@ -50,8 +51,10 @@ def truth_twin(robot: Robot, truth: str, rng: np.random.Generator) -> Twin:
         If there is no such truth, or the file is of another kind of robot.
     """
     tool = next(iter(robot.tools.values()), DEFAULT_TOOL)
+    if isinstance(truth, Robot):
+        return _twin_of(robot, truth, truth.name)
     if truth in robot.truths:
-        published = robot.truths[truth]
+        published = robot.truths[str(truth)]
         true = robot.with_values(published.values)
         joints = joint_truths(true)
         for number, compliance in published.compliance.items():
@@ -71,18 +74,23 @@ def truth_twin(robot: Robot, truth: str, rng: np.random.Generator) -> Twin:
         raise InputError(
             f"{robot.name} has no truth of this name",
             parameter="truth",
-            came=truth,
+            came=str(truth),
             allowed=f"{', '.join(known)}, or a robot file",
-            cure=did_you_mean(truth, known),
+            cure=did_you_mean(str(truth), known),
         )
-    other = load_robot(truth)
+    return _twin_of(robot, load_robot(truth), str(truth))
+
+
+def _twin_of(robot: Robot, other: Robot, where: str) -> Twin:
+    """Return the twin that another robot describes, of the same kind as the nominal one."""
     if [j.kind for j in other.joints] != [j.kind for j in robot.joints]:
         raise InputError(
             f"this robot has other joints than {robot.name}",
-            where=truth,
-            came=f"{len(other.joints)} joints",
+            where=where,
+            came=counted(len(other.joints), "joint"),
             allowed=f"{len(robot.joints)}, of the same kinds",
         )
+    tool = next(iter(robot.tools.values()), DEFAULT_TOOL)
     return Twin(other if other.targets else stationed(other, tool), joint_truths(other), _contact(other))
 
 

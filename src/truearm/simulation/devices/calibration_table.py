@@ -18,6 +18,7 @@ from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY, Transform
+from truearm.notices import counted
 from truearm.simulation.twin import Conditions, Twin, directions
 
 #: The ball joint of the document's table turns no further about the roll axis; about the pitch axis it is free [rad].
@@ -122,7 +123,7 @@ class CalibrationTable:
             raise InputError(
                 "one target touches the table: the tip",
                 where=robot.name,
-                came=f"{len(robot.targets)} targets",
+                came=counted(len(robot.targets), "target"),
                 allowed="1",
             )
         n = len(self.points)

@@ -16,6 +16,7 @@ from truearm.modeling.chain import Array
 from truearm.modeling.parts import Tool
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform, rigid_motion
+from truearm.notices import counted
 from truearm.simulation.truths import DEFAULT_TOOL, stationed
 from truearm.simulation.twin import Twin, directions
 
@@ -122,7 +123,7 @@ def measured_with(
         raise InputError(
             "a campaign needs configurations, and a deviation is not negative",
             where=device.name,
-            came=f"{count} configurations, deviation {sigma}",
+            came=f"{counted(count, 'configuration')}, deviation {sigma}",
             allowed="1 configuration or more, deviation 0 or more",
         )
     if device.tool is not None:

@@ -55,8 +55,9 @@ def _table(folder: Path) -> Arguments:
     mapping = """\
 truearm: truearm-mapping/1
 length_unit: mm
-joints: {columns: [q1, q2], units: [deg, deg]}
-readings: [{target: tip, position: [x, y, z]}]
+configuration: {each: row}
+joints: {columns: [q1, q2], unit: deg}
+readings: [{target: tip, x: x, y: y, z: z}]
 """
     rows = "q1,q2,x,y,z\n10,20,100,200,300\n15,25,110,210,310\n"
     return {"file": _written(folder / "table.csv", rows), "mapping": _written(folder / "mapping.yaml", mapping)}

@@ -130,11 +130,7 @@ def plan(
             cure="Leave one of them out; `constraints` narrows the choice.",
         )
     instrument = None if device is None else device_argument(device)
-    rules, rules_file = constraints, "constraints"
-    if constraints is not None and not isinstance(constraints, Constraints):
-        rules_file = str(constraints)
-        with refusals_of("constraints"):
-            rules = read_constraints(path_argument(constraints, "constraints"))
+    rules = _rules(constraints)
     progress("reading the robot")
     carrying = robot_argument(robot).with_payload(payload_argument(payload), gravity_argument(gravity))
     labels, readings, own = None, None, bool(carrying.targets)
@@ -160,7 +156,7 @@ def plan(
         noise=deviation,
         labels=labels,
         constraints=rules,
-        where=rules_file,
+        where=str(constraints) if isinstance(constraints, str | Path) else "constraints",
         seen_from_the_origin=own,
         readings=readings,
     )
@@ -178,6 +174,13 @@ def _files(out: object, *read: object) -> Path:
         raise InputError("the plan is a CSV file", parameter="out", came=table.name, allowed="PLAN.csv")
     file_for(table.with_suffix(_PAGE), *read)
     return table
+
+
+def _rules(constraints: object) -> Constraints | None:
+    if constraints is None or isinstance(constraints, Constraints):
+        return constraints
+    with refusals_of("constraints"):
+        return read_constraints(path_argument(constraints, "constraints"))
 
 
 def _count(poses: object) -> int | None:

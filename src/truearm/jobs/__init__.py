@@ -25,4 +25,11 @@ JOBS: Final = (
     "inverse",
     "robots",
     "devices",
+    "compensate",
+    "revert",
+    "convert",
+    "export",
+    "new_robot",
+    "example",
+    "demo",
 )

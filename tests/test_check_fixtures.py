@@ -156,7 +156,7 @@ def test_readings_beyond_the_range_of_a_device_are_named(device: str) -> None:
         far = replace(data, position=data.position + moved)
     found = [notice.message for notice in check(far, device=device).warnings if notice.code == "beyond-range"]
     assert len(found) == 1
-    assert f"1 readings are beyond what the device {device} can read (configuration/target): 5/" in found[0]
+    assert f"1 reading is beyond what the device {device} can read (configuration/target): 5/" in found[0]
 
 
 def test_a_device_without_a_range_reads_all() -> None:

@@ -25,12 +25,21 @@ if TYPE_CHECKING:
     from truearm.jobs.compensate import compensate
     from truearm.jobs.convert import convert
     from truearm.jobs.demo import demo
+    from truearm.jobs.devices import devices
+    from truearm.jobs.distances import distances
     from truearm.jobs.example import example
     from truearm.jobs.export import export
+    from truearm.jobs.import_circle import import_circle
+    from truearm.jobs.import_matrices import import_matrices
+    from truearm.jobs.import_table import import_table
+    from truearm.jobs.inverse import inverse
     from truearm.jobs.load_data import load_data
     from truearm.jobs.load_robot import load_robot
     from truearm.jobs.new_robot import new_robot
+    from truearm.jobs.plan import plan
     from truearm.jobs.revert import revert
+    from truearm.jobs.robots import robots
+    from truearm.jobs.simulate import simulate
     from truearm.jobs.validate import validate
     from truearm.measurement.dataset import Dataset
     from truearm.modeling.parameters import Parameter
@@ -51,12 +60,21 @@ __all__ = [
     "compensate",
     "convert",
     "demo",
+    "devices",
+    "distances",
     "example",
     "export",
+    "import_circle",
+    "import_matrices",
+    "import_table",
+    "inverse",
     "load_data",
     "load_robot",
     "new_robot",
+    "plan",
     "revert",
+    "robots",
+    "simulate",
     "validate",
 ]
 

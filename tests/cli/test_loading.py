@@ -145,7 +145,7 @@ def test_a_wall_loads_the_first_axis(truearm: Truearm, folder: Path, tmp_path: P
     assert "Payload: 2.7 kg at x 50  y 25  z 100 mm of the flange" in shown.out
     assert "Joint effects: compliance" in shown.out
     assert "Free fall</dt><dd>(-9.81, 0, 0) m/s²" in (tmp_path / "report.html").read_text()
-    assert result(tmp_path)["command"].endswith(f"--payload {PAYLOAD} --gravity -9.81,0,0")
+    assert f" --payload {PAYLOAD} --gravity -9.81,0,0 " in result(tmp_path)["command"]
 
 
 def test_inverse_kinematics_lift_what_is_heavier(truearm: Truearm, elastic: Path, tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from tests.simulated import campaign
 
 from truearm.library import load_robot
@@ -31,6 +32,45 @@ def _calibrated(folder: Path) -> Path:
     if not path.exists():
         truearm.calibrate("irb120", _data(folder), model="offsets", out=folder / "result")
     return path
+
+
+def _poses(_: Path) -> Arguments:
+    """Return two poses of an IRB 120 that are easily reached."""
+    q = np.radians([[10.0, 20.0, -30.0, 40.0, 50.0, 60.0], [-70.0, 30.0, 0.0, -20.0, 40.0, 0.0]])
+    at = load_robot("irb120").forward_kinematics(q)
+    return {"robot": "irb120", "poses": at.position.T, "rotations": at.matrix(), "seed": q, "branch": "front-up-noflip"}
+
+
+def _written(path: Path, text: str) -> Path:
+    path.write_text(text)
+    return path
+
+
+def _matrices(folder: Path) -> Arguments:
+    joints = _written(folder / "joints.txt", "0 10 20 30 40 50\n5 10 25 30 45 50\n")
+    points = _written(folder / "points.txt", "100 200 300\n0 0 0\n")
+    names = {"targets": {"1": points}, "references": {"base": points}}
+    return {"joints": joints, **names, "angle_unit": "deg", "length_unit": "mm"}
+
+
+def _table(folder: Path) -> Arguments:
+    mapping = """\
+truearm: truearm-mapping/1
+length_unit: mm
+configuration: {each: row}
+joints: {columns: [q1, q2], unit: deg}
+readings: [{target: tip, x: x, y: y, z: z}]
+"""
+    rows = "q1,q2,x,y,z\n10,20,100,200,300\n15,25,110,210,310\n"
+    return {"file": _written(folder / "table.csv", rows), "mapping": _written(folder / "mapping.yaml", mapping)}
+
+
+def _circle(folder: Path) -> Arguments:
+    from tests.measurement.test_drawn_circles import drawn
+
+    rows = "configuration,joint_1 [deg],joint_2 [deg],angle [deg],height [mm]\n1,10,20,0,0.5\n2,12,22,180,-0.2\n"
+    points = _written(folder / "page.csv", rows)
+    return {"scans": {"a": drawn(folder / "page.png")}, "points": {"a": points}, "dpi": 300.0, "sigma": 2e-5}
 
 
 def _program(folder: Path) -> Path:
@@ -85,6 +125,15 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "gravity": (0.0, 0.0, -9.81),
     },
     "validate": lambda folder: {"robot": _calibrated(folder), "data": _data(folder)},
+    "import_table": _table,
+    "import_matrices": _matrices,
+    "import_circle": _circle,
+    "distances": lambda folder: {"robot": _calibrated(folder), "data": _data(folder), "payload": "1kg,0mm,0mm,50mm"},
+    "plan": lambda _: {"robot": "irb120", "poses": 12, "candidates": 40, "device": "ballbar", "seed": 1},
+    "simulate": lambda _: {"robot": "irb120", "truth": "random", "poses": 3, "noise": 1e-4, "device": "tracker"},
+    "inverse": _poses,
+    "robots": lambda _: {},
+    "devices": lambda _: {},
     "compensate": lambda folder: {
         "robot": _calibrated(folder),
         "programs": [_program(folder)],

@@ -11,6 +11,7 @@ from truearm.modeling.chain import Array
 from truearm.modeling.parts import NO_PAYLOAD, Payload
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY
+from truearm.notices import counted
 
 
 def with_cups(robot: Robot, tool: str | None = None) -> tuple[Robot, Array]:
@@ -50,7 +51,7 @@ def with_cups(robot: Robot, tool: str | None = None) -> tuple[Robot, Array]:
         raise InputError(
             "the device needs a tool with three cups",
             where=robot.name,
-            came=f"{len(robot.targets)} targets",
+            came=counted(len(robot.targets), "target"),
             cure="Describe the tool under 'tools' in the robot file, its cups as three targets.",
         )
     values = robot.values

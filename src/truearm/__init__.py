@@ -20,10 +20,18 @@ from truearm.jobs import JOBS
 from truearm.version import __version__
 
 if TYPE_CHECKING:
+    from truearm.jobs.axes import axes
     from truearm.jobs.calibrate import calibrate
     from truearm.jobs.check import check
+    from truearm.jobs.hexapod_enumerate import hexapod_enumerate
+    from truearm.jobs.hexapod_plan import hexapod_plan
+    from truearm.jobs.hexapod_solve import hexapod_solve
+    from truearm.jobs.hexapod_uncertainty import hexapod_uncertainty
+    from truearm.jobs.hexapod_world_frame import hexapod_world_frame
+    from truearm.jobs.lines import lines
     from truearm.jobs.load_data import load_data
     from truearm.jobs.load_robot import load_robot
+    from truearm.jobs.tolerance import tolerance
     from truearm.jobs.validate import validate
     from truearm.measurement.dataset import Dataset
     from truearm.modeling.parameters import Parameter
@@ -39,10 +47,18 @@ __all__ = [
     "Payload",
     "Robot",
     "__version__",
+    "axes",
     "calibrate",
     "check",
+    "hexapod_enumerate",
+    "hexapod_plan",
+    "hexapod_solve",
+    "hexapod_uncertainty",
+    "hexapod_world_frame",
+    "lines",
     "load_data",
     "load_robot",
+    "tolerance",
     "validate",
 ]
 

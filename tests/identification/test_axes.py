@@ -175,7 +175,7 @@ def test_circles_see_24_sums_and_name_the_rest(kr5: Dataset) -> None:
         "ez_5 - ey_6",
         "ez_6",
     ]
-    assert fit.felt == ("ez_6",)
+    assert fit.moving_flange == ("ez_6",)
 
 
 def test_intervals_hold_what_they_say(kr5: Dataset) -> None:

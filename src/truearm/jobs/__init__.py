@@ -16,4 +16,12 @@ JOBS: Final = (
     "check",
     "calibrate",
     "validate",
+    "axes",
+    "tolerance",
+    "lines",
+    "hexapod_enumerate",
+    "hexapod_uncertainty",
+    "hexapod_plan",
+    "hexapod_solve",
+    "hexapod_world_frame",
 )

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from numbers import Integral, Real
 from pathlib import Path
 from typing import Any, TypeVar
@@ -11,13 +12,26 @@ from typing import Any, TypeVar
 import numpy as np
 
 from truearm.errors import InputError, did_you_mean
-from truearm.library import is_robot, load_robot
+from truearm.files import refuse_overwriting, writable_file, writable_folder
+from truearm.library import is_robot, load_robot, urdf_source
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.readers.canonical import read_csv
+from truearm.modeling.chain import Array
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
+from truearm.units import believable
 
 T = TypeVar("T")
+
+
+@contextmanager
+def refusals_of(parameter: str) -> Iterator[None]:
+    """Let refusals of what a parameter holds name it, beside the file or the place that they name."""
+    try:
+        yield
+    except InputError as error:
+        error.parameter = error.parameter or parameter
+        raise
 
 
 def robot_argument(robot: object, parameter: str = "robot") -> Robot:
@@ -25,12 +39,9 @@ def robot_argument(robot: object, parameter: str = "robot") -> Robot:
     if isinstance(robot, Robot):
         return robot
     if isinstance(robot, str | Path):
-        try:
+        with refusals_of(parameter):
             return load_robot(robot)
-        except InputError as error:
-            error.parameter = error.parameter or parameter
-            raise
-    raise _wrong_kind("a robot belongs here", robot, parameter, "a Robot, a library id, a robot file or a URDF")
+    raise wrong_kind("a robot belongs here", robot, parameter, "a Robot, a library id, a robot file or a URDF")
 
 
 def data_argument(data: object, parameter: str = "data") -> Dataset:
@@ -47,12 +58,9 @@ def data_argument(data: object, parameter: str = "data") -> Dataset:
                 allowed="a canonical CSV file",
                 cure="The robot comes first, then the measurements.",
             )
-        try:
+        with refusals_of(parameter):
             return read_csv(path)
-        except InputError as error:
-            error.parameter = error.parameter or parameter
-            raise
-    raise _wrong_kind("measurements belong here", data, parameter, "a Dataset, or a canonical CSV file")
+    raise wrong_kind("measurements belong here", data, parameter, "a Dataset, or a canonical CSV file")
 
 
 def path_argument(path: object, parameter: str) -> Path:
@@ -61,7 +69,37 @@ def path_argument(path: object, parameter: str) -> Path:
         if str(path):
             return Path(path)
         raise InputError("no file is given", parameter=parameter, came=str(path))
-    raise _wrong_kind("a path belongs here", path, parameter, "a text or a pathlib.Path")
+    raise wrong_kind("a path belongs here", path, parameter, "a text or a pathlib.Path")
+
+
+def folder_for(names: Iterable[str], out: object, *read: object, parameter: str = "out") -> Path:
+    """Return the folder for files of some names, or refuse one that cannot be written to, before any long work.
+
+    Parameters
+    ----------
+    read
+        What the job was given: none of these, as far as they are files, may be overwritten.
+    """
+    folder = path_argument(out, parameter)
+    with refusals_of(parameter):
+        writable_folder(folder)
+        for name in names:
+            refuse_overwriting(folder / name, _files_of(read))
+    return folder
+
+
+def file_for(out: object, *read: object, parameter: str = "out") -> Path:
+    """Return where a file shall be written, or refuse a place that cannot be; `read` as for :func:`folder_for`."""
+    path = path_argument(out, parameter)
+    with refusals_of(parameter):
+        writable_file(path)
+        refuse_overwriting(path, _files_of(read))
+    return path
+
+
+def _files_of(given: Iterable[object]) -> list[Path]:
+    named = [value for value in given if isinstance(value, str | Path)]
+    return [(urdf_source(value) or (Path(value), None))[0] for value in named]
 
 
 def payload_argument(payload: object, parameter: str = "payload") -> Payload | None:
@@ -70,7 +108,7 @@ def payload_argument(payload: object, parameter: str = "payload") -> Payload | N
         return payload
     if isinstance(payload, str):
         return Payload.of_text(payload, parameter)
-    raise _wrong_kind("a payload belongs here", payload, parameter, "a Payload, or a text: 2.7kg,50mm,25mm,100mm")
+    raise wrong_kind("a payload belongs here", payload, parameter, "a Payload, or a text: 2.7kg,50mm,25mm,100mm")
 
 
 def gravity_argument(gravity: object, parameter: str = "gravity") -> tuple[float, float, float] | None:
@@ -84,7 +122,7 @@ def gravity_argument(gravity: object, parameter: str = "gravity") -> tuple[float
 def numbers_argument(values: object, parameter: str, count: int, allowed: str) -> tuple[float, ...]:
     """Return `count` finite numbers."""
     if isinstance(values, str | bytes) or not isinstance(values, Iterable):
-        raise _wrong_kind(f"{count} numbers belong here", values, parameter, allowed)
+        raise wrong_kind(f"{count} numbers belong here", values, parameter, allowed)
     found = [*values]
     if len(found) != count:
         raise InputError(f"{count} numbers belong here", parameter=parameter, came=f"{len(found)}", allowed=allowed)
@@ -95,7 +133,7 @@ def whole_argument(value: object, parameter: str, lowest: int = 0, highest: int 
     """Return a whole number within limits."""
     span = f"{lowest} or more" if highest is None else f"{lowest} to {highest}"
     if isinstance(value, bool | np.bool_) or not isinstance(value, Integral):
-        raise _wrong_kind("a whole number belongs here", value, parameter, span)
+        raise wrong_kind("a whole number belongs here", value, parameter, span)
     number = int(value)
     if number < lowest or (highest is not None and number > highest):
         raise InputError("the number is out of range", parameter=parameter, came=number, allowed=span)
@@ -106,18 +144,83 @@ def number_argument(value: object, parameter: str, lowest: float = -math.inf, al
     """Return a finite number, `lowest` or more."""
     span = allowed or ("a finite number" if lowest == -math.inf else f"a finite number, {lowest:g} or more")
     if isinstance(value, bool | np.bool_) or not isinstance(value, Real):
-        raise _wrong_kind("a number belongs here", value, parameter, span)
+        raise wrong_kind("a number belongs here", value, parameter, span)
     number = float(value)
     if not math.isfinite(number) or number < lowest:
         raise InputError("the number cannot be used", parameter=parameter, came=number, allowed=span)
     return number
 
 
+def length_argument(value: object, parameter: str, lowest: float = -math.inf) -> float:
+    """Return a length that can be meant [m], `lowest` or more."""
+    length = number_argument(value, parameter, allowed="a length")
+    least, most = believable("m")
+    if not max(least, lowest) <= length <= most:
+        span = f"up to {most:g} m" if lowest == -math.inf else f"{lowest:g} m to {most:g} m"
+        raise InputError("the length is out of range", parameter=parameter, came=f"{length:g} m", allowed=span)
+    return length
+
+
+def lengths_argument(
+    values: object, parameter: str, count: int, lowest: float = -math.inf, *, one_for_all: bool = False
+) -> tuple[float, ...]:
+    """Return `count` lengths [m], each `lowest` or more.
+
+    Parameters
+    ----------
+    one_for_all
+        Whether a single number may stand for all of them.
+    """
+    if one_for_all and isinstance(values, Real):
+        return (length_argument(values, parameter, lowest),) * count
+    found = numbers_argument(values, parameter, count, f"{count} lengths{', or one for all' if one_for_all else ''}")
+    return tuple(length_argument(value, parameter, lowest) for value in found)
+
+
+def array_argument(values: object, parameter: str, shape: tuple[int | None, ...], allowed: str) -> Array:
+    """Return an array of finite numbers, or refuse what is none.
+
+    Parameters
+    ----------
+    shape
+        With None where any length will do.
+    allowed
+        What belongs here, for the message.
+    """
+    try:
+        found = np.asarray(values)
+    except ValueError as error:  # rows of different lengths
+        raise wrong_kind("an array of numbers belongs here", values, parameter, allowed) from error
+    if found.dtype.kind not in "iuf":
+        raise wrong_kind("an array of numbers belongs here", values, parameter, allowed)
+    array = found.astype(np.float64)
+    fits = array.ndim == len(shape) and all(n in (None, m) for n, m in zip(shape, array.shape, strict=True))
+    if not fits or array.size == 0:
+        raise InputError(
+            "the array has another shape", parameter=parameter, came=f"shape {array.shape}", allowed=allowed
+        )
+    if not np.isfinite(array).all():
+        raise InputError(
+            "NaN and infinity are no values",
+            parameter=parameter,
+            came=f"{array[~np.isfinite(array)][0]}",
+            allowed=allowed,
+        )
+    return array
+
+
 def flag_argument(value: object, parameter: str) -> bool:
     """Return True or False."""
     if isinstance(value, bool | np.bool_):
         return bool(value)
-    raise _wrong_kind("yes or no belongs here", value, parameter, "True, False")
+    raise wrong_kind("yes or no belongs here", value, parameter, "True, False")
+
+
+def name_argument(value: object, parameter: str) -> str:
+    """Return a name."""
+    if isinstance(value, str):
+        return value
+    raise wrong_kind("a name belongs here", value, parameter, "a text")
 
 
 def choice_argument(value: object, parameter: str, known: Mapping[str, T], what: str | None = None) -> T:
@@ -129,7 +232,7 @@ def choice_argument(value: object, parameter: str, known: Mapping[str, T], what:
         What it is the name of, for the message; the parameter if None.
     """
     if not isinstance(value, str):
-        raise _wrong_kind("a name belongs here", value, parameter, ", ".join(known))
+        raise wrong_kind("a name belongs here", value, parameter, ", ".join(known))
     if value in known:
         return known[value]
     raise InputError(
@@ -144,7 +247,7 @@ def choice_argument(value: object, parameter: str, known: Mapping[str, T], what:
 def choices_argument(values: object, parameter: str, known: Collection[str], what: str) -> tuple[str, ...]:
     """Return a sequence of names of those that are known."""
     if isinstance(values, str | bytes) or not isinstance(values, Sequence):
-        raise _wrong_kind("a sequence of names belongs here", values, parameter, ", ".join(known))
+        raise wrong_kind("a sequence of names belongs here", values, parameter, ", ".join(known))
     return tuple(choice_argument(value, parameter, {name: name for name in known}, what) for value in values)
 
 
@@ -164,7 +267,8 @@ def _written(value: object) -> str:
     return repr(value) if plain else type(value).__name__.upper()
 
 
-def _wrong_kind(what: str, came: object, parameter: str, allowed: str) -> InputError:
+def wrong_kind(what: str, came: object, parameter: str, allowed: str) -> InputError:
+    """Return the refusal of a value of another kind than belongs here."""
     text = repr(came) if isinstance(came, str | bytes | int | float | None) else f"an object of type {kind_of(came)}"
     return InputError(what, parameter=parameter, came=came if isinstance(came, str) else text, allowed=allowed)
 

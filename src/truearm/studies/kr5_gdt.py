@@ -19,7 +19,7 @@ from truearm.modeling.chain import Array
 from truearm.modeling.conversion import converted
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY
-from truearm.planning.poses.seven_lines import DIRECTIONS, SevenLines, readings, seven_lines
+from truearm.planning.poses.seven_lines import DIRECTIONS, SevenLines, seven_lines, usable_joints
 from truearm.reporting.drawing import AFTER, BEFORE, axis, figure
 from truearm.reporting.numbers import rounded_to
 from truearm.simulation.twin import Twin, measure
@@ -164,7 +164,7 @@ def _found(
 def _one(nominal: Robot, twin: Twin, perfect: Dataset, lines: SevenLines, joints: Array, seed: int) -> _Outcome:
     rng = np.random.default_rng(seed)
     fit = _found(nominal, perfect, rng)
-    commanded = readings(fake_targets(fit.robot, joints).solutions, lines.labels, "line test")
+    commanded = usable_joints(fake_targets(fit.robot, joints).solutions, lines.labels, "line test")
     before = on_twin(lines, twin, joints, _NOISE, _REPEATS, rng)
     after = on_twin(lines, twin, commanded, _NOISE, _REPEATS, rng)
     apart = fit.robot.poses(joints)[0] - twin.robot.poses(joints)[0]
@@ -243,7 +243,7 @@ def _ranks(nominal: Robot, exact: AxisFit) -> Table:
                 "from circles",
                 "",
                 [len(exact.free.names)],
-                explanation=f"Not seen: {unseen}. Only {', '.join(exact.felt)} moves the flange.",
+                explanation=f"Not seen: {unseen}. Only {', '.join(exact.moving_flange)} moves the flange.",
             ),
         ),
     )

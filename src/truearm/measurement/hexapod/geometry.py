@@ -45,7 +45,7 @@ class Device:
     reach: float = 1e-3
     sigma: float = 1e-6 / 1.96
 
-    def check(self, nominal: float, length: float, between: str, where: str = "ballbar") -> None:
+    def check(self, nominal: float, length: float, between: str, where: str | None = "ballbar") -> None:
         """Refuse a length that the ballbar cannot have read.
 
         Parameters
@@ -55,7 +55,7 @@ class Device:
         between
             The two cups, as ``B1-T2``.
         where
-            For the message.
+            For the message; None where a job's parameter says enough.
         """
         if not abs(length - nominal) <= self.reach * (1 + 1e-9):
             raise InputError(

@@ -125,7 +125,7 @@ def numbers_argument(values: object, parameter: str, count: int, allowed: str) -
         raise wrong_kind(f"{count} numbers belong here", values, parameter, allowed)
     found = [*values]
     if len(found) != count:
-        raise InputError(f"{count} numbers belong here", parameter=parameter, came=f"{len(found)}", allowed=allowed)
+        raise InputError(f"{count} numbers belong here", parameter=parameter, came=len(found), allowed=allowed)
     return tuple(number_argument(value, parameter) for value in found)
 
 

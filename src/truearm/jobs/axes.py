@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final, Literal
 
 from truearm.identification.axes.analysis import analyse
-from truearm.jobs.arguments import choice_argument, data_argument, folder_for, robot_argument
+from truearm.jobs.arguments import choice_argument, data_argument, folder_for, refusals_of, robot_argument
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.robot import Robot
 from truearm.results.axis_calibration import AXIS_FILES, AxisCalibration
@@ -49,7 +49,8 @@ def axes(
     folder = None if out is None else folder_for(AXIS_FILES, out, robot, data)
     nominal, readings = robot_argument(robot), data_argument(data)
     progress("fitting circles and axes")
-    found = AxisCalibration(analyse(nominal, readings, in_robot_frame=in_robot_frame))
+    with refusals_of("data"):
+        found = AxisCalibration(analyse(nominal, readings, in_robot_frame=in_robot_frame))
     if folder is not None:
         progress("writing the files")
         found.save(folder)

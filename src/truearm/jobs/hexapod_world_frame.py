@@ -63,10 +63,11 @@ def hexapod_world_frame(
     with refusals_of("base"):
         for name, side in zip(side_names("B"), sides.tolist(), strict=True):
             device.check(device.base, side, name, None)
-    cup, name = (None if v is None else name_argument(v, p) for v, p in ((target, "target"), (tool, "tool")))
+    cup = None if target is None else name_argument(target, "target")
+    fixture = None if tool is None else name_argument(tool, "tool")
     loaded = robot_argument(robot)
     with refusals_of("tool"):
-        arm, _ = with_cups(loaded, name)
+        arm, _ = with_cups(loaded, fixture)
     joints = _touches_argument(touches, arm)
     with refusals_of("target"):
         position, _ = arm.poses(joints, cup or arm.targets[0].name)

@@ -144,7 +144,8 @@ def triangle(sides: Sequence[float] | Array, fixture: str) -> Array:
     """
     d12, d23, d31 = (np.asarray(side, float) for side in sides)
     lengths = np.array(np.broadcast_arrays(d12, d23, d31)).reshape(3, -1)
-    x = (lengths[0] ** 2 + lengths[2] ** 2 - lengths[1] ** 2) / (2 * lengths[0])
+    with np.errstate(divide="ignore", invalid="ignore"):  # two cups in one place
+        x = (lengths[0] ** 2 + lengths[2] ** 2 - lengths[1] ** 2) / (2 * lengths[0])
     height = lengths[2] ** 2 - x**2
     flat = np.flatnonzero(~(height > (_THINNEST * lengths.max(axis=0)) ** 2))
     if len(flat):

@@ -69,7 +69,9 @@ def path_argument(path: object, parameter: str) -> Path:
         if str(path):
             return Path(path)
         raise InputError("no file is given", parameter=parameter, came=str(path))
-    raise wrong_kind("a path belongs here", path, parameter, "a text or a pathlib.Path")
+    raise wrong_kind(
+        "a path belongs here", path, parameter, "the path of a file or folder, as a text or a pathlib.Path"
+    )
 
 
 def folder_for(names: Iterable[str], out: object, *read: object, parameter: str = "out") -> Path:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from html import escape
-from typing import Final
+from typing import Any, Final
 
 from truearm.notices import Notice
 
@@ -14,7 +14,11 @@ _LONGEST: Final = 2000
 
 
 class Record(ABC):
-    """A result that a person can read: its text is what the command prints."""
+    """A result that a person can read: its text is what the command prints, its summary what JSON holds."""
+
+    @abstractmethod
+    def summary(self) -> dict[str, Any]:
+        """Return the figures as JSON holds them, units in the names."""
 
     @abstractmethod
     def lines(self) -> list[str]:

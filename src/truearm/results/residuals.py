@@ -79,6 +79,22 @@ class Residuals(Record):
         for (configuration, target, part, kind, norm), error in zip(rows, self.error, strict=True):
             yield Residual(configuration, target, part, kind, error, norm)
 
+    def summary(self) -> dict[str, Any]:
+        """Return every row, in mm and mrad."""
+        return {
+            "residuals": [
+                {
+                    "configuration": row.configuration,
+                    "target": row.target,
+                    "part": row.part,
+                    "kind": row.kind,
+                    "error": [None if np.isnan(value) else value * 1e3 for value in row.error.tolist()],
+                    "norm": row.norm * 1e3,
+                }
+                for row in self
+            ]
+        }
+
     def lines(self) -> list[str]:
         """Return the largest of them, worst first."""
         text = [f"{len(self)} residuals; the largest of each kind:"]

@@ -103,7 +103,7 @@ def test_strings_from_unknown_points_are_a_closed_loop(count: int) -> None:
     """Four strings in turn: whatever part of the readings a search looks at, every string must be in it."""
     _, data = campaign("strings", count)
     fit = identify(ROBOT, replace(data, setup=None), GEOMETRIC)
-    assert fit.trusted == ("base",)
+    assert fit.gauge_freedoms == ("base",)
     assert fit.excess == 1.0
 
 
@@ -140,7 +140,7 @@ def test_how_well_positions_are_told_is_true(device: str) -> None:
         a, b = got - got.mean(axis=0), at - at.mean(axis=0)
         U, s, Vt = np.linalg.svd(a.T @ b)
         turn = np.diag([1.0, 1.0, np.linalg.det(U @ Vt)])
-        grown = np.trace(np.diag(s) @ turn) / np.sum(a * a) if "size" in fit.trusted else 1.0
+        grown = np.trace(np.diag(s) @ turn) / np.sum(a * a) if "size" in fit.gauge_freedoms else 1.0
         true.append(1e3 * float(np.linalg.norm(grown * a @ U @ turn @ Vt - b, axis=1).mean()))
     assert 1 / 3 < np.mean(true) / np.mean(told) < 3
 

@@ -278,7 +278,7 @@ def _reached(fit: Fit, data: Dataset, joints: Array, true: Array) -> Reached:
         _mean_and_largest(np.linalg.norm(predicted @ R.T + p - true, axis=1)),
         float(np.sum(spread * truly) / np.sum(truly * truly)) - 1.0,
         gauge_freedoms(data),
-        fit.unseen,
+        fit.unobservable,
     )
 
 

@@ -44,7 +44,7 @@ class AxisAnalysis:
     found
         The circles.
     measured
-        The axes at zero readings, four numbers each.
+        The axes with all joints at zero, four numbers each.
     calibrated
         The robot in its own convention.
     errors
@@ -92,7 +92,7 @@ class AxisAnalysis:
 
     @cached_property
     def flange(self) -> tuple[Transform, float, float]:
-        """Where the flange stands at zero readings by the last two axes, with the same deviations."""
+        """Where the flange stands with all joints at zero, by the last two axes, with the same deviations."""
         return self._frame(self._flange_of)
 
     def _frame(self, place: Any) -> tuple[Transform, float, float]:
@@ -172,7 +172,8 @@ class AxisAnalysis:
                 Notice(
                     "not-circular",
                     f"The points are {self.found.excess:.2g} times further from their circles than the declared"
-                    " deviations allow: the arm gives way, or something moved. All deviations are widened by that.",
+                    " deviations allow. The arm gives way, or something moved. All deviations are widened by that"
+                    " factor.",
                 )
             )
         misfit = self.calibrated.residual
@@ -181,8 +182,8 @@ class AxisAnalysis:
                 Notice(
                     "misfit",
                     f"The convention {self.nominal.convention_name} leaves {misfit:.2g} deviations between the robot's"
-                    " axes and the measured ones. Convert the robot to hayati, or to joint-errors, if axes are"
-                    " parallel; else the arm does not turn about fixed axes.",
+                    " axes and the measured ones. If axes are parallel, convert the robot to hayati or to joint-errors."
+                    " Otherwise the arm does not turn about fixed axes.",
                 )
             )
         return tuple(said)

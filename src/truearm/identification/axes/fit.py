@@ -111,7 +111,7 @@ def fit_axes(
             where=robot.name,
             came=f"no run of joint {', '.join(map(str, missing))}",
             allowed="a run of every joint",
-            cure="Measure it: four readings or more while the others stand still.",
+            cure="Measure it: four configurations or more while the others stand still.",
         )
     chosen = (p.restarted(p.value) for p in robot.parameters.values() if p.group in groups)
     # Of what cannot be told apart the last is held. That shall be the slides along joint axes.
@@ -135,7 +135,7 @@ def fit_axes(
         raise InputError(
             "the robot's axes cannot be brought onto the measured ones",
             where=robot.name,
-            cure="Check joint order and signs with 'truearm check DATA.csv ROBOT'.",
+            cure="Check joint order and signs with 'truearm check ROBOT DATA.csv'.",
         )
     kept = problem.free.without(held)
     R = np.linalg.qr(solution.jacobian * kept.prior, mode="r")
@@ -158,7 +158,7 @@ def fit_axes(
 
 
 def measured_axes(robot: Robot, circles: Sequence[AxisCircle]) -> AxisFit:
-    """Return the axes themselves, robot at zero readings: four numbers a joint, none of them redundant.
+    """Return the axes themselves, with all joints at zero: four numbers a joint, none of them redundant.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """Were the joints at rest when they were read: residuals explained by the direction each joint arrived from.
 
 If joints were read before the robot settled, or if a joint stops short by friction, the true joint position differs
-from the recorded one by a small lag with the sign of the last move. These lags, one a joint, are fitted to the residuals
-of the identified model, after removing what its own parameters could still take.
+from the recorded one by a small lag with the sign of the last move. These lags, one a joint, are fitted to the
+residuals of the identified model, after removing what its own parameters could still take.
 """
 
 from __future__ import annotations

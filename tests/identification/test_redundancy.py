@@ -89,7 +89,7 @@ def test_data_that_move_too_few_joints_lose_rank_and_say_so() -> None:
 def test_too_few_equations_without_priors_are_refused() -> None:
     _, data = campaign("irb120", 4, 0.0, 2)
     with pytest.raises(
-        InputError, match=r"fewer equations than unknowns.*36 equations for 40 unknown.*at least 14.*redundancy prior"
+        InputError, match=r"fewer equations than unknowns.*36 equations for 40 unknown.*at least 14.*`redundancy=prior`"
     ):
         identify(load_robot("irb120"), data, GEOMETRIC, redundancy="drop")
 

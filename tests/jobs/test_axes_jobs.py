@@ -103,7 +103,9 @@ def test_measured_lines_are_judged_by_the_frames_of_the_joint_errors(found: Axis
     assert judged.before.largest("xyz") == pytest.approx(3.7e-3, abs=0.6e-3)
 
 
-axes, tolerance, lines = (partial(job, "kr5") for job in (truearm.axes, truearm.tolerance, truearm.lines))
+axes: Callable[..., Any] = partial(truearm.axes, "kr5")
+tolerance: Callable[..., Any] = partial(truearm.tolerance, "kr5")
+lines: Callable[..., Any] = partial(truearm.lines, "kr5")
 
 
 @pytest.mark.parametrize(
@@ -143,9 +145,10 @@ def test_refusals_name_the_parameter(call: Callable[[], Any], parameter: str, wo
 
 
 def test_data_of_other_joints_are_refused(data: Dataset) -> None:
-    for job in (partial(axes, frame="robot"), lambda data: lines(CENTRE, data=data)):
+    other = replace(data, joints=data.joints[:, :5], joint_kinds=data.joint_kinds[:5])
+    for job in (partial(axes, other, frame="robot"), partial(lines, CENTRE, data=other)):
         with pytest.raises(InputError, match="joints") as refused:
-            job(replace(data, joints=data.joints[:, :5], joint_kinds=data.joint_kinds[:5]))
+            job()
         assert refused.value.parameter == "data"
 
 

@@ -92,8 +92,8 @@ SIDES, JOINTS = (0.3, 0.3, 0.3), np.zeros((3, 6))
     [
         (lambda: truearm.hexapod_uncertainty(trials=1), "trials", "allowed: 2 or more"),
         (lambda: truearm.hexapod_uncertainty(seed=-1), "seed", "allowed: 0 or more"),
-        (lambda: truearm.hexapod_solve(), "sheet", "a sheet, or a pose and its six legs"),
-        (lambda: truearm.hexapod_solve("a.csv", pose=7, legs=LEGS), "sheet", "a sheet, or a pose"),
+        (lambda: truearm.hexapod_solve(), "sheet, pose, legs", "a sheet, or a pose and its six legs"),
+        (lambda: truearm.hexapod_solve("a.csv", pose=7, legs=LEGS), "sheet, pose, legs", "a sheet, or a pose"),
         (lambda: truearm.hexapod_solve("missing.csv"), "sheet", "there is no such file"),
         (lambda: truearm.hexapod_solve(3), "sheet", "a path belongs here"),  # type: ignore[arg-type]
         (lambda: truearm.hexapod_solve(pose=73, legs=LEGS), "pose", "allowed: 1 to 72"),
@@ -115,7 +115,7 @@ SIDES, JOINTS = (0.3, 0.3, 0.3), np.zeros((3, 6))
         (lambda: truearm.hexapod_solve(pose=7, legs=LEGS, reach=-1.0), "reach", "the length is out of range"),
         (lambda: truearm.hexapod_solve(pose=7, legs=LEGS, out="a.csv"), "out", "is no data file"),
         (lambda: truearm.hexapod_plan("irb120", (1.0, 2.0)), "fixture", "4 or 7 numbers"),
-        (lambda: truearm.hexapod_plan("irb120", "here"), "fixture", "an array of numbers belongs here"),
+        (lambda: truearm.hexapod_plan("irb120", "here"), "fixture", "an array of numbers"),  # type: ignore[arg-type]
         (lambda: truearm.hexapod_plan("irb120", (0, 0, np.nan, 0)), "fixture", "NaN and infinity"),
         (lambda: truearm.hexapod_plan("irb120", (0, 0, 0, 1, 1, 0, 0)), "fixture", "has not length 1"),
         (lambda: truearm.hexapod_plan("irb120", (9.0, 0, 0, 0)), "fixture", "can take none of the 72 poses"),

@@ -30,8 +30,15 @@ def refusals_of(parameter: str) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        error.parameter = error.parameter or parameter
+        if error.parameter is None:
+            _name(error, parameter)
         raise
+
+
+def _name(error: InputError, parameter: str) -> None:
+    """Let a refusal name a parameter."""
+    error.parameter = parameter
+    error.args = (error.told(str),)
 
 
 def robot_argument(robot: object, parameter: str = "robot") -> Robot:
@@ -39,8 +46,11 @@ def robot_argument(robot: object, parameter: str = "robot") -> Robot:
     if isinstance(robot, Robot):
         return robot
     if isinstance(robot, str | Path):
-        with refusals_of(parameter):
+        try:
             return load_robot(robot)
+        except InputError as error:  # the library calls whatever it is given the robot
+            _name(error, parameter)
+            raise
     raise wrong_kind("a robot belongs here", robot, parameter, "a Robot, a library id, a robot file or a URDF")
 
 

@@ -58,7 +58,7 @@ def hexapod_solve(
     if (sheet is None) == (legs is None) or (legs is None) != (pose is None):
         raise InputError(
             "a sheet, or a pose and its six legs, belong here",
-            parameter="sheet",
+            parameter="sheet, pose, legs",
             allowed="a sheet, or `pose` and `legs`",
         )
     if legs is not None:

@@ -71,7 +71,7 @@ def lines(
     InputError
         If the robot cannot go to a pose, joint errors or data are of another robot, or both truth and data are given.
     """
-    middle, sides = lengths_argument(centre, "centre", 3), lengths_argument(size, "size", 3, one_for_all=True)
+    middle, sides = lengths_argument(centre, "centre", 3), lengths_argument(size, "size", 3)
     scatter, repeats = length_argument(noise, "noise", 0.0), whole_argument(repeats, "repeats", 1)
     seed = whole_argument(seed, "seed")
     if truth is not None and data is not None:

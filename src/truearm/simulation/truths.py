@@ -71,7 +71,7 @@ def truth_twin(robot: Robot, truth: str, rng: np.random.Generator) -> Twin:
         near = nearest_names(truth, known)
         raise InputError(
             f"{robot.name} has no truth of this name",
-            where="--truth",
+            parameter="truth",
             came=truth,
             allowed=f"{', '.join(known)}, or a robot file",
             cure=f"Did you mean {' or '.join(near)}?" if near else None,

@@ -23,6 +23,11 @@ if TYPE_CHECKING:
     from truearm.jobs.axes import axes
     from truearm.jobs.calibrate import calibrate
     from truearm.jobs.check import check
+    from truearm.jobs.compensate import compensate
+    from truearm.jobs.convert import convert
+    from truearm.jobs.demo import demo
+    from truearm.jobs.example import example
+    from truearm.jobs.export import export
     from truearm.jobs.hexapod_enumerate import hexapod_enumerate
     from truearm.jobs.hexapod_plan import hexapod_plan
     from truearm.jobs.hexapod_solve import hexapod_solve
@@ -31,6 +36,8 @@ if TYPE_CHECKING:
     from truearm.jobs.lines import lines
     from truearm.jobs.load_data import load_data
     from truearm.jobs.load_robot import load_robot
+    from truearm.jobs.new_robot import new_robot
+    from truearm.jobs.revert import revert
     from truearm.jobs.tolerance import tolerance
     from truearm.jobs.validate import validate
     from truearm.measurement.dataset import Dataset
@@ -50,6 +57,11 @@ __all__ = [
     "axes",
     "calibrate",
     "check",
+    "compensate",
+    "convert",
+    "demo",
+    "example",
+    "export",
     "hexapod_enumerate",
     "hexapod_plan",
     "hexapod_solve",
@@ -58,6 +70,8 @@ __all__ = [
     "lines",
     "load_data",
     "load_robot",
+    "new_robot",
+    "revert",
     "tolerance",
     "validate",
 ]

@@ -156,9 +156,14 @@ def write_text(path: Path, text: str) -> None:
 
 def write_new_text(path: Path, text: str) -> None:
     """Write a file that does not exist yet; nothing is overwritten."""
+    write_text(new_file(path), text)
+
+
+def new_file(path: Path) -> Path:
+    """Make sure that a file does not exist yet and can be written at `path`, before any long work, and return it."""
     if exists(path):
         raise InputError("this exists already and is not overwritten", where=str(path), cure="Choose another name.")
-    write_text(path, text)
+    return writable_file(path)
 
 
 def writable_folder(folder: Path) -> Path:

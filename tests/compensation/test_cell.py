@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from truearm.compensation.cell import Cell, read_cell
+from truearm.compensation.cell import Cell, read_frames, read_tools
 from truearm.errors import InputError
 from truearm.library import load_robot
 from truearm.modeling.robot import Robot
@@ -27,7 +27,8 @@ def robot() -> Robot:
 def read(tmp_path: Path, text: str) -> Cell:
     file = tmp_path / "cell.yaml"
     file.write_text(HEAD + text)
-    return read_cell(robot(), file if "tools" in text else None, file if "frames" in text else None)
+    tools = read_tools(robot(), file if "tools" in text else None)
+    return Cell(tools, read_frames(robot(), file if "frames" in text else None))
 
 
 def test_a_frame_in_the_world_is_seen_from_the_base(tmp_path: Path) -> None:

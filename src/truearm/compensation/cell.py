@@ -121,7 +121,7 @@ class Placed:
     controller
         What its controller has, in its flange or base frame; None if only the program can say.
     identified
-        Where it really is, in the identified flange or base; None if nobody knows.
+        Where it really is, in the identified flange or base; None if it is not known.
     """
 
     controller: Transform | None
@@ -140,25 +140,40 @@ class Cell:
 NOTHING_GIVEN: Final = Cell({}, {})
 
 
-def read_cell(robot: Robot, tools: Path | None, frames: Path | None) -> Cell:
-    """Read which tools, and which frames, a program's are.
+def read_tools(robot: Robot, path: Path | None) -> dict[str, Placed]:
+    """Read where a program's tools are.
 
     Parameters
     ----------
     robot
-        Calibrated; its base and targets are meant by ``world`` and ``target``.
-    tools, frames
-        Files of the schema above, of which the tools or the frames are taken; None for none.
+        Calibrated; ``target`` refers to its targets.
+    path
+        File of the schema above, of which the tools are taken; None for none.
 
     Raises
     ------
     InputError
-        If a file is not of the schema, or has nothing of what it is read for.
+        If the file is not of the schema, or has no tools.
     """
-    return Cell(
-        {} if tools is None else _tools(robot, tools, _file(tools, "tools")),
-        {} if frames is None else _frames(robot, frames, _file(frames, "frames")),
-    )
+    return {} if path is None else _tools(robot, path, _file(path, "tools"))
+
+
+def read_frames(robot: Robot, path: Path | None) -> dict[str, Placed]:
+    """Read where a program's frames are.
+
+    Parameters
+    ----------
+    robot
+        Calibrated; ``world`` refers to its base.
+    path
+        File of the schema above, of which the frames are taken; None for none.
+
+    Raises
+    ------
+    InputError
+        If the file is not of the schema, or has no frames.
+    """
+    return {} if path is None else _frames(robot, path, _file(path, "frames"))
 
 
 def _file(path: Path, part: str) -> CellFile:

@@ -24,4 +24,11 @@ JOBS: Final = (
     "hexapod_plan",
     "hexapod_solve",
     "hexapod_world_frame",
+    "compensate",
+    "revert",
+    "convert",
+    "export",
+    "new_robot",
+    "example",
+    "demo",
 )

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from truearm.errors import InputError, did_you_mean
-from truearm.files import refuse_overwriting, writable_file, writable_folder
+from truearm.files import new_file, refuse_overwriting, writable_file, writable_folder
 from truearm.library import is_robot, load_robot, urdf_source
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.readers.canonical import read_csv
@@ -107,6 +107,12 @@ def file_for(out: object, *read: object, parameter: str = "out") -> Path:
         writable_file(path)
         refuse_overwriting(path, _files_of(read))
     return path
+
+
+def new_file_for(out: object, parameter: str = "out") -> Path:
+    """Return where a file shall be written that does not exist yet, or refuse a place that cannot be."""
+    with refusals_of(parameter):
+        return new_file(path_argument(out, parameter))
 
 
 def _files_of(given: Iterable[object]) -> list[Path]:
@@ -263,6 +269,15 @@ def choices_argument(values: object, parameter: str, known: Collection[str], wha
     return tuple(choice_argument(value, parameter, {name: name for name in known}, what) for value in values)
 
 
+def paths_argument(paths: object, parameter: str, what: str) -> list[Path]:
+    """Return a sequence of at least one path; `what` one path is, for the message."""
+    if isinstance(paths, str | bytes) or not isinstance(paths, Sequence):
+        raise wrong_kind(f"a sequence of {what}s belongs here", paths, parameter, "a list of paths")
+    if not paths:
+        raise InputError(f"no {what} is given", parameter=parameter, came="nothing", allowed="one or more")
+    return [path_argument(path, parameter) for path in paths]
+
+
 def python_call(job: str, /, *given: object, **keywords: object) -> str:
     """Return the call of a job in Python, objects by the kind they are; keywords that are None are left out."""
     words = [_written(value) for value in given]
@@ -275,7 +290,10 @@ def _written(value: object) -> str:
         return repr(str(value))
     if isinstance(value, Payload):
         return repr(value.text)
-    plain = value is None or isinstance(value, str | bool | int | float | tuple | list)
+    if isinstance(value, list | tuple):
+        words = ", ".join(_written(entry) for entry in value)
+        return f"[{words}]"
+    plain = value is None or isinstance(value, str | bool | int | float)
     return repr(value) if plain else type(value).__name__.upper()
 
 

@@ -60,7 +60,7 @@ def exported(robot: Robot, format_: str) -> Export:
         near = nearest_names(format_, FORMATS)
         raise InputError(
             "there is no such format",
-            where="--format",
+            parameter="format",
             came=format_,
             allowed=", ".join(FORMATS),
             cure=f"Did you mean {' or '.join(near)}?" if near else None,

@@ -277,7 +277,7 @@ def test_python_and_command_say_the_same(truearm: Truearm, small: Path, tmp_path
 def test_the_wrong_robot_is_doubted(truearm: Truearm, small: Path, tmp_path: Path) -> None:
     run = truearm("calibrate", "irb1600", small / "data.csv", "--out", tmp_path, "--json")
     codes = {w["code"]: w["message"] for w in json.loads(run.out)["warnings"]}
-    assert "Is it this robot" in codes["far-from-nominal"]
+    assert "Check that it is this robot" in codes["far-from-nominal"]
 
 
 def test_too_few_readings_for_a_model_are_said(truearm: Truearm, small: Path, tmp_path: Path) -> None:
@@ -301,7 +301,7 @@ def test_convert_writes_the_same_robot_in_another_convention(truearm: Truearm, t
 
 def test_a_model_that_cannot_tilt_parallel_axes_says_what_would(truearm: Truearm, small: Path, tmp_path: Path) -> None:
     for name, cure in (
-        ("s-model", "Convert the robot: truearm convert, --convention hayati."),
+        ("s-model", "Convert the robot to the convention hayati with 'truearm convert'."),
         ("standard-dh", "Write 'convention: hayati' in the robot file and 'beta: 0' at the link between them."),
     ):
         truearm("convert", "irb120", "--convention", name, "--out", tmp_path / f"{name}.yaml")

@@ -82,8 +82,8 @@ def test_orientations_as_each_maker_writes_them(tmp_path: Path, entry: str, colu
     ("text", "said"),
     [
         ("frames: {}\n", "has no frames"),
-        ("tools:\n  t: {of: world}\n", "'flange' or 'controller'"),
-        ("frames:\n  f: {of: flange}\n", "'world', 'base' or 'controller'"),
+        ("tools:\n  t: {of: world}\n", "got 'world'; allowed: flange, controller"),
+        ("frames:\n  f: {of: flange}\n", "got 'flange'; allowed: world, base, controller"),
         ("frames:\n  f: {of: base, wpr: [0, 0, 0], abc: [0, 0, 0]}\n", "one orientation belongs here"),
         ("frames:\n  f: {of: base, quaternion: [1, 1, 0, 0]}\n", "must have length 1"),
         ("frames:\n  f: {of: base, translation: [1, 2]}\n", "f.translation"),

@@ -55,7 +55,8 @@ _ORIENTATIONS: Final[dict[str, Orientation]] = {
 
 def _unit_length(q: tuple[float, ...]) -> tuple[float, ...]:
     if abs(float(np.linalg.norm(q)) - 1.0) > 1e-3:
-        raise ValueError(f"a quaternion (w, x, y, z) must have length 1, this one has {np.linalg.norm(q):.6g}")
+        length = float(np.linalg.norm(q))
+        raise InputError(f"a quaternion (w, x, y, z) must have length 1, this one has {length:.6g}", came=list(q))
     return q
 
 
@@ -88,7 +89,7 @@ class _Place(_Entry):
     def _one_orientation(self) -> _Place:
         given = [name for name in _ORIENTATIONS if getattr(self, name) is not None]
         if len(given) > 1:
-            raise ValueError(f"one orientation belongs here, not {' and '.join(given)}")
+            raise InputError("one orientation belongs here", came=" and ".join(given), allowed=", ".join(_ORIENTATIONS))
         return self
 
 

@@ -262,9 +262,9 @@ def test_a_closed_loop_names_what_joints_that_never_moved_leave_open(device: str
     )  # fmt: skip
     fit = identify(NOMINAL, readings, GEOMETRIC)
     assert fit.status is Status.RANK_LOSS
-    assert fit.unseen
-    assert not any(name.startswith(("base_", "fixture_")) for name in fit.unseen)
-    assert all(fit.parameter_status(name) == "not-determined" for name in fit.unseen)
+    assert fit.unobservable
+    assert not any(name.startswith(("base_", "fixture_")) for name in fit.unobservable)
+    assert all(fit.parameter_status(name) == "not-determined" for name in fit.unobservable)
 
 
 # -- refusals ----------------------------------------------------------------------------------------------

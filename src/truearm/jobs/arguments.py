@@ -33,8 +33,15 @@ def refusals_of(parameter: str) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        error.parameter = error.parameter or parameter
+        if error.parameter is None:
+            _name(error, parameter)
         raise
+
+
+def _name(error: InputError, parameter: str) -> None:
+    """Let a refusal name a parameter."""
+    error.parameter = parameter
+    error.args = (error.told(str),)
 
 
 def robot_argument(robot: object, parameter: str = "robot") -> Robot:
@@ -42,8 +49,11 @@ def robot_argument(robot: object, parameter: str = "robot") -> Robot:
     if isinstance(robot, Robot):
         return robot
     if isinstance(robot, str | Path):
-        with refusals_of(parameter):
+        try:
             return load_robot(robot)
+        except InputError as error:  # the library calls whatever it is given the robot
+            _name(error, parameter)
+            raise
     raise wrong_kind("a robot belongs here", robot, parameter, "a Robot, a library id, a robot file or a URDF")
 
 
@@ -146,7 +156,7 @@ def numbers_argument(values: object, parameter: str, count: int, allowed: str) -
         raise wrong_kind(f"{count} numbers belong here", values, parameter, allowed)
     found = [*values]
     if len(found) != count:
-        raise InputError(f"{count} numbers belong here", parameter=parameter, came=f"{len(found)}", allowed=allowed)
+        raise InputError(f"{count} numbers belong here", parameter=parameter, came=len(found), allowed=allowed)
     return tuple(number_argument(value, parameter) for value in found)
 
 

@@ -108,7 +108,7 @@ def test_without_noise_the_true_robot_is_found(seed: int) -> None:
     truth = Twin(published("standard").with_frames(STANDS, {}))
     data = drawn(truth, 72, seed)
     fit = identify(katana(), data, GEOMETRIC, redundancy="drop")
-    assert fit.unseen == ()
+    assert fit.unobservable == ()
     assert max(fit.sigma.values()) < 1e-8
     for name in ("a_3", "a_4", "theta_offset_2", "theta_offset_3", "beta_3"):
         assert fit.robot.values[name] == pytest.approx(truth.robot.values[name], abs=1e-7)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from truearm.errors import InputError
+from truearm.errors import InputError, did_you_mean
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import NO_PAYLOAD, Payload
 from truearm.modeling.robot import Robot
@@ -40,7 +40,11 @@ def with_cups(robot: Robot, tool: str | None = None) -> tuple[Robot, Array]:
     if tool is not None or not robot.targets:
         if tool is not None and tool not in robot.tools:
             raise InputError(
-                "the robot has no such tool", where=robot.name, came=tool, allowed=", ".join(robot.tools) or "none"
+                "the robot has no such tool",
+                where=robot.name,
+                came=tool,
+                allowed=", ".join(robot.tools) or "none",
+                cure=did_you_mean(tool, robot.tools),
             )
         if robot.tools:
             chosen = robot.tools[tool] if tool is not None else next(iter(robot.tools.values()))

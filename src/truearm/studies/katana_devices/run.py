@@ -254,7 +254,7 @@ def _reached(fit: Fit, data: Dataset, joints: Array, true: Array) -> Reached:
         _errors(np.linalg.norm(predicted @ R.T + p - true, axis=1)),
         float(np.sum(spread * truly) / np.sum(truly * truly)) - 1.0,
         gauge_freedoms(data),
-        fit.unseen,
+        fit.unobservable,
     )
 
 

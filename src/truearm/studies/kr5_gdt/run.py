@@ -19,7 +19,7 @@ from truearm.modeling.chain import Array
 from truearm.modeling.conversion import converted
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY
-from truearm.planning.poses.seven_lines import SevenLines, readings, seven_lines
+from truearm.planning.poses.seven_lines import SevenLines, usable_joints, seven_lines
 from truearm.simulation.twin import Twin, measure
 from truearm.studies import Progress
 from truearm.studies.seeds import Seed, over_seeds
@@ -164,7 +164,7 @@ def _found(
 def _one(nominal: Robot, twin: Twin, perfect: Dataset, lines: SevenLines, joints: Array, seed: Seed) -> Outcome:
     rng = seed.generator()
     fit = _found(nominal, perfect, rng)
-    commanded = readings(fake_targets(fit.robot, joints).solutions, lines.labels, "line test")
+    commanded = usable_joints(fake_targets(fit.robot, joints).solutions, lines.labels, "line test")
     before = on_twin(lines, twin, joints, NOISE, REPEATS, rng)
     after = on_twin(lines, twin, commanded, NOISE, REPEATS, rng)
     apart = fit.robot.poses(joints)[0] - twin.robot.poses(joints)[0]

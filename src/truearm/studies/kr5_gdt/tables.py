@@ -77,7 +77,7 @@ def determined_table(found: Run) -> Table:
                 "from circles",
                 "",
                 [len(exact.free.names)],
-                explanation=f"Not seen: {unseen}. Only {', '.join(exact.felt)} moves the flange.",
+                explanation=f"Not seen: {unseen}. Only {', '.join(exact.moving_flange)} moves the flange.",
             ),
         ),
     )

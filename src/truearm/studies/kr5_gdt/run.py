@@ -19,7 +19,7 @@ from truearm.modeling.chain import Array
 from truearm.modeling.conversion import converted
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY
-from truearm.planning.poses.seven_lines import SevenLines, usable_joints, seven_lines
+from truearm.planning.poses.seven_lines import SevenLines, seven_lines, usable_joints
 from truearm.simulation.twin import Twin, measure
 from truearm.studies import Progress
 from truearm.studies.seeds import Seed, over_seeds

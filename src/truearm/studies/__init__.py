@@ -1,6 +1,7 @@
 """Published experiments made again: ours beside the document's, over several seeds.
 
-One study a file. What is here is light: the command's help reads it.
+One study a folder: `run` repeats the experiment once a seed and returns records, `tables` and `pictures` show them, and
+the folder itself tells what came out. What is here is light: the command's help reads it.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ class Entry:
     about
         What it does, in a few words.
     module
-        Where its function ``study(seeds, progress)`` is; ``study(seeds, progress, folder)`` if it needs data.
+        Its folder, with the function ``study(seeds, progress)``; ``study(seeds, progress, folder)`` if it needs data.
     files
         Measured data that its folder must hold; none for a study on digital twins.
     """
@@ -59,7 +60,7 @@ STUDIES: Final = (
     ),
     Entry(
         "irb120-faro",
-        "a measured IRB 120: what every model leaves, and where it comes from (with --data)",
+        "a measured IRB 120: what every model leaves, and where it comes from",
         "truearm.studies.irb120_faro",
         ("joints_commanded.txt", *(f"{kind}_{number}.txt" for kind in ("target", "base") for number in (1, 2, 3))),
     ),
@@ -132,11 +133,13 @@ def run_study(name: str, seeds: int = 10, data: str | Path | None = None, progre
     """
     entry = _entry(name)
     if seeds < 1:
-        raise InputError("at least one seed is needed", where="--seeds", came=seeds, allowed="1 or more")
+        raise InputError("at least one seed is needed", parameter="seeds", came=seeds, allowed="1 or more")
     study = import_module(entry.module).study
     if not entry.files:
         if data is not None:
-            raise InputError("this study simulates its data", where="--data", came=str(data), cure="Leave --data out.")
+            raise InputError(
+                "this study simulates its data", parameter="data", came=str(data), cure="Leave `data` out."
+            )
         return cast("Study", study(seeds, progress))
     return cast("Study", study(seeds, progress, _folder(entry, data)))
 
@@ -149,7 +152,7 @@ def _entry(name: str) -> Entry:
     near = nearest_names(name, names)
     raise InputError(
         "there is no such study",
-        where="NAME",
+        parameter="name",
         came=name,
         allowed=", ".join(names),
         cure=f"Did you mean {' or '.join(near)}?" if near else None,
@@ -160,7 +163,7 @@ def _folder(entry: Entry, data: str | Path | None) -> Path:
     needed = f"a folder with {', '.join(entry.files)}"
     if data is None:
         raise InputError(
-            "this study needs measured data, which truearm does not bring along", where="--data", allowed=needed
+            "this study needs measured data, which truearm does not bring along", parameter="data", allowed=needed
         )
     folder = Path(data)
     missing = [name for name in entry.files if not (folder / name).is_file()]

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -16,13 +16,11 @@ from truearm.modeling.inverse import inverse
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY
-from truearm.reporting.drawing import AFTER, BEFORE, Figure, axis, figure
-from truearm.reporting.numbers import rounded_to
 from truearm.simulation.hexapod.simulated import ballbar
 from truearm.simulation.twin import Twin
-from truearm.studies.irb120_worn import calibrated, in_base, in_region, tracked, worn_twin
-from truearm.studies.parallel_axes import without_beta
-from truearm.studies.study import Picture, Row, Table
+from truearm.studies import regions
+from truearm.studies.irb120 import without_beta
+from truearm.studies.irb120_hexapod.worn import calibrated, in_base, tracked, worn_twin
 from truearm.validation.sphere_test import SphereTest, sphere_test
 
 #: Deviation of a coordinate read by tracker and C-Track [m]: 0.035 mm over a scale bar, and 0.070 mm in space.
@@ -31,7 +29,7 @@ C_TRACK: Final = 0.040e-3
 #: Configurations that tracker, C-Track and C-Track with the spatial artefact calibrate from.
 _TRAINING: Final = {"laser tracker": 38, "C-Track": 36, "C-Track, spatial": 35}
 #: Tables 2.12 and 2.13: readings, mean, deviation and largest [mm], by nest and model.
-_PRINTED: Final[Mapping[tuple[str, str], tuple[int, float, float, float]]] = {
+PRINTED: Final[Mapping[tuple[str, str], tuple[int, float, float, float]]] = {
     ("1", "laser tracker"): (123, -0.105, 0.091, 0.327),
     ("1", "C-Track"): (123, 0.022, 0.110, 0.250),
     ("2", "laser tracker"): (95, -0.148, 0.118, 0.437),
@@ -85,8 +83,8 @@ def spheres(twin: Twin, tracker: Robot, rng: np.random.Generator, coarser: int =
     nominal = without_beta(load_robot("irb120").with_payload(twin.robot.payload))
     spatial = _with_spatial(rng)
     spatial_nominal = without_beta(load_robot("irb120").with_payload(_SPATIAL_LOAD))
-    seen = tracked(twin, in_region(_TRAINING["C-Track"], rng), C_TRACK, rng)
-    seen_spatial = tracked(spatial, in_region(_TRAINING["C-Track, spatial"], rng), C_TRACK, rng)
+    seen = tracked(twin, regions.IRB120.draw(_TRAINING["C-Track"], rng), C_TRACK, rng)
+    seen_spatial = tracked(spatial, regions.IRB120.draw(_TRAINING["C-Track, spatial"], rng), C_TRACK, rng)
     models = {
         "laser tracker": (twin, in_base(tracker)),
         "C-Track": (twin, in_base(calibrated(nominal, seen))),
@@ -94,7 +92,7 @@ def spheres(twin: Twin, tracker: Robot, rng: np.random.Generator, coarser: int =
     }
     taught, found = {}, {}
     balls = {"triangular": _taught(twin, nominal, rng), "spatial": _taught(spatial, spatial_nominal, rng)}
-    for (nest, name), (count, *_) in _PRINTED.items():
+    for (nest, name), (count, *_) in PRINTED.items():
         true, model = models[name]
         ball = balls["spatial" if "spatial" in name else "triangular"]
         joints, lengths, centre = _readings(true, model, ball, nest, count // coarser, rng)
@@ -112,7 +110,7 @@ def _with_spatial(rng: np.random.Generator) -> Twin:
 
 
 def _taught(twin: Twin, nominal: Robot, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Return the joint readings at which nest 1 was brought to the ball by hand, and where the ball is [m]."""
+    """Return the joint positions at which nest 1 was brought to the ball by hand, and where the ball is [m]."""
     values = twin.robot.values
     nests = {t.name: [values[t.parameter(axis)] for axis in "xyz"] for t in twin.robot.targets}
     arm = nominal.with_frames(IDENTITY, nests)
@@ -123,7 +121,7 @@ def _taught(twin: Twin, nominal: Robot, rng: np.random.Generator) -> tuple[Array
 def _readings(
     twin: Twin, model: Robot, ball: tuple[Array, Array], nest: str, count: int, rng: np.random.Generator
 ) -> tuple[Array, Array, Array]:
-    """Return joint readings on the sphere, what the bar reads there [m], and the centre by the model [m]."""
+    """Return joint positions on the sphere, what the bar reads there [m], and the centre by the model [m]."""
     at_ball, place = ball
     centre = model.poses(at_ball[None], "1")[0][0]
     joints = _on_sphere(model, nest, centre, count, rng)
@@ -133,10 +131,10 @@ def _readings(
 
 
 def _on_sphere(model: Robot, nest: str, centre: Array, count: int, rng: np.random.Generator) -> Array:
-    """Return joint readings that bring a nest to points of the sphere above the ball, ``(count, joints)``."""
+    """Return joint positions that bring a nest to points of the sphere above the ball, ``(count, joints)``."""
     rows: list[Array] = []
     while sum(map(len, rows)) < count:
-        q = in_region(4000, rng)
+        q = regions.IRB120.draw(4000, rng)
         position, rotation = model.poses(q, nest)
         away = position - centre
         distance = np.linalg.norm(away, axis=1)
@@ -147,106 +145,3 @@ def _on_sphere(model: Robot, nest: str, centre: Array, count: int, rng: np.rando
         usable = np.array([status.usable for status in found.status])
         rows.append(found.joints[usable])
     return np.concatenate(rows)[:count]
-
-
-# -- tables ------------------------------------------------------------------------------------------------
-
-
-def sphere_tables(runs: list[Spheres]) -> tuple[Table, Table]:
-    """Return Tables 2.12 and 2.13, and what the centre has to do with them."""
-    rows, about = [], []
-    for key, (count, mean, deviation, largest) in _PRINTED.items():
-        nest, name = key
-        tests = [run.taught[key] for run in runs]
-        table = "Table 2.13" if "spatial" in name else "Table 2.12"
-        first = key == ("1", "laser tracker")
-        words = f"nest {nest}, {name}"
-        rows += [
-            Row(
-                f"{words}: size of the mean, {count} readings",
-                "mm",
-                [1e3 * abs(test.mean) for test in tests],
-                abs(mean),
-                table,
-                absolute=0.1,
-                explanation="A ball that was taught by hand too high or too low makes all distances too long or too"
-                " short, by chance. Here it was taught to 0.1 mm a coordinate, which is invented; about the centre that"
-                " fits best nothing is left of the mean."
-                if first
-                else "",
-            ),
-            Row(
-                f"{words}: standard deviation",
-                "mm",
-                [1e3 * test.deviation for test in tests],
-                deviation,
-                table,
-                relative=0.4,
-                explanation="Gears and lag of the twin were chosen so that calibration by tracker leaves what the"
-                " document has; here they are met by another way."
-                if first
-                else "",
-            ),
-            Row(f"{words}: maximum", "mm", [1e3 * test.largest for test in tests], largest, table, relative=0.4),
-        ]
-        free = [run.found[key] for run in runs]
-        about.append(Row(f"{words}: size of the mean", "mm", [1e3 * abs(test.mean) for test in free]))
-        about.append(Row(f"{words}: standard deviation", "mm", [1e3 * test.deviation for test in free]))
-    about.append(
-        Row(
-            "nominal robot: readings within the range of the bar",
-            "%",
-            [100.0 * run.nominal for run in runs],
-            explanation="The document has no measurements of the nominal robot, because of the range. Here its errors"
-            " are nearly the same everywhere on the sphere and at its centre, and a distance does not see that part.",
-        )
-    )
-    return (
-        Table(
-            "Ballbar on a sphere of 300 mm (Tables 2.12 and 2.13)",
-            "Measured length minus 300 mm, about the centre as it was taught with nest 1.",
-            tuple(rows),
-        ),
-        Table(
-            "The same about the centre that fits best",
-            "What the model's error at the taught centre adds is taken out.",
-            tuple(about),
-        ),
-    )
-
-
-def sphere_pictures(run: Spheres) -> tuple[Picture, Picture]:
-    """Draw the errors, reading after reading: with the triangular artefact, and with the spatial one."""
-    words = "First seed; one nest after the other. The document's paths are not printed, so only the spread compares."
-    return (
-        Picture(
-            "sphere",
-            "Distance errors on the sphere, nests 1 and 2 of the triangular artefact (Figures 2.13 and 2.14)",
-            words,
-            _errors_figure(run, ("1", "2"), (("laser tracker", AFTER), ("C-Track", BEFORE))),
-        ),
-        Picture(
-            "spatial",
-            "Distance errors on the sphere, nests 1 and 3 of the spatial artefact (Figures 2.15 and 2.16)",
-            words,
-            _errors_figure(run, ("1", "3"), (("C-Track, spatial", BEFORE),)),
-        ),
-    )
-
-
-def _errors_figure(run: Spheres, nests: Sequence[str], models: Sequence[tuple[str, str]]) -> Figure:
-    traces: list[dict[str, Any]] = []
-    for name, colour in models:
-        errors = np.concatenate([run.taught[nest, name].errors for nest in nests])
-        traces.append(
-            {
-                "type": "scatter",
-                "mode": "markers",
-                "name": name,
-                "x": list(range(1, len(errors) + 1)),
-                "y": rounded_to(1e3 * errors, 4),
-                "marker": {"color": colour, "size": 5},
-                "hovertemplate": f"{name}, reading %{{x}}: %{{y:.3f}} mm<extra></extra>",
-            }
-        )
-    return figure(traces, 340, xaxis=axis("reading"), yaxis=axis("error [mm]"))

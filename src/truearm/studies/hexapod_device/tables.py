@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import combinations
 from typing import Final
 
@@ -25,9 +24,9 @@ from truearm.measurement.hexapod.uncertainty import (
     all_solutions,
     cup_uncertainty,
 )
-from truearm.modeling.chain import Array
 from truearm.modeling.transform import rigid_motion
 from truearm.simulation.hexapod.fourth_cup import SIDES_OF_FOUR, four_cups
+from truearm.studies.hexapod_device.run import ATTACHED, REPEATED, Outcome
 from truearm.studies.study import Row, Table
 from truearm.validation.pose_accuracy import repeatability
 
@@ -52,37 +51,6 @@ _PER_AXIS: Final = {
     3: ((1.5, 1.6, 0.7), (1.5, 1.2, 1.6), (1.0, 2.1, 1.7)),
     4: ((1.5, 1.6, 0.7), (1.5, 1.2, 1.6), (1.6, 2.2, 1.7)),
 }
-#: How often the tool is attached, and each pose measured.
-ATTACHED: Final = 5
-REPEATED: Final = 5
-
-
-@dataclass(frozen=True, eq=False)
-class Run:
-    """One seed.
-
-    Attributes
-    ----------
-    monte_carlo
-        Deviations of the cups by solution, in standard deviations of a length.
-    flange
-        Deviation of the flange's place [m] and turn [rad].
-    errors
-        Of the cups over a session [m], ``(rows, 3)``, by what was done.
-    attachments
-        Cups after the tool was attached anew [m], ``(times, 3, 3)``.
-    repeated
-        Cups of poses measured again and again [m], ``(poses, times, 3, 3)``.
-    gain
-        How many times as many configurations a robot reaches with a fourth cup.
-    """
-
-    monte_carlo: dict[int, tuple[float, float, float]]
-    flange: tuple[float, float]
-    errors: dict[str, Array]
-    attachments: Array
-    repeated: Array
-    gain: dict[str, float]
 
 
 def counts_table(found: Sequence[HexapodPose]) -> Table:
@@ -140,7 +108,7 @@ def counts_table(found: Sequence[HexapodPose]) -> Table:
     return Table("What can be measured (Figures 3.6 and 3.7)", "Counted at nominal lengths.", tuple(rows))
 
 
-def uncertainty_table(runs: list[Run]) -> Table:
+def uncertainty_table(outcomes: Sequence[Outcome]) -> Table:
     """Return Table 3.1."""
     rows = []
     for solution, u in all_solutions().items():
@@ -160,7 +128,7 @@ def uncertainty_table(runs: list[Run]) -> Table:
                     else "",
                 )
             )
-            drawn = [run.monte_carlo[solution][cup - 1] for run in runs]
+            drawn = [one.monte_carlo[solution][cup - 1] for one in outcomes]
             rows.append(Row(f"solution {solution}, t{cup}, Monte Carlo", "sigma", drawn))
         rows += _per_axis(solution, u)
         rows.append(
@@ -195,7 +163,7 @@ def _per_axis(solution: int, u: CupUncertainty) -> list[Row]:
     ]
 
 
-def accuracy_table(runs: list[Run], worst: float) -> Table:
+def accuracy_table(outcomes: Sequence[Outcome], worst: float) -> Table:
     """Return what Table 3.1 means in micrometres."""
     of_designs = [max(cup_uncertainty(solution, design).norms) for design, solution in assemblies()]
     rng = np.random.default_rng(0)
@@ -239,11 +207,11 @@ def accuracy_table(runs: list[Run], worst: float) -> Table:
             Row(
                 "flange, standard deviation of its place",
                 "um",
-                [1e6 * run.flange[0] for run in runs],
+                [1e6 * one.flange[0] for one in outcomes],
                 explanation="The document leaves the flange out. The tool's cups stand before it, and the turn of the"
                 " tool moves it as well.",
             ),
-            Row("flange, standard deviation of its turn", "urad", [1e6 * run.flange[1] for run in runs]),
+            Row("flange, standard deviation of its turn", "urad", [1e6 * one.flange[1] for one in outcomes]),
         ),
     )
 
@@ -261,22 +229,25 @@ def _round_trip() -> float:
     )
 
 
-def spoilt_table(runs: list[Run]) -> Table:
+def spoilt_table(outcomes: Sequence[Outcome]) -> Table:
     """Return what drift does."""
     rows = []
-    for words, name, why in (
-        ("a bar that does not drift", "always", ""),
-        ("put on its calibrator before each pose", "each pose", "Six readings drift by less than they scatter."),
+    for words, errors, why in (
+        ("a bar that does not drift", [one.steady for one in outcomes], ""),
+        (
+            "put on its calibrator before each pose",
+            [one.each_pose for one in outcomes],
+            "Six readings drift by less than they scatter.",
+        ),
         (
             "never put on its calibrator",
-            "never",
+            [one.never for one in outcomes],
             "All legs are too long by the same length then, and the fixtures, measured first, are not.",
         ),
     ):
-        rows.append(Row(f"{words}: mean", "um", [1e6 * float(run.errors[name].mean()) for run in runs]))
-        largest = [1e6 * float(run.errors[name].max()) for run in runs]
-        rows.append(Row(f"{words}: largest", "um", largest, explanation=why))
-    readings = 6 * len(runs[0].errors["never"])
+        rows.append(Row(f"{words}: mean", "um", [1e6 * float(norms.mean()) for norms in errors]))
+        rows.append(Row(f"{words}: largest", "um", [1e6 * float(norms.max()) for norms in errors], explanation=why))
+    readings = 6 * len(outcomes[0].never)
     return Table(
         "Drift of the bar (section 3.5)",
         f"Error of the three cups over a session of {readings} leg lengths, against the truth. The document prints that"
@@ -285,13 +256,13 @@ def spoilt_table(runs: list[Run]) -> Table:
     )
 
 
-def changer_table(runs: list[Run]) -> Table:
+def changer_table(outcomes: Sequence[Outcome]) -> Table:
     """Return what the tool changer does."""
     rows = []
     for cup in range(3):
         apart = [
-            1e3 * max(float(np.linalg.norm(a[cup] - b[cup])) for a, b in combinations(run.attachments, 2))
-            for run in runs
+            1e3 * max(float(np.linalg.norm(a[cup] - b[cup])) for a, b in combinations(one.attachments, 2))
+            for one in outcomes
         ]
         name = f"T{cup + 1}, largest difference between {ATTACHED} attachments"
         if cup == 2:
@@ -299,7 +270,7 @@ def changer_table(runs: list[Run]) -> Table:
             rows.append(Row(name, "mm", apart, 0.100, "section 3.5", relative=0.3, explanation=why))
         else:
             rows.append(Row(name, "mm", apart))
-    found = [1e3 * run.errors["changer"] for run in runs]
+    found = [1e3 * one.changer for one in outcomes]
     rows.append(
         Row(
             "attached anew before every pose: mean error of the cups",
@@ -313,13 +284,13 @@ def changer_table(runs: list[Run]) -> Table:
     return Table("The tool changer (section 3.5)", "The robot does not move.", tuple(rows))
 
 
-def repeatability_table(runs: list[Run]) -> Table:
+def repeatability_table(outcomes: Sequence[Outcome]) -> Table:
     """Return how well the device repeats."""
     rows = []
     for cup in range(3):
-        most = [1e6 * max(repeatability(places[:, cup]) for places in run.repeated) for run in runs]
+        most = [1e6 * max(repeatability(places[:, cup]) for places in one.repeated) for one in outcomes]
         rows.append(Row(f"T{cup + 1}", "um", most))
-    flange = [1e6 * max(repeatability(rigid_motion(CUPS, places)[1]) for places in run.repeated) for run in runs]
+    flange = [1e6 * max(repeatability(rigid_motion(CUPS, places)[1]) for places in one.repeated) for one in outcomes]
     rows.append(
         Row(
             "flange",
@@ -337,7 +308,7 @@ def repeatability_table(runs: list[Run]) -> Table:
     )
 
 
-def fourth_table(runs: list[Run]) -> Table:
+def fourth_table(outcomes: Sequence[Outcome]) -> Table:
     """Return what a fourth cup is worth."""
     sides = len(SIDES_OF_FOUR)
     rows = [
@@ -346,7 +317,7 @@ def fourth_table(runs: list[Run]) -> Table:
             Row(
                 f"times as many configurations of the {title}",
                 "",
-                [run.gain[name] for run in runs],
+                [one.gain[name] for one in outcomes],
                 4,
                 "section 4.5",
                 relative=0.25,
@@ -356,7 +327,7 @@ def fourth_table(runs: list[Run]) -> Table:
                 else "",
             )
             for name, title in (("irb120", "IRB 120"), ("lrmate200ic", "LR Mate 200iC"))
-            if runs[0].gain
+            if outcomes[0].gain
         ),
     ]
     return Table(

@@ -1,4 +1,4 @@
-"""Pictures of what the hexapod device can measure (Nubiola, Figures 3.6, 3.7 and 3.10)."""
+"""Pictures of what the hexapod device can measure (Nubiola, Figures 3.6 and 3.7)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import numpy as np
 
 from truearm.measurement.hexapod.geometry import DEVICE, triangle
 from truearm.measurement.hexapod.poses import HexapodPose, distance, distinct, near_equal
-from truearm.measurement.hexapod.sheet import PlannedRow
 from truearm.modeling.chain import Array
 from truearm.reporting.drawing import AFTER, BEFORE, CAMERA, Figure, axis, figure, scene_axis
 from truearm.reporting.numbers import rounded, rounded_to
@@ -46,7 +45,7 @@ def poses_figure(groups: Sequence[tuple[str, str, Sequence[HexapodPose]]]) -> Fi
     return figure(traces, 480, scene={**scene, "aspectmode": "data", "camera": CAMERA})
 
 
-def all_poses(found: Sequence[HexapodPose]) -> Picture:
+def poses_picture(found: Sequence[HexapodPose]) -> Picture:
     """Draw the 72 poses, the superfluous ones apart."""
     kept = {pose.number for pose in distinct(found)}
     groups = [
@@ -57,7 +56,7 @@ def all_poses(found: Sequence[HexapodPose]) -> Picture:
     return Picture("poses", "The poses that can be measured (Figure 3.6)", words, poses_figure(groups))
 
 
-def pose_distances(found: Sequence[HexapodPose]) -> Picture:
+def distances_picture(found: Sequence[HexapodPose]) -> Picture:
     """Draw angle and distance between all pairs of poses."""
     near = set(near_equal(found))
     pairs = [(a, b) for n, a in enumerate(found) for b in found[n + 1 :]]
@@ -100,10 +99,3 @@ def _triangles(name: str, colour: str, triangles: Sequence[Array], width: int) -
         "line": {"color": colour, "width": width},
         "hoverinfo": "skip",
     }
-
-
-def reached_poses(found: Sequence[HexapodPose], rows: Sequence[PlannedRow]) -> Picture:
-    """Draw the poses that a plan takes."""
-    taken = {row.pose for row in rows}
-    drawn = poses_figure([("reached", AFTER, [pose for pose in found if pose.number in taken])])
-    return Picture("reached", "The poses that the robot takes (Figure 3.10)", "In the fixture's frame.", drawn)

@@ -9,7 +9,6 @@ from typing import Final
 import numpy as np
 
 from truearm.identification.solving.fit import identify
-from truearm.identification.solving.models import MODELS
 from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
@@ -18,11 +17,8 @@ from truearm.modeling.transform import IDENTITY
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import Twin, measure
 from truearm.simulation.twin_joint import PERFECT
+from truearm.studies.irb120 import ELASTIC
 
-#: Frees what the document's Table 2.2 does, and Hayati's beta.
-ELASTIC: Final = next(model for model in MODELS if model.name == "elastic")
-#: Lowest and highest joint readings [deg]: Nubiola, section 2.5.
-_REGION: Final = ((-90, 0, -80, -150, -90, -180), (90, 110, 70, 150, 90, 180))
 #: Nubiola, Table 2.3 [deg].
 _BACKLASH: Final = (0.004, 0.002, 0.004, 0.037, 0.017, 0.037)
 #: Deviations of the gears' sines, one and two a turn, and of axis 3 against axis 2 [deg]: chosen so that the document's
@@ -47,12 +43,6 @@ def worn_twin(rng: np.random.Generator, truth: str = "tracker-triangular") -> Tw
     )
 
 
-def in_region(count: int, rng: np.random.Generator) -> Array:
-    """Return joint readings drawn evenly from the region of section 2.5 [rad], ``(count, 6)``."""
-    low, high = np.radians(_REGION)
-    return np.asarray(rng.uniform(low, high, (count, 6)))
-
-
 def tracked(twin: Twin, joints: Array, noise: float, rng: np.random.Generator) -> Dataset:
     """Return what an instrument reads of the tool when every joint comes from below, as the document has it."""
     return measure(twin, joints, noise, rng, approach=np.ones(joints.shape))
@@ -64,6 +54,6 @@ def calibrated(nominal: Robot, data: Dataset) -> Robot:
 
 
 def in_base(robot: Robot) -> Robot:
-    """Return a robot as its controller has it: standing in the origin, its tool as calibrated."""
+    """Return a robot as its controller has it: its base in the origin, its tool as calibrated."""
     targets = {t.name: [robot.values[t.parameter(axis)] for axis in "xyz"] for t in robot.targets}
     return robot.with_frames(IDENTITY, targets)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from typing import Final
@@ -26,8 +26,8 @@ from truearm.simulation.hexapod.simulated import ballbar
 from truearm.simulation.hexapod.tool_changer import ToolChanger
 from truearm.simulation.twin import Twin
 from truearm.studies.hexapod_place import PLACE, fixture_at, placed, touched
-from truearm.studies.irb120_worn import ELASTIC, calibrated
-from truearm.studies.study import Row, Table
+from truearm.studies.irb120 import ELASTIC
+from truearm.studies.irb120_hexapod.worn import calibrated
 
 #: A fixture that lies flat before the robot, and two more at its sides.
 _FLAT: Final = fixture_at((0.30, 0.0, 0.05), 0.0)
@@ -37,42 +37,66 @@ _FOURTH: Final = 0.1e-3
 #: A bar that is never put on its calibrator gains this much with each reading [m]: 3 um over 39 configurations.
 _DRIFT: Final = 3e-6 / (6 * 39)
 #: Turns in which model and frames by touches are found.
-_TURNS: Final = 6
+TURNS: Final = 6
 #: Nearer to the middle of the poses than this is near [m] (Nubiola, 4.4).
 _NEAR: Final = 0.200
-TRACKER: Final = "tracker, 38 configurations"
-_ROWS: Final = {
-    TRACKER: "",
-    "one place, 22 poses": "The place of section 3.5.",
-    "one place": "A flat fixture before the robot.",
-    "three places": "Frames of the places and model are found in turn.",
-    "three places, frames by touches": "Each place by the readings at its three cups and the model from the first"
-    " place.",
-    "three places, frames by touches, in turn": f"The same {_TURNS} times, each time with the model found before. It"
-    " gets worse: what errs at the cups, up to 300 mm away from each other, turns and shifts a whole place, the model"
-    " follows, and errs more at the cups.",
-    "four cups": "All four sides of the tetrahedron, at one place. The bar says where they are to each other.",
-    "one place, bar never put on its calibrator": "A few um among a tenth of a millimetre.",
-    "one place, tool attached anew for every pose": "",
-    "one place, joints come from either side": "Nothing was done against the lag of the joints.",
-}
 
 
 @dataclass(frozen=True, eq=False)
-class Ways:
-    """Calibrations of one seed.
+class Way:
+    """A calibration of one seed.
 
     Attributes
     ----------
     configurations
-        How many each was made from.
+        How many it was made from.
     everywhere, near
         Error of each cup over unseen configurations, and of those near the fixture [m].
     """
 
-    configurations: Mapping[str, int]
-    everywhere: Mapping[str, Array]
-    near: Mapping[str, Array]
+    configurations: int
+    everywhere: Array
+    near: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Ways:
+    """All calibrations of one seed.
+
+    Attributes
+    ----------
+    tracker
+        By the readings of a tracker.
+    few
+        With the device at the place of section 3.5.
+    one_place
+        At a flat fixture before the robot.
+    three_places
+        At three, frames of the places and model found in turn.
+    by_touches
+        The same, each place by the readings at its cups and the model from the first place.
+    by_touches_in_turn
+        The same again and again, each time with the model found before.
+    four_cups
+        At all sides of a fixture with a fourth cup.
+    drifting
+        At one place, with a bar that is never put on its calibrator.
+    attached_anew
+        At one place, the tool attached anew for every pose.
+    either_side
+        At one place, joints come from either side.
+    """
+
+    tracker: Way
+    few: Way
+    one_place: Way
+    three_places: Way
+    by_touches: Way
+    by_touches_in_turn: Way
+    four_cups: Way
+    drifting: Way
+    attached_anew: Way
+    either_side: Way
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,14 +104,14 @@ class _Bench:
     """What all sessions of a seed share."""
 
     twin: Twin
-    told: Robot
+    nominal: Robot
     drive: Robot
     wanted: tuple[HexapodPose, ...]
     rng: np.random.Generator
     coarser: int
 
     def at(self, place: Transform) -> tuple[Array, SetUp]:
-        """Set the fixture up; return the readings at its cups and the fixture."""
+        """Set the fixture up; return the joint positions at its cups and the fixture."""
         touches = touched(self.drive, place)
         return touches, set_up(self.twin, touches, ballbar(self.rng), np.ones(touches.shape))
 
@@ -117,7 +141,7 @@ class _Bench:
 
 def ways(
     twin: Twin,
-    told: Robot,
+    nominal: Robot,
     drive: Robot,
     wanted: tuple[HexapodPose, ...],
     few_rows: Sequence[PlannedRow],
@@ -132,7 +156,7 @@ def ways(
     ----------
     twin
         The true robot.
-    told
+    nominal
         The nominal robot, with its load.
     drive
         The robot as its controller has it, calibrated well enough for the range of the ballbar.
@@ -149,49 +173,43 @@ def ways(
     coarser
         Only every so many-th configuration that the robot reaches.
     """
-    bench = _Bench(twin, told, drive, wanted, rng, coarser)
+    bench = _Bench(twin, nominal, drive, wanted, rng, coarser)
     sessions = [(*bench.at(place), bench.plan(place)) for place in _PLACES]
     _, first, flat = sessions[0]
     data = [bench.session(rows, fixtures) for _, fixtures, rows in sessions]
     _, tilted = bench.at(PLACE)
     by_touch = [(t, fixtures.base) for t, fixtures, _ in sessions]
-    one = calibrated(told, data[0])
-    few = bench.session(few_rows, tilted)
-    all_sides = _four_sides(bench, first, flat)
-    drifted = bench.session(flat, first, drift=_DRIFT)
-    changed = bench.session(flat, first, changer=ToolChanger(rng))
-    lagging = bench.session(flat, first, either_side=True)
-    made = {
-        TRACKER: (tracker.configurations, calibrated(told, tracker), None),
-        "one place, 22 poses": (few.configurations, calibrated(told, few), tilted),
-        "one place": (data[0].configurations, one, first),
-        "three places": (
-            sum(part.configurations for part in data),
-            identify_placements(told, data, ELASTIC).robot,
-            first,
-        ),
-    }
-    total = sum(part.configurations for part in data)
-    turned = one
-    for turn in range(_TURNS):
-        turned = calibrated(told, _by_touches(turned, data, by_touch))
-        if turn == 0:
-            made["three places, frames by touches"] = (total, turned, first)
-    made["three places, frames by touches, in turn"] = (total, turned, first)
-    for name, part in (
-        ("four cups", all_sides),
-        ("one place, bar never put on its calibrator", drifted),
-        ("one place, tool attached anew for every pose", changed),
-        ("one place, joints come from either side", lagging),
-    ):
-        made[name] = (part.configurations, calibrated(told, part), first)
     middle = first.base_cups.mean(axis=0) + 0.245 * plain_frame(first.base_cups).rotation[:, 2]
     near = np.linalg.norm(unseen.position - middle, axis=1) < _NEAR
-    errors = {name: _errors(robot, unseen, fixtures) for name, (_, robot, fixtures) in made.items()}
+
+    def judged(robot: Robot, configurations: int, fixtures: SetUp | None = first) -> Way:
+        errors = _errors(robot, unseen, fixtures)
+        return Way(configurations, errors, errors[near])
+
+    def from_session(part: Dataset, fixtures: SetUp | None = first) -> Way:
+        return judged(calibrated(nominal, part), part.configurations, fixtures)
+
+    one = calibrated(nominal, data[0])
+    total = sum(part.configurations for part in data)
+    few = bench.session(few_rows, tilted)
+    all_sides = _four_sides(bench, first, flat)
+    drifting = bench.session(flat, first, drift=_DRIFT)
+    attached_anew = bench.session(flat, first, changer=ToolChanger(rng))
+    either_side = bench.session(flat, first, either_side=True)
+    turns = [one]
+    for _ in range(TURNS):
+        turns.append(calibrated(nominal, _by_touches(turns[-1], data, by_touch)))
     return Ways(
-        configurations={name: count for name, (count, *_) in made.items()},
-        everywhere=errors,
-        near={name: norms[near] for name, norms in errors.items()},
+        tracker=from_session(tracker, None),
+        few=from_session(few, tilted),
+        one_place=judged(one, data[0].configurations),
+        three_places=judged(identify_placements(nominal, data, ELASTIC).robot, total),
+        by_touches=judged(turns[1], total),
+        by_touches_in_turn=judged(turns[-1], total),
+        four_cups=from_session(all_sides),
+        drifting=from_session(drifting),
+        attached_anew=from_session(attached_anew),
+        either_side=from_session(either_side),
     )
 
 
@@ -211,7 +229,7 @@ def _four_sides(bench: _Bench, first: SetUp, flat: Sequence[PlannedRow]) -> Data
 
 
 def _by_touches(robot: Robot, places: Sequence[Dataset], touches: Sequence[tuple[Array, Array]]) -> Dataset:
-    """Return the readings of all places in the frame of the first, by the readings at their cups and a model."""
+    """Return the readings of all places in the frame of the first, by the joint positions at their cups and a model."""
     name = robot.targets[0].name
     frames = [world_frame(robot.poses(at, name)[0], sides).frame for at, sides in touches]
     first = frames[0]
@@ -229,35 +247,3 @@ def _errors(robot: Robot, unseen: Dataset, fixtures: SetUp | None) -> Array:
     frame = plain_frame(fixtures.base_cups)
     there = replace(unseen, position=(unseen.position - np.array(frame.translation)) @ frame.rotation)
     return errors_of(robot, there).position_norms
-
-
-# -- tables ------------------------------------------------------------------------------------------------
-
-
-def ways_tables(runs: list[Ways]) -> tuple[Table, Table]:
-    """Return what each way leaves everywhere, and near the fixture."""
-
-    def rows(of: Callable[[Ways], Mapping[str, Array]], all_figures: bool) -> tuple[Row, ...]:
-        made = []
-        for name, why in _ROWS.items():
-            count = int(np.median([run.configurations[name] for run in runs]))
-            words = name if name == TRACKER else f"{name} ({count} configurations)"
-            mean = [1e3 * float(of(run)[name].mean()) for run in runs]
-            made.append(Row(f"{words}: mean", "mm", mean, explanation=why if all_figures else ""))
-            made.append(Row(f"{words}: maximum", "mm", [1e3 * float(of(run)[name].max()) for run in runs]))
-        return tuple(made)
-
-    return (
-        Table(
-            "Calibrated with the device, and with a tracker: everywhere",
-            "Error of the three cups over unseen configurations of the region of section 2.5, in the frame of the"
-            " instrument. The document has no such figures of the IRB 120; it hoped for more than from a tracker"
-            " (section 3.6), and found a third of the tracker's accuracy with the LR Mate (chapter 4).",
-            rows(lambda run: run.everywhere, True),
-        ),
-        Table(
-            "The same near the flat fixture",
-            "Less than 200 mm from the middle of the poses.",
-            rows(lambda run: run.near, False),
-        ),
-    )

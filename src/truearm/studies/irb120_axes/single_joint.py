@@ -81,8 +81,24 @@ def turn_of(places: Array, test: AxisTest) -> Turn:
     )
 
 
-def run_out(turn: Turn, test: AxisTest) -> tuple[float, float]:
-    """Return amplitude [deg] and phase [rad] of the smallest sine a turn that leaves the printed range and backlash.
+@dataclass(frozen=True)
+class RunOut:
+    """A sine a turn by which a gear runs out.
+
+    Attributes
+    ----------
+    amplitude
+        [deg].
+    phase
+        [rad].
+    """
+
+    amplitude: float
+    phase: float
+
+
+def run_out(turn: Turn, test: AxisTest) -> RunOut:
+    """Return the smallest sine a turn that leaves the printed range and backlash; none if no sine does.
 
     Parameters
     ----------
@@ -98,4 +114,5 @@ def run_out(turn: Turn, test: AxisTest) -> tuple[float, float]:
         passed = np.flatnonzero(np.sign(ranges - test.angular) != np.sign(ranges[0] - test.angular))
         if len(passed):
             found.append((float(amplitudes[passed[0]]), phase))
-    return min(found)
+    # Noise alone may make more than the printed range already.
+    return RunOut(*min(found, default=(0.0, 0.0)))

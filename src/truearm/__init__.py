@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from truearm.jobs.load_robot import load_robot
     from truearm.jobs.new_robot import new_robot
     from truearm.jobs.revert import revert
+    from truearm.jobs.study import study
     from truearm.jobs.validate import validate
     from truearm.measurement.dataset import Dataset
     from truearm.modeling.parameters import Parameter
@@ -57,6 +58,7 @@ __all__ = [
     "load_robot",
     "new_robot",
     "revert",
+    "study",
     "validate",
 ]
 

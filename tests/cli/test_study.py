@@ -44,7 +44,7 @@ def test_json_is_what_the_file_holds(truearm: Truearm, quick: None, tmp_path: Pa
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("irb120-sim",), "there is no such study"),
+        (("irb120-sim",), "there is no study of this name"),
         (("irb120-faro",), "this study needs measured data"),
         (("irb120-faro", "--data", "nowhere"), "a file of the measured data is missing"),
         (("irb120-axes", "--data", "nowhere"), "this study simulates its data"),

@@ -20,6 +20,7 @@ JOBS: Final = (
     "revert",
     "convert",
     "export",
+    "study",
     "new_robot",
     "example",
     "demo",

@@ -13,7 +13,7 @@ import json
 import os
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
@@ -61,7 +61,7 @@ class ProgramFile:
 
     path: Path
     name: str
-    original: bytes
+    original: bytes = field(repr=False)
 
 
 def record_path(program: Path) -> Path:

@@ -29,8 +29,8 @@ REPORT: Final = "compensation.html"
 _EXPLAINED: Final = 10
 
 
-@dataclass(frozen=True, eq=False)
-class FileCorrection:
+@dataclass(frozen=True, eq=False, repr=False)
+class FileCorrection(Record):
     """One corrected file of a program.
 
     Attributes
@@ -110,6 +110,14 @@ class FileCorrection:
             },
         }
 
+    def lines(self) -> list[str]:
+        """Return how many targets were corrected and by how much, and what was skipped."""
+        text = (
+            f"{self.name}  {self.language}: {self.corrected} of {self.targets} targets corrected, "
+            f"moved by {self.mean_shift * 1e3:.3f} mm on average, {self.largest_shift * 1e3:.3f} mm at most"
+        )
+        return [text, *(f"  {self.name}, line {one.line}: {one.reason}" for one in self.skipped)]
+
 
 @dataclass(frozen=True, eq=False)
 class SimulatedRun:
@@ -178,13 +186,10 @@ class ProgramCorrection(Record):
     def lines(self) -> list[str]:
         """Return a line for each file, what was skipped and what to know."""
         width = max(len(file.name) for file in self.files)
-        text = [
-            f"{file.name:{width}}  {file.language}: {file.corrected} of {file.targets} targets corrected, "
-            f"moved by {file.mean_shift * 1e3:.3f} mm on average, {file.largest_shift * 1e3:.3f} mm at most"
-            for file in self.files
-        ]
-        skipped = [(file.name, one) for file in self.files for one in file.skipped]
-        text += [f"  {name}, line {one.line}: {one.reason}" for name, one in skipped[:_EXPLAINED]]
+        parts = [(file, file.lines()) for file in self.files]
+        text = [f"{file.name:{width}}{head.removeprefix(file.name)}" for file, (head, *_) in parts]
+        skipped = [line for _, (_, *lines) in parts for line in lines]
+        text += skipped[:_EXPLAINED]
         if len(skipped) > _EXPLAINED:
             text.append(f"  and {len(skipped) - _EXPLAINED} more; the JSON summary lists all")
         for split in self.splits:

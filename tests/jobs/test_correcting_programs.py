@@ -124,5 +124,8 @@ def test_of_many_skipped_targets_the_first_are_listed(program: Path) -> None:
     correction = truearm.compensate(calibrated(), [program])
     (file,) = correction.files
     assert len(file.skipped) > 10
+    assert repr(file).startswith("plate.mod  RAPID: ")
+    assert len(file.lines()) == 1 + len(file.skipped)
+    assert len(repr(file)) <= 2000
     assert f"  and {len(file.skipped) - 10} more; the JSON summary lists all" in correction.lines()
     assert len(correction.summary()["programs"][0]["skipped"]) == len(file.skipped)

@@ -7,14 +7,15 @@ from typing import Annotated
 
 import typer
 
-from truearm.cli.output import Json, print_json, progress
+from truearm.cli.options import command_line
+from truearm.cli.output import Json, print_json, print_record, progress
 from truearm.studies import STUDIES
 
 HELP = "\n\n".join(
     [
         "Make a published experiment again and set our figures beside the printed ones, over several seeds.",
         "Writes report.html and study.json into DIR. The studies:",
-        *(f"{entry.name}: {entry.about}" for entry in STUDIES),
+        *(f"{entry.name}: {entry.about}{' (with --data)' if entry.files else ''}" for entry in STUDIES),
     ]
 )
 
@@ -30,26 +31,13 @@ def study(
     json: Json = False,
 ) -> None:
     """Make a published experiment again."""
-    from truearm.files import writable_folder
-    from truearm.studies import run_study
+    from truearm.jobs.study import study as run
     from truearm.studies.study import STUDY_FILES
 
-    writable_folder(out)
     with progress() as say:
-        finished = run_study(name, seeds, data, say)
-        say("writing the report")
-        finished.save(out)
+        finished = run(name, seeds=seeds, data=data, out=out, command=command_line(), progress=say)
     if json:
         print_json(finished.summary())
-        return
-    typer.echo(finished.title)
-    for table in finished.tables:
-        if table.compares:
-            typer.echo(f"{table.title}:")
-        for row in table.rows:
-            if row.published is not None:
-                allowed = "" if row.tolerance is None else f", may differ by {row.tolerance:.2g}"
-                typer.echo(
-                    f"  {row.verdict:8}{row.what}: {row.median:.3g}, published {row.published:g} {row.unit}{allowed}"
-                )
-    typer.echo(f"Written to {out}: {', '.join(STUDY_FILES)}")
+    else:
+        print_record(finished)
+        typer.echo(f"Written to {out}: {', '.join(STUDY_FILES)}")

@@ -269,11 +269,11 @@ class Robot:
             If the mass is negative, or the gravity is none.
         """
         if payload is not None and payload.mass < 0.0:
-            raise InputError("a mass cannot be negative", where="payload", came=f"{payload.mass:g} kg")
+            raise InputError("a mass cannot be negative", parameter="payload", came=f"{payload.mass:g} kg")
         if gravity is not None and not 0.1 <= math.hypot(*gravity) <= 100.0:
             raise InputError(
                 "this is no acceleration of free fall",
-                where="gravity",
+                parameter="gravity",
                 came=f"{math.hypot(*gravity):g} m/s^2",
                 allowed="about 9.81 m/s^2 on Earth, 0.1 to 100",
                 cure="Give x, y and z in the robot's base frame: 0,0,-9.81 stands, 0,0,9.81 hangs.",

@@ -97,7 +97,7 @@ def inverse(
     if branch is not None:
         raise InputError(
             "the branches have no names here",
-            where=robot.name,
+            parameter="branch",
             came=branch,
             allowed="no branch: the answer nearest to the seed is taken",
             cure="Named branches need six turning joints with a closed form, and the whole orientation.",
@@ -171,7 +171,7 @@ def _task(
     frame: PoseFrame,
     orientation: Orientation,
 ) -> PoseTask:
-    p = _array("position", position, 3)
+    p = _array("positions", position, 3)
     if target is not None:
         robot.target(target)  # refuses an unknown one
     for name, came, allowed in (
@@ -179,12 +179,12 @@ def _task(
         ("orientation", orientation, ("full", "axis", "free")),
     ):
         if came not in allowed:
-            raise InputError("there is no such choice", where=name, came=came, allowed=", ".join(allowed))
+            raise InputError("there is no such choice", parameter=name, came=came, allowed=", ".join(allowed))
     if rotation is None:
         if orientation != "free":
             raise InputError(
                 "the poses have no orientation",
-                where="rotation",
+                parameter="rotations",
                 allowed="rotation matrices, (n, 3, 3)",
                 cure="Give them, or ask for the position alone.",
             )
@@ -205,21 +205,23 @@ def _array(name: str, given: ArrayLike, *shape: int) -> Array:
     if values.shape[1:] != shape:
         raise InputError(
             "the array has the wrong shape",
-            where=name,
+            parameter=name,
             came=str(values.shape),
             allowed=f"(n, {', '.join(map(str, shape))})",
         )
     if not np.isfinite(values).all():
         row = int(np.argwhere(~np.isfinite(values))[0][0])
-        raise InputError("NaN and infinity are no pose", where=f"{name}, row {row}", cure="Remove the row.")
+        raise InputError(
+            "NaN and infinity are no pose", parameter=name, where=f"{name}, row {row}", cure="Remove the row."
+        )
     return values
 
 
 def _rotations(given: ArrayLike, count: int) -> Array:
-    R = _array("rotation", given, 3, 3)
+    R = _array("rotations", given, 3, 3)
     if len(R) != count:
         raise InputError(
-            "there are not as many rotations as positions", where="rotation", came=len(R), allowed=f"{count}"
+            "there are not as many rotations as positions", parameter="rotations", came=len(R), allowed=f"{count}"
         )
     off = np.abs(R.swapaxes(1, 2) @ R - np.eye(3)).max(axis=(1, 2), initial=0.0)
     wrong = np.flatnonzero((off > ROTATION_TOLERANCE) | (np.linalg.det(R) < 0))
@@ -230,7 +232,8 @@ def _rotations(given: ArrayLike, count: int) -> Array:
             "the matrix mirrors, it does not turn"
             if left
             else "the matrix is no rotation: its columns are not orthonormal",
-            where=f"rotation, row {row}",
+            parameter="rotations",
+            where=f"rotations, row {row}",
             came=f"determinant {np.linalg.det(R[row]):.6g}" if left else f"R'R off from 1 by {off[row]:.3g}",
             allowed="determinant 1" if left else f"within {ROTATION_TOLERANCE:g}",
             cure="Check rows against columns, and that all digits were passed on.",
@@ -245,12 +248,12 @@ def _seed(robot: Robot, seed: ArrayLike | None, count: int) -> tuple[Array, Arra
     if values.shape not in ((joints,), (count, joints)):
         raise InputError(
             "the seed has the wrong length",
-            where="seed",
+            parameter="seed",
             came=str(values.shape),
             allowed=f"({joints},), one reading for each joint of {robot.name}, or ({count}, {joints})",
         )
     if not np.isfinite(values).all():
-        raise InputError("NaN and infinity are no joint readings", where="seed")
+        raise InputError("NaN and infinity are no joint readings", parameter="seed")
     turned = robot.variables(np.atleast_2d(values), robot.values)[:joints].T
     return np.broadcast_to(values, (count, joints)), np.broadcast_to(turned, (count, joints))
 

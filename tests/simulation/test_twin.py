@@ -177,7 +177,7 @@ def test_with_nothing_true_but_the_robot_the_twin_is_the_model() -> None:
         q = twin.robot.random_configurations(3, rng)
         seen = measure(twin, q, 0.0, rng)
         for i, target in enumerate(seen.targets):
-            assert_allclose(seen.position[seen.target == i], twin.robot.poses(q, target)[0], rtol=0, atol=1e-13)
+            assert_allclose(seen.position[seen.target == i], twin.robot.world_poses(q, target)[0], rtol=0, atol=1e-13)
         zeros = replace(twin, joints={i: JointTruth() for i in range(1, len(twin.robot.joints) + 1)})
         assert np.array_equal(measure(zeros, q, 0.0, rng).position, seen.position)
 
@@ -330,7 +330,7 @@ def katana_on_the_circle() -> tuple[Robot, Array]:
         up, across = 0.1 * math.cos(angle) * math.sqrt(0.5), 0.1 * math.sin(angle)
         point, q = centre + np.array([across, -up, up]), np.radians([0.0, 30.0, 60.0, 60.0, 0.0])
         for _ in range(100):
-            missing = point - robot.poses(q[None], "tip")[0][0]
+            missing = point - robot.world_poses(q[None], "tip")[0][0]
             if np.linalg.norm(missing) < 1e-10:
                 break
             step = np.linalg.lstsq(robot.joint_jacobian(q[None], "tip")[0, :3], missing, rcond=None)[0]

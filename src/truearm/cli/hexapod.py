@@ -233,7 +233,7 @@ def world_frame(
     sides = _lengths(base, 3, "--base")
     for name, side in zip(side_names("B"), sides.tolist(), strict=True):
         device.check(device.base, side, name, "--base")
-    position, _ = loaded.poses(readings, target or loaded.targets[0].name)
+    position, _ = loaded.world_poses(readings, target or loaded.targets[0].name)
     stand = loaded.base
     points = (position - np.array(stand.translation)) @ stand.rotation
     found = fitted(points, sides)

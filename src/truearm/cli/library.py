@@ -105,7 +105,7 @@ def _content(robot: Robot) -> dict[str, Any]:
 
     shown = SHOWN_AS
     base = robot.base
-    position, _ = robot.poses(np.zeros((1, len(robot.joints))))
+    position, _ = robot.world_poses(np.zeros((1, len(robot.joints))))
     joints = []
     for number, joint in enumerate(robot.joints, 1):
         values = {

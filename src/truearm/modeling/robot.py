@@ -430,7 +430,7 @@ class Robot:
         """Run through the chain to a fixture: one configuration; `values` as for :meth:`forward_kinematics`."""
         return self.fixture(name).chain.forward_kinematics(np.zeros((0, 1)), self.values if values is None else values)
 
-    def poses(self, q: Array | Postures, target: str | None = None) -> tuple[Array, Array]:
+    def world_poses(self, q: Array | Postures, target: str | None = None) -> tuple[Array, Array]:
         """Return positions ``(n, 3)`` [m] and rotations ``(n, 3, 3)`` of the flange or a target in the world."""
         kinematics = self.forward_kinematics(q, target)
         return np.ascontiguousarray(kinematics.position.T), np.ascontiguousarray(kinematics.matrix())

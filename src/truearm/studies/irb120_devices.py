@@ -242,5 +242,7 @@ def _zones(found: Found, unseen: int, training: tuple[int, int], rng: np.random.
                 apart = [cut.positions(truth.joints, nest) - truth.places(point) for nest, point in nests.items()]
                 _mm(found, ("zones", name, str(count), title), np.linalg.norm(np.concatenate(apart), axis=1))
                 if title == next(iter(listed.DIVISIONS)):
-                    apart = [cut.whole.robot.poses(truth.joints, n)[0] - truth.places(p) for n, p in nests.items()]
+                    apart = [
+                        cut.whole.robot.world_poses(truth.joints, n)[0] - truth.places(p) for n, p in nests.items()
+                    ]
                     _mm(found, ("zones", name, str(count), "whole"), np.linalg.norm(np.concatenate(apart), axis=1))

@@ -115,7 +115,7 @@ def tool_alone(
     }
     error: dict[str, dict[int, float]] = {}
     for name, robot in robots.items():
-        origin, rotation = robot.poses(truth.joints)
+        origin, rotation = robot.world_poses(truth.joints)
         right = np.einsum("nji,nj->ni", rotation, truth.places(tip) - origin).mean(axis=0)
         error[name] = {}
         for count in touches:
@@ -133,7 +133,7 @@ def _points(robot: Robot) -> dict[str, tuple[float, ...]]:
 
 
 def _predicted(robot: Robot, data: Dataset, truth: Truth) -> Array:
-    return np.concatenate([robot.poses(truth.joints, name)[0] for name in data.targets])
+    return np.concatenate([robot.world_poses(truth.joints, name)[0] for name in data.targets])
 
 
 def _lengths(errors: Array) -> Array:

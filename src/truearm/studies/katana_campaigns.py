@@ -193,7 +193,7 @@ def run_devices(seed: int, counts: Counts) -> DeviceRun:
     for what, (device, count) in DOCUMENT.items():
         data = _measured(device, nominal, at_end, count, rng)
         judge(what, data, end)
-        apart = data.position - nominal.with_frames(_STANDS, _ATTACHMENT.targets).poses(data.joints, TIP)[0]
+        apart = data.position - nominal.with_frames(_STANDS, _ATTACHMENT.targets).world_poses(data.joints, TIP)[0]
         read[what] = _mean_and_largest(np.linalg.norm(apart, axis=1))
     low_cost = []
     for device in USED:
@@ -268,7 +268,7 @@ def _seen(nominal: Robot, joints: Array) -> dict[str, float]:
 
 def _reached(fit: Fit, data: Dataset, joints: Array, true: Array) -> Reached:
     """Judge a robot by true places ``(n, 3)`` of its tip in the world."""
-    predicted = fit.robot.poses(joints, TIP)[0]
+    predicted = fit.robot.world_poses(joints, TIP)[0]
     R, p = rigid_motion(predicted, true)
     own = np.linalg.norm(predicted - true, axis=1) if data.anchored else np.full(len(true), np.nan)
     spread, truly = (places - places.mean(axis=0) for places in (predicted @ R.T, true))

@@ -102,7 +102,7 @@ def run_influence(seed: int, cube: Cube, count: int, unseen: int) -> InfluenceRu
         for combination in COMBINATIONS:
             robot = _one_at_a_time(method, nominal, data, combination)
             combined[method, combination] = float(pose_errors(tip_poses(robot, others), elsewhere)["dP"].mean())
-    standard, other = (published(table).poses(joints, TIP)[0] for table in ("standard", "influence"))
+    standard, other = (published(table).world_poses(joints, TIP)[0] for table in ("standard", "influence"))
     return InfluenceRun(
         influence=influence(nominal, joints, NAMES, TIP, PERTURBATIONS),
         chapter_5=influence(nominal, central, NAMES, TIP, PERTURBATIONS),

@@ -135,7 +135,7 @@ def _follow(
 
 
 def _sums(method: str, robot: Robot, data: Dataset) -> dict[tuple[str, ...], float]:
-    errors = 1e3 * (robot.poses(data.joints, TIP)[0] - data.position)
+    errors = 1e3 * (robot.world_poses(data.joints, TIP)[0] - data.position)
     return {
         ("sum", "distances", method): float(np.linalg.norm(errors, axis=1).mean()),
         ("sum", "components", method): float(np.abs(errors).sum(axis=1).mean()),
@@ -163,4 +163,4 @@ def _without_camera(
 
 def _apart(robot: Robot, joints: Array, true: Array) -> float:
     """Return how far a robot is on average from where it believes to be [mm]."""
-    return 1e3 * float(np.linalg.norm(robot.poses(joints, TIP)[0] - true, axis=1).mean())
+    return 1e3 * float(np.linalg.norm(robot.world_poses(joints, TIP)[0] - true, axis=1).mean())

@@ -134,7 +134,7 @@ class Cups:
 
     def frame_by(self, robot: Robot) -> WorldFrame:
         """Return the fixture's frame in the world of a model."""
-        return world_frame(robot.poses(self.touches, TOUCHING)[0], self.sides)
+        return world_frame(robot.world_poses(self.touches, TOUCHING)[0], self.sides)
 
     def placed(self, robot: Robot) -> Robot:
         """Return the robot standing in the fixture's frame, where its own model finds the cups."""
@@ -269,7 +269,7 @@ def judged(model: Robot, truth: Unseen) -> Judgement:
     """Compare a model with what a twin does, both in the same frame."""
     at = model.loaded(truth.joints)
     predicted = _predicted(model, at, truth)
-    turned = model.poses(at)[1] @ np.swapaxes(truth.rotation, 1, 2)
+    turned = model.world_poses(at)[1] @ np.swapaxes(truth.rotation, 1, 2)
     front = truth.front_up
     return Judgement(
         position=np.linalg.norm(predicted - truth.position, axis=1),
@@ -287,5 +287,5 @@ def mean_position_error(model: Robot, truth: Unseen) -> float:
 
 def _predicted(model: Robot, at: Postures, truth: Unseen) -> Array:
     """Return where a model says the cup that is looked at is [m], ``(n, 3)``."""
-    places = np.array([model.poses(at, name)[0] for name in TARGETS])
+    places = np.array([model.world_poses(at, name)[0] for name in TARGETS])
     return np.asarray(places[truth.cup, np.arange(len(truth.cup))])

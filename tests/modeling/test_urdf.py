@@ -215,7 +215,7 @@ def test_chain_ends_at_the_named_link(tip: str, tmp_path: Path) -> None:
     assert len(robot.joints) == {"forearm_link": 3, "shoulder_link": 1}.get(tip, 4)
     names = [joint.name for joint in robot.joints]
     q = robot.random_configurations(5, np.random.default_rng(1))
-    for actual, expected in zip(robot.poses(q), Pinocchio(UR_LIKE).world_poses(names, q, tip), strict=True):
+    for actual, expected in zip(robot.world_poses(q), Pinocchio(UR_LIKE).poses(names, q, tip), strict=True):
         assert_allclose(actual, expected, rtol=0, atol=1e-12)
 
 

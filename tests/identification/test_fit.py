@@ -63,7 +63,10 @@ def test_the_jacobian_of_every_model_agrees_with_central_differences(model: Mode
 
 
 def test_intervals_contain_the_truth_as_often_as_they_say() -> None:
-    """1000 calibrations with truths drawn from the priors, 95 % intervals of the identifiable parameters pooled."""
+    """Truths drawn from the priors, 95 % intervals of the identifiable parameters pooled.
+
+    A thousand calibrations at once are counted in test_monte_carlo, which also says that they are these.
+    """
     rng = np.random.default_rng(2024)
     robot = load_robot("irb120")
     q = robot.random_configurations(30, rng)
@@ -71,7 +74,7 @@ def test_intervals_contain_the_truth_as_often_as_they_say() -> None:
     _, like = campaign("irb120", 30, sigma, 0)
     like = replace(like, joints=q)
     inside: list[bool] = []
-    for _ in range(1000):
+    for _ in range(150):
         twin = truth_twin(robot, "random", rng).robot
         position = np.stack([twin.world_poses(q, t.name)[0] for t in twin.targets], axis=1).reshape(-1, 3)
         data = replace(like, position=position + sigma * rng.standard_normal(position.shape))
@@ -80,7 +83,7 @@ def test_intervals_contain_the_truth_as_often_as_they_say() -> None:
             if p.group in ("geometry", "joint zero") and p.informed is not None and p.informed > 0.5:
                 assert p.deviation is not None
                 inside.append(abs(p.value - twin.values[p.name]) < 1.959964 * p.deviation)
-    assert len(inside) > 15_000
+    assert len(inside) > 2_250
     assert 0.93 <= np.mean(inside) <= 0.97
 
 

@@ -67,12 +67,17 @@ def command_line() -> str:
             words += map(str, value if isinstance(value, list | tuple) else [value])
         elif name in _OUTPUT:
             end = [max(parameter.opts, key=len), str(_OUTPUT[name])] if _OUTPUT[name] else end
-        elif value is True:
+        elif value is True and _given(context, name):
             words.append(max(parameter.opts, key=len))
-        elif value is not None and value is not False and value != parameter.get_default(context):
+        elif value is not None and value is not False and _given(context, name):
             for entry in value if isinstance(value, list | tuple) else [value]:
                 words += [max(parameter.opts, key=len), str(entry)]
     return shlex.join([*words, *end])
+
+
+def _given(context: typer.Context, name: str) -> bool:
+    source = context.get_parameter_source(name)
+    return source is not None and source.name != "DEFAULT"
 
 
 def _option(name: str) -> str:

@@ -61,16 +61,14 @@ def path_argument(path: object, parameter: str) -> Path:
         if str(path):
             return Path(path)
         raise InputError("no file is given", parameter=parameter, came=str(path))
-    raise _wrong_kind("a path belongs here", path, parameter, "a text or a pathlib.Path")
+    raise _wrong_kind(
+        "a path belongs here", path, parameter, "the path of a file or folder, as a text or a pathlib.Path"
+    )
 
 
 def payload_argument(payload: object, parameter: str = "payload") -> Payload | None:
     """Return the payload that was given, or that a text such as ``2.7kg,50mm,25mm,100mm`` names; None for None."""
-    if payload is None or isinstance(payload, Payload):
-        return payload
-    if isinstance(payload, str):
-        return Payload.of_text(payload, parameter)
-    raise _wrong_kind("a payload belongs here", payload, parameter, "a Payload, or a text: 2.7kg,50mm,25mm,100mm")
+    return None if payload is None else Payload.of(payload, parameter)
 
 
 def gravity_argument(gravity: object, parameter: str = "gravity") -> tuple[float, float, float] | None:

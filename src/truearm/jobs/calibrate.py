@@ -147,7 +147,7 @@ def calibrate(
         digest = f" (sha256 {hashlib.sha256(read_bytes(path_argument(data, 'data'))).hexdigest()[:12]})"
     readings = data_argument(data)
     bounds_file = str(bounds) if isinstance(bounds, str | Path) else "bounds"
-    if isinstance(bounds, str | Path):
+    if bounds is not None and not isinstance(bounds, Bounds):
         bounds = read_bounds(path_argument(bounds, "bounds"))
     check_joints(nominal_robot, readings)
     n = readings.configurations

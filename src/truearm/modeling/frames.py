@@ -45,9 +45,7 @@ def checked_joints(robot: Robot, joints: ArrayLike, parameter: str = "joints") -
     return number_array([joints] if one else joints, parameter, ("n", len(robot.joints)))
 
 
-def forward(
-    robot: Robot, joints: ArrayLike | Postures, frame: Frame, target: str | None
-) -> tuple[Array, Array]:
+def forward(robot: Robot, joints: ArrayLike | Postures, frame: Frame, target: str | None) -> tuple[Array, Array]:
     """Return poses as :meth:`truearm.Robot.forward` does."""
     checked_frame(frame)
     position, rotation = robot.world_poses(_postures(robot, joints), target)

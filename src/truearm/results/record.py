@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from typing import Any
 
 from truearm.notices import Notice
 from truearm.shown import as_html, short_text
 
 
 class Record(ABC):
-    """A result that a person can read: its text is what the command prints."""
+    """A result that a person can read: its text is what the command prints, its summary what JSON holds."""
+
+    @abstractmethod
+    def summary(self) -> dict[str, Any]:
+        """Return the figures as JSON holds them, units in the names."""
 
     @abstractmethod
     def lines(self) -> list[str]:

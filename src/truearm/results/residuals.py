@@ -74,10 +74,26 @@ class Residuals(Record):
         return len(self.norm)
 
     def __iter__(self) -> Iterator[Residual]:
-        columns = (self.configuration, self.target, self.part, self.kind)
-        names = zip(*(column.tolist() for column in columns), strict=True)
-        for name, error, norm in zip(names, self.error, self.norm.tolist(), strict=True):
-            yield Residual(*name, error, norm)
+        columns = (self.configuration, self.target, self.part, self.kind, self.norm)
+        rows = zip(*(column.tolist() for column in columns), strict=True)
+        for (configuration, target, part, kind, norm), error in zip(rows, self.error, strict=True):
+            yield Residual(configuration, target, part, kind, error, norm)
+
+    def summary(self) -> dict[str, Any]:
+        """Return every row, in mm and mrad."""
+        return {
+            "residuals": [
+                {
+                    "configuration": row.configuration,
+                    "target": row.target,
+                    "part": row.part,
+                    "kind": row.kind,
+                    "error": [None if np.isnan(value) else value * 1e3 for value in row.error.tolist()],
+                    "norm": row.norm * 1e3,
+                }
+                for row in self
+            ]
+        }
 
     def lines(self) -> list[str]:
         """Return the largest of them, worst first."""

@@ -52,7 +52,7 @@ def branch_number(name: str) -> int:
         near = nearest_names(name, BRANCHES)
         raise InputError(
             "there is no such branch",
-            where="branch",
+            parameter="branch",
             came=name,
             allowed=f"{', '.join(BRANCHES)}, or all",
             cure=f"Did you mean {' or '.join(near)}?" if near else None,

@@ -1,0 +1,204 @@
+"""What holds for every job: it refuses what it cannot use, naming the parameter, and its result speaks for itself."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import math
+import re
+import typing
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import Any, get_args, get_type_hints
+
+import numpy as np
+import pytest
+from tests.jobs.examples import EXAMPLES
+
+import truearm
+from truearm.errors import InputError
+from truearm.jobs import JOBS
+from truearm.measurement.dataset import Dataset
+from truearm.modeling.effects import EFFECTS
+from truearm.modeling.parts import Payload
+from truearm.modeling.robot import Robot
+from truearm.results.record import Record
+from truearm.simulation.devices import DEVICES
+
+ROOT = Path(__file__).parents[2]
+#: Called by the job or only shown: a function, and how the caller would run it again.
+UNCHECKED = ("progress", "command")
+
+
+class Odd:
+    """Nothing that a job knows."""
+
+
+def function(job: str) -> Any:
+    return getattr(truearm, job)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("contract")
+
+
+@cache
+def parameters(job: str) -> dict[str, inspect.Parameter]:
+    return {n: p for n, p in inspect.signature(function(job)).parameters.items() if n not in UNCHECKED}
+
+
+def kinds(job: str, name: str) -> set[Any]:
+    """Return the types that a parameter takes, unions opened."""
+    module = import_module(f"truearm.jobs.{job}")
+    hint = get_type_hints(function(job), vars(module) | {"np": np})[name]
+
+    def opened(hint: Any) -> Iterator[Any]:
+        origin = typing.get_origin(hint)
+        if hint is Any or origin is None:
+            yield hint
+        elif origin is typing.Literal:
+            yield str
+        elif str(origin).endswith(("Union'>", "UnionType'>")) or origin is typing.Union:
+            for part in get_args(hint):
+                yield from opened(part)
+        else:
+            yield origin
+
+    return set(opened(hint))
+
+
+def misspelt(text: str) -> str:
+    return text[:-1] + ("x" if text[-1] != "x" else "y")
+
+
+def bad_values(job: str, name: str, good: Any) -> Iterator[tuple[str, Any]]:
+    """Give what a parameter must refuse, from the types it takes and a value that works."""
+    takes = kinds(job, name)
+    yield "wrong type", Odd()
+    if type(None) not in takes and parameters(job)[name].default is not None:
+        yield "None", None
+    texts = takes & {str, Path}
+    if not texts:
+        yield "a text", "twelve"
+    if int in takes or float in takes:
+        yield "True", True
+        for text in ("nan", "inf", "-inf"):
+            yield text, float(text)
+        if name == "seed":
+            yield "negative", -1
+        if float not in takes:
+            yield "a fraction", 1.5
+    elif bool in takes:
+        yield "1", 1
+    else:
+        yield "a number", 12.5
+    if str in takes and isinstance(good, str) and re.fullmatch(r"[a-zA-Z][-a-z0-9]*", good):
+        yield "misspelt", misspelt(good)
+    if texts:
+        yield "empty", ""
+    if np.ndarray in takes:
+        for number in (math.nan, math.inf):
+            yield f"holds {number}", np.full(np.shape(good) if isinstance(good, np.ndarray) else (3, 6), number)
+        yield "wrong shape", np.zeros((2, 2, 2, 2))
+    if isinstance(good, list | tuple) and good and not isinstance(good[0], str):
+        yield "too short", good[:-1]
+        yield "holds nan", [math.nan, *good[1:]]
+    elif isinstance(good, list | tuple) and good:
+        yield "a plain text", good[0] if str not in takes else Odd()
+        yield "misspelt within", [misspelt(str(good[0]))]
+
+
+def test_every_job_is_exported_and_has_an_example() -> None:
+    assert set(JOBS) == set(EXAMPLES)
+    for job in JOBS:
+        assert job in dir(truearm)
+        assert job in truearm.__all__
+        assert function(job).__module__ == f"truearm.jobs.{job}"
+        assert function(job).__name__ == job
+
+
+@pytest.mark.parametrize("job", JOBS)
+def test_every_parameter_and_the_result_have_a_type_and_a_word(job: str) -> None:
+    hints = get_type_hints(function(job), vars(import_module(f"truearm.jobs.{job}")))
+    assert set(hints) == {*inspect.signature(function(job)).parameters, "return"}
+    text = inspect.getdoc(function(job))
+    assert text
+    told = re.search(r"Parameters\n-+\n(.*?)(?:\n\n[A-Z]\w+\n-+|\Z)", text, re.S)
+    named = {n.strip() for line in re.findall(r"^(?=\S)(.+)$", told[1] if told else "", re.M) for n in line.split(",")}
+    assert named == set(inspect.signature(function(job)).parameters)
+
+
+@pytest.mark.parametrize("job", JOBS)
+def test_every_job_is_on_the_page(job: str) -> None:
+    assert re.search(rf"\b{job}\b", (ROOT / "docs" / "api.md").read_text())
+
+
+@pytest.mark.parametrize("job", JOBS)
+def test_the_result_is_frozen_and_speaks_for_itself(job: str, folder: Path) -> None:
+    result = function(job)(**EXAMPLES[job](folder))
+    assert isinstance(result, Record | Robot | Dataset)
+    assert is_dataclass(result)
+    assert 0 < len(repr(result)) <= 2000
+    with pytest.raises(AttributeError):
+        setattr(result, fields(result)[0].name, None)
+    if isinstance(result, Record):
+        assert repr(result) == "\n".join(result.lines())[: len(repr(result))] or repr(result).endswith("...")
+        assert result._repr_html_().startswith("<pre>")
+        assert json.loads(json.dumps(result.summary(), allow_nan=False))
+
+
+def cases() -> list[tuple[str, str]]:
+    return [(job, name) for job in JOBS for name in parameters(job)]
+
+
+@pytest.mark.parametrize(("job", "name"), cases())
+def test_what_cannot_be_used_is_refused_naming_the_parameter(job: str, name: str, folder: Path) -> None:
+    good = EXAMPLES[job](folder)
+    tried = 0
+    for what, bad in bad_values(job, name, good.get(name, parameters(job)[name].default)):
+        with pytest.raises(InputError) as refusal:
+            function(job)(**{**good, name: bad})
+        assert refusal.value.parameter is not None, f"{job}({name}: {what}) names no parameter: {refusal.value}"
+        assert name in refusal.value.parameter.split(", "), f"{job}({name}: {what}): {refusal.value}"
+        assert "--" not in str(refusal.value)
+        if what.startswith("misspelt") and isinstance(good.get(name), str):
+            assert "Did you mean" in str(refusal.value)
+        tried += 1
+    assert tried >= 2
+
+
+def test_no_text_outside_the_command_names_an_option() -> None:
+    option = re.compile(r"(?<![\w-])--[a-z][a-z-]+")
+    found = [
+        f"{path.relative_to(ROOT)}:{number}: {line.strip()}"
+        for path in sorted((ROOT / "src" / "truearm").rglob("*"))
+        if path.suffix in (".py", ".jinja", ".yaml") and "cli" not in path.parts and path.name != "style.css.jinja"
+        for number, line in enumerate(path.read_text().splitlines(), 1)
+        if option.search(line)
+    ]
+    assert found == []
+
+
+@pytest.mark.parametrize("effect", [effect.name for effect in EFFECTS])
+def test_a_misspelt_effect_is_refused_and_offered(effect: str) -> None:
+    with pytest.raises(InputError, match=effect) as refusal:
+        truearm.load_robot("irb120").with_effects([misspelt(effect)])
+    assert refusal.value.parameter == "effects"
+
+
+@pytest.mark.parametrize("device", [device.name for device in DEVICES])
+def test_a_misspelt_device_is_refused_and_offered(device: str, folder: Path) -> None:
+    with pytest.raises(InputError, match=f"Did you mean.*{device}") as refusal:
+        truearm.check(None, EXAMPLES["load_data"](folder)["data"], device=misspelt(device))
+    assert refusal.value.parameter == "device"
+
+
+@pytest.mark.parametrize("mass", [math.nan, math.inf, -1.0])
+def test_a_payload_that_is_none_is_refused(mass: float) -> None:
+    with pytest.raises(InputError) as refusal:
+        Payload(mass)
+    assert refusal.value.parameter == "mass"

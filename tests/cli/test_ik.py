@@ -107,9 +107,9 @@ def test_what_is_not_reached_is_explained_and_ends_with_3(truearm: Truearm, tmp_
         ("no such branch", ["--branch", "left"]),
         ("wrong length", ["--seed-joints", "1,2,3"]),
         ("numbers separated by commas", ["--seed-joints", "a,b"]),
-        ("no joint readings", ["--seed-joints", "nan,0,0,0,0,0"]),
+        ("NaN and infinity cannot be used", ["--seed-joints", "nan,0,0,0,0,0"]),
         ("no target of this name", ["--target", "gripper"]),
-        ("no such choice", ["--frame", "tool"]),
+        ("no frame of this name", ["--frame", "tool"]),
         ("only one of them", ["--position-only", "--axis-only"]),
     ],
 )

@@ -65,7 +65,7 @@ def test_a_path_with_a_hash_is_a_path(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("text", ["", " "])
 def test_no_robot_is_refused(text: str) -> None:
-    with pytest.raises(InputError, match=r"ROBOT: no robot is given; .* a robot file or a URDF"):
+    with pytest.raises(InputError, match=r"robot: no robot is given; .* a robot file or a URDF"):
         load_robot(text)
 
 

@@ -16,3 +16,14 @@ def measured_data() -> Path:
     if not (folder / "irb120-faro").is_dir():
         pytest.skip(f"no measured data in {folder}; name their folder in TRUEARM_DATA")
     return folder
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Say loudly that tests on measured data did not run: without them no figure on a real robot was checked."""
+    skipped = [r for r in terminalreporter.stats.get("skipped", []) if "no measured data" in str(r.longrepr)]
+    if skipped:
+        terminalreporter.section("MEASURED DATA ARE MISSING", sep="!", red=True, bold=True)
+        terminalreporter.line(
+            f"{len(skipped)} tests on real robots were skipped: nothing above says how well measured robots are"
+            " calibrated. Name the folder of the data in TRUEARM_DATA."
+        )

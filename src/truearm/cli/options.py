@@ -31,6 +31,11 @@ class Command(TyperCommand):
     The parameters of a command's function are called like those of its job.
     """
 
+    def collect_usage_pieces(self, ctx: Any) -> list[str]:
+        """Return the arguments as their metavar has them: [ROBOT] may be left out."""
+        named = [str(p.metavar) for p in self.params if isinstance(p, TyperArgument) and p.metavar]
+        return ["[OPTIONS]", *named]
+
     def invoke(self, ctx: Any) -> Any:
         """Run the command; a refusal of the job is told in the words of the command line."""
         mark = _running.set(ctx)
@@ -85,7 +90,7 @@ def _option(name: str) -> str:
     context = _running.get()
     for parameter in context.command.params if context is not None else ():
         if parameter.name == name and isinstance(parameter, TyperArgument):
-            return str(parameter.metavar or name)
+            return str(parameter.metavar or name).strip("[]")
         if parameter.name == name:
             return max(parameter.opts, key=len)
     return f"--{name.replace('_', '-')}"

@@ -142,10 +142,10 @@ def calibrate(
     urdf = None if source is None else read_bytes(source[0])
     nominal_robot = robot_argument(robot).with_payload(payload, fall)
     progress("reading the data")
+    readings = data_argument(data)
     digest = ""
     if isinstance(data, str | Path):
         digest = f" (sha256 {hashlib.sha256(read_bytes(path_argument(data, 'data'))).hexdigest()[:12]})"
-    readings = data_argument(data)
     bounds_file = str(bounds) if isinstance(bounds, str | Path) else "bounds"
     if bounds is not None and not isinstance(bounds, Bounds):
         bounds = read_bounds(path_argument(bounds, "bounds"))

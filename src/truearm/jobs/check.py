@@ -7,6 +7,7 @@ from pathlib import Path
 from truearm.errors import InputError
 from truearm.identification.judging.plausibility import check_against
 from truearm.jobs.arguments import choice_argument, data_argument, robot_argument
+from truearm.library import is_robot
 from truearm.measurement.checks import check_data, check_joints, check_range
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.table_motion import without_table_motion
@@ -36,13 +37,17 @@ def check(
         If the robot or the data cannot be used, or their joints do not belong together.
     """
     if data is None:
-        if robot is None:
-            raise InputError(
-                "no measurements are given", parameter="data", allowed="a Dataset, or a canonical CSV file"
-            )
         robot, data = None, robot
-    data = data_argument(data)
-    return DataCheck(data, notices_of(data, None if robot is None else robot_argument(robot), device))
+    if isinstance(data, str | Path) and is_robot(data) and isinstance(robot, str | Path) and not is_robot(robot):
+        raise InputError(
+            "the robot comes first, then the measurements",
+            parameter="robot",
+            came=str(robot),
+            allowed="a library id, a robot file or a URDF",
+            cure=f"Write 'truearm check {data} {robot}'.",
+        )
+    measured = data_argument(data)
+    return DataCheck(measured, notices_of(measured, None if robot is None else robot_argument(robot), device))
 
 
 def notices_of(data: Dataset, robot: Robot | None = None, device: str | None = None) -> tuple[Notice, ...]:

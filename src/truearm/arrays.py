@@ -46,10 +46,18 @@ def number_array(
         raise InputError(
             "infinity is no number that can be used" if missing else "NaN and infinity cannot be used here",
             parameter=parameter,
-            came=f"{numbers[place]} at {shape_text(place) if len(place) > 1 else f'index {place[0]}'}",
+            came=f"{numbers[place]}{f' at {list(place)}' if place else ''}",
             allowed="finite numbers, NaN where one is missing" if missing else "finite numbers",
         )
     return numbers
+
+
+def axes(given: object) -> int:
+    """Return how many axes an array has, 0 of a number and -1 of what is no array."""
+    try:
+        return int(np.ndim(given))  # type: ignore[arg-type]
+    except (TypeError, ValueError):  # such as rows of different lengths
+        return -1
 
 
 def finite_number(value: object, parameter: str, *, where: str | None = None, lowest: float = -math.inf) -> float:

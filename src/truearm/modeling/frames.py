@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from truearm.arrays import number_array
+from truearm.arrays import axes, number_array
 from truearm.errors import InputError, did_you_mean
 from truearm.modeling.chain import Array
 from truearm.modeling.postures import Postures
@@ -38,11 +38,7 @@ def checked_frame(frame: object) -> None:
 
 def checked_joints(robot: Robot, joints: ArrayLike, parameter: str = "joints") -> Array:
     """Return joint positions ``(n, joints)``, also of one configuration ``(joints,)``."""
-    try:
-        one = np.ndim(joints) == 1
-    except ValueError:  # rows of different lengths
-        one = False
-    return number_array([joints] if one else joints, parameter, ("n", len(robot.joints)))
+    return number_array([joints] if axes(joints) == 1 else joints, parameter, ("n", len(robot.joints)))
 
 
 def forward(robot: Robot, joints: ArrayLike | Postures, frame: Frame, target: str | None) -> tuple[Array, Array]:

@@ -17,7 +17,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truearm.arrays import number_array
+from truearm.arrays import axes, number_array
 from truearm.errors import InputError, did_you_mean
 from truearm.modeling.chain import Array
 from truearm.modeling.frames import Frame, checked_frame, checked_joints
@@ -209,11 +209,7 @@ def _task(
 
 def _array(given: ArrayLike, parameter: str, *shape: int) -> Array:
     """Return an array of one row a pose; a single pose may come without its axis."""
-    try:
-        one = np.ndim(given) == len(shape)
-    except ValueError:  # rows of different lengths
-        one = False
-    return number_array([given] if one else given, parameter, ("n", *shape))
+    return number_array([given] if axes(given) == len(shape) else given, parameter, ("n", *shape))
 
 
 def _rotations(given: ArrayLike, count: int) -> Array:

@@ -83,7 +83,7 @@ def test_sessions_that_do_not_fit_are_refused(arm: Robot) -> None:
     with pytest.raises(InputError, match="not of one robot with one tool"):
         joined(data, replace(data, targets=("a", "b", "c")))
     with pytest.raises(InputError, match="sessions with quaternion cannot be joined"):
-        joined(data, replace(data, quaternion=np.zeros((3, 4))))
+        joined(data, replace(data, quaternion=np.full((3, 4), 0.5)))
 
 
 def test_a_bar_that_is_not_initialised_errs_more_and_more(arm: Robot, plan: tuple[list[PlannedRow], Array]) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from truearm.library import load_robot
 from truearm.measurement.readers.matrices import read_matrices
-from truearm.modeling.formats.urdf import urdf_text
+from truearm.modeling.formats.urdf_writing import urdf_text
 from truearm.modeling.inverse.branches import BRANCHES, branch_rule
 from truearm.simulation.truths import truth_twin
 

@@ -22,8 +22,15 @@ from truearm.version import __version__
 if TYPE_CHECKING:
     from truearm.jobs.calibrate import calibrate
     from truearm.jobs.check import check
+    from truearm.jobs.compensate import compensate
+    from truearm.jobs.convert import convert
+    from truearm.jobs.demo import demo
+    from truearm.jobs.example import example
+    from truearm.jobs.export import export
     from truearm.jobs.load_data import load_data
     from truearm.jobs.load_robot import load_robot
+    from truearm.jobs.new_robot import new_robot
+    from truearm.jobs.revert import revert
     from truearm.jobs.validate import validate
     from truearm.measurement.dataset import Dataset
     from truearm.modeling.parameters import Parameter
@@ -41,8 +48,15 @@ __all__ = [
     "__version__",
     "calibrate",
     "check",
+    "compensate",
+    "convert",
+    "demo",
+    "example",
+    "export",
     "load_data",
     "load_robot",
+    "new_robot",
+    "revert",
     "validate",
 ]
 

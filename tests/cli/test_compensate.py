@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from tests.cli.conftest import Truearm
 
-from truearm.demonstration import demonstration
+from truearm.jobs.demo import demo
 from truearm.library import load_robot
 from truearm.modeling.formats.robot_file import robot_text
 from truearm.modeling.parts import Payload
@@ -94,7 +94,7 @@ def test_the_report_says_how_to_do_it_again(truearm: Truearm, cell: Path) -> Non
     assert code == 0
     page = (cell / "out" / "compensation.html").read_text()
     command = page.partition("How to reproduce this")[2].partition("<pre>")[2].partition("</pre>")[0]
-    assert shlex.split(command)[4:] == options
+    assert shlex.split(command)[4:] == [*options, "--out", "DIR"]
 
 
 def test_the_payload_matters(truearm: Truearm, cell: Path) -> None:
@@ -142,21 +142,25 @@ def test_what_cannot_be_corrected_is_listed_and_strict_writes_nothing(truearm: T
     assert not (cell / "strict").exists()
 
 
-def test_moves_are_divided(truearm: Truearm, cell: Path) -> None:
+def test_moves_are_split(truearm: Truearm, cell: Path) -> None:
     code, said = run(truearm, cell, "--split", "0.005")
     assert code == 0
-    assert "moves divided by" in said
+    assert "moves split by" in said
     assert "moves-not-divided" in said
     text = (cell / "out" / "plate.mod").read_text()
     assert text.count("MoveC") > 2
-    for bad, words in (("0", "allowed: 0.001 to 100 mm"), ("-1", "no distance"), ("nan", "no distance")):
+    for bad, words in (
+        ("0", "allowed: 0.001 to 100 mm"),
+        ("-1", "moves cannot be split by this distance"),
+        ("nan", "--split: the number cannot be used"),
+    ):
         code, said = run(truearm, cell, "--split", bad, out="bad")
         assert code == 2
         assert words in said
 
 
-def test_a_move_on_which_the_posture_changes_is_not_divided(truearm: Truearm, cell: Path) -> None:
-    """No straight move leads from one posture of the wrist to the other, and no number of pieces would do."""
+def test_a_move_on_which_the_posture_changes_is_not_split(truearm: Truearm, cell: Path) -> None:
+    """No straight move leads from one posture of the wrist to the other, and no number of segments would do."""
     joints = np.radians([[10.0, 20, 10, 30, 50, 20], [15.0, 22, 8, -148, -52, 202]])
     position, rotation = load_robot("irb120").world_poses(joints)
     configurations = ((0, 0), (-2, 2))
@@ -169,7 +173,7 @@ def test_a_move_on_which_the_posture_changes_is_not_divided(truearm: Truearm, ce
     code, said = run(truearm, cell, "--split", "0.01", program="turn.mod")
     assert code == 0
     assert "2 of 2 targets corrected" in said
-    assert "divided by" not in said
+    assert "split by" not in said
     assert "the posture changes on the way" in said
     assert (cell / "out" / "turn.mod").read_text().count("MoveL") == 2
 
@@ -319,18 +323,18 @@ P[2]{
 
 
 def test_the_demo_ends_with_a_corrected_program(tmp_path: Path) -> None:
-    shown = demonstration(tmp_path)
+    shown = demo(tmp_path)
     assert shown.correction is not None
-    checked = shown.correction.checked
-    assert checked is not None
+    simulated = shown.correction.simulated
+    assert simulated is not None
     assert shown.calibration.validation is not None
-    assert checked.corrected.mean() < 1.5 * shown.calibration.validation.position_norms.mean()
-    assert checked.original.mean() > 10 * checked.corrected.mean()
+    assert simulated.corrected.mean() < 1.5 * shown.calibration.validation.position_norms.mean()
+    assert simulated.original.mean() > 10 * simulated.corrected.mean()
     page = (tmp_path / "corrected" / "compensation.html").read_text()
-    assert f"{1e3 * checked.corrected.mean():.3f}" in page
+    assert f"{1e3 * simulated.corrected.mean():.3f}" in page
     assert "Before and after" in page
     # What it wrote itself it writes again; another program of that name stays.
-    demonstration(tmp_path)
+    demo(tmp_path)
     shutil.copy(tmp_path / "measurements.csv", tmp_path / "plate.mod")
     with pytest.raises(ValueError, match="another file of that name"):
-        demonstration(tmp_path)
+        demo(tmp_path)

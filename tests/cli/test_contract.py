@@ -14,9 +14,9 @@ import pytest
 from tests.cli.conftest import Truearm
 
 import truearm as package
-from truearm.demonstration import Demonstration
 from truearm.library import load_robot
 from truearm.measurement.readers.canonical import csv_text, read_csv
+from truearm.results.demonstration import Demonstration
 
 IDS = ["irb120", "irb1600", "katana450", "kr5", "li3", "lrmate200ic", "puma560", "ur10", "ur5"]
 
@@ -248,7 +248,7 @@ def test_a_demo_that_does_not_converge_ends_like_a_calibration(
     data = read_csv(small / "data.csv").of_configurations([0, 1])
     run = package.calibrate("irb120", data, train=1)
     assert run.status.value == "rank-loss"
-    monkeypatch.setattr("truearm.demonstration.demonstration", lambda *_: Demonstration(run, None))
+    monkeypatch.setattr("truearm.jobs.demo.demo", lambda out, **_: Demonstration(out, run, None))
     assert truearm("demo", "--out", tmp_path / "demo").code == 3
 
 
@@ -301,7 +301,7 @@ def test_convert_writes_the_same_robot_in_another_convention(truearm: Truearm, t
 
 def test_a_model_that_cannot_tilt_parallel_axes_says_what_would(truearm: Truearm, small: Path, tmp_path: Path) -> None:
     for name, cure in (
-        ("s-model", "Convert the robot: truearm convert, --convention hayati."),
+        ("s-model", "Convert the robot to the convention hayati with 'truearm convert'."),
         ("standard-dh", "Write 'convention: hayati' in the robot file and 'beta: 0' at the link between them."),
     ):
         truearm("convert", "irb120", "--convention", name, "--out", tmp_path / f"{name}.yaml")

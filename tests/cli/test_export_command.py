@@ -59,7 +59,7 @@ def test_nearly_parallel_axes_are_refused(truearm: Truearm, calibrated: Path, fo
     run = truearm("export", calibrated, "--format", format_, "--out", tmp_path / "table.csv")
     assert (run.code, run.out) == (2, "")
     message = " ".join(run.err.split())
-    for part in ("irb120: the axes of two joints are nearly parallel", "axis_2 and axis_3", "--format hayati"):
+    for part in ("irb120: the axes of two joints are nearly parallel", "axis_2 and axis_3", "convention hayati"):
         assert part in message
     assert not (tmp_path / "table.csv").exists()
 
@@ -68,8 +68,8 @@ def test_unknown_formats_are_refused(truearm: Truearm, tmp_path: Path) -> None:
     run = truearm("export", "irb120", "--format", "haiati", "--out", tmp_path / "table.csv")
     assert (run.code, run.out) == (2, "")
     message = " ".join(run.err.split())
-    assert "there is no such format; got 'haiati'; allowed: dh, mdh, hayati, urdf, json, python" in message
-    assert "Did you mean hayati?" in message
+    assert "--format: there is no format of this name; got 'haiati'" in message
+    assert "allowed: dh, mdh, hayati, urdf, json, python. Did you mean hayati?" in message
 
 
 @pytest.mark.parametrize("format_", FORMATS)

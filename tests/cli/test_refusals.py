@@ -395,7 +395,7 @@ def test_convert_overwrites_nothing_and_knows_its_conventions(truearm: Truearm, 
     assert "exists already" in refused(truearm, "convert", "ur5", "--convention", "cpc", "--out", out)
     assert out.read_text() == "mine"
     message = refused(truearm, "convert", "ur5", "--convention", "dh", "--out", tmp_path / "dh.yaml")
-    assert "there is no such convention; got 'dh'; allowed: standard-dh, modified-dh" in message
+    assert "--convention: there is no convention of this name; got 'dh'; allowed: standard-dh, modified-dh" in message
 
 
 def test_a_calibration_does_not_overwrite_what_it_reads(truearm: Truearm, small: Path, tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from truearm.compensation.cell import Cell, read_cell
+from truearm.compensation.cell import Cell, read_frames, read_tools
 from truearm.errors import InputError
 from truearm.library import load_robot
 from truearm.modeling.robot import Robot
@@ -27,7 +27,8 @@ def robot() -> Robot:
 def read(tmp_path: Path, text: str) -> Cell:
     file = tmp_path / "cell.yaml"
     file.write_text(HEAD + text)
-    return read_cell(robot(), file if "tools" in text else None, file if "frames" in text else None)
+    tools = read_tools(robot(), file if "tools" in text else None)
+    return Cell(tools, read_frames(robot(), file if "frames" in text else None))
 
 
 def test_a_frame_in_the_world_is_seen_from_the_base(tmp_path: Path) -> None:
@@ -81,8 +82,8 @@ def test_orientations_as_each_maker_writes_them(tmp_path: Path, entry: str, colu
     ("text", "said"),
     [
         ("frames: {}\n", "has no frames"),
-        ("tools:\n  t: {of: world}\n", "'flange' or 'controller'"),
-        ("frames:\n  f: {of: flange}\n", "'world', 'base' or 'controller'"),
+        ("tools:\n  t: {of: world}\n", "got 'world'; allowed: flange, controller"),
+        ("frames:\n  f: {of: flange}\n", "got 'flange'; allowed: world, base, controller"),
         ("frames:\n  f: {of: base, wpr: [0, 0, 0], abc: [0, 0, 0]}\n", "one orientation belongs here"),
         ("frames:\n  f: {of: base, quaternion: [1, 1, 0, 0]}\n", "must have length 1"),
         ("frames:\n  f: {of: base, translation: [1, 2]}\n", "f.translation"),

@@ -14,8 +14,8 @@ from truearm.compensation.program_correction import commanded, corrected_program
 from truearm.compensation.programs.fanuc_ls import FANUC_LS
 from truearm.compensation.programs.program import Configuration, Program, Source
 from truearm.compensation.programs.rapid import RAPID
-from truearm.correction import correct
 from truearm.errors import InputError
+from truearm.jobs.compensate import compensate
 from truearm.library import load_robot
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
@@ -104,7 +104,7 @@ def test_a_track_is_reported_in_millimetres(tmp_path: Path) -> None:
     program.write_text(ls(joints("1000 mm", *six), joints("1500 mm", *six), joints("1200 mm", "40 deg", *six[1:])))
     cell = tmp_path / "cell.yaml"
     cell.write_text("truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\ntools:\n  flange: {of: flange}\n")
-    done = correct(on_a_track(), [program], tools=cell)
+    done = compensate(on_a_track(), [program], tools=cell)
     assert done.result.corrections[0].corrected.all()
     done.save(tmp_path / "out")
     page = (tmp_path / "out" / "compensation.html").read_text()

@@ -59,7 +59,7 @@ def test_a_record_holds_the_original_byte_for_byte(tmp_path: Path) -> None:
 
 
 def test_a_corrected_program_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"corrected already.*--again.*--revert"):
+    with pytest.raises(InputError, match=r"corrected already.*`again`.*`revert`"):
         program_files([corrected(tmp_path)])
 
 
@@ -119,7 +119,7 @@ def test_what_is_no_program_is_refused(tmp_path: Path, name: str, content: bytes
 
 def test_a_program_that_is_too_large_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(files_module, "LARGEST", 50)
-    with pytest.raises(InputError, match=r"too large to be corrected at once.*Divide it"):
+    with pytest.raises(InputError, match=r"too large to be corrected at once.*Split it"):
         program_files([write(tmp_path, "m.mod")])
 
 

@@ -1,4 +1,4 @@
-"""Moves divided: what the real robot does between targets, as its controller interpolates them."""
+"""Split moves: what the real robot does between targets, as its controller interpolates them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from truearm.compensation.program_poses import poses_of
 from truearm.compensation.programs.fanuc_ls import FANUC_LS
 from truearm.compensation.programs.program import Program, Source
 from truearm.compensation.programs.rapid import RAPID
-from truearm.compensation.split import MOST, Divided, divided
+from truearm.compensation.split import MOST_SEGMENTS, ProgramSplit, split_program
 from truearm.library import load_robot
 from truearm.modeling.inverse.kinematics import inverse
 from truearm.modeling.transform import Transform
@@ -43,12 +43,12 @@ def program(*moves: str) -> Program:
     return RAPID.read([Source(Path("m.mod"), text)])
 
 
-def split(*moves: str) -> tuple[Program, Divided]:
-    """Return a program divided and read again, with what was divided."""
+def split(*moves: str) -> tuple[Program, ProgramSplit]:
+    """Return a program whose moves are split, read again, and how they are split."""
     whole = program(*moves)
     done = corrected_programs(IRB120, [whole], AT_BASE)
     assert done.corrections[0].corrected.all()
-    cut = divided(RAPID, done.corrections[0], done.between[0], FARTHEST)
+    cut = split_program(RAPID, done.corrections[0], done.between[0], FARTHEST)
     again = [e for e in done.corrections[0].edits if not any(c.start <= e.start < c.stop for c in cut.edits)]
     text = edited(whole.sources[0].text, [*cut.edits, *again])
     return RAPID.read([Source(Path("m.mod"), text)]), cut
@@ -78,7 +78,7 @@ def beside(points: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray
     return np.asarray(np.linalg.norm(np.cross(points - start, along), axis=1))
 
 
-def test_a_divided_line_is_straight_on_the_real_robot() -> None:
+def test_a_split_line_is_straight_on_the_real_robot() -> None:
     moves = (f"MoveJ {START},v100,fine,tool0;", f"MoveL {END},v100,fine,tool0;")
     start, end = (pose[:3, 3] for pose in poses_of(program(*moves)))
     shares = np.linspace(0, 1, 41)
@@ -91,7 +91,7 @@ def test_a_divided_line_is_straight_on_the_real_robot() -> None:
     assert beside(real_tips(*interpolated(poses, shares)), start, end).max() < FARTHEST + ROUNDING
 
 
-def test_a_divided_circle_is_round_on_the_real_robot() -> None:
+def test_a_split_circle_is_round_on_the_real_robot() -> None:
     centre, radius = np.array([0.37, 0.21, 0.45]), 0.03
 
     def on_it(angle: float) -> str:
@@ -100,7 +100,7 @@ def test_a_divided_circle_is_round_on_the_real_robot() -> None:
 
     first, via, last = (on_it(angle) for angle in (-0.5, 0.5, 1.5))
     again, cut = split(f"MoveJ {first},v100,fine,tool0;", f"MoveC {via},{last},v100,fine,tool0;")
-    assert (cut.moves, cut.left) == (1, ())
+    assert (cut.moves, cut.unsplit) == (1, ())
     poses = poses_of(again)
     angles = [-0.5]
     for move in again.moves[1:]:
@@ -117,7 +117,7 @@ def test_a_divided_circle_is_round_on_the_real_robot() -> None:
 @pytest.mark.parametrize("via", [START, END])
 def test_an_arc_without_a_circle_is_no_fault(via: str) -> None:
     again, cut = split(f"MoveJ {START},v100,fine,tool0;", f"MoveC {via},{END},v100,fine,tool0;")
-    assert cut.added < MOST
+    assert cut.added < MOST_SEGMENTS
     assert np.isfinite(poses_of(again)).all()
 
 
@@ -149,12 +149,12 @@ P[2]{{
 def test_a_move_that_its_language_leaves_whole_is_listed_and_not_counted(
     speed: str, moves: int, left: tuple[int, ...]
 ) -> None:
-    """A speed in seconds would hold for every piece."""
+    """A speed in seconds would hold for every segment."""
     robot = worn(load_robot("lrmate200ic"), 2.0)
     read = FANUC_LS.read([Source(Path("a.ls"), TIMED.format(speed=speed))])
     done = corrected_programs(robot, [read], Cell({}, {}))
     assert done.corrections[0].corrected.all()
-    cut = divided(FANUC_LS, done.corrections[0], done.between[0], FARTHEST)
-    assert (cut.moves, cut.left) == (moves, left)
+    cut = split_program(FANUC_LS, done.corrections[0], done.between[0], FARTHEST)
+    assert (cut.moves, cut.unsplit) == (moves, left)
     again = FANUC_LS.read([Source(Path("a.ls"), edited(read.sources[0].text, cut.edits))])
     assert len(again.moves) == len(read.moves) + cut.added

@@ -18,6 +18,7 @@ from truearm.jobs.calibrate import calibrate
 from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of
+from truearm.modeling.effects import EFFECTS
 from truearm.modeling.parts import LinkMass, Payload
 from truearm.modeling.robot import Robot
 from truearm.simulation.truths import truth_twin
@@ -53,17 +54,12 @@ def taken(selection: Selection) -> list[str]:
     return [attempt.effect for attempt in selection.attempts if attempt.taken]
 
 
-@pytest.fixture
-def few(monkeypatch: pytest.MonkeyPatch) -> tuple[str, ...]:
-    """Some effects to choose from, which is quicker."""
-    candidates = ("backlash", "hardening", "approach", "thermal-growth")
-    monkeypatch.setattr("truearm.identification.choosing.selection._CANDIDATES", candidates)
-    return candidates
+#: Some effects to choose from, which is quicker.
+FEW = ("backlash", "hardening", "approach", "thermal-growth")
 
 
-@pytest.mark.usefixtures("few")
 def test_backlash_is_found_where_there_is_some() -> None:
-    chosen = select(arm(), seen(twin_of(backlash=math.radians(0.05)), 50, 2))
+    chosen = select(arm(), seen(twin_of(backlash=math.radians(0.05)), 50, 2), candidates=FEW)
     assert taken(chosen)[0] == "backlash"
     assert {"compliance", "backlash"} <= set(chosen.model.effects)
     first = next(attempt for attempt in chosen.attempts if attempt.taken)
@@ -72,14 +68,12 @@ def test_backlash_is_found_where_there_is_some() -> None:
     assert first.gain > first.standard_error > 0.0
 
 
-@pytest.mark.usefixtures("few")
 def test_hysteresis_is_found_where_there_is_some() -> None:
-    assert taken(select(arm(), seen(twin_of(hysteresis=math.radians(0.02)), 50, 3)))[0] == "approach"
+    assert taken(select(arm(), seen(twin_of(hysteresis=math.radians(0.02)), 50, 3), candidates=FEW))[0] == "approach"
 
 
-@pytest.mark.usefixtures("few")
 def test_growth_is_found_where_the_temperature_tells_it() -> None:
-    chosen = select(arm(), seen(twin_of(growth=23e-6), 50, 4, warming=15.0))
+    chosen = select(arm(), seen(twin_of(growth=23e-6), 50, 4, warming=15.0), candidates=FEW)
     assert taken(chosen)[0] == "thermal-growth"
 
 
@@ -95,40 +89,48 @@ def test_what_is_only_elastic_stays_as_good() -> None:
     assert errors[0] <= 1.05 * errors[1]
 
 
-@pytest.mark.usefixtures("few")
 def test_one_seed_gives_one_answer() -> None:
     data = seen(twin_of(), 15, 5)
-    first = select(arm(), data, seed=1)
-    assert first == select(arm(), data, seed=1)
-    assert first.start != select(arm(), data, seed=2).start
+    first = select(arm(), data, seed=1, candidates=FEW)
+    assert first == select(arm(), data, seed=1, candidates=FEW)
+    assert first.start != select(arm(), data, seed=2, candidates=FEW).start
 
 
-def test_what_the_data_do_not_tell_is_not_tried(few: tuple[str, ...]) -> None:
+def test_what_the_data_do_not_tell_is_not_tried() -> None:
     told = replace(seen(twin_of(), 12, 6), temperature=np.linspace(18.0, 25.0, 12))
     silent = replace(told, approach=None, number=None, temperature=None)
-    tried = [{attempt.effect for attempt in select(arm(), data).attempts} for data in (told, silent)]
-    assert tried == [set(few), {"backlash", "hardening"}]
+    tried = [{attempt.effect for attempt in select(arm(), data, candidates=FEW).attempts} for data in (told, silent)]
+    assert tried == [set(FEW), {"backlash", "hardening"}]
 
 
-def test_nothing_loads_an_arm_that_carries_nothing(few: tuple[str, ...]) -> None:
+def test_what_needs_loads_is_not_tried_on_an_arm_that_nothing_loads() -> None:
     weightless = replace(arm(), masses=(), payload=Payload())
-    chosen = select(weightless, seen(Twin(twin_of().robot), 20, 7))
-    idle = [attempt for attempt in chosen.attempts if attempt.effect == few[0]]
-    assert idle
-    assert not any(attempt.taken for attempt in idle)
-    assert max(abs(attempt.gain) for attempt in idle) < 1e-9
+    data = seen(Twin(twin_of().robot), 20, 7)
+    chosen = select(weightless, data)
+    loaded = {effect.name for effect in EFFECTS if effect.loaded}
+    assert {"hardening", "backlash"} <= loaded
+    assert chosen.attempts
+    assert not loaded & {attempt.effect for attempt in chosen.attempts}
+    pulled = replace(data, wrench=np.full((20, 6), 5.0))
+    assert "hardening" in {attempt.effect for attempt in select(weightless, pulled, candidates=FEW).attempts}
 
 
-@pytest.mark.usefixtures("few")
+def test_every_selectable_effect_is_tried_where_the_data_tell_it() -> None:
+    geared = replace(arm(), joints=tuple(replace(joint, transmission_periods=100) for joint in arm().joints))
+    data = seen(twin_of(), 40, 13, warming=5.0)
+    for robot, left_out in ((geared, set[str]()), (arm(), {"transmission-error"})):
+        first = {attempt.effect for attempt in select(robot, data).attempts if attempt.round == 1}
+        assert first == {effect.name for effect in EFFECTS if effect.selectable} - {"compliance"} - left_out
+
+
 def test_a_target_seen_once_is_no_obstacle() -> None:
     data = seen(twin_of(), 20, 8)
     once = data.targets.index("3")
     hidden = (data.target == once) & (data.configuration != 4)
     data = replace(data, position=np.where(hidden[:, None], np.nan, data.position))
-    assert math.isfinite(select(arm(), data).start)
+    assert math.isfinite(select(arm(), data, candidates=FEW).start)
 
 
-@pytest.mark.usefixtures("few")
 def test_bounds_may_name_effects_that_are_not_chosen() -> None:
     data = seen(twin_of(backlash=math.radians(0.05)), 40, 9)
     entries = {"truearm": "truearm-bounds/1", "units": {"length": "mm", "angle": "deg"}}
@@ -149,7 +151,6 @@ def test_too_few_configurations_are_refused(count: int) -> None:
         select(arm(), data)
 
 
-@pytest.mark.usefixtures("few")
 def test_the_held_out_part_has_no_say() -> None:
     data = seen(twin_of(backlash=math.radians(0.05)), 40, 12)
     order = np.random.default_rng(3).permutation(40)

@@ -14,7 +14,7 @@ from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.robot import Robot
 from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import measure
+from truearm.simulation.twin import Twin, measure
 from truearm.simulation.twin_joint import JointTruth
 
 ELASTIC = next(model for model in MODELS if model.name == "elastic")
@@ -71,3 +71,53 @@ def test_the_effect_takes_the_error_out() -> None:
     assert np.arctan2(cosine, sine) == pytest.approx(0.7, abs=0.05)
     assert better.excess == 1.0
     assert fit.excess > 1.5
+
+
+GEOMETRIC = next(model for model in MODELS if model.name == "geometric")
+
+
+def moved_by_a_joint(
+    robot: Robot, joints: np.ndarray, joint: int, motion: np.ndarray, noise: float = 2e-5
+) -> tuple[Fit, Dataset]:
+    """Return a fit to readings that a joint (from 0) has moved by so much [m] the way it moves its target."""
+    data = measure(Twin(robot, {}), joints, noise, np.random.default_rng(5))
+    way = robot.joint_jacobian(joints, "tip")[:, :3, joint]
+    way /= np.linalg.norm(way, axis=1)[:, None]
+    data = replace(data, position=data.position + motion[:, None] * way)
+    return identify(robot.with_frames(robot.base, {}), data, GEOMETRIC), data
+
+
+def test_a_joint_whose_axis_passes_the_only_target_is_not_named() -> None:
+    # 0.05 mm at a target that is 0.01 mm off the axis of joint 6 would be a gear that errs by turns.
+    plain = unknown_gears(load_robot("irb120"))
+    robot = plain.with_frames(plain.base, {"tip": (1e-5, 0.0, 0.1)})
+    joints = robot.random_configurations(150, np.random.default_rng(0))
+    fit, data = moved_by_a_joint(robot, joints, 5, 5e-5 * np.sin(200 * joints[:, 5]))
+    assert periodic_errors(fit, data) == ()
+    seen = robot.with_frames(plain.base, {"tip": (0.2, 0.0, 0.1)})
+    fit, data = moved_by_a_joint(seen, joints, 5, 5e-5 * np.sin(200 * joints[:, 5]))
+    (error,) = periodic_errors(fit, data)
+    assert (error.joint, error.periods) == (6, 200)
+    assert error.amplitude == pytest.approx(5e-5 / 0.2, rel=0.25)
+
+
+@pytest.mark.parametrize("span", [1e-4, 1e-3, 2e-2])
+def test_a_joint_that_hardly_turns_is_not_named(span: float) -> None:
+    # What grows with the cube of the joint's small turns is the slope of any slow sine.
+    plain = unknown_gears(load_robot("irb120"))
+    robot = plain.with_frames(plain.base, {"tip": (0.1, 0.05, 0.1)})
+    rng = np.random.default_rng(0)
+    joints = robot.random_configurations(150, rng)
+    joints[:, 3] = rng.uniform(-span, span, 150)
+    fit, data = moved_by_a_joint(robot, joints, 3, 5e-5 * (joints[:, 3] / span) ** 3)
+    assert periodic_errors(fit, data) == ()
+
+
+def test_a_joint_that_stands_still_is_not_named() -> None:
+    plain = unknown_gears(load_robot("irb120"))
+    robot = plain.with_frames(plain.base, {"tip": (0.1, 0.05, 0.1)})
+    rng = np.random.default_rng(0)
+    joints = robot.random_configurations(150, rng)
+    joints[:, 3] = 0.3
+    fit, data = moved_by_a_joint(robot, joints, 3, 3e-5 * rng.normal(size=150))
+    assert 4 not in [error.joint for error in periodic_errors(fit, data)]

@@ -207,7 +207,7 @@ def test_a_dataset_checks_itself(field: str, value: Any) -> None:
 def test_wrong_arrays_are_refused_before_a_job_starts() -> None:
     """They ended in LinAlgError, ValueError or IndexError far from here."""
     data = Dataset.of(joints(40), positions(40))
-    for job in (lambda d: calibrate("irb120", d), lambda d: check(data=d)):
+    for job in (lambda d: calibrate("irb120", d), lambda d: check(d)):
         for field, value in (("joints", data.joints * NAN), ("sigma", np.zeros(80)), ("position", np.zeros((80, 2)))):
             refused(field, lambda job=job, field=field, value=value: job(replace(data, **{field: value})))
 
@@ -292,7 +292,8 @@ def test_readings_by_mask_by_index_and_twice() -> None:
 
 def test_nothing_chosen_is_nothing() -> None:
     data = sound()
-    for none in ([], np.zeros(0, dtype=np.intp), np.zeros(N, dtype=bool), range(0)):
+    nothing: tuple[Any, ...] = ([], np.zeros(0, dtype=np.intp), np.zeros(N, dtype=bool), range(0))
+    for none in nothing:
         assert data.of_configurations(none).configurations == 0
         assert len(data.of_configurations(none).target) == 0
 

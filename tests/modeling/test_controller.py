@@ -16,7 +16,8 @@ from truearm.modeling.chain import Array
 from truearm.modeling.controller import AS_THE_MODEL, Controller
 from truearm.modeling.conversion import CONVERSIONS, converted
 from truearm.modeling.formats.robot_file import read_robot, robot_text
-from truearm.modeling.formats.urdf import read_urdf, urdf_text
+from truearm.modeling.formats.urdf import read_urdf
+from truearm.modeling.formats.urdf_writing import urdf_text
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 
@@ -125,15 +126,18 @@ def test_unknown_pulses_are_refused(pulses: tuple[float | None, ...], missing: s
     [
         ("{joint: frist}", ["joints[1]", "no joint of this name", "got 'frist'", "Did you mean first"]),
         ("{joint: first, coupling: {secnd: 1}}", ["joints[1].coupling", "got 'secnd'", "Did you mean second"]),
-        ("{joint: first, sign: 0}", ["controller.joints[1].sign", "a sign is 1 or -1", "got 0"]),
-        ("{joint: first, sign: -2}", ["a sign is 1 or -1", "got -2"]),
-        ("{joint: first, sign: true}", ["joints[1].sign", "valid integer"]),
-        ("{joint: first, sign: -1.0}", ["joints[1].sign", "valid integer"]),
+        ("{joint: first, sign: 0}", ["controller.joints[1].sign", "got 0", "allowed: 1, -1"]),
+        ("{joint: first, sign: -2}", ["got -2", "allowed: 1, -1"]),
+        ("{joint: first, sign: true}", ["joints[1].sign", "a whole number belongs here"]),
+        ("{joint: first, sign: -1.0}", ["joints[1].sign", "a whole number belongs here"]),
         ("{joint: first, zero: .nan}", ["joints[1].zero", "finite"]),
         ("{joint: first, zero: 1e9}", ["zero of first", "too large to be meant"]),
         ("{joint: first, coupling: {first: 1}}", ["cannot be coupled with itself", "got 'first'"]),
         ("{joint: first, coupling: {slide: 1}}", ["both turn, or both slide", "revolute first, prismatic slide"]),
-        ("{joint: first, pulses_per_degree: 0}", ["joints[1].pulses_per_degree", "pulses belong here", "got 0"]),
+        (
+            "{joint: first, pulses_per_degree: 0}",
+            ["joints[1].pulses_per_degree", "so many pulses cannot be", "got 0", "allowed: 0.000001"],
+        ),
         ("{joint: first, pulses_per_degree: .inf}", ["joints[1].pulses_per_degree", "finite"]),
         ("{joint: first, pulses_per_mm: 5}", ["is revolute", "got 'pulses_per_mm'", "allowed: pulses_per_degree"]),
         ("{joint: slide, pulses_per_degree: 5}", ["is prismatic", "allowed: pulses_per_mm"]),

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import ast
+import runpy
+from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+import truearm
+from truearm.errors import InputError
 from truearm.library import load_robot
-from truearm.modeling.effects import EFFECTS, Effect
+from truearm.modeling.effects import EFFECTS, NON_NEGATIVE, Effect
 from truearm.modeling.effects.backlash import SEATED
+from truearm.modeling.formats.export import exported
+from truearm.modeling.formats.robot_file import read_robot, robot_text
 from truearm.modeling.parts import LinkMass, Payload
 from truearm.modeling.postures import Postures, approach_of
 from truearm.modeling.robot import Robot
@@ -152,3 +160,119 @@ def test_what_is_not_known_does_nothing(effect: str) -> None:
     q = robot.random_configurations(5, np.random.default_rng(8))
     for actual, expected in zip(robot.world_poses(q), replace(robot, effect_names=()).world_poses(q), strict=True):
         assert_array_equal(actual, expected)
+
+
+# -- what an effect says about itself
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.name)
+def test_the_group_of_its_parameters_is_its_name(effect: type[Effect]) -> None:
+    robot = loaded_arm((effect.name,), 3)
+    (own,) = robot.effects
+    assert own.parameters
+    assert {p.group for p in own.parameters} == {effect.name}
+    assert len({e.name for e in EFFECTS}) == len(EFFECTS)
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.name)
+def test_it_depends_on_what_it_says(effect: type[Effect]) -> None:
+    robot = loaded_arm((effect.name,), 3)
+    at = circumstances(robot, 40, 4)
+    assert at.wrench is not None
+    assert at.approach is not None
+    assert at.number is not None
+    assert at.temperature is not None
+
+    def matters(**changed: np.ndarray) -> bool:
+        """Whether the effect moves the arm otherwise in other circumstances."""
+        return bool(np.abs(robot.world_poses(replace(at, **changed))[0] - robot.world_poses(at)[0]).max() > 1e-9)
+
+    assert matters(wrench=2.0 * at.wrench) == effect.loaded
+    assert matters(approach=-at.approach, number=at.number[::-1]) == effect.ordered
+    assert matters(temperature=at.temperature + 5.0) == effect.warmed
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.name)
+def test_it_moves_what_it_says(effect: type[Effect]) -> None:
+    robot = loaded_arm((effect.name,), 3)
+    at = robot.loaded(circumstances(robot, 20, 4))
+    moved = {variable for rate in robot.effects[0].derivative(at, robot.values).values() for variable in rate}
+    layout = robot.layout
+    tilts = {variable for joint in layout.joints for variable in layout.tilt(joint)}
+    lengths = {layout.length(number) for number in range(len(layout.lengths))}
+    assert bool(moved & tilts) == effect.tilts
+    assert bool(moved & lengths) == effect.stretches
+    assert bool(moved & set(layout.joints)) == (not effect.tilts and not effect.stretches)
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.name)
+def test_only_what_can_be_negative_may_be_stated_so(effect: type[Effect], tmp_path: Path) -> None:
+    robot = replace(loaded_arm((effect.name,), 3), history=())
+    name = robot.effects[0].parameters[0].name
+    (tmp_path / "robot.yaml").write_text(robot_text(robot.with_values({name: -1e-5})))
+    assert (effect.name in NON_NEGATIVE) == effect.non_negative
+    if effect.non_negative:
+        with pytest.raises(
+            InputError, match=rf"{name}\.value: no joint has a negative one; got '-.*; allowed: 0 or more"
+        ):
+            read_robot(tmp_path / "robot.yaml")
+    else:
+        assert read_robot(tmp_path / "robot.yaml").values[name] == pytest.approx(-1e-5)
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.name)
+def test_the_python_file_computes_it_or_says_that_it_does_not(effect: type[Effect], tmp_path: Path) -> None:
+    robot = replace(loaded_arm((effect.name,), 3), targets=())
+    made = exported(robot, "python")
+    left = [sentence for sentence in made.left_out if f"the joint effect {effect.name};" in sentence]
+    assert len(left) == (0 if effect.exportable else 1)
+    (tmp_path / "arm.py").write_text(made.text)
+    q = robot.random_configurations(20, np.random.default_rng(5))
+    position, _ = runpy.run_path(str(tmp_path / "arm.py"))["forward"](q)
+    counterpart = robot if effect.exportable else robot.rigid
+    away = {name: p for name, p in counterpart.known.items() if p.group != "base"}
+    in_base = replace(counterpart, known=away, base_quaternion=(1.0, 0.0, 0.0, 0.0))
+    assert_allclose(position, in_base.world_poses(q)[0], rtol=0, atol=1e-9)
+    assert effect.exportable == bool(np.abs(position - in_base.rigid.world_poses(q)[0]).max() > 1e-9)
+
+
+#: Modules outside of truearm.modeling.effects that name several effects, and why.
+NAMED_ELSEWHERE = {
+    "identification/solving/models.py": "a model is a choice of effects",
+    "identification/inclinometers/fit.py": "so is the first stage of the method with inclinometers",
+    "studies/": "a study chooses models as its document does",
+    "planning/choosing/plan_table.py": "a column of a plan has the name of an effect",
+}
+
+
+def spelled_lists(source: str, names: frozenset[str]) -> Iterator[int]:
+    """Return the lines of lists that spell the name of a joint effect, and of tables that spell several."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Dict):
+            entries = [*(key for key in node.keys if key is not None), *node.values]
+        elif isinstance(node, ast.Tuple | ast.List | ast.Set):
+            entries = node.elts
+        else:
+            continue
+        spelled = sum(isinstance(entry, ast.Constant) and entry.value in names for entry in entries)
+        if spelled >= (2 if isinstance(node, ast.Dict) else 1):
+            yield node.lineno
+
+
+def test_no_other_module_lists_effects() -> None:
+    names = frozenset(effect.name for effect in EFFECTS)
+    package = Path(truearm.__file__).parent
+    found = [
+        f"{path.relative_to(package)}:{line}"
+        for path in sorted(package.rglob("*.py"))
+        if package / "modeling" / "effects" not in path.parents
+        for line in spelled_lists(path.read_text("utf-8"), names)
+    ]
+    assert [place for place in found if not place.startswith(tuple(NAMED_ELSEWHERE))] == []
+    for allowed in NAMED_ELSEWHERE:
+        assert any(place.startswith(allowed) for place in found), f"{allowed} needs no exception any more"
+
+
+def test_the_scan_finds_a_list() -> None:
+    names = frozenset(effect.name for effect in EFFECTS)
+    assert list(spelled_lists('x = ("gain", 1)\ny = {"gain": "backlash"}\nz = ["other"]\n', names)) == [1, 2]

@@ -122,7 +122,7 @@ def test_tables_of_any_convention_read_back(convention: Convention, format_: str
 def test_nearly_parallel_axes_go_into_no_dh_table(format_: str) -> None:
     with pytest.raises(InputError, match="nearly parallel") as refusal:
         exported(calibrated(load_robot("irb120")), format_)
-    assert "--format hayati" in str(refusal.value)
+    assert "take the convention hayati" in str(refusal.value)
 
 
 def test_a_table_says_where_it_starts() -> None:

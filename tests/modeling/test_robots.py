@@ -11,7 +11,7 @@ from truearm.library import library, load_robot, urdf_source
 from truearm.modeling.chain import Array
 from truearm.modeling.conventions import parallel_joints_without_beta
 from truearm.modeling.formats.robot_file import read_robot, robot_text
-from truearm.modeling.formats.urdf import urdf_text
+from truearm.modeling.formats.urdf_writing import urdf_text
 from truearm.modeling.robot import Robot
 
 IDS = ("irb120", "irb1600", "katana450", "kr5", "li3", "lrmate200ic", "puma560", "ur10", "ur5")

@@ -16,7 +16,9 @@ from truearm.library import library, load_robot
 from truearm.modeling.chain import Array, Chain
 from truearm.modeling.conventions import CONVENTIONS, Convention, JointKind
 from truearm.modeling.formats.robot_file import read_robot, robot_text
-from truearm.modeling.formats.urdf import calibrated_urdf, read_urdf, roll_pitch_yaw, urdf_text
+from truearm.modeling.formats.urdf import calibrated_urdf, read_urdf
+from truearm.modeling.formats.urdf_tree import roll_pitch_yaw
+from truearm.modeling.formats.urdf_writing import urdf_text
 from truearm.modeling.parts import Joint, LinkMass
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform

@@ -433,3 +433,9 @@ def test_correlations_of_all_free_parameters() -> None:
 )
 def test_three_digits(value: float, text: str) -> None:
     assert significant(value) == text
+
+
+def test_parameters_named_in_a_notice_are_shown_as_code() -> None:
+    notice = Notice("odd", "Leave `train` out, or use `loss=cauchy` & <b>.")
+    html = report_html(replace(made(), warnings=(notice,)))
+    assert "Leave <code>train</code> out, or use <code>loss=cauchy</code> &amp; &lt;b&gt;." in html

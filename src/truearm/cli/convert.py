@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from truearm.cli.output import print_record
+
 
 def convert(
     robot: Annotated[str, typer.Argument(metavar="ROBOT", help="A library id, a robot file or a URDF.")],
@@ -14,11 +16,6 @@ def convert(
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Robot file to write; nothing is overwritten.")],
 ) -> None:
     """Write a robot in another kinematic convention, every pose the same."""
-    from truearm.files import write_new_text
-    from truearm.library import load_robot
-    from truearm.modeling.conversion import converted
-    from truearm.modeling.formats.robot_file import robot_text
+    from truearm.jobs.convert import convert as run
 
-    made = converted(load_robot(robot), convention)
-    write_new_text(out, robot_text(made))
-    typer.echo(f"{out}: {made.name}, {made.history[-1]}.")
+    print_record(run(robot, convention, out=out))

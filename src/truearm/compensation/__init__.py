@@ -1,1 +1,1 @@
-"""What to command, so that the real robot does what was meant."""
+"""What to command so that the real robot goes where the program says."""

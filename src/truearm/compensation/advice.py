@@ -11,7 +11,7 @@ import numpy as np
 
 from truearm.compensation.gauge import turns_between
 from truearm.compensation.program_correction import CorrectedPrograms, Frames
-from truearm.compensation.split import MOST, Divided
+from truearm.compensation.split import MOST_SEGMENTS, ProgramSplit
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import NO_PAYLOAD
 from truearm.modeling.robot import Robot
@@ -24,7 +24,9 @@ _FEW: Final = 3
 _LISTED: Final = 5
 
 
-def check_correction(robot: Robot, result: CorrectedPrograms, division: Sequence[Divided] = ()) -> tuple[Notice, ...]:
+def check_correction(
+    robot: Robot, result: CorrectedPrograms, splits: Sequence[ProgramSplit] = ()
+) -> tuple[Notice, ...]:
     """Say what is to be known about corrected programs before they run.
 
     Parameters
@@ -32,9 +34,9 @@ def check_correction(robot: Robot, result: CorrectedPrograms, division: Sequence
     robot
         Calibrated, with the payload that holds.
     result
-        The programs put right.
-    division
-        What was divided, one a program; empty if nothing was to be.
+        The corrected programs.
+    splits
+        How their moves are split, one a program; empty if they are not.
     """
     corrections = result.corrections
     count = sum(int(one.corrected.sum()) for one in corrections)
@@ -86,21 +88,21 @@ def check_correction(robot: Robot, result: CorrectedPrograms, division: Sequence
                 "tools, frames and robot belong together, and the convention of their angles.",
             )
         )
-    left = sum(len(one.left) for one in division)
-    if left:
+    unsplit = sum(len(one.unsplit) for one in splits)
+    if unsplit:
         made.append(
             Notice(
                 "moves-not-divided",
-                f"{_counted(left, 'straight or circular move')} not divided for --split: where the start is not sure, "
-                "a target was not corrected, is given by joints or is an offset, the posture changes on the way, "
-                f"{MOST} pieces are not enough, or its instruction has options that pieces of it cannot have.",
+                f"{_counted(unsplit, 'straight or circular move')} not split: the start of such a move is not sure; or "
+                "a target was not corrected, is given by joints or is an offset; or the posture changes on the way; or "
+                f"{MOST_SEGMENTS} segments are not enough; or its instruction has options that segments cannot have.",
             )
         )
     if robot.payload == NO_PAYLOAD and any(effect.loaded for effect in robot.effects):
         made.append(
             Notice(
                 "no-payload",
-                "The robot carries nothing in this correction. If its tool weighs something, say so with --payload.",
+                "The robot carries nothing in this correction. If its tool weighs something, give it with `payload`.",
             )
         )
     return tuple(made)
@@ -109,7 +111,7 @@ def check_correction(robot: Robot, result: CorrectedPrograms, division: Sequence
 def _assumed(frames: Frames, count: int) -> list[Notice]:
     made = []
     if frames.frames == "assumed":
-        few = f" With so few targets ({count}) little or nothing of the correction is left: give the frame."
+        few = f" With so few targets ({count}) little or nothing of the correction is left: give `frames`."
         made.append(Notice("frames-assumed", f"{frame_words(frames)[0]}{few if count <= _FEW else ''}"))
     if frames.tools == "assumed":
         made.append(Notice("tools-assumed", frame_words(frames)[-1]))
@@ -125,19 +127,20 @@ def frame_words(frames: Frames) -> list[str]:
 
     if frames.frames == "identified":
         said = [
-            "The program's frames are where --frame says; targets are corrected in them, and may all move together."
+            "The program's frames are where `frames` places them; targets are corrected in them, and may all move "
+            "together."
         ]
     else:
         said = [
-            "No --frame was given. Calibration cannot know where a program's frames really are, so the base was "
+            "`frames` is not given. Calibration cannot know where a program's frames really are, so the base was "
             f"shifted by {size(frames.base)} until the mean correction of all targets is zero: targets are right to "
             "each other, and the program as a whole stays where it was."
         ]
     if frames.tools == "identified":
-        said.append("The program's tools are where --tool says, on the identified flange.")
+        said.append("The program's tools are where `tools` places them, on the identified flange.")
     else:
         said.append(
-            "No --tool was given. The program's tools were taken to sit on a flange that agrees best with the nominal "
+            "`tools` is not given. The program's tools are taken to sit on a flange that agrees best with the nominal "
             f"one all over the workspace, {size(frames.flange)} from the identified one."
         )
     return said

@@ -55,7 +55,8 @@ _ORIENTATIONS: Final[dict[str, Orientation]] = {
 
 def _unit_length(q: tuple[float, ...]) -> tuple[float, ...]:
     if abs(float(np.linalg.norm(q)) - 1.0) > 1e-3:
-        raise ValueError(f"a quaternion (w, x, y, z) must have length 1, this one has {np.linalg.norm(q):.6g}")
+        length = float(np.linalg.norm(q))
+        raise InputError(f"a quaternion (w, x, y, z) must have length 1, this one has {length:.6g}", came=list(q))
     return q
 
 
@@ -88,7 +89,7 @@ class _Place(_Entry):
     def _one_orientation(self) -> _Place:
         given = [name for name in _ORIENTATIONS if getattr(self, name) is not None]
         if len(given) > 1:
-            raise ValueError(f"one orientation belongs here, not {' and '.join(given)}")
+            raise InputError("one orientation belongs here", came=" and ".join(given), allowed=", ".join(_ORIENTATIONS))
         return self
 
 
@@ -121,7 +122,7 @@ class Placed:
     controller
         What its controller has, in its flange or base frame; None if only the program can say.
     identified
-        Where it really is, in the identified flange or base; None if nobody knows.
+        Where it really is, in the identified flange or base; None if it is not known.
     """
 
     controller: Transform | None
@@ -140,25 +141,40 @@ class Cell:
 NOTHING_GIVEN: Final = Cell({}, {})
 
 
-def read_cell(robot: Robot, tools: Path | None, frames: Path | None) -> Cell:
-    """Read which tools, and which frames, a program's are.
+def read_tools(robot: Robot, path: Path | None) -> dict[str, Placed]:
+    """Read where a program's tools are.
 
     Parameters
     ----------
     robot
-        Calibrated; its base and targets are meant by ``world`` and ``target``.
-    tools, frames
-        Files of the schema above, of which the tools or the frames are taken; None for none.
+        Calibrated; ``target`` refers to its targets.
+    path
+        File of the schema above, of which the tools are taken; None for none.
 
     Raises
     ------
     InputError
-        If a file is not of the schema, or has nothing of what it is read for.
+        If the file is not of the schema, or has no tools.
     """
-    return Cell(
-        {} if tools is None else _tools(robot, tools, _file(tools, "tools")),
-        {} if frames is None else _frames(robot, frames, _file(frames, "frames")),
-    )
+    return {} if path is None else _tools(robot, path, _file(path, "tools"))
+
+
+def read_frames(robot: Robot, path: Path | None) -> dict[str, Placed]:
+    """Read where a program's frames are.
+
+    Parameters
+    ----------
+    robot
+        Calibrated; ``world`` refers to its base.
+    path
+        File of the schema above, of which the frames are taken; None for none.
+
+    Raises
+    ------
+    InputError
+        If the file is not of the schema, or has no frames.
+    """
+    return {} if path is None else _frames(robot, path, _file(path, "frames"))
 
 
 def _file(path: Path, part: str) -> CellFile:

@@ -1,7 +1,7 @@
-"""Fake targets: what to write into a program so that the robot as it is goes where the program meant (Nubiola, 1.5).
+"""Fake targets: what to write into a program so that the real robot goes where it says (Nubiola, 1.5).
 
 The controller believes in the nominal robot. It is sent to another pose: the one the nominal robot would have with the
-joint readings with which the calibrated robot is where it shall be.
+joint readings with which the calibrated robot reaches the wanted one.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from truearm.modeling.inverse.solutions import JointSolutions, PoseStatus
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import homogeneous
 
-_There = Callable[[JointSolutions, NDArray[np.intp]], NDArray[np.bool_]]
+_OnBranch = Callable[[JointSolutions, NDArray[np.intp]], NDArray[np.bool_]]
 
 
 def nominal_robot(robot: Robot) -> Robot:
@@ -69,7 +69,7 @@ class FakeTargets:
 
     @property
     def joints(self) -> Array:
-        """Readings with which the calibrated robot is where it shall be [rad or m], ``(n, joints)``."""
+        """Readings with which the calibrated robot reaches the wanted poses [rad or m], ``(n, joints)``."""
         return self.solutions.joints
 
 
@@ -83,8 +83,8 @@ def fake_targets(robot: Robot, flange: Array, near: Array) -> FakeTargets:
     flange
         Wanted poses of the flange in the identified base frame, ``(n, 4, 4)`` [m], at least one.
     near
-        Readings of the nominal robot where the program meant it to be, ``(n, joints)`` [rad or m]: the answers are on
-        the same branch and in the same turns.
+        Readings of the nominal robot at the wanted poses, ``(n, joints)`` [rad or m]: the answers are on the same
+        branch and in the same turns.
 
     Raises
     ------
@@ -100,23 +100,23 @@ def fake_targets(robot: Robot, flange: Array, near: Array) -> FakeTargets:
     # The branch that counts is the controller's, of the nominal arm: next to a singular posture the calibrated arm may
     # call the same joints by another name. So the nearest joints are taken, and all branches looked through where they
     # are on another one.
-    meant = rule.numbers(nominal.forward_kinematics(near))
+    wanted_branch = rule.numbers(nominal.forward_kinematics(near))
 
-    def there(solutions: JointSolutions, rows: NDArray[np.intp]) -> NDArray[np.bool_]:
-        return np.asarray(rule.numbers(nominal.forward_kinematics(solutions.joints)) == meant[rows])
+    def on_branch(solutions: JointSolutions, rows: NDArray[np.intp]) -> NDArray[np.bool_]:
+        return np.asarray(rule.numbers(nominal.forward_kinematics(solutions.joints)) == wanted_branch[rows])
 
     everyone = np.arange(len(flange))
-    missed = np.flatnonzero(~there(found, everyone) | ~found.usable)
+    missed = np.flatnonzero(~on_branch(found, everyone) | ~found.usable)
     if len(missed):
         again = inverse(robot, position[missed], rotation[missed], branch="all", seed=near[missed])
-        found = _better(found, again, missed[again.pose], near, there)
+        found = _better(found, again, missed[again.pose], near, on_branch)
     reached = np.array([status is not PoseStatus.UNREACHABLE for status in found.status], dtype=bool)
-    lost = np.flatnonzero(~there(found, everyone) & reached)
-    for number in np.unique(meant[lost]).tolist():
-        rows = lost[meant[lost] == number]
+    lost = np.flatnonzero(~on_branch(found, everyone) & reached)
+    for number in np.unique(wanted_branch[lost]).tolist():
+        rows = lost[wanted_branch[lost] == number]
         again = inverse(robot, position[rows], rotation[rows], branch=BRANCHES[number], seed=near[rows])
-        found = _better(found, again, rows, near, there)
-    same = there(found, everyone)
+        found = _better(found, again, rows, near, on_branch)
+    same = on_branch(found, everyone)
     status = []
     for row, one in enumerate(found.status):
         if one.usable and not same[row]:
@@ -130,7 +130,7 @@ def fake_targets(robot: Robot, flange: Array, near: Array) -> FakeTargets:
 
 
 def _better(
-    found: JointSolutions, again: JointSolutions, rows: NDArray[np.intp], near: Array, there: _There
+    found: JointSolutions, again: JointSolutions, rows: NDArray[np.intp], near: Array, on_branch: _OnBranch
 ) -> JointSolutions:
     """Return solutions with others in their place that are on the branch where they are not, or can be used.
 
@@ -142,15 +142,15 @@ def _better(
         Others, and the pose of each.
     near
         Joints to be near to, of every pose.
-    there
+    on_branch
         Whether solutions of poses are on the branch of these.
     """
-    agrees, usable = there(again, rows), again.usable
+    agrees, usable = on_branch(again, rows), again.usable
     away = np.abs(again.joints - near[rows]).max(axis=1)
     order = np.lexsort((away, ~usable, ~agrees, rows))
     best = order[np.unique(rows[order], return_index=True)[1]]
     now = _picked(found, rows[best])
-    known, worked = there(now, rows[best]), now.usable
+    known, worked = on_branch(now, rows[best]), now.usable
     best = best[agrees[best] & ~(known & worked) & (usable[best] | ~known)]
     return _merged([(np.arange(len(near)), found), (rows[best], _picked(again, best))], len(near))
 

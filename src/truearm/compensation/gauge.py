@@ -4,7 +4,7 @@ After a calibration the shift of the base against joint 1, and of the tool again
 target say where the target is, and not where the robot's base plate and its flange are. Written into a program, that
 shift would move all of it. So unless somebody says where a program's tool and frames really are, the identified flange
 is taken to be where it agrees best with the nominal one all over the workspace, and the base to be where the mean
-correction of the program is nothing.
+correction of the program is zero.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from truearm.modeling.transform import rotation_from_vector, rotation_vector
 #: Configurations on which flange and base are compared.
 _CONFIGURATIONS: Final = 300
 _ROUNDS: Final = 8
-#: The mean correction is nothing below this [m, rad].
-_NOTHING: Final = 1e-10
+#: The mean correction counts as zero below this [m, rad].
+_ZERO: Final = 1e-10
 
 
 def best_agreement(robot: Robot) -> tuple[Array, Array]:
@@ -45,12 +45,14 @@ def best_agreement(robot: Robot) -> tuple[Array, Array]:
     """
     nominal = nominal_robot(robot)
     joints = robot.random_configurations(_CONFIGURATIONS, np.random.default_rng(0))
-    meant, real = matrices(nominal, joints), np.linalg.inv(robot.base.matrix) @ matrices(robot, joints)
+    nominal_poses, real_poses = matrices(nominal, joints), np.linalg.inv(robot.base.matrix) @ matrices(robot, joints)
     weight = np.repeat([1.0, reach(nominal, None)], 3)
     base, before_flange = np.eye(4), np.eye(4)
     for _ in range(_ROUNDS):
-        expected = base @ meant @ before_flange
-        missed = np.concatenate([real[:, :3, 3] - expected[:, :3, 3], turns_between(expected, real)], axis=1)
+        expected = base @ nominal_poses @ before_flange
+        missed = np.concatenate(
+            [real_poses[:, :3, 3] - expected[:, :3, 3], turns_between(expected, real_poses)], axis=1
+        )
         rows = np.concatenate([_by_base(expected), _by_flange(expected)], axis=2)
         step, *_ = np.linalg.lstsq((rows * weight[:, None]).reshape(-1, 12), (missed * weight).ravel(), rcond=None)
         base, before_flange = _small(step[:6]) @ base, before_flange @ _small(step[6:])
@@ -58,12 +60,12 @@ def best_agreement(robot: Robot) -> tuple[Array, Array]:
 
 
 def base_shift(corrected: Callable[[Array], tuple[Array, Array]], start: Array) -> Array:
-    """Return where the nominal base has to be in the identified one for the mean correction of targets to be nothing.
+    """Return where the nominal base has to be in the identified one for the mean correction of targets to be zero.
 
     Parameters
     ----------
     corrected
-        For a base ``(4, 4)`` the tips that targets mean and those of their corrections, in the nominal base frame,
+        For a base ``(4, 4)`` the tips of targets before and after their correction, in the nominal base frame,
         ``(n, 4, 4)`` each; of no targets at all if none can be corrected.
     start
         A base near to it.
@@ -71,20 +73,20 @@ def base_shift(corrected: Callable[[Array], tuple[Array, Array]], start: Array) 
     Returns
     -------
     base
-        ``T_base_nominalbase``, ``(4, 4)``. The mean of what positions change by is nothing, and so is that of the
-        rotation vectors that orientations change by.
+        ``T_base_nominalbase``, ``(4, 4)``. The mean change of positions is zero, and so is the mean rotation vector
+        of the changes of orientations.
     """
     base = start
     for _ in range(_ROUNDS):
-        meant, written = corrected(base)
-        if not len(meant):
+        tips, new_tips = corrected(base)
+        if not len(tips):
             break
-        moved = (written[:, :3, 3] - meant[:, :3, 3]).mean(axis=0)
-        turned = turns_between(meant, written).mean(axis=0)
-        if np.abs(moved).max() < _NOTHING and np.abs(turned).max() < _NOTHING:
+        moved = (new_tips[:, :3, 3] - tips[:, :3, 3]).mean(axis=0)
+        turned = turns_between(tips, new_tips).mean(axis=0)
+        if np.abs(moved).max() < _ZERO and np.abs(turned).max() < _ZERO:
             break
         centre = np.eye(4)
-        centre[:3, 3] = meant[:, :3, 3].mean(axis=0)
+        centre[:3, 3] = tips[:, :3, 3].mean(axis=0)
         # Base and correction move alike: where the base goes, the answers, and with them what is written, go as well.
         base = centre @ _small(-np.concatenate([moved, turned])) @ np.linalg.inv(centre) @ base
     return base

@@ -1,8 +1,8 @@
 """Off-line compensation through the model with inverted joint errors (KR5 paper, equation 11).
 
 The robot with errors is ``A1 E1 A2 E2 ..``. At the nominal joint readings ``A1 inv(E1) A2 inv(E2) ..`` is as far from
-the pose that is meant as the real robot, the other way: it is the fake target. The nominal robot's readings for the
-fake target bring the real robot to the pose, but for what is of second order in the errors. (Solving the inverse
+the wanted pose as the real robot, on the other side: it is the fake target. The nominal robot's readings for the
+fake target bring the real robot to the pose, up to terms of second order in the errors. (Solving the inverse
 kinematics of the inverted model for the pose itself would double the error.)
 """
 
@@ -29,7 +29,7 @@ CONVENTION: Final = "joint-errors"
 
 @dataclass(frozen=True, eq=False)
 class FakeTargets:
-    """What a robot is told so that it does what was meant.
+    """What to command so that the real robot reaches wanted poses.
 
     Attributes
     ----------
@@ -89,7 +89,7 @@ def fake_targets(robot: Robot, joints: Array) -> FakeTargets:
     robot
         With identified joint errors.
     joints
-        Readings at which the nominal robot is where it shall be.
+        Readings at which the nominal robot is at the wanted poses.
     """
     position, rotation = inverted(robot).world_poses(joints)
     return FakeTargets(position, rotation, inverse(design(robot), position, rotation, seed=joints))

@@ -1,7 +1,8 @@
-"""Whole programs put right: from the poses that a program means to the numbers that bring the real robot there.
+"""Whole programs corrected: from the poses of a program to the numbers with which the real robot reaches them.
 
-Every target is taken as the tip of its tool in its frame. Where tool and frame really are decides what correct means;
-see :mod:`truearm.compensation.cell` for how to say it and :mod:`truearm.compensation.gauge` for what is done without.
+Every target is taken as the tip of its tool in its frame. What is correct depends on where tool and frame really are;
+see :mod:`truearm.compensation.cell` for how to say it, and :mod:`truearm.compensation.gauge` for what is assumed
+otherwise.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 from truearm.compensation.cell import NOTHING_GIVEN, Cell
 from truearm.compensation.fake_targets import FakeTargets, fake_targets, matrices, nominal_robot
 from truearm.compensation.gauge import base_shift, best_agreement, turns_between
-from truearm.compensation.program_places import Places, Told, told
+from truearm.compensation.program_places import Places, Provenance, provenance
 from truearm.compensation.program_poses import edits_of, joint_numbers, joints_of, place, pose_numbers, poses_of
 from truearm.compensation.programs.program import Configuration, Edit, Program, Skipped
 from truearm.compensation.resolved_configurations import (
@@ -32,7 +33,7 @@ from truearm.modeling.chain import Array
 from truearm.modeling.inverse.solutions import PoseStatus
 from truearm.modeling.robot import Robot
 
-#: The base that nobody measured is found with this many targets, evenly along the programs.
+#: A base that was not measured is found with this many targets, evenly along the programs.
 _TARGETS_FOR_BASE: Final = 2000
 _JOINTS: Final = 6
 #: A joint within this of a bound [rad] is on it: the numbers of programs are rounded.
@@ -45,7 +46,7 @@ Between = Callable[[NDArray[np.intp], Array, Array], tuple[Array, NDArray[np.boo
 
 @dataclass(frozen=True, eq=False)
 class Correction:
-    """One program put right.
+    """One program corrected.
 
     Attributes
     ----------
@@ -58,13 +59,13 @@ class Correction:
     skipped
         What stays as it is, and why: what the reader could not use, and targets that cannot be computed.
     before, after
-        Tips of the targets in their frames, ``(n, 4, 4)`` [m], as the program has them and as it shall.
+        Tips of the targets in their frames, ``(n, 4, 4)`` [m], before and after the correction.
     tips
-        Tips that the targets mean in the controller's base frame, ``(n, 4, 4)`` [m].
+        Tips of the targets in the controller's base frame, ``(n, 4, 4)`` [m].
     joints
-        Readings of the model with which the real robot is there [rad or m], ``(n, joints)``.
+        Readings of the model with which the real robot reaches the targets [rad or m], ``(n, joints)``.
     on_edge
-        Corrected targets with a joint that leaves the readings of its configuration, by less than controllers mind.
+        Corrected targets with a joint that leaves the readings of its configuration, by less than controllers refuse.
     """
 
     program: Program
@@ -101,15 +102,15 @@ class Frames:
         identified, `base` is that of the first of them.
     """
 
-    tools: Told
-    frames: Told
+    tools: Provenance
+    frames: Provenance
     base: Array
     flange: Array
 
 
 @dataclass(frozen=True, eq=False)
 class CorrectedPrograms:
-    """Programs put right together, with one base and one flange.
+    """Programs corrected together, with one base and one flange.
 
     Attributes
     ----------
@@ -120,7 +121,7 @@ class CorrectedPrograms:
     guessed
         Where the posture of a first pose was guessed, in words; empty if nowhere.
     between
-        One a program: how poses between its targets are put right.
+        One a program: how poses between its targets are corrected.
     """
 
     corrections: tuple[Correction, ...]
@@ -132,7 +133,7 @@ class CorrectedPrograms:
 def corrected_programs(
     robot: Robot, programs: Sequence[Program], cell: Cell, progress: Callable[[str], None] = lambda _: None
 ) -> CorrectedPrograms:
-    """Put programs right.
+    """Correct programs.
 
     Parameters
     ----------
@@ -159,18 +160,18 @@ def corrected_programs(
             cure="An arm of fewer cannot go where its errors have to be made good.",
         )
     nominal = nominal_robot(robot)
-    tools, frames = told(programs, cell, "tool"), told(programs, cell, "frame")
+    tools, frames = provenance(programs, cell, "tool"), provenance(programs, cell, "frame")
     base, flange = np.eye(4), np.eye(4)
     if "assumed" in (tools, frames):
         base, flange = best_agreement(robot)
-    progress("finding the postures that the programs mean")
-    meant = [_Meant(robot, nominal, program, cell) for program in programs]
+    progress("resolving the configurations")
+    resolved = [_ResolvedProgram(robot, nominal, program, cell) for program in programs]
     if frames == "identified":
         # What is given by joints stays where it is to the first frame that was measured.
-        base = next(one.measured_base for one in meant if one.measured_base is not None)
+        base = next(one.measured_base for one in resolved if one.measured_base is not None)
     else:
         progress("finding where the base is")
-        parts = [(one, one.some(_TARGETS_FOR_BASE // len(meant) + 1)) for one in meant]
+        parts = [(one, one.some(_TARGETS_FOR_BASE // len(resolved) + 1)) for one in resolved]
 
         def corrected(shift: Array) -> tuple[Array, Array]:
             tips = [one.tips_with(rows, shift, flange) for one, rows in parts]
@@ -179,19 +180,20 @@ def corrected_programs(
         base = base_shift(corrected, base)
     progress("finding fake targets")
     return CorrectedPrograms(
-        tuple(one.correction(base, flange) for one in meant),
+        tuple(one.correction(base, flange) for one in resolved),
         Frames(tools, frames, base, flange),
-        tuple(one.guess for one in meant if one.guess),
-        tuple(partial(one.between, base, flange) for one in meant),
+        tuple(one.guess for one in resolved if one.guess),
+        tuple(partial(one.between, base, flange) for one in resolved),
     )
 
 
 def commanded(robot: Robot, program: Program, cell: Cell = NOTHING_GIVEN) -> Array:
     """Return the readings of the model to which the controller sends the robot, ``(n, joints)`` [rad or m].
 
-    It believes in the nominal robot. NaN where it finds none; `cell` is asked for what the program does not define.
+    The controller knows the nominal robot alone. NaN where it finds no joints; `cell` has tools and frames that the
+    program does not define.
     """
-    return _Meant(robot, nominal_robot(robot), program, cell).joints
+    return _ResolvedProgram(robot, nominal_robot(robot), program, cell).joints
 
 
 def _straight(program: Program) -> frozenset[int]:
@@ -204,8 +206,8 @@ def _straight(program: Program) -> frozenset[int]:
     return frozenset(index for index, kind in first.items() if kind != "joint")
 
 
-class _Meant:
-    """What one program means."""
+class _ResolvedProgram:
+    """A program whose targets are poses and joints of the nominal robot."""
 
     def __init__(self, robot: Robot, nominal: Robot, program: Program, cell: Cell) -> None:
         self._robot, self._nominal, self._program = robot, nominal, program
@@ -218,19 +220,19 @@ class _Meant:
         poses = poses_of(program)
         flange = np.zeros((len(targets), 4, 4))
         by_pose, by_joints = ~self._joints_given, self._joints_given
-        back = np.linalg.inv(self._tool.shown)
-        flange[by_pose] = self._base.shown[by_pose] @ poses[by_pose] @ back[by_pose]
+        back = np.linalg.inv(self._tool.nominal)
+        flange[by_pose] = self._base.nominal[by_pose] @ poses[by_pose] @ back[by_pose]
         flange[by_joints] = matrices(nominal, known[by_joints])
-        #: Tips in their frames, and the nominal flange, as the program means them.
+        #: Tips of the targets in their frames.
         self._poses = np.where(
-            by_pose[:, None, None], poses, np.linalg.inv(self._base.shown) @ flange @ self._tool.shown
+            by_pose[:, None, None], poses, np.linalg.inv(self._base.nominal) @ flange @ self._tool.nominal
         )
         configurations = [target.configuration for target in targets]
         order = [index for move in program.moves for index in (move.via, move.target) if index is not None]
-        self._postures: ResolvedConfigurations = resolved_configurations(
+        self._resolved: ResolvedConfigurations = resolved_configurations(
             nominal, flange, configurations, known, order, [target.parent for target in targets], _straight(program)
         )
-        found = self._postures
+        found = self._resolved
         self.guess = "" if found.guessed is None else place(program, targets[found.guessed])
         self.joints = found.joints
         self._usable: NDArray[np.bool_] = np.asarray(~np.isnan(found.joints).any(axis=1))
@@ -247,26 +249,26 @@ class _Meant:
         return np.asarray(usable[np.unique(evenly)])
 
     def tips_with(self, rows: NDArray[np.intp], base: Array, flange: Array) -> tuple[Array, Array]:
-        """Return tips of targets in the controller's base frame, as meant and as corrected, without those not found."""
+        """Return tips of targets in the controller's base frame, before and after correction, where found."""
         if not len(rows):
             return np.zeros((0, 4, 4)), np.zeros((0, 4, 4))
         found = self._found(rows, base, flange)
         good = found.solutions.usable
-        meant = self._base.shown[rows] @ self._poses[rows]
-        return meant[good], (found.flange @ self._tool.shown[rows])[good]
+        tips = self._base.nominal[rows] @ self._poses[rows]
+        return tips[good], (found.flange @ self._tool.nominal[rows])[good]
 
     def correction(self, base: Array, flange: Array) -> Correction:
-        """Return the program put right, with what was taken for the real base and flange."""
+        """Return the corrected program, with what was taken for the real base and flange."""
         program, count = self._program, len(self._program.targets)
         rows = np.flatnonzero(self._usable)
-        after, joints = self._poses.copy(), self._postures.joints.copy()
+        after, joints = self._poses.copy(), self._resolved.joints.copy()
         reasons: dict[int, str] = {}
         on_edge: tuple[int, ...] = ()
         for row in np.flatnonzero(~self._usable).tolist():
             reasons[row] = (
                 "the nominal robot reaches it in no posture of the configuration that the program states, or only in a "
                 "singular one: check its configuration data, tool and frame"
-                if self._postures.reachable[row]
+                if self._resolved.reachable[row]
                 else "out of reach of the nominal robot: check its tool and frame"
             )
         if len(rows):
@@ -277,10 +279,10 @@ class _Meant:
                     reasons[row] = _reason(found, at)
             reasons |= self._changed_turns(rows, joints, reasons)
             on_edge = self._on_edge(rows, joints, reasons)
-            after[rows] = np.linalg.inv(self._base.shown[rows]) @ found.flange @ self._tool.shown[rows]
+            after[rows] = np.linalg.inv(self._base.nominal[rows]) @ found.flange @ self._tool.nominal[rows]
         corrected = np.ones(count, dtype=bool)
         corrected[list(reasons)] = False
-        after[~corrected], joints[~corrected] = self._poses[~corrected], self._postures.joints[~corrected]
+        after[~corrected], joints[~corrected] = self._poses[~corrected], self._resolved.joints[~corrected]
         numbers = pose_numbers(program, self._poses, after, np.flatnonzero(corrected & ~self._joints_given))
         numbers |= joint_numbers(self._nominal, program, joints, np.flatnonzero(corrected & self._joints_given))
         targets = program.targets
@@ -292,7 +294,7 @@ class _Meant:
             skipped=tuple(sorted((*program.skipped, *left), key=lambda s: (s.source, s.line))),
             before=self._poses,
             after=after,
-            tips=self._base.shown @ self._poses,
+            tips=self._base.nominal @ self._poses,
             joints=joints,
             on_edge=on_edge,
         )
@@ -303,12 +305,12 @@ class _Meant:
         """Return fake targets for poses in the frames, and with the tools, of targets; see :data:`Between`."""
         wanted = self._base.real(rows, base) @ poses @ np.linalg.inv(self._tool.real(rows, flange))
         found = fake_targets(self._robot, wanted, near)
-        fakes = np.linalg.inv(self._base.shown[rows]) @ found.flange @ self._tool.shown[rows]
+        fakes = np.linalg.inv(self._base.nominal[rows]) @ found.flange @ self._tool.nominal[rows]
         return fakes, found.solutions.usable
 
     def _found(self, rows: NDArray[np.intp], base: Array, flange: Array) -> FakeTargets:
         wanted = self._base.real(rows, base) @ self._poses[rows] @ np.linalg.inv(self._tool.real(rows, flange))
-        return fake_targets(self._robot, wanted, self._postures.joints[rows])
+        return fake_targets(self._robot, wanted, self._resolved.joints[rows])
 
     def _changed_turns(self, rows: NDArray[np.intp], joints: Array, reasons: Mapping[int, str]) -> dict[int, str]:
         """Return the targets that would leave the readings of their configuration, with the reason."""
@@ -328,7 +330,7 @@ class _Meant:
         """Return the targets that leave the readings of their configuration and did not before."""
         found: list[int] = []
         for configuration, members in self._configured(rows, reasons):
-            before = agrees(self._robot, self._postures.joints[members], configuration, _ROUNDING)
+            before = agrees(self._robot, self._resolved.joints[members], configuration, _ROUNDING)
             after = agrees(self._robot, joints[members], configuration, _ROUNDING)
             found += members[before & ~after].tolist()
         return tuple(sorted(found))

@@ -1,4 +1,4 @@
-"""Program files: read, put right, written beside a record of what was done, and restored from it.
+"""Program files: read, corrected, written beside a record of what was done, and restored from it.
 
 Beside every program that is written stands ``NAME.truearm.json``: hashes of the program before and after, what was
 applied, and the original itself. A program with such a record has been corrected already.
@@ -13,7 +13,7 @@ import json
 import os
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
@@ -32,7 +32,7 @@ LARGEST: Final = 200_000_000
 Hash = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 
 
-class Record(BaseModel):
+class CorrectionRecord(BaseModel):
     """Schema ``truearm-corrected/1``: what was done to a program."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -61,7 +61,7 @@ class ProgramFile:
 
     path: Path
     name: str
-    original: bytes
+    original: bytes = field(repr=False)
 
 
 def record_path(program: Path) -> Path:
@@ -155,7 +155,7 @@ def edited(text: str, edits: Sequence[Edit]) -> str:
 
 def recorded(file: ProgramFile, corrected: bytes, language: str, applied: Mapping[str, Any]) -> str:
     """Return the text of the record of a corrected program."""
-    content = Record(
+    content = CorrectionRecord(
         truearm=SCHEMA,
         program=Path(file.name).name,
         language=language,
@@ -185,7 +185,7 @@ def write_programs(folder: Path, inputs: Sequence[Path], files: Mapping[str, str
             raise InputError(
                 "a record of a correction stands here, and would be taken for one of this program",
                 where=str(record_path(path)),
-                cure="Choose another --out.",
+                cure="Choose another `out`.",
             )
         if not exists(path):
             continue
@@ -196,7 +196,7 @@ def write_programs(folder: Path, inputs: Sequence[Path], files: Mapping[str, str
             raise InputError(
                 "this file exists already, was not written by truearm or was changed since, and is not overwritten",
                 where=str(path),
-                cure="Choose another --out.",
+                cure="Choose another `out`.",
             )
     write_files(folder, files)
 
@@ -213,12 +213,12 @@ def _original(path: Path, again: bool) -> bytes:
             "this program was corrected already",
             where=str(path),
             came=f"the record {record_path(path).name}",
-            cure="Give the original; or correct that original anew with --again, or restore it with --revert.",
+            cure="Give the original; or correct that original anew with `again`, or restore it with `revert`.",
         )
     return _unchanged_original(path, record)
 
 
-def _unchanged_original(path: Path, record: Record) -> bytes:
+def _unchanged_original(path: Path, record: CorrectionRecord) -> bytes:
     if _hash(_text_bytes(path)) != record.corrected_sha256:
         raise InputError(
             "this program was changed after it was corrected, so its record is no longer about it",
@@ -234,7 +234,7 @@ def _unchanged_original(path: Path, record: Record) -> bytes:
     return original
 
 
-def _record(path: Path) -> Record | None:
+def _record(path: Path) -> CorrectionRecord | None:
     if path.is_dir():
         raise InputError("this is a folder, a program is needed", where=str(path), cure="Name the files in it.")
     beside = record_path(path)
@@ -244,7 +244,7 @@ def _record(path: Path) -> Record | None:
         content = json.loads(read_bytes(beside))
     except (ValueError, RecursionError) as error:
         raise InputError("this record cannot be read", where=str(beside), cure="Remove it, or restore it.") from error
-    return validated(content, Record, str(beside))
+    return validated(content, CorrectionRecord, str(beside))
 
 
 def _text_bytes(path: Path) -> bytes:
@@ -257,7 +257,7 @@ def _text_bytes(path: Path) -> bytes:
             where=str(path),
             came=f"{len(content) / 1e6:.0f} MB",
             allowed=f"{LARGEST / 1e6:.0f} MB, about two million targets",
-            cure="Divide it.",
+            cure="Split it into several files.",
         )
     if b"\0" in content:
         wide = content[:2] in (b"\xff\xfe", b"\xfe\xff")

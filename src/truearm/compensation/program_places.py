@@ -1,4 +1,4 @@
-"""The tools and frames of a program's targets: where its controller has them, and where they really are."""
+"""The tools and frames of a program's targets: where the controller has them, and where they really are."""
 
 from __future__ import annotations
 
@@ -15,11 +15,19 @@ from truearm.errors import InputError, nearest_names
 from truearm.modeling.chain import Array
 from truearm.modeling.transform import IDENTITY
 
-Told = Literal["identified", "assumed"]
+Kind = Literal["tool", "frame"]
+#: Whether real places were given, or have to be assumed.
+Provenance = Literal["identified", "assumed"]
 
 
-def told(programs: Sequence[Program], cell: Cell, kind: Literal["tool", "frame"]) -> Told:
-    """Return whether the real places of all tools or frames in use were given, or of none."""
+def provenance(programs: Sequence[Program], cell: Cell, kind: Kind) -> Provenance:
+    """Return whether the real places of all tools or frames in use were given, or of none.
+
+    Raises
+    ------
+    InputError
+        If only some of them were given, or none that the programs use.
+    """
     given = cell.tools if kind == "tool" else cell.frames
     used: set[str] = set()
     needed: dict[str, str] = {}
@@ -31,62 +39,65 @@ def told(programs: Sequence[Program], cell: Cell, kind: Literal["tool", "frame"]
                 needed[name] = place(program, target)
     own, without = {
         "tool": ("flange", "the flange is taken to be where it agrees best with the nominal one"),
-        "frame": ("base", "the base is shifted so that nothing moves on average"),
+        "frame": ("base", "the base is shifted so that the targets do not move on average"),
     }[kind]
     if given and needed and not any(name.lower() in given for name in used):
         first = next(iter(needed))
         raise InputError(
             f"no {kind} that the programs use is in the file",
-            where=f"--{kind}, {needed[first]}",
+            parameter=f"{kind}s",
+            where=needed[first],
             came=", ".join(sorted({name or own for name in given})),
             allowed=", ".join(name or own for name in needed),
-            cure=f"Call the {kind}s in the file as the programs do, or leave out --{kind}.",
+            cure=f"Call the {kind}s in the file as the programs do, or leave out `{kind}s`.",
         )
     known = {name for name in used if given.get(name.lower(), Placed(None, None)).identified is not None}
     missing = [name for name in needed if name not in known]
     if known and missing:
         raise InputError(
             f"only some of the {kind}s in use have a real place in the file",
+            parameter=f"{kind}s",
             where=needed[missing[0]],
             came=missing[0] or own,
-            cure=f"Give it one too, or none of them: without, {without}.",
+            cure=f"Give it one too, or none of them: without any, {without}.",
         )
     return "identified" if known else "assumed"
 
 
 class Places:
-    """Where the frames, or the tools, of a program's targets are: ``(n, 4, 4)`` of the nominal and the real robot."""
+    """Where the frames, or the tools, of a program's targets are on the nominal and the real robot: ``(n, 4, 4)``."""
 
-    def __init__(self, program: Program, given: dict[str, Placed], kind: Literal["tool", "frame"], own: Array) -> None:
+    def __init__(self, program: Program, given: dict[str, Placed], kind: Kind, own: Array) -> None:
         defined = {name.lower(): t for name, t in (program.tools if kind == "tool" else program.frames).items()}
         names = [(target.tool if kind == "tool" else target.frame).lower() for target in program.targets]
         unique = {name: number for number, name in enumerate(dict.fromkeys(names))}
         self._index = np.array([unique[name] for name in names], dtype=int)
-        shown, real = [], []
+        nominal, real = [], []
         for name in unique:
             entry = given.get(name, Placed(None, None))
             here = defined.get(name, IDENTITY if name == "" else entry.controller or entry.identified)
             if here is None:
                 raise _undefined(program, name, names, kind, [*defined, *given])
-            shown.append(own @ here.matrix)
+            nominal.append(own @ here.matrix)
             real.append(None if entry.identified is None else entry.identified.matrix)
-        self._shown = np.array(shown).reshape(-1, 4, 4)
+        self._nominal = np.array(nominal).reshape(-1, 4, 4)
         self._real: list[Array | None] = real
 
     @property
-    def shown(self) -> Array:
+    def nominal(self) -> Array:
         """In the base or flange of the nominal robot."""
-        return np.asarray(self._shown[self._index])
+        return np.asarray(self._nominal[self._index])
 
     @property
     def measured(self) -> Array | None:
         """Where the nominal base or flange is in the identified one by the first place that was measured."""
-        pairs = zip(self._shown, self._real, strict=True)
-        return next((real @ np.linalg.inv(shown) for shown, real in pairs if real is not None), None)
+        pairs = zip(self._nominal, self._real, strict=True)
+        return next((real @ np.linalg.inv(nominal) for nominal, real in pairs if real is not None), None)
 
     def real(self, rows: NDArray[np.intp], shift: Array) -> Array:
-        """Return them in the identified base or flange; where nobody measured, with the shift that is assumed."""
-        every = [shift @ shown if real is None else real for shown, real in zip(self._shown, self._real, strict=True)]
+        """Return them in the identified base or flange; where it was not measured, with the shift that is assumed."""
+        pairs = zip(self._nominal, self._real, strict=True)
+        every = [shift @ nominal if real is None else real for nominal, real in pairs]
         return np.asarray(np.reshape(every, (-1, 4, 4))[self._index[rows]])
 
 
@@ -95,8 +106,9 @@ def _undefined(program: Program, name: str, names: list[str], kind: str, known: 
     near = nearest_names(name, known)
     return InputError(
         f"this {kind} is used and never defined",
+        parameter=f"{kind}s",
         where=place(program, target),
         came=target.tool if kind == "tool" else target.frame,
         cure=(f"Did you mean {' or '.join(near)}? " if near else "")
-        + f"Give the file that defines it along with the program, or what the controller has with --{kind} FILE.",
+        + f"Give the file that defines it along with the program, or say with `{kind}s` where the controller has it.",
     )

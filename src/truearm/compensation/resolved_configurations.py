@@ -1,8 +1,8 @@
-"""The postures that a program means: the joint readings of the nominal robot, as its controller picks them.
+"""Resolved configurations: the joints of the nominal robot at a program's targets, as its controller picks them.
 
-A pose can be reached in up to eight postures and several turns. Configuration data in the program say which is meant;
-where they leave a choice, or there are none, it is the posture nearest to where the robot comes from. An offset has the
-configuration of what it is an offset from, in the posture next to that.
+A pose can be reached in up to eight postures and several turns. Configuration data in the program say in which; where
+they leave a choice, or there are none, it is the posture nearest to where the robot comes from. An offset has the
+configuration of the target that it is an offset from, in the posture next to that.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ _WORDS: Final = (
 
 @dataclass(frozen=True, eq=False)
 class ResolvedConfigurations:
-    """Joint readings of the nominal robot for poses.
+    """Joints of the nominal robot at poses.
 
     Attributes
     ----------
@@ -52,8 +52,8 @@ class ResolvedConfigurations:
     reachable
         Whether the nominal robot reaches the pose at all, ``(n,)``.
     guessed
-        Index of the first pose whose posture nothing tells, neither its configuration nor where the robot comes from;
-        None if there is none.
+        Index of the first pose whose posture is not known, neither by its configuration nor by where the robot comes
+        from; None if there is none.
     """
 
     joints: Array
@@ -97,12 +97,12 @@ def resolved_configurations(
     parents: Sequence[int | None] = (),
     straight: Collection[int] = (),
 ) -> ResolvedConfigurations:
-    """Return the postures that a program means.
+    """Return the joints at a program's targets.
 
     Parameters
     ----------
     nominal
-        The robot that its controller believes in, of six joints or more.
+        The robot that its controller knows, of six joints or more.
     flange
         Poses of the flange in its base frame, ``(n, 4, 4)`` [m].
     configurations
@@ -135,10 +135,8 @@ def resolved_configurations(
     number[possible], bend[possible] = rule.numbers(kinematics), rule.bend(kinematics)
     given = nominal.trunk.forward_kinematics(np.nan_to_num(known).T)
     number_given, bend_given = rule.numbers(given), rule.bend(given)
-    fixed = np.zeros(candidates.shape, dtype=bool)
     reachable[wanted] = possible.any(axis=1)
-    _confine(nominal, candidates, possible, number, fixed, [configurations[i] for i in wanted])
-    walk = _Walk(nominal, candidates, possible, number, fixed)
+    choice = _Candidates(nominal, candidates, possible, number, [configurations[i] for i in wanted])
     guessed = None
     place = {index: row for row, index in enumerate(wanted)}
     before: Array | None = None
@@ -151,7 +149,7 @@ def resolved_configurations(
             parent = parents[parent]
         if parent is None or configurations[parent] == ANY_POSTURE:
             return None
-        found = walk.chosen(place[parent], before, None)
+        found = choice.chosen(place[parent], before, None)
         return None if found is None else found[0]
 
     for index in dict.fromkeys((*order, *range(len(flange)))):
@@ -161,10 +159,10 @@ def resolved_configurations(
             reference = before if near is None else nominal.controller.joints(np.array([near]))[0]
             above = parent_of(index)
             reference = reference if above is None else above
-            if reference is None and guessed is None and walk.open[row]:
+            if reference is None and guessed is None and choice.open[row]:
                 guessed = index
             kept = branch if index in straight and near is None and above is None else None
-            found = walk.chosen(row, reference, kept)
+            found = choice.chosen(row, reference, kept)
             if found is None:
                 continue
             joints[index], slot = found
@@ -175,69 +173,81 @@ def resolved_configurations(
     return ResolvedConfigurations(joints, reachable, guessed)
 
 
-def _confine(
-    nominal: Robot,
-    candidates: Array,
-    possible: NDArray[np.bool_],
-    number: NDArray[np.intp],
-    fixed: NDArray[np.bool_],
-    configurations: Sequence[Configuration],
-) -> None:
-    """Leave of the candidates ``(m, 8, 6)`` those of the configurations, in the turns that these say."""
-    groups: dict[Configuration, list[int]] = {}
-    for row, configuration in enumerate(configurations):
-        if configuration.near is None:
-            groups.setdefault(configuration, []).append(row)
-        else:  # of its own for every target, and of no meaning here
-            groups.setdefault(replace(configuration, near=None), []).append(row)
-    signs = np.array(nominal.controller.signs or (1,) * len(nominal.joints))
-    for configuration, members in groups.items():
-        rows = np.array(members)
+class _Candidates:
+    """The candidates for each pose that its configuration allows, and the choice among them along the way.
+
+    Parameters
+    ----------
+    nominal
+        The robot that the controller knows.
+    joints
+        Candidates, eight a pose, ``(m, 8, joints)`` [rad or m].
+    possible
+        Which of them reach the pose, ``(m, 8)``.
+    number
+        Number of the branch of each, ``(m, 8)``.
+    configurations
+        What the program says of each pose.
+    """
+
+    def __init__(
+        self,
+        nominal: Robot,
+        joints: Array,
+        possible: NDArray[np.bool_],
+        number: NDArray[np.intp],
+        configurations: Sequence[Configuration],
+    ) -> None:
+        self._nominal, self._number = nominal, number
+        self._joints, self._possible = joints.copy(), possible.copy()
+        #: Joints whose turn is given.
+        self._given = np.zeros(joints.shape, dtype=bool)
+        groups: dict[Configuration, list[int]] = {}
+        for row, configuration in enumerate(configurations):
+            # The joints to be near to are of every target's own, and of no meaning here.
+            shared = configuration if configuration.near is None else replace(configuration, near=None)
+            groups.setdefault(shared, []).append(row)
+        for configuration, members in groups.items():
+            self._allow(configuration, np.array(members))
+        self._turn_near_zero()
+
+    def _allow(self, configuration: Configuration, rows: NDArray[np.intp]) -> None:
+        """Leave of the candidates of some poses those of their configuration, in the turns that it gives."""
+        joints, controller = self._joints, self._nominal.controller
+        signs = controller.signs or (1,) * len(self._nominal.joints)
         for word, bit, values in _WORDS:
-            said = getattr(configuration, word)
-            if said is not None:
-                possible[rows] &= (number[rows] & bit) == values[said]
+            name = getattr(configuration, word)
+            if name is not None:
+                self._possible[rows] &= (self._number[rows] & bit) == values[name]
         for joint in _bound(configuration):
-            shown = nominal.controller.readings(candidates[rows].reshape(-1, candidates.shape[2]))
+            shown = controller.readings(joints[rows].reshape(-1, joints.shape[2]))
             reading = shown[:, joint - 1].reshape(len(rows), SLOTS, 1) + _TURNS * _TURN
             allowed = _allowed(configuration, joint, reading, ON_EDGE)
             # Of the turns that are allowed the one nearest to zero.
             turn = np.argmin(np.where(allowed, np.abs(reading), np.inf), axis=2)
             turns = np.where(allowed.any(axis=2), _TURNS[turn], 0.0)
-            candidates[rows, :, joint - 1] += signs[joint - 1] * turns * _TURN
-            fixed[rows, :, joint - 1] = True
-            possible[rows] &= allowed.any(axis=2)
+            joints[rows, :, joint - 1] += signs[joint - 1] * turns * _TURN
+            self._given[rows, :, joint - 1] = True
+            self._possible[rows] &= allowed.any(axis=2)
 
-
-class _Walk:
-    """The choice among candidates along the way."""
-
-    def __init__(
-        self,
-        nominal: Robot,
-        candidates: Array,
-        possible: NDArray[np.bool_],
-        number: NDArray[np.intp],
-        fixed: NDArray[np.bool_],
-    ) -> None:
-        self._number = number
-        low, high = limits(nominal)
-        free = ~fixed
-        turned = nearest_turns(nominal, candidates, np.zeros(candidates.shape[2]))
-        turned = np.where(free, turned, candidates)
-        beyond: NDArray[np.bool_] = np.asarray(beyond_limits(nominal, turned, _SLACK).any(axis=2))
-        within: NDArray[np.bool_] = possible & ~beyond
-        self._possible: NDArray[np.bool_] = np.asarray(np.where(within.any(axis=1, keepdims=True), within, possible))
-        self._low, self._high = low, high
+    def _turn_near_zero(self) -> None:
+        """Turn joints whose turn is not given near to zero, and prefer candidates within the limits."""
+        free = ~self._given
+        self._low, self._high = limits(self._nominal)
+        near_zero = nearest_turns(self._nominal, self._joints, np.zeros(self._joints.shape[2]))
+        self._joints = np.where(free, near_zero, self._joints)
+        beyond: NDArray[np.bool_] = np.asarray(beyond_limits(self._nominal, self._joints, _SLACK).any(axis=2))
+        within: NDArray[np.bool_] = self._possible & ~beyond
+        self._possible = np.asarray(np.where(within.any(axis=1, keepdims=True), within, self._possible))
         with np.errstate(invalid="ignore"):
-            turns = np.floor((high - turned) / _TURN) + np.floor((turned - low) / _TURN)
-        several: NDArray[np.bool_] = np.asarray(free & (turns > 0))
-        turning = np.asarray((several & np.expand_dims(self._possible, 2)).any(axis=(1, 2)))
+            turns = np.floor((self._high - self._joints) / _TURN) + np.floor((self._joints - self._low) / _TURN)
+        #: Joints that have several turns to choose from.
+        self._several: NDArray[np.bool_] = np.asarray(free & (turns > 0))
+        turning = np.asarray((self._several & np.expand_dims(self._possible, 2)).any(axis=(1, 2)))
         #: Whether there is a choice.
         self.open: NDArray[np.bool_] = np.asarray((self._possible.sum(axis=1) > 1) | turning)
         self._only = np.argmax(self._possible, axis=1)
         self._any: NDArray[np.bool_] = np.asarray(self._possible.any(axis=1))
-        self._turned, self._several = turned, several
 
     def chosen(self, row: int, reference: Array | None, branch: int | None) -> tuple[Array, int] | None:
         """Return the readings of a pose nearest to a reference, on a branch if it has one there, and which they are.
@@ -247,8 +257,8 @@ class _Walk:
         if not self._any[row]:
             return None
         if not self.open[row]:
-            return np.asarray(self._turned[row, self._only[row]]), int(self._only[row])
-        joints = self._turned[row]
+            return np.asarray(self._joints[row, self._only[row]]), int(self._only[row])
+        joints = self._joints[row]
         if reference is None:
             cost = np.abs(joints).max(axis=1) + 1e3 * self._number[row]
         else:
@@ -267,12 +277,12 @@ class _Walk:
 def _by_seeds(
     nominal: Robot, flange: Array, configurations: Sequence[Configuration], joints: Array, wanted: list[int]
 ) -> ResolvedConfigurations:
-    """Return postures of an arm whose branches have no names: nearest to what the program says, else to zero."""
+    """Return the joints of an arm whose branches have no names: nearest to what the program says, else to zero."""
     zero = (0.0,) * len(nominal.joints)
     seeds = nominal.controller.joints(np.array([configurations[i].near or zero for i in wanted]))
     found = inverse(nominal, flange[wanted, :3, 3], flange[wanted, :3, :3], seed=seeds)
     reached = np.array([status is not PoseStatus.UNREACHABLE for status in found.status])
     joints[np.array(wanted)[reached]] = found.joints[reached]
     reachable: NDArray[np.bool_] = np.asarray(~np.isnan(joints).any(axis=1))
-    untold = [i for i in wanted if configurations[i].near is None]
-    return ResolvedConfigurations(joints, reachable, untold[0] if untold else None)
+    unspecified = [i for i in wanted if configurations[i].near is None]
+    return ResolvedConfigurations(joints, reachable, unspecified[0] if unspecified else None)

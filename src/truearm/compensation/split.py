@@ -1,10 +1,10 @@
-"""Moves divided where the correction between targets would stray (``--split``).
+"""Moves split where the correction between targets would deviate.
 
 The controller interpolates between corrected targets with the nominal robot's kinematics, and between targets the real
 robot's errors are others than at them. A straight or circular move gets more targets in between, each corrected, until
 what the controller interpolates is nowhere farther from the right correction than was asked for.
 
-Only a move is divided whose start is sure: the move before it in the text, with nothing in between that could come from
+Only a move is split whose start is sure: the move before it in the text, with nothing in between that could come from
 elsewhere, move the robot or jump.
 """
 
@@ -18,45 +18,45 @@ import numpy as np
 
 from truearm.compensation.program_correction import Between, Correction
 from truearm.compensation.program_poses import numbers_of
-from truearm.compensation.programs.program import Division, Edit, Language, Move, Program
+from truearm.compensation.programs.program import Edit, Language, Move, Program, Split
 from truearm.errors import InputError
 from truearm.modeling.chain import Array
 from truearm.modeling.transform import homogeneous, rotation_from_vector, rotation_vector
 
-#: Where a piece is looked at, as shares of it.
-_LOOKED_AT: Final = np.array([0.25, 0.5, 0.75])
-#: A move is divided into so many pieces at most.
-MOST: Final = 64
-#: What may be asked for [m].
-_FARTHEST: Final = (1e-6, 0.1)
+#: Where a segment is checked, as shares of it.
+_CHECKED: Final = np.array([0.25, 0.5, 0.75])
+#: A move is split into so many segments at most.
+MOST_SEGMENTS: Final = 64
+#: Smallest and largest tolerance [m].
+_TOLERANCES: Final = (1e-6, 0.1)
 
 
 @dataclass(frozen=True, eq=False)
-class Divided:
-    """What was divided in a program.
+class ProgramSplit:
+    """How the moves of a program are split.
 
     Attributes
     ----------
     edits
         What changes in the text.
     moves
-        How many moves were divided.
+        How many moves are split.
     added
-        How many targets were added.
-    left
-        Lines of straight and circular moves that could not be looked at, because their start is not sure, or one of
-        their targets was not corrected or is no pose of its own; of those that stray in the most pieces still; and of
-        those whose pieces would be something else in this language.
+        How many targets are added.
+    unsplit
+        Lines of straight and circular moves that stay whole: of those whose start is not sure, or one of
+        their targets was not corrected or is no pose of its own; of those that need more segments than allowed; and of
+        those with options that segments cannot have.
     """
 
     edits: tuple[Edit, ...]
     moves: int
     added: int
-    left: tuple[int, ...]
+    unsplit: tuple[int, ...]
 
 
-def divided(language: Language, correction: Correction, between: Between, farthest: float) -> Divided:
-    """Divide the moves of a program.
+def split_program(language: Language, correction: Correction, between: Between, tolerance: float) -> ProgramSplit:
+    """Split the moves of a program.
 
     Parameters
     ----------
@@ -66,65 +66,70 @@ def divided(language: Language, correction: Correction, between: Between, farthe
         Of the program.
     between
         What finds fake targets between those of the program.
-    farthest
-        How far the correction between targets may stray [m].
+    tolerance
+        How far the correction between targets may deviate [m].
 
     Raises
     ------
     InputError
-        If programs in this language cannot be divided, or the distance is none.
+        If moves in this language cannot be split, or the tolerance is out of range.
     """
-    if language.divide is None:
+    if language.split is None:
         raise InputError(
-            f"programs in {language.name} cannot be divided", where="--split", cure="Leave it out, or add targets."
+            f"moves in {language.name} cannot be split", parameter="split", cure="Leave it out, or add targets."
         )
-    if not _FARTHEST[0] <= farthest <= _FARTHEST[1]:
-        raise InputError(
-            "this is no distance to divide moves by",
-            where="--split",
-            came=f"{farthest * 1e3:g} mm",
-            allowed=f"{_FARTHEST[0] * 1e3:g} to {_FARTHEST[1] * 1e3:g} mm",
-        )
+    check_tolerance(tolerance)
     program = correction.program
-    left: list[int] = []
-    open_moves: list[_Dividing] = []
+    unsplit: list[int] = []
+    open_moves: list[_SplitMove] = []
     for index, move in enumerate(program.moves):
         if move.kind != "joint":
             before = _start(program, index)
             if before is None or not _sound(correction, move, before):
-                left.append(move.line)
+                unsplit.append(move.line)
             else:
-                open_moves.append(_Dividing(correction, index, before))
-    done: list[_Dividing] = []
+                open_moves.append(_SplitMove(correction, index, before))
+    done: list[_SplitMove] = []
     while open_moves:
         shares = [one.shares for one in open_moves]
         rows = np.repeat([one.end for one in open_moves], [len(s) for s in shares])
-        meant = np.concatenate([one.meant.at(s) for one, s in zip(open_moves, shares, strict=True)])
+        wanted = np.concatenate([one.path.at(s) for one, s in zip(open_moves, shares, strict=True)])
         near = np.concatenate([one.near(s) for one, s in zip(open_moves, shares, strict=True)])
-        fakes, found = between(rows, meant, near)
-        again: list[_Dividing] = []
-        left_over: list[_Dividing] = []
+        fakes, found = between(rows, wanted, near)
+        again: list[_SplitMove] = []
+        given_up: list[_SplitMove] = []
         at = 0
         for one, asked in zip(open_moves, shares, strict=True):
             part = slice(at, at + len(asked))
             at += len(asked)
             if not found[part].all():
-                left.append(program.moves[one.index].line)
-            elif one.strays(fakes[part], farthest):
-                (again if one.divided_further(farthest) else left_over).append(one)
+                unsplit.append(program.moves[one.index].line)
+            elif one.deviates(fakes[part], tolerance):
+                (again if one.split_further(tolerance) else given_up).append(one)
             else:
                 done.append(one)
-        left += [program.moves[one.index].line for one in left_over]
+        unsplit += [program.moves[one.index].line for one in given_up]
         open_moves = again
-    cut = sorted((one for one in done if one.pieces > 1), key=lambda one: one.index)
-    edits, whole = language.divide(program, [one.division() for one in cut])
-    left += [program.moves[index].line for index in whole]
-    parted = [one for one in cut if one.index not in whole]
-    return Divided(tuple(edits), len(parted), sum(one.pieces - 1 for one in parted), tuple(sorted(left)))
+    several = sorted((one for one in done if one.segments > 1), key=lambda one: one.index)
+    edits, whole = language.split(program, [one.split() for one in several])
+    unsplit += [program.moves[index].line for index in whole]
+    split = [one for one in several if one.index not in whole]
+    return ProgramSplit(tuple(edits), len(split), sum(one.segments - 1 for one in split), tuple(sorted(unsplit)))
 
 
-class _Dividing:
-    """A move on its way into pieces.
+def check_tolerance(tolerance: float) -> None:
+    """Refuse a tolerance [m] by which no move can be split."""
+    if not _TOLERANCES[0] <= tolerance <= _TOLERANCES[1]:
+        raise InputError(
+            "moves cannot be split by this distance",
+            parameter="split",
+            came=f"{tolerance * 1e3:g} mm",
+            allowed=f"{_TOLERANCES[0] * 1e3:g} to {_TOLERANCES[1] * 1e3:g} mm",
+        )
+
+
+class _SplitMove:
+    """A move that is split into more segments until they are straight or round enough.
 
     Parameters
     ----------
@@ -138,53 +143,52 @@ class _Dividing:
 
     def __init__(self, correction: Correction, index: int, before: int) -> None:
         move = correction.program.moves[index]
-        self.index, self.end, self.pieces = index, move.target, 1
+        self.index, self.end, self.segments = index, move.target, 1
         self._target = correction.program.targets[move.target]
-        self._round = move.via is not None
-
-        def ways(poses: Array) -> _Path:
-            return _Path(poses[before], poses[move.target], None if move.via is None else poses[move.via])
-
-        self.meant = ways(correction.before)
+        self._circular = move.via is not None
+        poses = correction.before
+        self.path = _Path(poses[before], poses[move.target], None if move.via is None else poses[move.via])
         self._ends = correction.after[[before, move.target]]
         self._joints = correction.joints[[before, move.target]]
-        self._fakes, self._far = correction.after[:0], 0.0
+        self._fakes, self._deviation = correction.after[:0], 0.0
 
     @property
     def shares(self) -> Array:
-        """Where fake targets are needed: four in each piece, the last at its end."""
-        return np.arange(1, 4 * self.pieces) / (4 * self.pieces)
+        """Where fake targets are needed: four in each segment, the last at its end."""
+        return np.arange(1, 4 * self.segments) / (4 * self.segments)
 
     def near(self, shares: Array) -> Array:
-        """Return joints to be near to at shares of the way."""
+        """Return joints to be near to at shares of the path."""
         start, end = self._joints
         return np.asarray(start + shares[:, None] * (end - start))
 
-    def strays(self, fakes: Array, farthest: float) -> bool:
-        """Return whether what the controller interpolates strays too far."""
+    def deviates(self, fakes: Array, tolerance: float) -> bool:
+        """Return whether what the controller interpolates is too far from the correction."""
         self._fakes = np.concatenate([self._ends[:1], fakes, self._ends[1:]])
-        self._far = 0.0
-        for piece in range(self.pieces):
-            one = self._fakes[4 * piece : 4 * piece + 5]
-            gone = _Path(one[0], one[4], one[2] if self._round else None).at(_LOOKED_AT)
-            self._far = max(self._far, float(np.linalg.norm(gone[:, :3, 3] - one[1:4, :3, 3], axis=1).max()))
-        return self._far > farthest
+        self._deviation = 0.0
+        for segment in range(self.segments):
+            one = self._fakes[4 * segment : 4 * segment + 5]
+            gone = _Path(one[0], one[4], one[2] if self._circular else None).at(_CHECKED)
+            away = float(np.linalg.norm(gone[:, :3, 3] - one[1:4, :3, 3], axis=1).max())
+            self._deviation = max(self._deviation, away)
+        return self._deviation > tolerance
 
-    def divided_further(self, farthest: float) -> bool:
-        """Return whether there are more pieces from now on; there are none where the posture changes on the way."""
-        if self.pieces == MOST:
+    def split_further(self, tolerance: float) -> bool:
+        """Return whether there are more segments from now on; not where the posture changes on the way."""
+        if self.segments == MOST_SEGMENTS:
             return False
-        # What a piece strays falls with the square of its length.
-        self.pieces = min(max(self.pieces + 1, math.ceil(self.pieces * math.sqrt(self._far / farthest))), MOST)
+        # The deviation falls with the square of a segment's length.
+        needed = math.ceil(self.segments * math.sqrt(self._deviation / tolerance))
+        self.segments = min(max(self.segments + 1, needed), MOST_SEGMENTS)
         return True
 
-    def division(self) -> Division:
-        """Return the pieces as numbers."""
+    def split(self) -> Split:
+        """Return the segments as numbers."""
         near = np.tile(self._target.values, (len(self._fakes), 1))
         numbers = [tuple(row) for row in numbers_of(self._target.form, self._fakes, near).tolist()]
-        vias = [numbers[4 * piece + 2] if self._round else None for piece in range(self.pieces)]
-        ends = [numbers[4 * piece + 4] for piece in range(self.pieces)]
-        return Division(self.index, tuple(zip(ends[:-1], vias[:-1], strict=True)), vias[-1])
+        vias = [numbers[4 * segment + 2] if self._circular else None for segment in range(self.segments)]
+        ends = [numbers[4 * segment + 4] for segment in range(self.segments)]
+        return Split(self.index, tuple(zip(ends[:-1], vias[:-1], strict=True)), vias[-1])
 
 
 def _start(program: Program, index: int) -> int | None:

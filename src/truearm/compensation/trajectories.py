@@ -1,9 +1,9 @@
-"""Joint readings changed so that the calibrated robot keeps to the path that was meant (Patel, equation 5.22).
+"""Joint readings changed so that the calibrated robot keeps to the wanted path (Patel, equation 5.22).
 
 The calibrated robot predicts where the tip will be with the readings of the nominal motion. By how much it is beside
 the path is turned into a change of the readings by the step of least norm, ``J^T (J J^T)^-1 (P_predicted -
 P_desired)``. That is subtracted (the document does not say so; added, it would double the error), and the prediction is
-made again until the tip is where it shall be. The norm counts rad, and m for sliding joints.
+made again until the tip is on the path. The norm counts rad, and m for sliding joints.
 
 Readings are changed by fractions of a degree. The velocities and accelerations of the nominal motion are therefore kept
 for the moments that bend the arm in motion.
@@ -25,7 +25,7 @@ from truearm.modeling.robot import Robot
 from truearm.planning.paths.joint_motion import JointMotion
 from truearm.planning.poses.tip import Tip
 
-#: The tip is where it shall be within this [m].
+#: The tip is on the path within this [m].
 AGREED: Final = 1e-9
 _MOST_ROUNDS: Final = 20
 #: A change of a reading this large corrects no calibration error [rad or m]: something else is wrong.

@@ -1,1 +1,1 @@
-"""Files to start from: the robot file to fill in."""
+"""Files to start from: a robot file to fill in, a program to correct, the commands of a session."""

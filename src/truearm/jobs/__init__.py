@@ -16,4 +16,11 @@ JOBS: Final = (
     "check",
     "calibrate",
     "validate",
+    "compensate",
+    "revert",
+    "convert",
+    "export",
+    "new_robot",
+    "example",
+    "demo",
 )

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from numbers import Integral, Real
 from pathlib import Path
 from typing import Any, TypeVar
@@ -11,7 +12,8 @@ from typing import Any, TypeVar
 import numpy as np
 
 from truearm.errors import InputError, did_you_mean
-from truearm.library import is_robot, load_robot
+from truearm.files import new_file, refuse_overwriting, writable_file, writable_folder
+from truearm.library import is_robot, load_robot, urdf_source
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.readers.canonical import read_csv
 from truearm.modeling.parts import Payload
@@ -20,16 +22,23 @@ from truearm.modeling.robot import Robot
 T = TypeVar("T")
 
 
+@contextmanager
+def refusals_of(parameter: str) -> Iterator[None]:
+    """Let refusals of what a parameter holds name it, beside the file or the place that they name."""
+    try:
+        yield
+    except InputError as error:
+        error.parameter = error.parameter or parameter
+        raise
+
+
 def robot_argument(robot: object, parameter: str = "robot") -> Robot:
     """Return the robot that was given, or that a library id, robot file or URDF names."""
     if isinstance(robot, Robot):
         return robot
     if isinstance(robot, str | Path):
-        try:
+        with refusals_of(parameter):
             return load_robot(robot)
-        except InputError as error:
-            error.parameter = error.parameter or parameter
-            raise
     raise _wrong_kind("a robot belongs here", robot, parameter, "a Robot, a library id, a robot file or a URDF")
 
 
@@ -47,11 +56,8 @@ def data_argument(data: object, parameter: str = "data") -> Dataset:
                 allowed="a canonical CSV file",
                 cure="The robot comes first, then the measurements.",
             )
-        try:
+        with refusals_of(parameter):
             return read_csv(path)
-        except InputError as error:
-            error.parameter = error.parameter or parameter
-            raise
     raise _wrong_kind("measurements belong here", data, parameter, "a Dataset, or a canonical CSV file")
 
 
@@ -64,6 +70,42 @@ def path_argument(path: object, parameter: str) -> Path:
     raise _wrong_kind(
         "a path belongs here", path, parameter, "the path of a file or folder, as a text or a pathlib.Path"
     )
+
+
+def folder_for(names: Iterable[str], out: object, *read: object, parameter: str = "out") -> Path:
+    """Return the folder for files of some names, or refuse one that cannot be written to, before any long work.
+
+    Parameters
+    ----------
+    read
+        What the job was given: none of these, as far as they are files, may be overwritten.
+    """
+    folder = path_argument(out, parameter)
+    with refusals_of(parameter):
+        writable_folder(folder)
+        for name in names:
+            refuse_overwriting(folder / name, _files_of(read))
+    return folder
+
+
+def file_for(out: object, *read: object, parameter: str = "out") -> Path:
+    """Return where a file shall be written, or refuse a place that cannot be; `read` as for :func:`folder_for`."""
+    path = path_argument(out, parameter)
+    with refusals_of(parameter):
+        writable_file(path)
+        refuse_overwriting(path, _files_of(read))
+    return path
+
+
+def new_file_for(out: object, parameter: str = "out") -> Path:
+    """Return where a file shall be written that does not exist yet, or refuse a place that cannot be."""
+    with refusals_of(parameter):
+        return new_file(path_argument(out, parameter))
+
+
+def _files_of(given: Iterable[object]) -> list[Path]:
+    named = [value for value in given if isinstance(value, str | Path)]
+    return [(urdf_source(value) or (Path(value), None))[0] for value in named]
 
 
 def payload_argument(payload: object, parameter: str = "payload") -> Payload | None:
@@ -146,6 +188,15 @@ def choices_argument(values: object, parameter: str, known: Collection[str], wha
     return tuple(choice_argument(value, parameter, {name: name for name in known}, what) for value in values)
 
 
+def paths_argument(paths: object, parameter: str, what: str) -> list[Path]:
+    """Return a sequence of at least one path; `what` one path is, for the message."""
+    if isinstance(paths, str | bytes) or not isinstance(paths, Sequence):
+        raise _wrong_kind(f"a sequence of {what}s belongs here", paths, parameter, "a list of paths")
+    if not paths:
+        raise InputError(f"no {what} is given", parameter=parameter, came="nothing", allowed="one or more")
+    return [path_argument(path, parameter) for path in paths]
+
+
 def python_call(job: str, /, *given: object, **keywords: object) -> str:
     """Return the call of a job in Python, objects by the kind they are; keywords that are None are left out."""
     words = [_written(value) for value in given]
@@ -158,7 +209,10 @@ def _written(value: object) -> str:
         return repr(str(value))
     if isinstance(value, Payload):
         return repr(value.text)
-    plain = value is None or isinstance(value, str | bool | int | float | tuple | list)
+    if isinstance(value, list | tuple):
+        words = ", ".join(_written(entry) for entry in value)
+        return f"[{words}]"
+    plain = value is None or isinstance(value, str | bool | int | float)
     return repr(value) if plain else type(value).__name__.upper()
 
 

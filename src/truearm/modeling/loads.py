@@ -40,6 +40,11 @@ if TYPE_CHECKING:
 _NOTHING: Final[Coordinates] = (0.0, 0.0, 0.0)
 
 
+def has_weight(robot: Robot) -> bool:
+    """Return whether anything of a robot, or what it carries, has a mass, so that gravity loads its joints."""
+    return robot.payload.mass > 0.0 or any(link.mass > 0.0 for link in robot.masses)
+
+
 def joint_loads(
     robot: Robot,
     variables: Array,

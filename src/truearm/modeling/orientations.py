@@ -1,7 +1,7 @@
-"""Orientations as controllers write them: quaternions, three kinds of angles, rotation vectors.
+"""Orientations as the controllers of several makers write them: quaternions, three kinds of angles, rotation vectors.
 
-Every orientation has many writings. Of those, the one nearest to what the program had is written: the sign of the
-quaternion, the turns of the angles and what is free in gimbal lock stay as they were.
+Numbers stand for one orientation; an orientation can be written with many numbers. Of those, the ones nearest to given
+numbers are returned: the sign of a quaternion, whole turns of angles and what is free in gimbal lock stay as they are.
 
 ==================== ======================================== ==================================================
 orientation          numbers                                  rotation matrix
@@ -137,7 +137,7 @@ def _nearest_moving_xyz(R: Array, near: Array) -> Array:
 def _nearest_vectors(R: Array, near: Array) -> Array:
     v = rotation_vector(R)
     angle, size = (np.linalg.norm(u, axis=1, keepdims=True) for u in (v, near))
-    # No turn at all, or whole turns, about any axis: the program's own.
+    # No turn at all, or whole turns, about any axis: that of the given numbers.
     along_near = near / np.where(size > 0.0, size, 1.0)
     axis = np.where(angle > _SAME, v / np.where(angle > 0.0, angle, 1.0), along_near)
     turns = np.round(((near * axis).sum(axis=1, keepdims=True) - angle) / _TURN)

@@ -15,26 +15,8 @@ import numpy as np
 from truearm.arrays import finite_number
 from truearm.modeling.chain import Array
 
-Group = Literal[
-    "base",
-    "joint zero",
-    "geometry",
-    "target",
-    "fixture",
-    # of joint effects, by their names
-    "gain",
-    "fourier",
-    "transmission-error",
-    "compliance",
-    "hardening",
-    "backlash",
-    "bearing-compliance",
-    "clearance",
-    "clearance-linear-contact",
-    "approach",
-    "thermal-growth",
-    "warm-up",
-]
+#: What parameters of the rigid robot and of what stands beside it describe.
+Group = Literal["base", "joint zero", "geometry", "target", "fixture"]
 Unit = Literal["m", "rad", "1", "rad/(N m)", "m/N", "rad/(N m)^2", "rad/(N m)^3", "1/K"]
 
 #: What a nominal value is believed to be good for (one standard deviation) unless the robot file says otherwise.
@@ -64,7 +46,7 @@ class Parameter:
     unit
         SI unit of all values here.
     group
-        What the parameter describes; models free whole groups.
+        What the parameter describes, a :data:`Group` or a joint effect by its name; models free whole groups.
     nominal
         Value before calibration.
     value
@@ -79,7 +61,7 @@ class Parameter:
 
     name: str
     unit: Unit
-    group: Group
+    group: str
     nominal: float
     value: float
     prior: float
@@ -97,7 +79,7 @@ class Parameter:
             finite_number(self.informed, "informed", where=self.name)
 
     @classmethod
-    def plain(cls, name: str, unit: Unit, group: Group, nominal: float, prior: float) -> Parameter:
+    def plain(cls, name: str, unit: Unit, group: str, nominal: float, prior: float) -> Parameter:
         """Make a parameter at its nominal value."""
         return cls(name, unit, group, nominal, nominal, prior)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import platform
+import re
 from collections.abc import Mapping
 from importlib.metadata import version as installed_version
 from importlib.resources import files
@@ -11,7 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from truearm.reporting.drawing import AFTER, BEFORE, Figure
 from truearm.version import __version__
@@ -39,6 +40,7 @@ def page(template: str, figures: Mapping[str, Figure], **content: Any) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.filters["with_code"] = with_code
     return environment.get_template(template).render(
         **content,
         drawn=set(figures),
@@ -53,6 +55,12 @@ def page(template: str, figures: Mapping[str, Figure], **content: Any) -> str:
         },
         colours={"before": BEFORE, "after": AFTER},
     )
+
+
+def with_code(text: str) -> Markup:
+    """Return a text for a page: what is in backticks, parameters and values, as code."""
+    plain = str(escape(text))
+    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", plain))
 
 
 def json_for_script(value: object) -> str:

@@ -4,22 +4,20 @@ from __future__ import annotations
 
 import html
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Final
+from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truearm.compensation.program_correction import Correction
-from truearm.compensation.split import Divided
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import Joint
-from truearm.notices import Notice
 from truearm.reporting.drawing import AFTER, BEFORE, CAMERA, COLOURS, Figure, axis, figure, scene_axis
 from truearm.reporting.figures import histogram
 from truearm.reporting.numbers import rounded, rounded_to
 from truearm.reporting.page import page
+from truearm.results.program_correction import ProgramCorrection
 from truearm.units import from_si
 
 #: Targets in a picture: more slow a browser down and show no more.
@@ -32,98 +30,33 @@ _CAMERA: Final = CAMERA | {"eye": {"x": 1.9, "y": 1.9, "z": 1.0}}
 _ARROW: Final = 0.08
 
 
-@dataclass(frozen=True)
-class ReportedFile:
-    """What the summary says of a file: counts, what was skipped, mean and largest shift [mm]."""
-
-    file: str
-    language: str
-    targets: int
-    corrected: int
-    skipped: Sequence[Mapping[str, Any]]
-    shift_mm: Mapping[str, float]
-
-
-@dataclass(frozen=True, eq=False)
-class Checked:
-    """What a simulated robot does with a program: its distance from where each target was meant to be [m], ``(n,)``.
-
-    Attributes
-    ----------
-    original, corrected
-        With the program as it was, and as it is now.
-    robot
-        Who went there, in words.
-    """
-
-    original: Array
-    corrected: Array
-    robot: str
-
-
-@dataclass(frozen=True, eq=False)
-class ProgramReport:
-    """What the report tells about.
-
-    Attributes
-    ----------
-    robot
-        Its title.
-    files
-        One row of the summary each.
-    corrections
-        One a program.
-    joints
-        Of the robot.
-    words
-        What was taken for the real base and flange, see :func:`truearm.compensation.advice.frame_words`.
-    divisions
-        What was divided, one a program; empty if nothing was to be.
-    warnings
-        What to know about the result.
-    command
-        How to do it again.
-    checked
-        What a simulated robot does with it, where there is one.
-    """
-
-    robot: str
-    files: Sequence[ReportedFile]
-    corrections: Sequence[Correction]
-    joints: Sequence[Joint]
-    words: Sequence[str]
-    divisions: Sequence[Divided]
-    warnings: Sequence[Notice]
-    command: str
-    checked: Checked | None = None
-
-
-def program_html(report: ProgramReport) -> str:
-    """Return the page."""
-    shown = [c for c in report.corrections if c.corrected.any()]
+def program_html(correction: ProgramCorrection) -> str:
+    """Return the page of corrected programs."""
+    corrections = correction.result.corrections
+    shown = [c for c in corrections if c.corrected.any()]
     figures: dict[str, Figure] = {}
     if shown:
         figures = {"path": path_figure(shown), "along": along_figure(shown)}
-    if report.checked is not None:
-        figures["checked"] = histogram(
-            report.checked.original * 1e3,
-            report.checked.corrected * 1e3,
+    if correction.simulated is not None:
+        figures["simulated"] = histogram(
+            correction.simulated.original * 1e3,
+            correction.simulated.corrected * 1e3,
             "mm",
             "distance from where it was meant",
             "targets",
         )
-    every = [(file.file, one) for file in report.files for one in file.skipped]
+    every = [(file.name, one) for file in correction.files for one in file.skipped]
     return page(
         "program.html.jinja",
         figures,
-        report=report,
-        joints=_joint_rows(report),
+        correction=correction,
+        joints=_joint_rows(correction.robot.joints, corrections),
         skipped=every[:_LISTED],
         unlisted=max(len(every) - _LISTED, 0),
-        corrected=sum(file.corrected for file in report.files),
-        targets=sum(file.targets for file in report.files),
-        moved=_spread(np.concatenate([c.moved[c.corrected] for c in report.corrections]) * 1e3),
-        turned=_spread(np.degrees(np.concatenate([c.turned[c.corrected] for c in report.corrections]))),
+        corrected=sum(file.corrected for file in correction.files),
+        targets=sum(file.targets for file in correction.files),
+        moved=_spread(np.concatenate([c.moved[c.corrected] for c in corrections]) * 1e3),
+        turned=_spread(np.degrees(np.concatenate([c.turned[c.corrected] for c in corrections]))),
     )
 
 
@@ -255,13 +188,13 @@ def _evenly(rows: NDArray[np.intp]) -> NDArray[np.intp]:
     return np.asarray(rows[np.linspace(0, len(rows) - 1, _DRAWN).astype(int)])
 
 
-def _joint_rows(report: ProgramReport) -> list[tuple[str, str, str, str]]:
+def _joint_rows(robot_joints: Sequence[Joint], corrections: Sequence[Correction]) -> list[tuple[str, str, str, str]]:
     """Return the range of each joint in the corrected programs, in deg or mm as the model counts."""
-    joints = np.concatenate([c.joints[c.corrected] for c in report.corrections])
+    joints = np.concatenate([c.joints[c.corrected] for c in corrections])
     if not len(joints):
         return []
     rows = []
-    for joint, low, high in zip(report.joints, joints.min(axis=0).tolist(), joints.max(axis=0).tolist(), strict=True):
+    for joint, low, high in zip(robot_joints, joints.min(axis=0).tolist(), joints.max(axis=0).tolist(), strict=True):
         unit = "deg" if joint.kind == "revolute" else "mm"
         rows.append((joint.name, f"{from_si(low, unit):.2f}", f"{from_si(high, unit):.2f}", unit))
     return rows

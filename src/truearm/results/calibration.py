@@ -204,7 +204,8 @@ class Calibration(Record):
         -------
         The files written.
         """
-        from truearm.modeling.formats.urdf import calibrated_urdf, urdf_text
+        from truearm.modeling.formats.urdf import calibrated_urdf
+        from truearm.modeling.formats.urdf_writing import urdf_text
         from truearm.reporting.report import report_html
 
         folder = writable_folder(Path(folder))

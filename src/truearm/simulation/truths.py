@@ -13,6 +13,7 @@ from truearm.files import exists
 from truearm.library import load_robot
 from truearm.modeling.chain import Array
 from truearm.modeling.effects.fourier import HARMONICS
+from truearm.modeling.effects.linear_contact import LinearContactClearance
 from truearm.modeling.parts import NO_PAYLOAD, Payload, Tool
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform, rotation_from_quaternion
@@ -88,7 +89,11 @@ def truth_twin(robot: Robot, truth: str, rng: np.random.Generator) -> Twin:
 
 
 def joint_truths(robot: Robot) -> dict[int, JointTruth]:
-    """Return what the joint effects of a robot file say about each joint."""
+    """Return what the joint effects of a robot file say about each joint.
+
+    The twin computes every effect a second time, on a path of its own, so that one can be held against the other. What
+    it knows is therefore named here parameter by parameter, and not taken from the effects.
+    """
     values = robot.values
 
     def of(name: str, number: int) -> float:
@@ -117,7 +122,7 @@ def joint_truths(robot: Robot) -> dict[int, JointTruth]:
 
 
 def _contact(robot: Robot) -> Contact:
-    return "document" if "clearance-linear-contact" in robot.effect_names else "exact"
+    return "document" if any(isinstance(effect, LinearContactClearance) for effect in robot.effects) else "exact"
 
 
 def stationed(robot: Robot, tool: Tool) -> Robot:

@@ -17,12 +17,12 @@ from truearm.compensation.program_poses import edits_of, numbers_of, pose_number
 from truearm.compensation.programs import LANGUAGES
 from truearm.compensation.programs.lines import Lines
 from truearm.compensation.programs.numbers import NUMBER
-from truearm.compensation.programs.program import Division, Edit, Language, Program, ProgramTarget, Source
+from truearm.compensation.programs.program import Edit, Language, Program, ProgramTarget, Source, Split
 from truearm.errors import InputError
 from truearm.modeling.orientations import QUATERNION
 
 SAMPLES = Path(__file__).parent / "samples"
-dividing = pytest.mark.parametrize("language", [one for one in LANGUAGES if one.divide], ids=lambda one: one.name)
+splitting = pytest.mark.parametrize("language", [one for one in LANGUAGES if one.split], ids=lambda one: one.name)
 languages = pytest.mark.parametrize("language", LANGUAGES, ids=lambda one: one.name)
 
 
@@ -136,10 +136,10 @@ def skeleton(text: str, before: str, spans: Sequence[tuple[int, int]]) -> list[s
     return [*parts, text[at:]]
 
 
-@dividing
-def test_a_division_reads_back(language: Language) -> None:
-    """Moves divided at made-up places: the added targets come before the move's own, with the same tool and frame."""
-    assert language.divide is not None
+@splitting
+def test_split_moves_read_back(language: Language) -> None:
+    """Moves split at made-up places: the added targets come before the move's own, with the same tool and frame."""
+    assert language.split is not None
     tried = 0
     for sources in samples(language):
         program = language.read(sources)
@@ -153,10 +153,10 @@ def test_a_division_reads_back(language: Language) -> None:
             near = np.tile(target.values, (3, 1))
             one, two, three = (tuple(row) for row in numbers_of(target.form, pose, near).tolist())
             circle = move.via is not None
-            cut = Division(index, ((one, two if circle else None),), three if circle else None)
-            edits, whole = language.divide(program, [cut])
+            cut = Split(index, ((one, two if circle else None),), three if circle else None)
+            edits, whole = language.split(program, [cut])
             assert whole == ([] if edits else [index])
-            if not edits:  # pieces of this one would mean something else
+            if not edits:  # segments of this one would mean something else
                 continue
             tried += 1
             again = language.read(

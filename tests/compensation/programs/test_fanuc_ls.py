@@ -17,7 +17,7 @@ import pytest
 
 from truearm.compensation.programs.fanuc_ls import FANUC_LS
 from truearm.compensation.programs.fanuc_ls.configuration import configuration
-from truearm.compensation.programs.program import Configuration, Division, Program, Skipped, Source
+from truearm.compensation.programs.program import Configuration, Program, Skipped, Source, Split
 from truearm.errors import InputError
 from truearm.library import load_robot
 from truearm.modeling.inverse.branches import BRANCHES, branch_rule
@@ -69,12 +69,12 @@ def program_of(count: int) -> list[Source]:
     return [program([f"L P[{i}] 250mm/sec CNT100   " for i in range(1, count + 1)], "".join(positions))]
 
 
-def edited(found: Program, divisions: Sequence[Division]) -> Source:
-    """Return a program with divided moves; edits have to come in order and apart."""
-    assert FANUC_LS.divide is not None
+def edited(found: Program, splits: Sequence[Split]) -> Source:
+    """Return a program with split moves; edits have to come in order and apart."""
+    assert FANUC_LS.split is not None
     (source,) = found.sources
     text, at = "", 0
-    for edit in FANUC_LS.divide(found, divisions).edits:
+    for edit in FANUC_LS.split(found, splits).edits:
         assert edit.start >= at
         text += source.text[at : edit.start] + edit.text
         at = edit.stop
@@ -410,7 +410,7 @@ def test_up_stays_up_when_the_arm_leans_back_over_its_first_axis() -> None:
 LINE = (374.0, -12.25, -1.0, 180.0, 0.0, 30.0)
 
 
-def test_a_line_and_a_circle_are_divided() -> None:
+def test_a_line_and_a_circle_are_split() -> None:
     found = FANUC_LS.read([sample("bracket.ls")])
     first, second = (382.5, -12.25, 39.5, 180.0, -0.0015, 30.0), (390.0, -12.25, 20.0, 180.0, 0.0, 30.0)
     via, end, last_via = (
@@ -418,7 +418,7 @@ def test_a_line_and_a_circle_are_divided() -> None:
         (440.0, -6.0, -1.0, 180.0, 0.0, 47.0),
         (451.0, 9.0, -1.0, 180.0, 0.0, 66.0),
     )
-    source = edited(found, [Division(4, ((end, via),), last_via), Division(2, ((first, None), (second, None)))])
+    source = edited(found, [Split(4, ((end, via),), last_via), Split(2, ((first, None), (second, None)))])
     lines = source.text.split("\r\n")
     assert lines[32:43] == [
         "  10:L P[2:approach] 250mm/sec CNT50    ;",
@@ -453,9 +453,9 @@ def test_a_line_and_a_circle_are_divided() -> None:
     ]
 
 
-def test_what_is_to_happen_once_is_not_said_in_pieces() -> None:
+def test_what_is_to_happen_once_is_not_said_in_segments() -> None:
     found = FANUC_LS.read([sample("bracket.ls")])
-    lines = edited(found, [Division(3, ((LINE, None),))]).text.split("\r\n")
+    lines = edited(found, [Split(3, ((LINE, None),))]).text.split("\r\n")
     assert lines[35:37] == [
         "  13:L P[100] 80mm/sec CNT100 ACC80    ;",
         "  14:L P[4] 80mm/sec CNT100 ACC80 TB    .10sec,DO[6]=ON    ;",
@@ -467,7 +467,7 @@ def test_instructions_that_a_move_carries_keep_their_numbers() -> None:
     source = program(["L P[1] 9mm/sec FINE", *words], pose(1) + pose(2))
     carried = "      1:  TC_ONLINE (ON) ;\n      2:  DO[1]=ON ;\n      3:  DO[2]=ON ;\n       ------ ;\n"
     source = replace(source, text=source.text.replace("   3:", carried + "   3:"))
-    text = edited(FANUC_LS.read([source]), [Division(0, ((LINE, None),))]).text
+    text = edited(FANUC_LS.read([source]), [Split(0, ((LINE, None),))]).text
     assert carried in text
     assert f"   2:L P[1] 9mm/sec FINE ;\n   3:J P[1] 100% FINE ;\n{carried}   4:J P[2] 100% FINE ;\n" in text
     assert "\n   5:J P[1] 100% FINE ;\n/POS" in text
@@ -475,7 +475,7 @@ def test_instructions_that_a_move_carries_keep_their_numbers() -> None:
 
 def test_lines_without_numbers_stay_without() -> None:
     found = FANUC_LS.read([sample("wipe.ls")])
-    lines = edited(found, [Division(2, ((LINE, None),))]).text.split("\r")
+    lines = edited(found, [Split(2, ((LINE, None),))]).text.split("\r")
     assert lines[4:7] == [":L P[2] 100mm/sec CNT50 ;", ": L P[4] 100mm/sec CNT100    ;", ": L P[3] 100mm/sec FINE ;"]
     assert lines[-7:-1] == ["P[4]{", "GP1:", "UF : 0, UT : F,", *lines[-4:-2], "}"]
     assert lines[-4] == "X = 374.000 mm, Y = -12.250 mm, Z = -1.000 mm,"
@@ -485,7 +485,7 @@ def test_lines_without_numbers_stay_without() -> None:
 def test_numbers_of_lines_grow_into_the_blanks_before_them() -> None:
     source = program(["L P[1] 9mm/sec FINE"] * 9 + ["END"], pose(1), "LINE_COUNT = 10;\n")
     found = FANUC_LS.read([source])
-    text = edited(found, [Division(k, ((LINE, None),)) for k in range(9)]).text
+    text = edited(found, [Split(k, ((LINE, None),)) for k in range(9)]).text
     assert "\n   9:L P[6] 9mm/sec CNT100    ;\n  10:L P[1] 9mm/sec FINE ;\n" in text
     assert text.count("\n  19:END ;\n") == 1
     assert "LINE_COUNT = 19;" in text
@@ -518,8 +518,8 @@ def test_moves_that_are_left_whole(words: str, change: Callable[[str], str]) -> 
     source = replace(source, text=change(source.text))
     found = FANUC_LS.read([source])
     is_circle = found.moves[0].kind == "circular"
-    division = Division(0, ((LINE, LINE if is_circle else None),), LINE if is_circle else None)
-    assert edited(found, [division]) == source
+    split = Split(0, ((LINE, LINE if is_circle else None),), LINE if is_circle else None)
+    assert edited(found, [split]) == source
 
 
 def test_many_positions() -> None:

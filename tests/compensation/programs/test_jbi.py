@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from truearm.compensation.programs.jbi import JBI
-from truearm.compensation.programs.program import Configuration, Division, Edit, Program, Source
+from truearm.compensation.programs.program import Configuration, Edit, Program, Source, Split
 from truearm.errors import InputError
 from truearm.modeling.orientations import FIXED_XYZ_ANGLES
 
@@ -306,17 +306,17 @@ def test_incomplete_jobs_are_refused() -> None:
     assert "does not say how many positions" in refused([Source(source.path, without)])
 
 
-def divided(sources: list[Source], divisions: Sequence[Division]) -> tuple[list[Source], Program]:
+def split_moves(sources: list[Source], splits: Sequence[Split]) -> tuple[list[Source], Program]:
     program = JBI.read(sources)
-    assert JBI.divide is not None
-    new = edited(program, JBI.divide(program, divisions).edits)
+    assert JBI.split is not None
+    new = edited(program, JBI.split(program, splits).edits)
     return new, JBI.read(new)
 
 
-def test_a_line_is_divided() -> None:
+def test_a_line_is_split() -> None:
     before = JBI.read(sample("weld.jbi"))
     points = (((101.0, -20.5, 5.0, 180.0, 0.0, -45.25), None), ((102.0, 0.12345, -0.0, 180.0, 0.0, -1e-9), None))
-    new, after = divided(sample("weld.jbi"), [Division(5, points)])
+    new, after = split_moves(sample("weld.jbi"), [Split(5, points)])
     lines = new[0].text.split("\r\n")
     assert "\n" not in new[0].text.replace("\r\n", "")
     assert lines[3] == "///NPOS 14,0,0,3,0,0"
@@ -344,7 +344,7 @@ def test_states_are_as_before_behind_new_positions() -> None:
     sources = job(table, ["MOVL C00000 V=1.0", "MOVL C00001 V=1.0"])
     pulses = ((10.0, 20.0, 30.4, 40.6, -50.0, 60.0), None)
     pose = ((10.0, 20.0, 30.4, 40.6, -50.0, 60.0), None)
-    new, after = divided(sources, [Division(1, (pose,)), Division(0, (pulses,))])
+    new, after = split_moves(sources, [Split(1, (pose,)), Split(0, (pulses,))])
     targets = {t.name: t for t in after.targets}
     assert targets["C00002"].values == (10.0, 20.0, 30.0, 41.0, -50.0, 60.0)
     assert (targets["C00002"].form.kind, targets["C00002"].tool) == ("pulses", "1")
@@ -354,10 +354,10 @@ def test_states_are_as_before_behind_new_positions() -> None:
     assert "C00002=10,20,30,41,-50,60\n" in new[0].text
 
 
-def test_a_circle_is_divided() -> None:
+def test_a_circle_is_split() -> None:
     numbers = {name: tuple(float(i + k) for k in range(6)) for i, name in enumerate(("v", "p", "w"))}
-    division = Division(2, ((numbers["p"], numbers["v"]),), numbers["w"])
-    new, after = divided(sample("cell/main.jbi", "cell/track.jbi"), [division])
+    split = Split(2, ((numbers["p"], numbers["v"]),), numbers["w"])
+    new, after = split_moves(sample("cell/main.jbi", "cell/track.jbi"), [split])
     assert way(after)[1:5] == [
         ("linear", "C0002", None),
         ("circular", "C0007", "C0006"),
@@ -373,8 +373,8 @@ def test_a_circle_is_divided() -> None:
     assert new[0].text == sample("cell/main.jbi")[0].text
 
 
-def test_the_line_to_a_circle_is_divided_by_lines() -> None:
-    _, after = divided(sample("cell/main.jbi", "cell/track.jbi"), [Division(1, (((1.0,) * 6, None),))])
+def test_the_line_to_a_circle_is_split_by_lines() -> None:
+    _, after = split_moves(sample("cell/main.jbi", "cell/track.jbi"), [Split(1, (((1.0,) * 6, None),))])
     assert way(after)[1:4] == [("linear", "C0006", None), ("linear", "C0002", None), ("circular", "C0004", "C0003")]
 
 

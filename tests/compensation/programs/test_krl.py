@@ -1,4 +1,4 @@
-"""KUKA programs: what the reader finds, leaves alone and refuses, and how it divides moves.
+"""KUKA programs: what the reader finds, leaves alone and refuses, and how it splits moves.
 
 The syntax of the samples is that of KUKA System Software 8.3, Operating and Programming Instructions for System
 Integrators ("Programming for user group Expert", "Status and Turn") and of KUKA, Expert Programming, KSS 5.2 ("Motion
@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 
 from truearm.compensation.programs import LANGUAGES
 from truearm.compensation.programs.krl import KRL
-from truearm.compensation.programs.program import ANY_POSTURE, Division, Edit, Program, ProgramTarget, Source
+from truearm.compensation.programs.program import ANY_POSTURE, Edit, Program, ProgramTarget, Source, Split
 from truearm.errors import InputError
 
 SAMPLES = Path(__file__).parent / "samples" / "krl"
@@ -373,7 +373,7 @@ def test_every_element_of_a_list_has_the_tool_of_its_move() -> None:
     ["LOOP", "ELSE", "AGAIN:", "GRIP()", "LIN_REL {X 5}", "PTP XHOME", "LIN {X 5}", "CIRC XP1,XP1,CA 90",
      "TRIGGER WHEN DISTANCE=1 DELAY=0 DO A=1"],
 )  # fmt: skip
-def test_moves_are_divided_only_where_it_is_known_from_where_they_come(between: str) -> None:
+def test_moves_are_split_only_where_it_is_known_from_where_they_come(between: str) -> None:
     data = f"DECL POS XP1={FRAMES}"
     plain = read("PTP XP1\nWAIT SEC 0.5\n$OUT[3]=TRUE\nLIN XP1", data).moves[-1]
     assert plain.target_text != (0, 0)
@@ -415,15 +415,15 @@ def test_line_ends_and_a_byte_order_mark_do_not_matter() -> None:
         assert [m.line for m in other.moves] == [m.line for m in plain.moves]
 
 
-def test_a_divided_line() -> None:
+def test_a_split_line() -> None:
     program = KRL.read(sample(*CELL))
-    assert KRL.divide is not None
+    assert KRL.split is not None
     line = next(i for i, move in enumerate(program.moves) if move.line == 61)
     pieces = (
         ((703.25, -55.0, 640.0, 10.0, 0.00001, 180.0), None),
         ((703.5, -50.0, 640.00049, 10.0, 0.0, -180.0), None),
     )
-    edits = KRL.divide(program, [Division(line, pieces)]).edits
+    edits = KRL.split(program, [Split(line, pieces)]).edits
     text = edited(program, edits)[0].text
     assert (
         "\tLIN {X 703.250,Y -55.000,Z 640.000,A 10.0000,B 0.0000,C 180.0000} C_DIS\r\n"
@@ -439,12 +439,12 @@ def test_a_divided_line() -> None:
     ]
 
 
-def test_a_divided_circle() -> None:
+def test_a_split_circle() -> None:
     program = KRL.read(sample(*CELL))
-    assert KRL.divide is not None
+    assert KRL.split is not None
     circle = next(i for i, move in enumerate(program.moves) if move.line == 36)
     via, end, last = ((900.0 + i, 5.0, 1000.0, 0.0, 0.0, 180.0) for i in range(3))
-    edits = KRL.divide(program, [Division(circle, ((end, via),), last)]).edits
+    edits = KRL.split(program, [Split(circle, ((end, via),), last)]).edits
     text = edited(program, edits)[0].text
     assert (
         "   circ {X 900.000,Y 5.000,Z 1000.000,A 0.0000,B 0.0000,C 180.0000}, "
@@ -456,19 +456,19 @@ def test_a_divided_circle() -> None:
     assert [again.targets[via].values[0] for via in vias if via is not None] == [900.0, 902.0]
 
 
-def test_what_cannot_be_divided_stays_whole() -> None:
+def test_what_cannot_be_split_stays_whole() -> None:
     program = KRL.read(sample(*CELL))
-    assert KRL.divide is not None
+    assert KRL.split is not None
     whole = [i for i, move in enumerate(program.moves) if move.target_text == (0, 0)]
-    assert KRL.divide(program, [Division(i, (((0.0,) * 6, None),)) for i in whole]) == ([], [*whole])
+    assert KRL.split(program, [Split(i, (((0.0,) * 6, None),)) for i in whole]) == ([], [*whole])
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
 def test_a_piece_ends_its_line_as_the_program_does(end: str) -> None:
     text = f"DEF A ( )\n  PTP {FRAMES}\n  LIN {FRAMES}\nEND".replace("\n", end)
     program = KRL.read([Source(Path("a.src"), text)])
-    assert KRL.divide is not None
-    (edit,) = KRL.divide(program, [Division(1, (((1.0,) * 6, None),))]).edits
+    assert KRL.split is not None
+    (edit,) = KRL.split(program, [Split(1, (((1.0,) * 6, None),))]).edits
     assert edit.text == "LIN {X 1.000,Y 1.000,Z 1.000,A 1.0000,B 1.0000,C 1.0000}" + end + "  "
 
 

@@ -22,7 +22,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from truearm.compensation.programs.numbers import rewritten
-from truearm.compensation.programs.program import ANY_POSTURE, Division, Edit, Program, Source
+from truearm.compensation.programs.program import ANY_POSTURE, Edit, Program, Source, Split
 from truearm.compensation.programs.rapid import RAPID
 from truearm.compensation.programs.rapid.data import configuration
 from truearm.errors import InputError
@@ -556,18 +556,18 @@ def test_quadrants_that_are_none_are_left_open() -> None:
     assert configuration("9E9", "0.5", "-1", "0").readings == ((6, -pi / 2, 0.0),)
 
 
-def division(program: Program, move: int, *points: tuple[float, ...]) -> list[Edit]:
-    assert RAPID.divide is not None
-    return RAPID.divide(program, [Division(move, tuple((point, None) for point in points))]).edits
+def split(program: Program, move: int, *points: tuple[float, ...]) -> list[Edit]:
+    assert RAPID.split is not None
+    return RAPID.split(program, [Split(move, tuple((point, None) for point in points))]).edits
 
 
-def test_a_linear_move_is_divided_by_the_same_instruction() -> None:
+def test_a_linear_move_is_split_by_the_same_instruction() -> None:
     down = pose(rest="[0,0,1,0],[0,-1,1,5],[12.5,9E9,9E9,9E9,9E9,9E9]")
     program = read(
         "  MoveJ p1,v1,z1,tPen;\n  MoveL p2, v100,fine\t,tPen\\WObj:=wobj0 ; ! down",
         f"CONST robtarget p1:={pose()};\nCONST robtarget p2:={down};",
     )
-    edits = division(program, 1, (1.0, 2.0, -0.0001, 0.6, 0.8, 0.0, 0.0), (1.5, 2.25, 3.0005, 0.0, 0.0, 1.0, 0.0))
+    edits = split(program, 1, (1.0, 2.0, -0.0001, 0.6, 0.8, 0.0, 0.0), (1.5, 2.25, 3.0005, 0.0, 0.0, 1.0, 0.0))
     (source,) = edited(program, edits)
     assert source.text.splitlines()[5:9] == [
         "  MoveJ p1,v1,z1,tPen;",
@@ -582,10 +582,10 @@ def test_a_linear_move_is_divided_by_the_same_instruction() -> None:
     assert [again.targets[m.target].values[0] for m in again.moves] == [300.0, 1.0, 1.5, 300.0]
 
 
-def test_a_circular_move_is_divided_with_its_via(polish: Program) -> None:
-    assert RAPID.divide is not None
+def test_a_circular_move_is_split_with_its_via(polish: Program) -> None:
+    assert RAPID.split is not None
     half, mid, last = ((x, 3.0, 4.0, *DOWN) for x in (1.0, 2.0, 3.0))
-    edits = RAPID.divide(polish, [Division(3, ((mid, half),), last)]).edits
+    edits = RAPID.split(polish, [Split(3, ((mid, half),), last)]).edits
     (source,) = edited(polish, edits)
     again = RAPID.read([source])
     first, second = again.moves[3:5]
@@ -599,9 +599,7 @@ def test_a_circular_move_is_divided_with_its_via(polish: Program) -> None:
 
 
 def test_offsets_stay_offsets(polish: Program) -> None:
-    (source,) = edited(
-        polish, division(polish, 4, (1.0, -2.0, 3.5)) + division(polish, 5, (1.0, 2.0, 3.0, 0.1, 0.2, 0.3))
-    )
+    (source,) = edited(polish, split(polish, 4, (1.0, -2.0, 3.5)) + split(polish, 5, (1.0, 2.0, 3.0, 0.1, 0.2, 0.3)))
     lines = source.text.splitlines()
     assert lines[49] == "    MoveL Offs(p10,1.000,-2.000,3.500),v100,z5,tDisc\\WObj:=wCover;"
     assert lines[51] == (
@@ -611,9 +609,9 @@ def test_offsets_stay_offsets(polish: Program) -> None:
     assert len(RAPID.read([source]).targets) == len(polish.targets) + 2
 
 
-def test_line_ends_are_kept_by_a_division() -> None:
+def test_line_ends_are_kept_by_a_split() -> None:
     program = RAPID.read(sources("press_crlf.prg"))
-    (source,) = edited(program, division(program, 2, (450.0, 12.5, 260.0, 0.0, 0.0, 1.0, 0.0)))
+    (source,) = edited(program, split(program, 2, (450.0, 12.5, 260.0, 0.0, 0.0, 1.0, 0.0)))
     assert "\tMoveL [[450.000,12.500,260.000]," in source.text
     assert source.text.count("\r\n") == source.text.count("\n") == program.sources[0].text.count("\n") + 1
 
@@ -632,12 +630,12 @@ def test_line_ends_are_kept_by_a_division() -> None:
         f"MoveL Offs({pose()},1,2,3),v1,fine,tPen;",
     ],
 )
-def test_moves_that_cannot_be_divided_are_left_whole(body: str) -> None:
+def test_moves_that_cannot_be_split_are_left_whole(body: str) -> None:
     program = read(body)
     (move,) = program.moves
     assert move.statement == (0, 0)
     count = len(program.targets[move.target].values)
-    assert division(program, 0, (1.0,) * count) == []
+    assert split(program, 0, (1.0,) * count) == []
 
 
 def test_a_zero_correction_changes_nothing_and_a_correction_only_numbers() -> None:

@@ -1,4 +1,4 @@
-"""URScript: what is found in scripts, what is refused or left, and moves divided.
+"""URScript: what is found in scripts, what is refused or left, and split moves.
 
 Syntax and meaning are those of Universal Robots, The URScript Programming Language (script manual, e-Series): "Module
 motion" (movej, movel, movep, movec), "Module internals" (get_inverse_kin, set_tcp), "Module urmath" (pose_trans,
@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 
 from truearm.compensation.program_poses import poses_of
 from truearm.compensation.programs import LANGUAGES
-from truearm.compensation.programs.program import Division, Edit, Program, Skipped, Source
+from truearm.compensation.programs.program import Edit, Program, Skipped, Source, Split
 from truearm.compensation.programs.urscript import URSCRIPT
 from truearm.errors import InputError
 
@@ -67,9 +67,9 @@ def edited(program: Program, edits: list[Edit]) -> str:
     return text
 
 
-def divided(program: Program, *divisions: Division) -> str:
-    assert URSCRIPT.divide is not None
-    return edited(program, URSCRIPT.divide(program, divisions).edits)
+def split_moves(program: Program, *splits: Split) -> str:
+    assert URSCRIPT.split is not None
+    return edited(program, URSCRIPT.split(program, splits).edits)
 
 
 # What is found
@@ -447,7 +447,7 @@ def test_with_a_computed_offset_the_target_itself_is_corrected() -> None:
     assert len(program.targets) == 1
     assert program.skipped == ()
     assert [m.target for m in program.moves] == [0, 0, 0]
-    # Where it really goes is not known: it cannot be divided, and what follows has no start.
+    # Where it really goes is not known: it cannot be split, and what follows has no start.
     assert program.moves[1].target_text == (0, 0)
     assert [m.routine for m in program.moves] == [0, 0, 1]
     beyond = read(f"{TCP}a = p[.1,.2,.3,0,0,0]\nmovel(a)\nmovel(pose_trans(pose_trans(a, x()), p[0,0,.1,0,0,0]))\n")
@@ -559,13 +559,13 @@ def test_deep_and_round_texts_are_read(text: str) -> None:
     assert read(TCP + text).targets == ()
 
 
-# Moves divided
+# Split moves
 
 
-def test_a_line_in_a_frame_is_divided_into_calls_with_a_small_blend() -> None:
+def test_a_line_in_a_frame_is_split_into_calls_with_a_small_blend() -> None:
     program = URSCRIPT.read([sample("milling.script")])
     points = tuple(((x, 0.182525, 0.021866, 1.688324, -0.808544, -1.688324), None) for x in (0.05, 0.08))
-    text = divided(program, Division(3, points))
+    text = split_moves(program, Split(3, points))
     line = text.split("\r\n")[17]
     assert line == (
         "    movel(pose_trans(ref_frame,p[0.050000, 0.182525, 0.021866, 1.688324, -0.808544, -1.688324]),"
@@ -578,15 +578,15 @@ def test_a_line_in_a_frame_is_divided_into_calls_with_a_small_blend() -> None:
     assert [t.line for t in again.targets[2:6]] == [17, 18, 19, 20]
 
 
-def test_a_circle_is_divided_into_circles() -> None:
+def test_a_circle_is_split_into_circles() -> None:
     program = URSCRIPT.read([sample("milling.script")])
     turned = (1.688324, -0.808544, -1.688324)
-    division = Division(
+    split = Split(
         4,
         (((0.145355, 0.19717, 0.021866, *turned), (0.129134, 0.186331, 0.021866, *turned)),),
         (0.156194, 0.213391, 0.021866, *turned),
     )
-    again = read(divided(program, division))
+    again = read(split_moves(program, split))
     circles = [
         (again.targets[m.via or 0].values, again.targets[m.target].values) for m in again.moves if m.kind == "circular"
     ]
@@ -594,22 +594,22 @@ def test_a_circle_is_divided_into_circles() -> None:
         ((0.129134, 0.186331, 0.021866, *turned), (0.145355, 0.19717, 0.021866, *turned)),
         ((0.156194, 0.213391, 0.021866, *turned), (0.16, 0.232525, 0.021866, *turned)),
     ]
-    assert divided(program, division).count(",0, r=0.001000)") == 0  # its radius is the argument after v
-    assert divided(program, division).count(",accel_mss,speed_ms,0.001000)") == 1
+    assert split_moves(program, split).count(",0, r=0.001000)") == 0  # its radius is the argument after v
+    assert split_moves(program, split).count(",accel_mss,speed_ms,0.001000)") == 1
 
 
-def test_named_targets_joints_and_offsets_are_divided() -> None:
+def test_named_targets_joints_and_offsets_are_split() -> None:
     text = (
         f"def f():\n  {TCP}  a = p[0.1,0.2,0.3,0,3,0]\n  movel([0,0,0,0,0,0], v=0.1)\n  movel(a, # go\n    v=0.1)\n"
         "  movel(pose_trans(a, p[0,0,0.1,0,0,0]), v=0.1)\nend\n"
     )
     program = read(text)
     via = (0.1, 0.2, 0.25, 0.0, -3.0, -0.0)
-    made = divided(
+    made = split_moves(
         program,
-        Division(0, (((1.0, 2.0, 3.0, 0.0, 0.0, 0.0), None),)),
-        Division(1, ((via, None),)),
-        Division(2, ((via, None),)),
+        Split(0, (((1.0, 2.0, 3.0, 0.0, 0.0, 0.0), None),)),
+        Split(1, ((via, None),)),
+        Split(2, ((via, None),)),
     )
     assert made == (
         f"def f():\n  {TCP}  a = p[0.1,0.2,0.3,0,3,0]\n"
@@ -637,17 +637,17 @@ def test_named_targets_joints_and_offsets_are_divided() -> None:
         "movep(p[0.1,0,0.3,0,3,0], r=0.05)\nmovel(p[0.2,0,0.3,0,3,0])",
     ],
 )
-def test_moves_that_cannot_be_divided_stay(move: str) -> None:
+def test_moves_that_cannot_be_split_stay(move: str) -> None:
     program = read(f"{TCP}wide = 0.04\n{move}\n")
     points = tuple(((x, 0.0, 0.3, 0.0, 3.0, 0.0), None) for x in (0.16, 0.18))
     last = len(program.moves) - 1
-    assert divided(program, Division(last, points)) == program.sources[0].text
+    assert split_moves(program, Split(last, points)) == program.sources[0].text
 
 
 def test_variables_tell_times_and_radii() -> None:
     program = read(f"{TCP}narrow = 0.004\nnow = 0\nmovel(p[0.2,0,0.3,0,3,0], 1.2, 0.25, now, narrow)\n")
     points = tuple(((x, 0.0, 0.3, 0.0, 3.0, 0.0), None) for x in (0.16, 0.18))
-    assert divided(program, Division(0, points)).count("now, 0.001000)") == 2
+    assert split_moves(program, Split(0, points)).count("now, 0.001000)") == 2
 
 
 def test_large_programs_have_as_many_targets() -> None:

@@ -133,7 +133,7 @@ class ProgramTarget:
         Names of the tool and of the work object, base or user frame that hold; empty for the flange and the robot's
         own base.
     configuration
-        The posture meant.
+        In which posture the target is reached.
     parent
         Index of the target that this one is an offset from, None for none. A target and its parent have the same tool
         and frame.
@@ -175,7 +175,7 @@ class Move:
         Where the whole instruction stands in the text, ``(start, stop)``, from its first to after its last character.
     target_text, via_text
         Where the words for the targets stand in the text, inside of `statement`. ``(0, 0)`` for a move that cannot be
-        divided.
+        split.
     """
 
     kind: MoveKind
@@ -260,18 +260,18 @@ class Edit(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Division:
-    """A linear or circular move to be divided.
+class Split:
+    """A linear or circular move that is split into segments.
 
     Attributes
     ----------
     move
         Index of the move.
     points
-        One entry an instruction to insert before the move: the numbers of its target, and of its via for a circle
-        (else None), in the form and units of the move's target.
+        One entry for each instruction to insert before the move: the numbers of its target, and of its via for a
+        circle (else None), in the form and units of the move's target.
     last_via
-        For a circle the numbers of the via of its last piece, which is the move itself.
+        For a circle the numbers of the via of its last segment, which is the move itself.
     """
 
     move: int
@@ -279,19 +279,19 @@ class Division:
     last_via: tuple[float, ...] | None = None
 
 
-class Pieces(NamedTuple):
-    """Moves divided.
+class SplitEdits(NamedTuple):
+    """How the text of a program changes when moves are split.
 
     Attributes
     ----------
     edits
         What changes in the text.
-    whole
-        Indices of moves that were to be divided and stay whole, because pieces of them would be something else.
+    unsplit
+        Indices of moves that stay whole, because segments of them would do something else.
     """
 
     edits: list[Edit]
-    whole: list[int]
+    unsplit: list[int]
 
 
 @dataclass(frozen=True)
@@ -308,8 +308,8 @@ class Language:
         Whether a text looks like this language.
     read
         Read the files of one program, given together.
-    divide
-        Divide moves; None if the language's programs cannot be divided.
+    split
+        Split moves; None if the language's programs cannot be split.
     together
         Whether files that are given together are one program and share names; else each is one for itself.
     companions
@@ -320,7 +320,7 @@ class Language:
     suffixes: tuple[str, ...]
     is_one: Callable[[str], bool]
     read: Callable[[Sequence[Source]], Program]
-    divide: Callable[[Program, Sequence[Division]], Pieces] | None = None
+    split: Callable[[Program, Sequence[Split]], SplitEdits] | None = None
     together: bool = False
     companions: tuple[tuple[str, str], ...] = ()
 

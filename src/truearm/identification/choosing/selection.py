@@ -1,14 +1,16 @@
 """Which joint effects the data can carry: added one by one while cross-validation says that they help.
 
 It begins with the elastic model. Each round adds, one at a time, every effect that is not there yet, and judges by
-5-fold cross-validation on the training part. The best of those whose gain is larger than its own standard error, over
-the paired differences of the folds, stays; the search ends where there is none (the rule of one standard error:
-Breiman and others 1984, "Classification and Regression Trees", section 3.4.3).
+5-fold cross-validation on the training part. An effect is tried if it is selectable, if the robot has what it moves,
+and if the data tell what it depends on: the order of the configurations, the temperature, loads. The best of those
+whose gain is larger than its own standard error, over the paired differences of the folds, stays; the search ends where
+there is none (the rule of one standard error: Breiman and others 1984, "Classification and Regression Trees", section
+3.4.3).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -23,24 +25,15 @@ from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of
 from truearm.modeling.chain import Array
 from truearm.modeling.effects import EFFECTS
+from truearm.modeling.loads import has_weight
 from truearm.modeling.robot import Robot
 
 AUTO: Final = "auto"
 FOLDS: Final = 5
 _ROUGH: Final = 1e-3  # priors; errors of folds are not compared more closely
 _START: Final = next(model for model in MODELS if model.name == "elastic")
-#: What stands for something of its own; gain and the other form of clearance are left to those who ask for them.
-_CANDIDATES: Final = (
-    "bearing-compliance",
-    "hardening",
-    "backlash",
-    "clearance",
-    "fourier",
-    "approach",
-    "warm-up",
-    "transmission-error",
-    "thermal-growth",
-)
+#: Joint effects that are tried, in this order.
+SELECTABLE: Final = tuple(effect.name for effect in EFFECTS if effect.selectable)
 
 
 @dataclass(frozen=True)
@@ -97,6 +90,7 @@ def select(
     bounds: Bounds | None = None,
     bounds_file: str = "bounds",
     seed: int = 0,
+    candidates: Sequence[str] = SELECTABLE,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Selection:
     """Choose the joint effects for a robot and its training data.
@@ -107,6 +101,8 @@ def select(
         As :func:`truearm.identification.solving.fit.identify` takes them.
     seed
         Of the folds.
+    candidates
+        Joint effects that may be tried.
     progress
         Called with a few words at each step.
 
@@ -130,7 +126,7 @@ def select(
     ]
 
     def judged(effects: tuple[str, ...]) -> Array:
-        model = _model(effects)
+        model = _model(effects, candidates)
         errors = []
         for training, held_out in folds:
             fit = identify(
@@ -153,9 +149,9 @@ def select(
     now = judged(effects)
     start = float(np.nanmean(now))
     attempts: list[Attempt] = []
-    for number in range(1, len(_CANDIDATES) + 1):
+    for number in range(1, len(candidates) + 1):
         tried: list[tuple[Attempt, Array]] = []
-        for name in _open(robot, effects, data):
+        for name in _open(robot, effects, data, candidates):
             progress(f"choosing a model: {', '.join(effects)} and {name}?")
             try:
                 errors = judged((*effects, name))
@@ -172,7 +168,7 @@ def select(
         if best is None:
             break
         effects, now = (*effects, best[0].effect), best[1]
-    return Selection(_model(effects), start, tuple(attempts))
+    return Selection(_model(effects, candidates), start, tuple(attempts))
 
 
 def _fold(training: Dataset, held_out: Dataset) -> tuple[Dataset, Dataset]:
@@ -182,23 +178,26 @@ def _fold(training: Dataset, held_out: Dataset) -> tuple[Dataset, Dataset]:
     return training, replace(held_out.of_readings(placed), quaternion=None)
 
 
-def _open(robot: Robot, effects: tuple[str, ...], data: Dataset) -> list[str]:
-    """Return the effects that are not there yet and that the data say something about."""
-    kinds = {effect.name: effect for effect in EFFECTS}
-    geared = any(joint.transmission_periods for joint in robot.joints)
+def _open(robot: Robot, effects: tuple[str, ...], data: Dataset, candidates: Sequence[str]) -> list[str]:
+    """Return the effects that are not there yet and that the robot and the data say something about."""
+    ordered = data.approach is not None and data.number is not None
+    warmed = data.temperature is not None
+    loaded = has_weight(robot) or data.wrench is not None
     return [
-        name
-        for name in _CANDIDATES
-        if name not in effects
-        and not (kinds[name].ordered and (data.approach is None or data.number is None))
-        and (geared or name != "transmission-error")
-        and not (kinds[name].warmed and data.temperature is None)
+        effect.name
+        for effect in EFFECTS
+        if effect.name in candidates
+        and effect.name not in effects
+        and effect(robot.layout).parameters
+        and (ordered or not effect.ordered)
+        and (warmed or not effect.warmed)
+        and (loaded or not effect.loaded)
     ]
 
 
-def _model(effects: tuple[str, ...]) -> Model:
+def _model(effects: tuple[str, ...], candidates: Sequence[str]) -> Model:
     names = [effect.name for effect in EFFECTS if effect.name in effects]
     added = [name for name in names if name not in _START.effects]
-    tried = tuple(name for name in _CANDIDATES if name not in effects)
+    tried = tuple(name for name in candidates if name not in effects)
     summary = f"elastic, and what cross-validation added: {', '.join(added) or 'nothing'}"
     return Model(AUTO, summary, _START.groups, tuple(names), tried)

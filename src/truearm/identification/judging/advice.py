@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import combinations
 from typing import Final
 
 import numpy as np
@@ -10,8 +11,12 @@ import numpy as np
 from truearm.identification.solving.fit import Fit, Status
 from truearm.identification.solving.redundancy import gauge_motion_removed
 from truearm.modeling.conventions import parallel_joints_without_beta
+from truearm.modeling.effects import EFFECTS, NON_NEGATIVE
+from truearm.modeling.loads import has_weight
 from truearm.notices import Notice
 
+#: Groups of parameters of the rigid arm.
+_KINEMATIC: Final = frozenset({"joint zero", "geometry", *(effect.name for effect in EFFECTS if effect.kinematic)})
 #: Priors that a parameter may move before the robot, its units or its joint order are doubted.
 _FAR: Final = 6.0
 #: Standard deviations below zero from which a stiffness or a play is doubted.
@@ -35,7 +40,7 @@ def check_fit(fit: Fit) -> list[Notice]:
                 robot.convention_name, robot.convention_name
             )
             cure = (
-                "Convert the robot: truearm convert, --convention hayati."
+                "Convert the robot to the convention hayati with 'truearm convert'."
                 if robot.convention_name == "s-model"
                 else f"Write 'convention: {better}' in the robot file and 'beta: 0' at the link between them."
             )
@@ -80,9 +85,7 @@ def check_fit(fit: Fit) -> list[Notice]:
             )
         )
     far = [
-        p.name
-        for p in robot.parameters.values()
-        if p.group in ("joint zero", "geometry", "gain") and abs(p.value - p.nominal) > _FAR * p.prior
+        p.name for p in robot.parameters.values() if p.group in _KINEMATIC and abs(p.value - p.nominal) > _FAR * p.prior
     ]
     if far:
         found.append(
@@ -132,20 +135,19 @@ def _check_effects(fit: Fit) -> list[Notice]:
             Notice(
                 "effects-idle",
                 f"The robot file has the joint effects {', '.join(idle)} at nothing, and the model "
-                f"{fit.model.name} does not free them. Add --effect {idle[0]}, or take them out of the file.",
+                f"{fit.model.name} does not free them. Add `effects={idle[0]}`, or take them out of the file.",
             )
         )
     effects = {p.name for effect in robot.effects for p in effect.parameters}
     own = [name for name in fit.free.names if name in effects]
     unknown = [name for name in own if fit.parameter_status(name) == "uninformed"]
     unknown += [r.dropped for r in fit.redundancies if r.dropped in effects]
-    masses = (robot.payload.mass, *(link.mass for link in robot.masses))
-    if any(effect.loaded for effect in robot.effects) and not any(masses):
+    if any(effect.loaded for effect in robot.effects) and not has_weight(robot):
         found.append(
             Notice(
                 "no-loads",
                 "The robot has no link masses and no payload, so nothing loads its joints and compliance cannot be "
-                "found. Give masses in the robot file, or --payload.",
+                "found. Give masses in the robot file, or `payload`.",
             )
         )
     elif unknown:
@@ -164,17 +166,10 @@ def _check_effects(fit: Fit) -> list[Notice]:
                 "too-many-effects",
                 f"Of {len(own)} parameters of joint effects the data know {len(vague)} less than half, "
                 f"{', '.join(vague[:8])}{' and others' if len(vague) > 8 else ''}: there are too few configurations "
-                f"for so many effects. Measure more{'' if fit.model.tried else ', or let --model auto choose'}.",
+                f"for so many effects. Measure more{'' if fit.model.tried else ', or let `model=auto` choose'}.",
             )
         )
-    soft = [
-        p.name
-        for p in (robot.parameters[name] for name in own)
-        if p.group in ("compliance", "bearing-compliance", "backlash", "clearance")
-        and p.deviation is not None
-        and p.value < -_NEGATIVE * p.deviation
-        and fit.parameter_status(p.name) == "identified"
-    ]
+    soft = _negative(fit)
     if soft:
         found.append(
             Notice(
@@ -184,6 +179,27 @@ def _check_effects(fit: Fit) -> list[Notice]:
             )
         )
     return found
+
+
+def _negative(fit: Fit) -> list[str]:
+    """Return which springs, plays and gaps came out negative, and of which two the sum did.
+
+    Two joints may move a target in the same way: only the sum of their parameters is known then, and neither alone.
+    """
+    of = fit.robot.parameters
+    places = [
+        place
+        for place, name in enumerate(fit.free.names)
+        if of[name].group in NON_NEGATIVE and fit.parameter_status(name) == "identified"
+    ]
+    names, spread = fit.free.names, fit.covariance
+    found = {i: names[i] for i in places if of[names[i]].value < -_NEGATIVE * math.sqrt(spread[i, i])}
+    for i, j in combinations([place for place in places if place not in found], 2):
+        total, variance = of[names[i]].value + of[names[j]].value, spread[i, i] + spread[j, j] + 2.0 * spread[i, j]
+        better_known = variance < min(spread[i, i], spread[j, j])
+        if of[names[i]].group == of[names[j]].group and better_known and total < -_NEGATIVE * math.sqrt(variance):
+            found[i] = f"the sum of {names[i]} and {names[j]}"
+    return [found[place] for place in sorted(found)]
 
 
 def _positions_told(fit: Fit, seed: int = 0) -> float:

@@ -2,7 +2,8 @@
 
 The residuals of each joint are held against sines of its readings, one number of periods in a turn after the other: a
 periodogram on readings at uneven places (Lomb 1976, "Least-squares frequency analysis of unequally spaced data"). The
-strongest is taken out before the next one is looked for.
+strongest is taken out before the next one is looked for. A sine is looked for only where the readings could tell one of
+the size that gears have: a joint that hardly turns, or whose axis passes the only target, says nothing.
 """
 
 from __future__ import annotations
@@ -23,6 +24,10 @@ _PERIODS: Final = np.arange(20, 401)
 #: A periodic error is believed if chance would show one as strong in any joint less often than this.
 _CHANCE: Final = 1e-3
 _FEWEST: Final = 60  # configurations
+#: Largest standard deviation of an amplitude [rad] at which the readings see a gear; good ones err by less.
+_SEEN: Final = 5e-4
+#: Periods that a joint must pass through, or else a sine is the same as an offset or a gain.
+_PASSED: Final = 4.0
 
 
 @dataclass(frozen=True)
@@ -86,7 +91,8 @@ def periodic_errors(fit: Fit, data: Dataset) -> tuple[PeriodicError, ...]:
     found: list[PeriodicError] = []
     total = float(left.sum())
     while open_joints:
-        tried = [(*_strongest(at.joints[:, i], pull[:, i], weight[:, i, i]), i) for i in open_joints]
+        noise = total / max(free, 1)
+        tried = [(*_strongest(at.joints[:, i], pull[:, i], weight[:, i, i], noise), i) for i in open_joints]
         explained, periods, a, b, joint = max(tried)
         chance = len(open_joints) * len(_PERIODS) * math.exp(-0.5 * free * explained / total)
         if chance >= _CHANCE:
@@ -99,15 +105,30 @@ def periodic_errors(fit: Fit, data: Dataset) -> tuple[PeriodicError, ...]:
     return tuple(sorted(found, key=lambda error: error.joint))
 
 
-def _strongest(q: Array, pull: Array, weight: Array) -> tuple[float, int, float, float]:
-    """Return what the best sine explains of the squared residuals [m^2], its periods, and its two amplitudes [rad]."""
+def _strongest(q: Array, pull: Array, weight: Array, noise: float) -> tuple[float, int, float, float]:
+    """Return what the best sine explains of the squared residuals [m^2], its periods, and its two amplitudes [rad].
+
+    It explains nothing where the readings see none.
+
+    Parameters
+    ----------
+    q
+        Positions of the joint [rad], ``(n,)``.
+    pull, weight
+        J'r [m^2] and J'J [m^2] of the joint, ``(n,)``.
+    noise
+        Variance of a coordinate of the residuals [m^2].
+    """
     angle = _PERIODS[:, None] * q
     s, c = np.sin(angle), np.cos(angle)
     ss, sc, cc = (s * s) @ weight, (s * c) @ weight, (c * c) @ weight
     ys, yc = s @ pull, c @ pull
-    safe = np.maximum(ss * cc - sc * sc, 1e-12 * (ss + cc) ** 2 + 1e-300)
+    least = 0.5 * (ss + cc) - np.hypot(0.5 * (ss - cc), sc)  # what is known of the sine of the phase known least [m^2]
+    passed = _PERIODS * math.sqrt(12.0) * q.std() / (2.0 * math.pi)  # of a range that is passed through evenly
+    seen = (least * _SEEN**2 > noise) & (passed > _PASSED)
+    safe = np.where(seen, ss * cc - sc * sc, 1.0)
     a, b = (cc * ys - sc * yc) / safe, (ss * yc - sc * ys) / safe
-    explained = a * ys + b * yc
+    explained = np.where(seen, a * ys + b * yc, 0.0)
     best = int(np.argmax(explained))
     return float(explained[best]), int(_PERIODS[best]), float(a[best]), float(b[best])
 
@@ -125,7 +146,7 @@ def check_transmission(fit: Fit, data: Dataset) -> list[Notice]:
         Notice(
             "transmission-error",
             f"What is left over repeats with the joints' angles: {told}. Strain wave gears do that, twice in a turn of "
-            "their wave generator. Write transmission_periods to these joints in the robot file, and --model auto "
+            "their wave generator. Write transmission_periods to these joints in the robot file, and `model=auto` "
             "will try to take the error out.",
         )
     ]

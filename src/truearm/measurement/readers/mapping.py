@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints, model_validator
 from pydantic import field_validator as validator_of
 
+from truearm.errors import InputError
 from truearm.files import is_one_line
 from truearm.measurement.readers.cells import Layout
 
@@ -25,7 +26,7 @@ def _none_as_null(value: object) -> object:
 
 def _on_one_line(text: str) -> str:
     if not is_one_line(text):
-        raise ValueError("text on one line belongs here, without control characters")
+        raise InputError("a name belongs here", came=text, allowed="one line of text without control characters")
     return text
 
 
@@ -57,7 +58,9 @@ class LayoutEntry(_Entry):
         try:
             return codecs.lookup(name).name
         except LookupError:
-            raise ValueError("there is no such encoding; usual ones are utf-8, utf-16, cp1252, latin-1") from None
+            raise InputError(
+                "there is no such encoding", came=name, allowed="utf-8, utf-16, cp1252, latin-1 and others of Python"
+            ) from None
 
     @model_validator(mode="after")
     def _header_first(self) -> LayoutEntry:
@@ -100,7 +103,11 @@ class NamesEntry(_Entry):
         except (re.error, OverflowError, RecursionError) as error:
             raise ValueError(f"this is not a regular expression ({error})") from None
         if not groups or groups - {"configuration", "target"}:
-            raise ValueError("the named groups must be (?P<configuration>..), (?P<target>..) or both")
+            raise InputError(
+                "the pattern has other named groups",
+                came=pattern,
+                allowed="(?P<configuration>..), (?P<target>..) or both",
+            )
         return pattern
 
     @property

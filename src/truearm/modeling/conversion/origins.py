@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from truearm.modeling.conversion.links import Links
-from truearm.modeling.formats.urdf import roll_pitch_yaw
+from truearm.modeling.formats.urdf_tree import roll_pitch_yaw
 from truearm.modeling.lines import at_zero, base_and_flange
 from truearm.modeling.robot import Robot
 

@@ -1,4 +1,8 @@
-"""Joint effects: what moves a joint by something else than its reading. One effect a file."""
+"""Joint effects: what moves a joint by something else than its reading.
+
+One effect a file, which knows all about itself: its parameters, what it needs to know, and where it may be used. A new
+one is a file here and a line in `EFFECTS`; the order there is that of parameters and of trials.
+"""
 
 from __future__ import annotations
 
@@ -9,12 +13,13 @@ from truearm.errors import InputError, did_you_mean
 from truearm.modeling.effects.approach import Approach
 from truearm.modeling.effects.backlash import Backlash
 from truearm.modeling.effects.bearing import BearingCompliance
-from truearm.modeling.effects.clearance import Clearance, LinearContactClearance
+from truearm.modeling.effects.clearance import Clearance
 from truearm.modeling.effects.compliance import Compliance
 from truearm.modeling.effects.effect import Effect, Layout
 from truearm.modeling.effects.fourier import Fourier
 from truearm.modeling.effects.gain import Gain
 from truearm.modeling.effects.hardening import Hardening
+from truearm.modeling.effects.linear_contact import LinearContactClearance
 from truearm.modeling.effects.thermal import ThermalGrowth
 from truearm.modeling.effects.transmission import TransmissionError
 from truearm.modeling.effects.warm_up import WarmUp
@@ -34,7 +39,10 @@ EFFECTS: Final[tuple[type[Effect], ...]] = (
     WarmUp,
 )
 
-__all__ = ["EFFECTS", "Effect", "Gain", "Layout", "checked_effects"]
+#: Groups of parameters that no joint has negative ones of. An identified value may come out so all the same.
+NON_NEGATIVE: Final = frozenset(effect.name for effect in EFFECTS if effect.non_negative)
+
+__all__ = ["EFFECTS", "NON_NEGATIVE", "Effect", "Layout", "checked_effects"]
 
 
 def checked_effects(names: Sequence[str], parameter: str = "effects") -> tuple[str, ...]:

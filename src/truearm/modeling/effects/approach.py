@@ -24,9 +24,9 @@ class Approach(LinearEffect):
     def parameters(self) -> tuple[Parameter, ...]:
         """One a joint."""
         return tuple(
-            Parameter.plain(f"approach_{i + 1}", "rad", "approach", 0.0, _PRIOR)
+            self.parameter(f"approach_{i + 1}", "rad", _PRIOR)
             if self.layout.kinds[i] == "revolute"
-            else Parameter.plain(f"approach_{i + 1}", "m", "approach", 0.0, 1e-4)
+            else self.parameter(f"approach_{i + 1}", "m", 1e-4)
             for i in self.layout.joints
         )
 

@@ -27,11 +27,13 @@ class Backlash(LinearEffect):
 
     name: ClassVar[str] = "backlash"
     loaded: ClassVar[bool] = True
+    non_negative: ClassVar[bool] = True
+    exportable: ClassVar[bool] = True
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """One play a turning joint."""
-        return tuple(Parameter.plain(f"backlash_{i + 1}", "rad", "backlash", 0.0, _PRIOR) for i in self.layout.turning)
+        return tuple(self.parameter(f"backlash_{i + 1}", "rad", _PRIOR) for i in self.layout.turning)
 
     def shapes(self, at: Postures) -> Rates:
         """Return half the sign of the moments, smooth where they change sign."""

@@ -21,14 +21,13 @@ class BearingCompliance(LinearEffect):
     name: ClassVar[str] = "bearing-compliance"
     loaded: ClassVar[bool] = True
     tilts: ClassVar[bool] = True
+    non_negative: ClassVar[bool] = True
+    exportable: ClassVar[bool] = True
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """One a turning joint."""
-        return tuple(
-            Parameter.plain(f"bearing_compliance_{i + 1}", "rad/(N m)", "bearing-compliance", 0.0, 1e-4)
-            for i in self.layout.turning
-        )
+        return tuple(self.parameter(f"bearing_compliance_{i + 1}", "rad/(N m)", 1e-4) for i in self.layout.turning)
 
     def shapes(self, at: Postures) -> Rates:
         """Return the moments across the axes."""

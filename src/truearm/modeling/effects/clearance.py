@@ -33,14 +33,13 @@ class Clearance(Effect):
     name: ClassVar[str] = "clearance"
     loaded: ClassVar[bool] = True
     tilts: ClassVar[bool] = True
+    non_negative: ClassVar[bool] = True
+    exportable: ClassVar[bool] = True
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """One angle a turning joint."""
-        return tuple(
-            Parameter.plain(f"clearance_{i + 1}", "rad", self.name, 0.0, _PRIOR)  # type: ignore[arg-type]
-            for i in self.layout.turning
-        )
+        return tuple(self.parameter(f"clearance_{i + 1}", "rad", _PRIOR) for i in self.layout.turning)
 
     def contact(self, x: Array, y: Array) -> tuple[Array, Array]:
         """Return sine and cosine of the contact angle, signed like the moments x and y, as far as it is seated."""
@@ -71,20 +70,3 @@ class Clearance(Effect):
 
     def _contacts(self, at: Postures) -> Mapping[int, tuple[Array, Array]]:
         return {i: self.contact(*at.joint_loads[i, 3:5]) for i in self.layout.turning}
-
-
-@dataclass(frozen=True)
-class LinearContactClearance(Clearance):
-    """Clearance tilt with the document's contact angle, gamma = pi/2 |M_x| / (|M_x| + |M_y|) (Patel, 5.16).
-
-    It is up to 4 deg away from the exact one, and stands for the document's own numbers.
-    """
-
-    name: ClassVar[str] = "clearance-linear-contact"
-
-    def contact(self, x: Array, y: Array) -> tuple[Array, Array]:
-        """Return sine and cosine of the contact angle, signed like the moments x and y, as far as it is seated."""
-        total = np.abs(x) + np.abs(y)
-        gamma = 0.5 * np.pi * np.abs(x) / np.where(total > 0.0, total, 1.0)
-        seated = np.tanh(np.hypot(x, y) / SEATED)
-        return seated * np.sign(x) * np.sin(gamma), seated * np.sign(y) * np.cos(gamma)

@@ -16,14 +16,16 @@ class Compliance(LinearEffect):
 
     name: ClassVar[str] = "compliance"
     loaded: ClassVar[bool] = True
+    non_negative: ClassVar[bool] = True
+    exportable: ClassVar[bool] = True
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """One compliance a joint."""
         return tuple(
-            Parameter.plain(f"compliance_{i + 1}", "rad/(N m)", "compliance", 0.0, 1e-3)
+            self.parameter(f"compliance_{i + 1}", "rad/(N m)", 1e-3)
             if self.layout.kinds[i] == "revolute"
-            else Parameter.plain(f"compliance_{i + 1}", "m/N", "compliance", 0.0, 1e-5)
+            else self.parameter(f"compliance_{i + 1}", "m/N", 1e-5)
             for i in self.layout.joints
         )
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from truearm.modeling.chain import Array
 from truearm.modeling.conventions import JointKind
-from truearm.modeling.parameters import Parameter
+from truearm.modeling.parameters import Parameter, Unit
 from truearm.modeling.postures import Postures
 
 #: A derivative of the chain's variables: by parameter, and for each the variables it moves.
@@ -78,6 +78,16 @@ class Effect(ABC):
         Whether it depends on loads, on the order in which configurations were reached, on the temperature.
     tilts, stretches
         Whether it tilts joints, or changes lengths.
+    non_negative
+        Whether its parameters are springs, plays or gaps: nobody may state a negative one, and one that a fit finds is
+        told.
+    kinematic
+        Whether it belongs to the kinematics of the rigid arm. Values far from nominal then mean another robot, other
+        units or another order of the joints.
+    selectable
+        Whether it is tried where cross-validation chooses the effects; others are left to those who ask for them.
+    exportable
+        Whether the Python file of a robot computes it, see :mod:`truearm.modeling.formats.python_file`.
     """
 
     layout: Layout
@@ -87,11 +97,15 @@ class Effect(ABC):
     warmed: ClassVar[bool] = False
     tilts: ClassVar[bool] = False
     stretches: ClassVar[bool] = False
+    non_negative: ClassVar[bool] = False
+    kinematic: ClassVar[bool] = False
+    selectable: ClassVar[bool] = True
+    exportable: ClassVar[bool] = False
 
     @property
     @abstractmethod
     def parameters(self) -> tuple[Parameter, ...]:
-        """Its parameters, at the values at which it does nothing."""
+        """Its parameters, at the values at which it does nothing; none where the robot has nothing that it moves."""
 
     @abstractmethod
     def deflection(self, at: Postures, values: Mapping[str, float | Array]) -> Mapping[int, Array]:
@@ -108,6 +122,10 @@ class Effect(ABC):
     @abstractmethod
     def derivative(self, at: Postures, values: Mapping[str, float | Array]) -> Rates:
         """Return, for each parameter, its derivative of the variables it moves. Loads are held."""
+
+    def parameter(self, name: str, unit: Unit, prior: float, nominal: float = 0.0) -> Parameter:
+        """Make a parameter of its own, at the value at which it does nothing."""
+        return Parameter.plain(name, unit, self.name, nominal, prior)
 
 
 @dataclass(frozen=True)

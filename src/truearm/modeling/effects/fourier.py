@@ -24,12 +24,13 @@ class Fourier(LinearEffect):
     """Parameters ``fourier_sin1_i``, ``fourier_cos1_i``, ``fourier_sin2_i``, ``fourier_cos2_i`` [rad]."""
 
     name: ClassVar[str] = "fourier"
+    exportable: ClassVar[bool] = True
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """Sine and cosine of each harmonic of each turning joint."""
         return tuple(
-            Parameter.plain(f"fourier_{part}{k}_{i + 1}", "rad", "fourier", 0.0, _PRIOR)
+            self.parameter(f"fourier_{part}{k}_{i + 1}", "rad", _PRIOR)
             for i in self.layout.turning
             for k in HARMONICS
             for part in ("sin", "cos")

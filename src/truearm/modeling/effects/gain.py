@@ -18,11 +18,14 @@ class Gain(LinearEffect):
     """Parameters ``gain_i``, 1 for a perfect joint."""
 
     name: ClassVar[str] = "gain"
+    kinematic: ClassVar[bool] = True
+    selectable: ClassVar[bool] = False
+    exportable: ClassVar[bool] = True
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """One gain a joint, believed to be good for 1 in 1000."""
-        return tuple(Parameter.plain(f"gain_{i + 1}", "1", "gain", 1.0, 1e-3) for i in self.layout.joints)
+        return tuple(self.parameter(f"gain_{i + 1}", "1", 1e-3, nominal=1.0) for i in self.layout.joints)
 
     def shapes(self, at: Postures) -> Rates:
         """Return the readings."""

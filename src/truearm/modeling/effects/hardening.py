@@ -22,6 +22,7 @@ class Hardening(LinearEffect):
 
     name: ClassVar[str] = "hardening"
     loaded: ClassVar[bool] = True
+    exportable: ClassVar[bool] = True
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -30,8 +31,8 @@ class Hardening(LinearEffect):
             plain
             for i in self.layout.turning
             for plain in (
-                Parameter.plain(f"compliance_quadratic_{i + 1}", "rad/(N m)^2", "hardening", 0.0, 3e-5),
-                Parameter.plain(f"compliance_cubic_{i + 1}", "rad/(N m)^3", "hardening", 0.0, 3e-7),
+                self.parameter(f"compliance_quadratic_{i + 1}", "rad/(N m)^2", 3e-5),
+                self.parameter(f"compliance_cubic_{i + 1}", "rad/(N m)^3", 3e-7),
             )
         )
 

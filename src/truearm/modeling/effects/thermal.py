@@ -25,7 +25,7 @@ class ThermalGrowth(LinearEffect):
     def parameters(self) -> tuple[Parameter, ...]:
         """One a link that has a length."""
         links = dict.fromkeys(joint for joint, _ in self.layout.lengths)
-        return tuple(Parameter.plain(f"thermal_growth_{i + 1}", "1/K", "thermal-growth", 0.0, 3e-5) for i in links)
+        return tuple(self.parameter(f"thermal_growth_{i + 1}", "1/K", 3e-5) for i in links)
 
     def shapes(self, at: Postures) -> Rates:
         """Return length times warming; nothing where the temperature is not known."""

@@ -26,12 +26,13 @@ class TransmissionError(LinearEffect):
     """Parameters ``transmission_sin_i`` and ``transmission_cos_i`` [rad] of joints whose gear is known."""
 
     name: ClassVar[str] = "transmission-error"
+    exportable: ClassVar[bool] = True
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """Sine and cosine of each joint with known periods."""
         return tuple(
-            Parameter.plain(f"transmission_{part}_{i + 1}", "rad", "transmission-error", 0.0, _PRIOR)
+            self.parameter(f"transmission_{part}_{i + 1}", "rad", _PRIOR)
             for i, _ in self._geared()
             for part in ("sin", "cos")
         )

@@ -38,8 +38,8 @@ class WarmUp(Effect):
     def parameters(self) -> tuple[Parameter, ...]:
         """One growth a link that has a length, and the rate of all."""
         links = dict.fromkeys(joint for joint, _ in self.layout.lengths)
-        growths = (Parameter.plain(f"warm_up_{i + 1}", "1", "warm-up", 0.0, 3e-4) for i in links)
-        return (*growths, Parameter.plain(RATE, "1", "warm-up", 0.01, 0.005))
+        growths = (self.parameter(f"warm_up_{i + 1}", "1", 3e-4) for i in links)
+        return (*growths, self.parameter(RATE, "1", 0.005, nominal=0.01))
 
     def deflection(self, at: Postures, values: Mapping[str, float | Array]) -> Mapping[int, Array]:
         """Return what the links are shorter than when warm; nothing where the number is not known."""

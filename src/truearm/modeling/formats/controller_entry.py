@@ -21,13 +21,17 @@ _CONDITION = 1e9
 
 def _direction(sign: int) -> int:
     if sign not in (1, -1):
-        raise ValueError("a sign is 1 or -1")
+        raise InputError("this is no sign", came=sign, allowed="1, -1")
     return sign
 
 
 def _countable(pulses: float) -> float:
     if not 1e-6 <= abs(pulses) <= 1e12:
-        raise ValueError("0.000001 to 1e12 pulses belong here, negative where the motor counts against the reading")
+        raise InputError(
+            "so many pulses cannot be",
+            came=pulses,
+            allowed="0.000001 to 1e12, negative where the motor counts against the reading",
+        )
     return pulses
 
 

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Annotated, Final
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
 
+from truearm.errors import InputError
 from truearm.modeling.transform import IDENTITY, Transform
 from truearm.units import sized_si, written
 
 #: What a robot and a joint may be called.
 NAME: Final = r"[A-Za-z0-9][A-Za-z0-9_.-]*"
+NAME_IN_WORDS: Final = "letters, digits, _ . and -, starting with a letter or digit"
 
 #: Of an entry that has known keys only.
 STRICT: Final = ConfigDict(extra="forbid", frozen=True)
@@ -20,12 +23,22 @@ Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=True)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False, strict=True)]
 Triple = tuple[Number, Number, Number]
-Name = Annotated[str, StringConstraints(pattern=f"^{NAME}$", strict=True)]
+
+
+def _name(text: str) -> str:
+    if not re.fullmatch(NAME, text):
+        raise InputError("this cannot be a name", came=text, allowed=NAME_IN_WORDS)
+    return text
+
+
+Name = Annotated[str, StringConstraints(strict=True), AfterValidator(_name)]
 
 
 def _unit_length(q: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
     if abs(math.hypot(*q) - 1.0) > 1e-6:
-        raise ValueError(f"a quaternion (w, x, y, z) must have length 1, this one has {math.hypot(*q):.6g}")
+        raise InputError(
+            f"a quaternion (w, x, y, z) must have length 1, this one has {math.hypot(*q):.6g}", came=list(q)
+        )
     return q
 
 

@@ -13,9 +13,9 @@ from truearm.modeling.conversion import converted
 from truearm.modeling.formats.dh_csv import complete_dh_csv
 from truearm.modeling.formats.dh_table import DHRow, DHTable, TableConvention
 from truearm.modeling.formats.model_json import model_json
-from truearm.modeling.formats.python_file import HELD, python_text
+from truearm.modeling.formats.python_file import python_text
 from truearm.modeling.formats.remarks import comments, first_frame_said, frames, left_out, masses_left_out
-from truearm.modeling.formats.urdf import urdf_text
+from truearm.modeling.formats.urdf_writing import urdf_text
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY
 from truearm.units import from_si, to_si
@@ -60,7 +60,7 @@ def exported(robot: Robot, format_: str) -> Export:
         near = nearest_names(format_, FORMATS)
         raise InputError(
             "there is no such format",
-            where="--format",
+            parameter="format",
             came=format_,
             allowed=", ".join(FORMATS),
             cure=f"Did you mean {' or '.join(near)}?" if near else None,
@@ -101,7 +101,8 @@ def _json(robot: Robot) -> Export:
 
 
 def _python(robot: Robot) -> Export:
-    left = tuple(left_out(robot, "A Python file", HELD))
+    held = [effect.name for effect in robot.effects if effect.exportable]
+    left = tuple(left_out(robot, "A Python file", held))
     return Export(python_text(_in_base(robot), comments(robot, frames(robot), left)), frames(robot), left)
 
 

@@ -1,7 +1,7 @@
 """A robot as a Python file of its own that needs only NumPy.
 
-The file is :mod:`truearm.modeling.formats.python_template` with the constants of the robot in place of its own. All
-joint effects that depend on readings and weights alone are in it; approach, warm-up and thermal growth are not.
+The file is :mod:`truearm.modeling.formats.python_template` with the constants of the robot in place of its own. Joint
+effects that are exportable, those that depend on readings and weights alone, are in it; the template computes each.
 """
 
 from __future__ import annotations
@@ -15,22 +15,11 @@ from typing import Final
 import numpy as np
 
 from truearm.modeling.chain import Array, across, axis_of
+from truearm.modeling.effects.linear_contact import LinearContactClearance
 from truearm.modeling.formats.collapsed import collapsed
-from truearm.modeling.formats.urdf import roll_pitch_yaw
+from truearm.modeling.formats.urdf_tree import roll_pitch_yaw
 from truearm.modeling.robot import Robot
 
-#: Joint effects that the file computes.
-HELD: Final = (
-    "gain",
-    "fourier",
-    "transmission-error",
-    "compliance",
-    "hardening",
-    "backlash",
-    "bearing-compliance",
-    "clearance",
-    "clearance-linear-contact",
-)
 _WIDTH: Final = 118
 #: Stored poses for the file's own test.
 _STORED: Final = 3
@@ -77,18 +66,18 @@ def _constants(robot: Robot) -> dict[str, str]:
     """Return the text of every constant of the template."""
     names = [joint.name for joint in robot.joints]
     numbers = range(1, len(names) + 1)
-    values = {effect.name: robot.values for effect in robot.effects if effect.name in HELD}
+    effects = [effect for effect in robot.effects if effect.exportable]
+    values = {plain.name: robot.values[plain.name] for effect in effects for plain in effect.parameters}
 
-    def by_joint(effect: str, prefix: str, nothing: float = 0.0) -> tuple[float, ...]:
-        held = values.get(effect, {})
-        return tuple(held.get(f"{prefix}_{i}", nothing) for i in numbers)
+    def by_joint(family: str, nothing: float = 0.0) -> tuple[float, ...]:
+        return tuple(values.get(f"{family}_{i}", nothing) for i in numbers)
 
-    series = zip(*(by_joint("fourier", f"fourier_{part}") for part in ("sin1", "cos1", "sin2", "cos2")), strict=True)
-    gear = zip(*(by_joint("transmission-error", f"transmission_{part}") for part in ("sin", "cos")), strict=True)
-    periods = [joint.transmission_periods or 0 for joint in robot.joints]
-    if "transmission-error" not in values:
-        periods = [0 for _ in numbers]
-    clearances = [name for name in ("clearance", "clearance-linear-contact") if name in values]
+    series = zip(*(by_joint(f"fourier_{part}") for part in ("sin1", "cos1", "sin2", "cos2")), strict=True)
+    gear = zip(*(by_joint(f"transmission_{part}") for part in ("sin", "cos")), strict=True)
+    periods = [
+        (joint.transmission_periods or 0) if f"transmission_sin_{i}" in values else 0
+        for i, joint in enumerate(robot.joints, 1)
+    ]
     places, masses = _bodies(robot)
     q = np.round(robot.random_configurations(_STORED, np.random.default_rng(0)), 4)
     position, rotation = robot.world_poses(q)
@@ -100,16 +89,16 @@ def _constants(robot: Robot) -> dict[str, str]:
         "GRAVITY": repr(robot.gravity),
         "MASSES": _rows(masses, [names[joint] for joint, _, _ in masses]),
         "PAYLOAD": repr((robot.payload.mass, robot.payload.cog)),
-        "GAIN": _rows(by_joint("gain", "gain", 1.0), names),
+        "GAIN": _rows(by_joint("gain", 1.0), names),
         "FOURIER": _rows(list(series), names),
         "TRANSMISSION": _rows([(n, *parts) for n, parts in zip(periods, gear, strict=True)], names),
-        "COMPLIANCE": _rows(by_joint("compliance", "compliance"), names),
-        "COMPLIANCE_QUADRATIC": _rows(by_joint("hardening", "compliance_quadratic"), names),
-        "COMPLIANCE_CUBIC": _rows(by_joint("hardening", "compliance_cubic"), names),
-        "BACKLASH": _rows(by_joint("backlash", "backlash"), names),
-        "BEARING_COMPLIANCE": _rows(by_joint("bearing-compliance", "bearing_compliance"), names),
-        "CLEARANCE": _rows(by_joint(clearances[0] if clearances else "", "clearance"), names),
-        "LINEAR_CONTACT": repr("clearance-linear-contact" in clearances),
+        "COMPLIANCE": _rows(by_joint("compliance"), names),
+        "COMPLIANCE_QUADRATIC": _rows(by_joint("compliance_quadratic"), names),
+        "COMPLIANCE_CUBIC": _rows(by_joint("compliance_cubic"), names),
+        "BACKLASH": _rows(by_joint("backlash"), names),
+        "BEARING_COMPLIANCE": _rows(by_joint("bearing_compliance"), names),
+        "CLEARANCE": _rows(by_joint("clearance"), names),
+        "LINEAR_CONTACT": repr(any(isinstance(effect, LinearContactClearance) for effect in effects)),
         "READINGS": _rows(_tuples(q)),
         "POSITIONS": _rows(_tuples(position)),
         "ROTATIONS": _rows([_tuples(R) for R in rotation]),

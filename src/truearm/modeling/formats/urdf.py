@@ -14,11 +14,10 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
@@ -26,12 +25,10 @@ from truearm.errors import InputError
 from truearm.files import read_bytes
 from truearm.modeling.chain import Array
 from truearm.modeling.conventions import JointKind
-from truearm.modeling.formats.collapsed import collapsed
 from truearm.modeling.formats.entries import NAME
 from truearm.modeling.formats.remarks import left_out
 from truearm.modeling.formats.urdf_tree import (
     KIND,
-    ZERO,
     Tree,
     Triple,
     UrdfJoint,
@@ -41,6 +38,7 @@ from truearm.modeling.formats.urdf_tree import (
     placement,
     product,
     read_tree,
+    roll_pitch_yaw,
     triple,
 )
 from truearm.modeling.parts import Joint, LinkMass
@@ -113,60 +111,6 @@ def calibrated_urdf(source: bytes, robot: Robot) -> tuple[bytes, list[str]]:
     for start, end, text in sorted(edits, reverse=True):
         source = source[:start] + text + source[end:]
     return source, left_out(robot, "A URDF")
-
-
-def urdf_text(robot: Robot) -> tuple[str, list[str]]:
-    """Return a new URDF with the kinematics of `robot` as it is now, whatever its convention.
-
-    Links are ``base_link``, ``link_1`` ... and ``tool0``. The constant transforms between two joint variables
-    are multiplied into one origin. The base link is the base frame: where it stands in the world is left out.
-
-    Returns
-    -------
-    text, left_out
-        The file, and in words what a URDF cannot hold or the robot does not say.
-    """
-    names = [*(joint.name for joint in robot.joints), "tool0_joint"]
-    for name in names:
-        if names.count(name) > 1:
-            raise InputError("a URDF cannot have two joints of one name", where=robot.name, came=name)
-    origins, behind = collapsed(robot)
-    said = left_out(robot, "A URDF")
-    lines = [
-        '<?xml version="1.0" encoding="UTF-8"?>',
-        f"<robot name={quoteattr(robot.name)}>",
-        '  <link name="base_link"/>',
-    ]
-    for number, (joint, place) in enumerate(zip(robot.joints, origins[:-1], strict=True), 1):
-        parent = f"link_{number - 1}" if number > 1 else "base_link"
-        lines += _link_lines(robot, number, behind[number - 1])
-        moving = next(e for e in robot.link_elements[number - 1] if e.variable is not None)
-        lines += _joint_lines(joint, parent, f"link_{number}", place, _limit(robot.name, joint), moving.axis)
-    lines += ['  <link name="tool0"/>']
-    lines += _joint_lines(None, f"link_{len(robot.joints)}", "tool0", origins[-1], [])
-    if any(joint.limits for joint in robot.joints):
-        said.append("Effort and velocity limits are not known and stand as 0.")
-    if robot.masses:
-        said.append("Inertia tensors are not written and stand as 0.")
-    return "\n".join([*lines, "</robot>", ""]), said
-
-
-def roll_pitch_yaw(R: Array, near: Triple = ZERO) -> Triple:
-    """Return the angles [rad] of ``R = Rz(yaw) Ry(pitch) Rx(roll)``, ``(3, 3)``, those nearest `near`.
-
-    Yaw comes first and the others from ``Rz(-yaw) R``. Where pitch is 90 deg only the sum or the difference
-    of roll and yaw is defined: there yaw is taken from `near`, and roll makes up for it.
-    """
-    lying = math.hypot(R[0, 0], R[1, 0])
-    first = math.atan2(R[1, 0], R[0, 0]) if lying > 1e-14 else near[2]
-    solutions = []
-    for yaw in (first, first + math.pi):
-        c, s = math.cos(yaw), math.sin(yaw)
-        pitch = math.atan2(-R[2, 0], c * R[0, 0] + s * R[1, 0])
-        roll = math.atan2(s * R[0, 2] - c * R[1, 2], c * R[1, 1] - s * R[0, 1])
-        turns = (round((a - n) / (2 * math.pi)) for a, n in zip((roll, pitch, yaw), near, strict=True))
-        solutions.append(triple(a - 2 * math.pi * k for a, k in zip((roll, pitch, yaw), turns, strict=True)))
-    return min(solutions, key=lambda angles: sum(abs(a - n) for a, n in zip(angles, near, strict=True)))
 
 
 # -- the chain ----------------------------------------------------------------------------------------------
@@ -407,56 +351,3 @@ def _respelled(old: bytes, values: Triple) -> bytes:
         return match[0] if keep else word
 
     return re.sub(rb"\S+", respell, old)
-
-
-# -- a new file ---------------------------------------------------------------------------------------------
-
-
-def _joint_lines(
-    joint: Joint | None, parent: str, child: str, origin: Array, limit: list[str], axis: Triple | None = None
-) -> list[str]:
-    """Return the lines of one joint, its axis z if None; None is the fixed one at the end."""
-    if joint is None:
-        head = '  <joint name="tool0_joint" type="fixed">'
-    else:
-        type_ = joint.kind if limit else "continuous"
-        limit = [f'    <axis xyz="{_written(axis or (0.0, 0.0, 1.0))}"/>', *limit]
-        head = f'  <joint name={quoteattr(joint.name)} type="{type_}">'
-    place = f'xyz="{_written(origin[:3, 3])}" rpy="{_written(roll_pitch_yaw(origin[:3, :3]))}"'
-    ends = [f'    <parent link="{parent}"/>', f'    <child link="{child}"/>']
-    return [head, f"    <origin {place}/>", *ends, *limit, "  </joint>"]
-
-
-def _limit(where: str, joint: Joint) -> list[str]:
-    if joint.limits is None:
-        if joint.kind == "prismatic":
-            raise InputError(
-                "a URDF must have the limits of a prismatic joint",
-                where=f"{where}, joint {joint.name}",
-                cure="Give the joint its limits in the robot file.",
-            )
-        return []
-    low, high = joint.limits
-    return [f'    <limit lower="{low!r}" upper="{high!r}" effort="0" velocity="0"/>']
-
-
-def _link_lines(robot: Robot, number: int, behind: Array) -> list[str]:
-    masses = [m for m in robot.masses if m.joint == number and m.mass > 0]
-    if not masses:
-        return [f'  <link name="link_{number}"/>']
-    weights = [m.mass for m in masses]
-    cog = behind[:3, :3] @ np.average([m.cog for m in masses], axis=0, weights=weights) + behind[:3, 3]
-    return [
-        f'  <link name="link_{number}">',
-        "    <inertial>",
-        f'      <origin xyz="{_written(cog)}"/>',
-        f'      <mass value="{sum(weights)!r}"/>',
-        '      <inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/>',
-        "    </inertial>",
-        "  </link>",
-    ]
-
-
-def _written(values: Iterable[float]) -> str:
-    """Return numbers as text; the roundings of right angles are written as the zeros they stand for."""
-    return " ".join(repr(0.0 if abs(v) < 1e-15 else float(v)) for v in values)

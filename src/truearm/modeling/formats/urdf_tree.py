@@ -6,6 +6,7 @@ form one tree. What only matters on a chain, :mod:`truearm.modeling.formats.urdf
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -285,3 +286,21 @@ def placement(xyz: Triple, rpy: Triple) -> Array:
     """Return the transform of an ``<origin>``, ``(4, 4)``."""
     row = dict(zip(("x", "y", "z", "roll", "pitch", "yaw"), (*xyz, *rpy), strict=True))
     return product(Element(motion, row[column]) for column, motion in convention("urdf").link)
+
+
+def roll_pitch_yaw(R: Array, near: Triple = ZERO) -> Triple:
+    """Return the angles [rad] of ``R = Rz(yaw) Ry(pitch) Rx(roll)``, ``(3, 3)``, those nearest `near`.
+
+    Yaw comes first and the others from ``Rz(-yaw) R``. Where pitch is 90 deg only the sum or the difference
+    of roll and yaw is defined: there yaw is taken from `near`, and roll makes up for it.
+    """
+    lying = math.hypot(R[0, 0], R[1, 0])
+    first = math.atan2(R[1, 0], R[0, 0]) if lying > 1e-14 else near[2]
+    solutions = []
+    for yaw in (first, first + math.pi):
+        c, s = math.cos(yaw), math.sin(yaw)
+        pitch = math.atan2(-R[2, 0], c * R[0, 0] + s * R[1, 0])
+        roll = math.atan2(s * R[0, 2] - c * R[1, 2], c * R[1, 1] - s * R[0, 1])
+        turns = (round((a - n) / (2 * math.pi)) for a, n in zip((roll, pitch, yaw), near, strict=True))
+        solutions.append(triple(a - 2 * math.pi * k for a, k in zip((roll, pitch, yaw), turns, strict=True)))
+    return min(solutions, key=lambda angles: sum(abs(a - n) for a, n in zip(angles, near, strict=True)))

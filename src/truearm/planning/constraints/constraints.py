@@ -73,8 +73,9 @@ class Visibility(BaseModel):
 
     @model_validator(mode="after")
     def _directions(self) -> Visibility:
-        if not all(any(direction) for direction in self.targets.values()):
-            raise ValueError("A direction cannot be zero")
+        for name, direction in self.targets.items():
+            if not any(direction):
+                raise InputError("a direction cannot be zero", came=f"{name}: {list(direction)}")
         return self
 
 

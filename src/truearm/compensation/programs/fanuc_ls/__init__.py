@@ -28,7 +28,7 @@ from typing import Final
 
 from truearm.compensation.programs.fanuc_ls.configuration import configuration
 from truearm.compensation.programs.fanuc_ls.instructions import Instructions
-from truearm.compensation.programs.fanuc_ls.split import divide
+from truearm.compensation.programs.fanuc_ls.split import split_moves
 from truearm.compensation.programs.fanuc_ls.text import LsFile, Position, is_one
 from truearm.compensation.programs.numbers import LARGEST
 from truearm.compensation.programs.program import (
@@ -167,4 +167,4 @@ def read(sources: Sequence[Source]) -> Program:
     return Program(_NAME, tuple(sources), tuple(targets), tuple(moves), skipped=tuple(skipped), unknown=dict(unknown))
 
 
-FANUC_LS: Final = Language(_NAME, (".ls",), is_one, read, divide)
+FANUC_LS: Final = Language(_NAME, (".ls",), is_one, read, split_moves)

@@ -1,11 +1,11 @@
-"""Moves of FANUC programs, divided.
+"""Split moves of FANUC programs.
 
-A piece of a move is the same instruction to a position that is added to /POS, with the frame, tool and CONFIG of the
+A segment of a move is the same instruction to a position that is added to /POS, with the frame, tool and CONFIG of the
 move's own. It ends with CNT100, so that the robot does not stop there, and leaves out what is to happen once (TB, TA,
 DB, DA). The lines after it are numbered anew, and LINE_COUNT with them; jumps go to labels and stay.
 
-A move is left whole where pieces of it would be something else: with a speed in seconds; with options other than those
-and ACC and PTH; to positions with external axes or other motion groups; arcs and splines (A, S).
+A move is left whole where segments of it would do something else: with a speed in seconds; with options other than
+those and ACC and PTH; to positions with external axes or other motion groups; arcs and splines (A, S).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import Final, NamedTuple
 from truearm.compensation.programs.fanuc_ls.text import LsFile, Position
 from truearm.compensation.programs.lines import line_end, replaced
 from truearm.compensation.programs.numbers import rewritten
-from truearm.compensation.programs.program import Division, Edit, Move, Pieces, Program, ProgramTarget
+from truearm.compensation.programs.program import Edit, Move, Program, ProgramTarget, Split, SplitEdits
 
 _WORD: Final = r"(?:[^\s\[\];]|\[[^\[\]\n]*\])+"
 #: Speed, termination, options that last, options that happen once.
@@ -36,29 +36,29 @@ _CARRIED_END: Final = re.compile(r"^[ \t]*+-{4,}[ \t]*+;", re.MULTILINE)
 _BLANK: Final = re.compile(r"[ \t]*+")
 
 
-class _Piece(NamedTuple):
-    """What the pieces of a move say before, between and after their references."""
+class _Segment(NamedTuple):
+    """What the segments of a move say before, between and after their references."""
 
     before: str
     between: str
     after: str
 
 
-def divide(program: Program, divisions: Sequence[Division]) -> Pieces:
-    """Divide moves."""
+def split_moves(program: Program, splits: Sequence[Split]) -> SplitEdits:
+    """Split moves."""
     edits: list[Edit] = []
     whole: list[int] = []
     for source in range(len(program.sources)):
-        chosen = [division for division in divisions if program.moves[division.move].source == source]
+        chosen = [split for split in splits if program.moves[split.move].source == source]
         if chosen:
-            file = _DividedFile(program, source)
+            file = _SplitFile(program, source)
             edits += file.edits(chosen)
             whole += file.whole
-    return Pieces(edits, whole)
+    return SplitEdits(edits, whole)
 
 
-class _DividedFile:
-    """A file with divided moves."""
+class _SplitFile:
+    """A file with split moves."""
 
     def __init__(self, program: Program, source: int) -> None:
         self._program, self._source = program, source
@@ -71,44 +71,44 @@ class _DividedFile:
         #: Moves that stay whole.
         self.whole: list[int] = []
 
-    def edits(self, divisions: Sequence[Division]) -> list[Edit]:
+    def edits(self, splits: Sequence[Split]) -> list[Edit]:
         """Return the edits of the file."""
         edits: list[Edit] = []
         inserted: dict[int, list[str]] = {}
-        for division in sorted(divisions, key=lambda division: self._program.moves[division.move].statement):
-            move = self._program.moves[division.move]
+        for split in sorted(splits, key=lambda split: self._program.moves[split.move].statement):
+            move = self._program.moves[split.move]
             target = self._program.targets[move.target]
             position = self._taught[target.name[2:-1].partition(":")[0]]
-            piece = self._piece(move)
-            if piece is None or not position.alone or position.external:
-                self.whole.append(division.move)
+            segment = self._segment(move)
+            if segment is None or not position.alone or position.external:
+                self.whole.append(split.move)
                 continue
             words: list[str] = []
-            for point, via in division.points:
-                middle = "" if via is None else self._new(target, position, via) + piece.between
-                words.append(piece.before + middle + self._new(target, position, point) + piece.after)
+            for point, via in split.points:
+                middle = "" if via is None else self._new(target, position, via) + segment.between
+                words.append(segment.before + middle + self._new(target, position, point) + segment.after)
             inserted[move.statement[1]] = words
-            if division.last_via is not None and move.via_text is not None:
-                edits.append(Edit(self._source, *move.via_text, self._new(target, position, division.last_via)))
+            if split.last_via is not None and move.via_text is not None:
+                edits.append(Edit(self._source, *move.via_text, self._new(target, position, split.last_via)))
         edits += self._numbered(inserted)
         if self._added:
             end = self._file.positions[1]
             edits.append(Edit(self._source, end, end, "".join(self._added)))
         return sorted(edits, key=lambda edit: edit.start)
 
-    def _piece(self, move: Move) -> _Piece | None:
+    def _segment(self, move: Move) -> _Segment | None:
         raw, rest = self._raw, _REST.fullmatch(self._file.text, move.target_text[1], move.statement[1])
         if rest is None or _SECONDS.search(rest[1]) or move.kind == "joint":
             return None
         after = f"{raw[rest.start() : rest.end(1)]} CNT100{rest[2]}    ;"
         if move.kind == "linear":
-            return _Piece(raw[move.statement[0] : move.target_text[0]], "", after)
+            return _Segment(raw[move.statement[0] : move.target_text[0]], "", after)
         if move.via_text is None:
             return None
         between = raw[move.via_text[1] : move.target_text[0]]
         if _BETWEEN.fullmatch(between) is None:
             return None
-        return _Piece(raw[move.statement[0] : move.via_text[0]], between, after)
+        return _Segment(raw[move.statement[0] : move.via_text[0]], between, after)
 
     def _new(self, target: ProgramTarget, like: Position, numbers: Sequence[float]) -> str:
         """Add a position and return the reference to it."""

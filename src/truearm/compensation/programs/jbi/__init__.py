@@ -21,7 +21,7 @@ from math import radians
 from typing import Final
 
 from truearm.compensation.programs.jbi.job import JOB, Job, Key, Position, jobs_of
-from truearm.compensation.programs.jbi.split import divide
+from truearm.compensation.programs.jbi.split import split_moves
 from truearm.compensation.programs.jbi.steps import KINDS, NOWHERE, Step, Steps, arcs_of, steps_of
 from truearm.compensation.programs.lines import Lines
 from truearm.compensation.programs.program import (
@@ -202,4 +202,4 @@ def _interval(joint: int, degrees: float) -> tuple[int, float, float]:
     return joint, _OPEN - radians(degrees), _OPEN + radians(degrees)
 
 
-JBI: Final = Language("INFORM", (".jbi",), is_one, read, divide)
+JBI: Final = Language("INFORM", (".jbi",), is_one, read, split_moves)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from truearm.compensation.programs.jbi.job import Job, Position, State, jobs_of
 from truearm.compensation.programs.lines import Lines, indentation, line_end
 from truearm.compensation.programs.numbers import written
-from truearm.compensation.programs.program import Division, Edit, Pieces, Program, ProgramTarget
+from truearm.compensation.programs.program import Edit, Program, ProgramTarget, Split, SplitEdits
 
 
 @dataclass
@@ -32,27 +32,27 @@ class _Additions:
         return name
 
 
-def divide(program: Program, divisions: Sequence[Division]) -> Pieces:
-    """Divide linear and circular moves.
+def split_moves(program: Program, splits: Sequence[Split]) -> SplitEdits:
+    """Split linear and circular moves.
 
-    Every job gets its new positions behind the last one of its table, with the next free numbers. Between the pieces
+    Every job gets its new positions behind the last one of its table, with the next free numbers. Between the segments
     of a circle stands a MOVL to the point where the robot is already: circles of different curvature have to be
     separated in this way (NX100 operator's manual, "Continuous circular arcs").
     """
     edits: list[Edit] = []
-    by_source: dict[int, list[Division]] = {}
-    for division in sorted(divisions, key=lambda division: program.moves[division.move].statement):
-        by_source.setdefault(program.moves[division.move].source, []).append(division)
+    by_source: dict[int, list[Split]] = {}
+    for split in sorted(splits, key=lambda split: program.moves[split.move].statement):
+        by_source.setdefault(program.moves[split.move].source, []).append(split)
     for source, wanted in sorted(by_source.items()):
         text = program.sources[source].text
         for job in jobs_of(program.sources[source], Lines(text)):
-            own = [division for division in wanted if job.start <= program.moves[division.move].statement[0] < job.stop]
+            own = [split for split in wanted if job.start <= program.moves[split.move].statement[0] < job.stop]
             if own:
                 edits += _of_job(program, source, job, own)
-    return Pieces(edits, [])
+    return SplitEdits(edits, [])
 
 
-def _of_job(program: Program, source: int, job: Job, divisions: Sequence[Division]) -> Iterator[Edit]:
+def _of_job(program: Program, source: int, job: Job, splits: Sequence[Split]) -> Iterator[Edit]:
     text = program.sources[source].text
     steps = [position for position in job.positions if position.table == "C"]
     last = (steps or list(job.positions))[-1]
@@ -63,18 +63,18 @@ def _of_job(program: Program, source: int, job: Job, divisions: Sequence[Divisio
         width=len(last.name) - 1 if steps else 5,
         state=last.state,
     )
-    for division in divisions:
-        move = program.moves[division.move]
+    for split in splits:
+        move = program.moves[split.move]
         target = program.targets[move.target]
         like = by_place[target.places[0] or (0, 0)]
-        if move.via is None or move.via_text is None or division.last_via is None:
+        if move.via is None or move.via_text is None or split.last_via is None:
             line = move.statement[0] - len(indentation(text, move.statement[0]))
             head = text[line : move.target_text[0]].upper().replace("MOVC", "MOVL")
             tail = text[move.target_text[1] : move.statement[1]] + line_end(text, move.statement[1])
-            names = [additions.position(numbers, like, target) for numbers, _ in division.points]
+            names = [additions.position(numbers, like, target) for numbers, _ in split.points]
             yield Edit(source, line, line, "".join(f"{head}{name}{tail}" for name in names))
         else:
-            circle = [(numbers, through) for numbers, through in division.points if through is not None]
+            circle = [(numbers, through) for numbers, through in split.points if through is not None]
             via = program.targets[move.via]
             line = move.statement[0] - len(indentation(text, move.statement[0]))
             head, end = text[line : move.via_text[0]], line_end(text, move.via_text[1])
@@ -87,7 +87,7 @@ def _of_job(program: Program, source: int, job: Job, divisions: Sequence[Divisio
             ]
             yield Edit(source, line, line, "".join(new))
             places = [place for place in via.places if place is not None]
-            yield Edit(source, places[0][0], places[-1][1], _listed(division.last_via, via))
+            yield Edit(source, places[0][0], places[-1][1], _listed(split.last_via, via))
     count = len(steps) + sum(not line.startswith("/") for line in additions.written)
     yield Edit(source, *job.count, str(count))
     end = line_end(text, last.stop)

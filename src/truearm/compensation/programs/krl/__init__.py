@@ -24,7 +24,7 @@ What the language leaves open is decided so:
   a computed value anywhere, or a new value for one component, is left alone everywhere.
 - External axes may carry the robot or move the work: a position with one that is not at zero is left alone.
 - Targets in ``$config.dat`` are left alone, because all programs share them; its tools and bases are used.
-- A move is divided only if the move before it in the text is the one before it in time, if no TRIGGER belongs to it,
+- A move is split only if the move before it in the text is the one before it in time, if no TRIGGER belongs to it,
   and if its place is nothing but a target. A circle with an angle of its own (CA) and the segments of a spline stay
   whole. A segment SPL counts as linear.
 """
@@ -35,7 +35,7 @@ import re
 from typing import Final
 
 from truearm.compensation.programs.krl.reading import read
-from truearm.compensation.programs.krl.split import divide
+from truearm.compensation.programs.krl.split import split_moves
 from truearm.compensation.programs.lines import BYTE_ORDER_MARK
 from truearm.compensation.programs.program import Language
 
@@ -56,7 +56,7 @@ KRL: Final = Language(
     suffixes=(".src", ".dat", ".sub"),
     is_one=is_one,
     read=read,
-    divide=divide,
+    split=split_moves,
     together=True,
     companions=((".src", ".dat"), (".sub", ".dat"), (".dat", ".src")),
 )

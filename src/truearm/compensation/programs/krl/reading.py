@@ -46,7 +46,7 @@ class _Pending(NamedTuple):
     statement: Statement
     target_text: Span
     via_text: Span | None
-    divisible: bool
+    splittable: bool
     follows: bool
 
 
@@ -131,8 +131,8 @@ class _Reader:
             if kind == "move":
                 move, known = self._move(number, routine, statement, holding, current, first, known)
                 if move is not None:
-                    undivided = triggered or outside is not None
-                    self._moves.append(move._replace(divisible=False) if undivided else move)
+                    unsplit = triggered or outside is not None
+                    self._moves.append(move._replace(splittable=False) if unsplit else move)
                     first = False
                 triggered = False
             elif kind == "set":
@@ -177,7 +177,7 @@ class _Reader:
         end = self._finder.find(words.target)
         if end.taught is None:
             return None, False
-        divisible = end.plain and not words.angle and (via is None or via.plain)
+        splittable = end.plain and not words.angle and (via is None or via.plain)
         move = _Pending(
             kind,
             end.taught,
@@ -187,7 +187,7 @@ class _Reader:
             statement,
             words.target,
             words.via,
-            divisible,
+            splittable,
             known,
         )
         return move, end.exact and not words.angle
@@ -257,7 +257,7 @@ class _Reader:
                 came = False
                 continue
             via = None if move.via is None or move.via.index < 0 else move.via.index
-            divisible = move.divisible and move.follows and came and (via is None) == (move.via is None)
+            splittable = move.splittable and move.follows and came and (via is None) == (move.via is None)
             _, start, _, stop = move.statement
             moves.append(
                 Move(
@@ -268,8 +268,8 @@ class _Reader:
                     via,
                     move.routine,
                     (start, stop),
-                    move.target_text if divisible or move.kind == "joint" else (0, 0),
-                    move.via_text if divisible else None,
+                    move.target_text if splittable or move.kind == "joint" else (0, 0),
+                    move.via_text if splittable else None,
                 )
             )
             came = True

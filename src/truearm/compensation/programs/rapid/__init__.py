@@ -24,7 +24,7 @@ from truearm.compensation.programs.lines import BYTE_ORDER_MARK
 from truearm.compensation.programs.program import Language, Program, Source
 from truearm.compensation.programs.rapid.monitoring import with_postures_left_free
 from truearm.compensation.programs.rapid.moves import MOTIONS, QUIET
-from truearm.compensation.programs.rapid.split import divided
+from truearm.compensation.programs.rapid.split import split_moves
 from truearm.compensation.programs.rapid.syntax import listing_of
 from truearm.compensation.programs.rapid.targets import Finder
 
@@ -45,6 +45,6 @@ RAPID: Final = Language(
     suffixes=(".mod", ".prg", ".sys", ".modx", ".prgx", ".sysx"),
     is_one=_is_one,
     read=_read,
-    divide=divided,
+    split=split_moves,
     together=True,
 )

@@ -27,7 +27,7 @@ class Motion(NamedTuple):
         Whether the target is a jointtarget.
     searches
         Whether the robot may stop on the way.
-    divisible
+    splittable
         Whether several of it after each other do what one does.
     """
 
@@ -37,15 +37,15 @@ class Motion(NamedTuple):
     via: int | None = None
     joints: bool = False
     searches: bool = False
-    divisible: bool = False
+    splittable: bool = False
 
 
 def _motions() -> dict[str, Motion]:
     found: dict[str, Motion] = {}
     for ending in ("", "do", "ao", "go", "sync"):
         found[f"movej{ending}"] = Motion("joint", tool=3)
-        found[f"movel{ending}"] = Motion("linear", tool=3, divisible=not ending)
-        found[f"movec{ending}"] = Motion("circular", target=1, tool=4, via=0, divisible=not ending)
+        found[f"movel{ending}"] = Motion("linear", tool=3, splittable=not ending)
+        found[f"movec{ending}"] = Motion("circular", target=1, tool=4, via=0, splittable=not ending)
     found["moveabsj"] = Motion("joint", tool=3, joints=True)
     found["triggabsj"] = found["arcmoveabsj"] = Motion("joint", joints=True)
     for word in ("triggj", "triggjios", "arcmovej", "spotj", "spotmj", "dispj", "nutj"):
@@ -56,8 +56,8 @@ def _motions() -> dict[str, Motion]:
         found[word] = Motion("circular", target=1, via=0)
     for number in ("", "1", "2"):
         for phase in ("", "start", "end"):
-            found[f"arcl{number}{phase}"] = Motion("linear", divisible=not phase)
-            found[f"arcc{number}{phase}"] = Motion("circular", target=1, via=0, divisible=not phase)
+            found[f"arcl{number}{phase}"] = Motion("linear", splittable=not phase)
+            found[f"arcc{number}{phase}"] = Motion("circular", target=1, via=0, splittable=not phase)
     found["searchl"] = Motion("linear", target=2, searches=True)
     found["searchc"] = Motion("circular", target=3, via=2, searches=True)
     found["contactl"] = Motion("linear", searches=True)

@@ -1,6 +1,6 @@
 """Extra moves put before the linear and circular moves of a RAPID program.
 
-A move is divided into several of the same instruction. Its target is written out in the added ones, with the
+A move is split into several of the same instruction. Its target is written out in the added ones, with the
 configuration data and external axes of the move's own target; an offset stays one, with other numbers. A stop point
 (fine) becomes ``z1`` in the added moves, so that the robot does not stop on the way.
 """
@@ -13,7 +13,7 @@ from typing import Final
 
 from truearm.compensation.programs.lines import indentation, line_end, replaced
 from truearm.compensation.programs.numbers import written
-from truearm.compensation.programs.program import Division, Edit, Move, Pieces, Program, ProgramTarget
+from truearm.compensation.programs.program import Edit, Move, Program, ProgramTarget, Split, SplitEdits
 from truearm.compensation.programs.rapid.arguments import arguments_of
 from truearm.compensation.programs.rapid.data import RELTOOL, ROBTARGET_TAIL
 from truearm.compensation.programs.rapid.listing import code_of
@@ -21,8 +21,8 @@ from truearm.compensation.programs.rapid.listing import code_of
 _WORD: Final = re.compile(r"\w++")
 
 
-def divided(program: Program, divisions: Sequence[Division]) -> Pieces:
-    r"""Divide moves.
+def split_moves(program: Program, splits: Sequence[Split]) -> SplitEdits:
+    r"""Split moves.
 
     Moves without a known place of their statement are left whole: those with a time (``\T``), an identity for moves
     of several robots (``\ID``), ``\Conc`` or ``\Inpos``; instructions that do something at the end of the path or at
@@ -32,19 +32,19 @@ def divided(program: Program, divisions: Sequence[Division]) -> Pieces:
     codes: dict[int, str] = {}
     edits: list[Edit] = []
     whole: list[int] = []
-    for division in divisions:
-        move = program.moves[division.move]
+    for split in splits:
+        move = program.moves[split.move]
         if move.statement == (0, 0):
-            whole.append(division.move)
+            whole.append(split.move)
             continue
         for source in (move.source, program.targets[move.target].source):
             if source not in codes:
                 codes[source] = code_of(program.sources[source].text)[0]
-        edits += _divided(program, codes, move, division)
-    return Pieces(edits, whole)
+        edits += _split_edits(program, codes, move, split)
+    return SplitEdits(edits, whole)
 
 
-def _divided(program: Program, codes: dict[int, str], move: Move, division: Division) -> list[Edit]:
+def _split_edits(program: Program, codes: dict[int, str], move: Move, split: Split) -> list[Edit]:
     text, code = program.sources[move.source].text, codes[move.source]
     start, stop = move.statement
     word = _WORD.match(code, start)
@@ -52,7 +52,7 @@ def _divided(program: Program, codes: dict[int, str], move: Move, division: Divi
     between = line_end(text, stop) + indentation(text, start)
     target = program.targets[move.target]
     added = []
-    for numbers, via in division.points:
+    for numbers, via in split.points:
         words = [(*move.target_text, _written(program, codes, move, target, numbers))]
         if via is not None and move.via_text is not None:
             words.append((*move.via_text, _written(program, codes, move, target, via)))
@@ -60,8 +60,8 @@ def _divided(program: Program, codes: dict[int, str], move: Move, division: Divi
             words.append((*zone, "z1"))
         added.append(replaced(text, start, stop, words) + between)
     edits = [Edit(move.source, start, start, "".join(added))] if added else []
-    if division.last_via is not None and move.via_text is not None:
-        edits.append(Edit(move.source, *move.via_text, _written(program, codes, move, target, division.last_via)))
+    if split.last_via is not None and move.via_text is not None:
+        edits.append(Edit(move.source, *move.via_text, _written(program, codes, move, target, split.last_via)))
     return edits
 
 

@@ -124,7 +124,7 @@ class Finder:
         via = None if via_text is None else self._used(at, via_text, False, use, against)
         exact = target is not None and target.exact and (via_text is None or (via is not None and via.exact))
         whole = (
-            not motion.divisible or at.guarded or not exact or not _WHOLE_MOVES.isdisjoint(arguments.options)
+            not motion.splittable or at.guarded or not exact or not _WHOLE_MOVES.isdisjoint(arguments.options)
         )  # fmt: skip
         self.pending.append(
             _Pending(at, motion, only(target), only(via), exact and not motion.searches, target_text, via_text, whole)

@@ -32,7 +32,7 @@ from truearm.compensation.programs.lines import BYTE_ORDER_MARK
 from truearm.compensation.programs.program import Language, MoveKind, Program, Source
 from truearm.compensation.programs.urscript.program import Going, made_program
 from truearm.compensation.programs.urscript.script import Call, Script
-from truearm.compensation.programs.urscript.split import divide
+from truearm.compensation.programs.urscript.split import split_moves
 from truearm.compensation.programs.urscript.targets import At, Spot, Targets, Use
 from truearm.compensation.programs.urscript.tcp import COMPUTED, Places, Stretch, Tcp, TcpFlow
 from truearm.compensation.programs.urscript.text import Name, Numbers, Value
@@ -161,4 +161,4 @@ class _File:
         return self.targets.reach(value, at)
 
 
-URSCRIPT: Final = Language("URScript", (".script", ".urscript"), _is_one, _read, divide)
+URSCRIPT: Final = Language("URScript", (".script", ".urscript"), _is_one, _read, split_moves)

@@ -30,7 +30,7 @@ _NOWHERE: Final = (0, 0)
 
 
 class Going(NamedTuple):
-    """A move: where it ends and what it passes, as far as that is told, and the stretch of the text whose TCP holds.
+    """A move: where it ends and what it passes, as far as that is known, and the stretch of the text whose TCP holds.
 
     Moves of one `number` follow each other.
     """
@@ -223,7 +223,7 @@ def _moves(goings: list[Going], source: int, script: Script, routines: int) -> l
             continue
         via = -1 if passed is None else _final(passed.spot).index
         passes = None if passed is None or via < 0 else _words(passed)
-        divides = _words(end) if kind != "circular" or passes not in (None, _NOWHERE) else _NOWHERE
+        split_text = _words(end) if kind != "circular" or passes not in (None, _NOWHERE) else _NOWHERE
         moves.append(
             Move(
                 kind=kind,
@@ -233,7 +233,7 @@ def _moves(goings: list[Going], source: int, script: Script, routines: int) -> l
                 via=via if via >= 0 else None,
                 routine=routines + number + lost,
                 statement=(call.start, script.partner[call.opened] + 1),
-                target_text=divides,
+                target_text=split_text,
                 via_text=passes,
             )
         )

@@ -1,8 +1,8 @@
-"""Linear and circular moves of URScript divided: the same call before itself, once for each point on the way.
+"""Split linear and circular moves of URScript: the same call before itself, once for each point on the way.
 
 The robot would stop at every point without a blend radius, and blends must not overlap (script manual, movej: a move
 whose blend overlaps with another one is skipped). So the points on the way get a small radius, and a move is left
-undivided where its own radius, or the one it comes with, does not fit into its pieces; where a time is given for it;
+whole where its own radius, or the one it comes with, does not fit into its segments; where a time is given for it;
 where it goes to a target in a frame that the call does not name; and where its end is known to the robot alone.
 """
 
@@ -16,10 +16,10 @@ from typing import Final
 
 from truearm.compensation.programs.lines import indentation, line_end, replaced
 from truearm.compensation.programs.numbers import NUMBER, written
-from truearm.compensation.programs.program import Division, Edit, Move, Pieces, Program, ProgramTarget
+from truearm.compensation.programs.program import Edit, Move, Program, ProgramTarget, Split, SplitEdits
 from truearm.compensation.programs.urscript.text import Text, Value
 
-#: Blend radius at the points on the way [m]; less where pieces are short.
+#: Blend radius at the points on the way [m]; less where segments are short.
 _RADIUS: Final = 0.001
 #: Which argument is the time, and which the blend radius.
 _TIME: Final = {"movej": 3, "movel": 3}
@@ -28,19 +28,19 @@ _WORD: Final = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 _DECIMALS: Final = 6
 
 
-def divide(program: Program, divisions: Sequence[Division]) -> Pieces:
-    """Divide moves."""
+def split_moves(program: Program, splits: Sequence[Split]) -> SplitEdits:
+    """Split moves."""
     texts: dict[int, _Blends] = {}
     edits: list[Edit] = []
     whole: list[int] = []
-    for division in divisions:
-        source = program.moves[division.move].source
+    for split in splits:
+        source = program.moves[split.move].source
         if source not in texts:
             texts[source] = _Blends(Text(program.sources[source]))
-        made = _edits(program, division, texts[source])
+        made = _edits(program, split, texts[source])
         edits += made
-        whole += [] if made else [division.move]
-    return Pieces(edits, whole)
+        whole += [] if made else [split.move]
+    return SplitEdits(edits, whole)
 
 
 class _Blends:
@@ -81,22 +81,22 @@ class _Blends:
         return self.number(self.text.argument(opened, _BLEND[function], "r"))
 
 
-def _edits(program: Program, division: Division, blends: _Blends) -> list[Edit]:
-    """Return the edits that divide a move; none if it stays whole."""
-    move, text = program.moves[division.move], blends.text
+def _edits(program: Program, split: Split, blends: _Blends) -> list[Edit]:
+    """Return the edits that split a move; none if it stays whole."""
+    move, text = program.moves[split.move], blends.text
     target = program.targets[move.target]
     function, opened = blends.call(move)
-    if move.kind == "joint" or move.target_text == (0, 0) or not division.points:
+    if move.kind == "joint" or move.target_text == (0, 0) or not split.points:
         return []
     if function in _TIME and blends.number(text.argument(opened, _TIME[function], "t")) != 0.0:
         return []
-    radius = _radius(program, division, blends)
+    radius = _radius(program, split, blends)
     if radius is None:
         return []
     start, stop = move.statement
     blend = text.argument(opened, _BLEND[function], "r")
     copies = []
-    for numbers, via in division.points:
+    for numbers, via in split.points:
         parts = [(*move.target_text, _written(numbers, target))]
         if move.via_text is not None and via is not None:
             parts.append((*move.via_text, _written(via, target)))
@@ -105,16 +105,16 @@ def _edits(program: Program, division: Division, blends: _Blends) -> list[Edit]:
         copies.append(replaced(text.source.text, start, stop, parts))
     between = line_end(text.source.text, start) + indentation(text.source.text, start)
     edits = [Edit(move.source, start, start, "".join(copy + between for copy in copies))]
-    if move.via_text is not None and division.last_via is not None:
-        edits.append(Edit(move.source, *move.via_text, _written(division.last_via, target)))
+    if move.via_text is not None and split.last_via is not None:
+        edits.append(Edit(move.source, *move.via_text, _written(split.last_via, target)))
     return edits
 
 
-def _radius(program: Program, division: Division, blends: _Blends) -> str | None:
+def _radius(program: Program, split: Split, blends: _Blends) -> str | None:
     """Return the blend radius of the points on the way, as it is written; None if there is no room for any."""
-    move = program.moves[division.move]
+    move = program.moves[split.move]
     own = blends.radius(move)
-    before = program.moves[division.move - 1] if division.move else None
+    before = program.moves[split.move - 1] if split.move else None
     follows = before is not None and (before.source, before.routine) == (move.source, move.routine)
     coming = blends.radius(before) if before is not None and follows else 0.0
     if own is None or coming is None:
@@ -122,7 +122,7 @@ def _radius(program: Program, division: Division, blends: _Blends) -> str | None
     target = program.targets[move.target]
     shortest = math.inf
     if target.form.kind == "pose":
-        points = [numbers[:3] for numbers, _ in division.points]
+        points = [numbers[:3] for numbers, _ in split.points]
         if target.parent is None:
             points.append(target.values[:3])
         shortest = min((math.dist(a, b) for a, b in pairwise(points)), default=math.inf)

@@ -124,7 +124,7 @@ class Targets:
         Parameters
         ----------
         frame
-            That the value is meant in.
+            Of the value.
         name
             Of the variable that holds the value.
         """
@@ -287,7 +287,7 @@ class Targets:
 
 
 class _Frame(NamedTuple):
-    """A frame by its name, or why it cannot be told."""
+    """A frame by its name, or why it is not known."""
 
     name: str
     why: str = ""

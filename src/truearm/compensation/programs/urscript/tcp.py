@@ -57,7 +57,7 @@ class Stretch:
 
 
 class TcpFlow:
-    """The TCPs along the routines of a file, each of which is told by its number."""
+    """The TCPs along the routines of a file, each of which has a number."""
 
     def __init__(self, starts: list[int]) -> None:
         self._starts = starts

@@ -266,7 +266,7 @@ def _add_moves(found: _Found, application: _Application, places: dict[Key, int])
 def _target(
     found: _Found, application: _Application, places: dict[Key, int], index: int, routine: Routine, words: Words
 ) -> int | str | None:
-    """Return the target that words of a move mean, or why it is not known, or None if that is told elsewhere."""
+    """Return the target that words of a move mean, or why it is not known, or None if the reason is given elsewhere."""
     if words.point is None or words.point[0] in routine.own:
         return "the target of the move is computed when the program runs"
     name, key = words.point

@@ -1,10 +1,10 @@
-"""The main job on a digital twin, and the small session to imitate."""
+"""The main job on a digital twin."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Final
@@ -13,17 +13,18 @@ import numpy as np
 
 from truearm.compensation.gauge import best_agreement
 from truearm.compensation.program_correction import commanded
-from truearm.correction import ProgramCorrection, correct
 from truearm.errors import InputError
-from truearm.files import exists, read_bytes, read_yaml, write_files, write_new_text
+from truearm.files import exists, read_bytes, write_files
 from truearm.identification.solving.fit import Status
+from truearm.jobs.arguments import folder_for
 from truearm.jobs.calibrate import calibrate
+from truearm.jobs.compensate import compensate
 from truearm.library import load_robot
 from truearm.measurement.readers.canonical import csv_text
-from truearm.modeling.formats.robot_file import RobotFile, robot_from_file
 from truearm.modeling.transform import Transform
-from truearm.reporting.program_report import Checked
 from truearm.results.calibration import Calibration
+from truearm.results.demonstration import Demonstration
+from truearm.results.program_correction import ProgramCorrection, SimulatedRun
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import Twin, measure
 from truearm.simulation.twin_joint import PERFECT
@@ -35,25 +36,25 @@ _PLATE_FRAME: Final = Transform((0.31, -0.11, 0.06))
 _REGION: Final = ((-90, 0, -80, -150, -90, -180), (90, 110, 70, 150, 90, 180))
 
 
-@dataclass(frozen=True, eq=False)
-class Demonstration:
-    """What the demonstration shows: a calibration, and a program corrected with it unless the fit came to no end."""
-
-    calibration: Calibration
-    correction: ProgramCorrection | None
-
-
-def demonstration(folder: Path, progress: Callable[[str], None] = lambda _: None) -> Demonstration:
-    """Calibrate a digital twin of an IRB 120, correct a program with it, and write data and results into a folder.
+def demo(out: str | Path = "truearm-demo", *, progress: Callable[[str], None] = lambda _: None) -> Demonstration:
+    """Calibrate a digital twin of an IRB 120 and correct a program with it.
 
     The truth is the robot that Nubiola's thesis identified (Tables 2.6 and 2.7), with its compliance, and with gears
     that err by 0.01 deg two hundred times in a turn: those are beyond the elastic model, so the report has a remainder.
+
+    Parameters
+    ----------
+    out
+        Folder for data and results.
+    progress
+        Called with a few words at each step.
 
     Raises
     ------
     InputError
         If the folder holds other measurements or another program: they are not overwritten.
     """
+    folder = folder_for((), out)
     rng = np.random.default_rng(20240)
     robot = load_robot("irb120")
     twin = truth_twin(robot, "tracker-triangular", rng)
@@ -70,17 +71,18 @@ def demonstration(folder: Path, progress: Callable[[str], None] = lambda _: None
         if exists(folder / name) and read_bytes(folder / name) != mine.encode():
             raise InputError(
                 "this is another file of that name, and it is not overwritten",
+                parameter="out",
                 where=str(folder / name),
-                cure="Choose another --out.",
+                cure="Choose another `out`.",
             )
     write_files(folder, {path.name: text, _PLATE: plate})
-    calibration = calibrate("irb120", path, model="elastic", payload=twin.robot.payload, progress=progress)
-    calibration.save(folder, progress)
+    calibration = calibrate("irb120", path, out=folder, model="elastic", payload=twin.robot.payload, progress=progress)
+    shown = Demonstration(folder, calibration, None)
     if calibration.status is not Status.CONVERGED:
-        return Demonstration(calibration, None)
+        return shown
     correction = _corrected_plate(calibration, twin, folder, rng, progress)
-    correction.save(folder / "corrected", progress)
-    return Demonstration(calibration, correction)
+    correction.save(shown.corrected_folder, progress)
+    return replace(shown, correction=correction)
 
 
 def _corrected_plate(
@@ -91,72 +93,22 @@ def _corrected_plate(
     place = twin.robot.base.matrix @ best_agreement(twin.robot)[0] @ _PLATE_FRAME.matrix
     x, y, z = (f"{1e3 * v:.3f}" for v in place[:3, 3] + rng.normal(0.0, 0.03e-3, 3))
     quaternion = ", ".join(f"{v:.7f}" for v in Transform.from_matrix(place[:3, :3], place[:3, 3]).quaternion)
-    cell = _CELL.format(place=f"{x}, {y}, {z}", quaternion=quaternion)
-    write_files(folder, {"cell.yaml": cell})
-    correction = correct(
-        folder / "calibrated.yaml",
-        [folder / _PLATE],
-        tools=folder / "cell.yaml",
-        frames=folder / "cell.yaml",
-        progress=progress,
-    )
+    cell = folder / "cell.yaml"
+    write_files(folder, {cell.name: _CELL.format(place=f"{x}, {y}, {z}", quaternion=quaternion)})
+    correction = compensate(folder / "calibrated.yaml", [folder / _PLATE], tools=cell, frames=cell, progress=progress)
     progress("sending the twin there")
     before, after = correction.result.corrections[0].program, correction.as_written()[0]
     poses = [row for row, target in enumerate(before.targets) if target.form.kind == "pose"]
-    meant = (place @ correction.result.corrections[0].before)[poses, :3, 3]
+    wanted = (place @ correction.result.corrections[0].before)[poses, :3, 3]
     missed = []
     for program in (before, after):
         joints = commanded(calibration.robot, program)[poses]
-        missed.append(np.linalg.norm(twin.frames(joints)["1"][:, :3, 3] - meant, axis=1))
-    checked = Checked(missed[0], missed[1], "the digital twin that plays the real robot")
-    return replace(correction, checked=checked)
+        missed.append(np.linalg.norm(twin.frames(joints)["1"][:, :3, 3] - wanted, axis=1))
+    simulated = SimulatedRun(missed[0], missed[1], "the digital twin that plays the real robot")
+    return replace(correction, simulated=simulated)
 
 
-def template() -> str:
-    """Return the commented robot file to fill in."""
-    return (files("truearm.examples") / "new_robot.yaml").read_text("utf-8")
-
-
-def new_robot(path: Path) -> None:
-    """Write the commented robot file.
-
-    Raises
-    ------
-    InputError
-        If the file exists: nothing is overwritten.
-    """
-    write_new_text(path, template())
-
-
-def example(folder: Path) -> tuple[Path, ...]:
-    """Write a small complete session into a folder: a robot, its data, data to check with, the commands.
-
-    Raises
-    ------
-    InputError
-        If one of the files exists: nothing is overwritten.
-    """
-    rng = np.random.default_rng(7)
-    with_template = {"my_robot.yaml": template()}
-    for name in (*with_template, "measurements.csv", "check.csv", "session.sh"):
-        if exists(folder / name):
-            raise InputError(
-                "this exists already and is not overwritten", where=str(folder / name), cure="Choose another folder."
-            )
-    template_path = Path(str(files("truearm.examples") / "new_robot.yaml"))
-    robot = robot_from_file(read_yaml(template_path, RobotFile), "my_robot.yaml")
-    twin = truth_twin(robot, "random", rng)
-    made = {
-        **with_template,
-        "measurements.csv": csv_text(measure(twin, robot.random_configurations(60, rng), 0.05e-3, rng)),
-        "check.csv": csv_text(measure(twin, robot.random_configurations(15, rng), 0.05e-3, rng)),
-        "session.sh": _SESSION,
-    }
-    write_files(folder, made)
-    return tuple(folder / name for name in made)
-
-
-_CELL = """\
+_CELL: Final = """\
 # Where the plate and the tip of the probe really are: the tracker has seen the plate, and the tip is target 1.
 truearm: truearm-cell/1
 units: {{length: mm, angle: deg}}
@@ -164,16 +116,4 @@ tools:
   tProbe: {{of: flange, target: "1"}}
 frames:
   wobjPlate: {{of: world, translation: [{place}], quaternion: [{quaternion}]}}
-"""
-
-_SESSION = """\
-#!/bin/sh
-# A whole session. my_robot.yaml is the nominal robot, measurements.csv what a tracker saw at 60 configurations,
-# check.csv what it saw at 15 others.
-set -e
-cd "$(dirname "$0")"
-truearm show my_robot.yaml
-truearm calibrate my_robot.yaml measurements.csv --model geometric --out result
-truearm validate result/calibrated.yaml check.csv
-echo "Open result/report.html in a browser."
 """

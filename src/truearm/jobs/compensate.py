@@ -1,0 +1,171 @@
+"""From robot programs to corrected ones: read, correct, split, report, write."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from truearm.compensation.advice import check_correction
+from truearm.compensation.cell import Cell, read_frames, read_tools
+from truearm.compensation.program_correction import CorrectedPrograms, Correction, corrected_programs
+from truearm.compensation.program_files import edited, language_called, program_files, read_programs
+from truearm.compensation.programs.program import Edit
+from truearm.compensation.split import ProgramSplit, check_tolerance, split_program
+from truearm.errors import InputError
+from truearm.jobs.arguments import (
+    flag_argument,
+    folder_for,
+    number_argument,
+    path_argument,
+    paths_argument,
+    payload_argument,
+    python_call,
+    refusals_of,
+    robot_argument,
+)
+from truearm.modeling.parts import Payload
+from truearm.modeling.robot import Robot
+from truearm.results.program_correction import FileCorrection, ProgramCorrection
+
+
+def compensate(
+    robot: Robot | str | Path,
+    programs: Sequence[str | Path],
+    *,
+    out: str | Path | None = None,
+    tools: str | Path | None = None,
+    frames: str | Path | None = None,
+    payload: Payload | str | None = None,
+    strict: bool = False,
+    split: float | None = None,
+    again: bool = False,
+    command: str | None = None,
+    progress: Callable[[str], None] = lambda _: None,
+) -> ProgramCorrection:
+    """Correct robot programs so that the real robot goes where they say.
+
+    Parameters
+    ----------
+    robot
+        A calibrated robot, or its file.
+    programs
+        Files in one robot language. Those given together share what has to be assumed of base and flange.
+    out
+        Folder for the corrected programs, their records and compensation.html; None writes nothing, see
+        :meth:`truearm.results.program_correction.ProgramCorrection.save`.
+    tools, frames
+        Files that say where tools and frames are, see :mod:`truearm.compensation.cell`.
+    payload
+        What the flange carries in production (an object, or a text such as ``2.7kg,50mm,25mm,100mm``); None for what
+        it carried in calibration.
+    strict
+        Refuse if a target cannot be corrected.
+    split
+        Split straight and circular moves where the correction between targets would deviate farther [m].
+    again
+        Take the originals of programs that were corrected already.
+    command
+        How to do it again, for the report; None writes the call in Python.
+    progress
+        Called with a few words at each step.
+
+    Raises
+    ------
+    InputError
+        If a program cannot be read or was corrected already, the robot is not calibrated, a tool or frame is not
+        defined, or with `strict` a target cannot be corrected.
+    """
+    paths = paths_argument(programs, "programs", "program")
+    tool_file = None if tools is None else path_argument(tools, "tools")
+    frame_file = None if frames is None else path_argument(frames, "frames")
+    payload = payload_argument(payload)
+    strict, again = flag_argument(strict, "strict"), flag_argument(again, "again")
+    if split is not None:
+        split = number_argument(split, "split")
+        check_tolerance(split)
+    folder = None if out is None else folder_for((), out)
+    invocation = command or python_call(
+        "compensate",
+        robot,
+        paths,
+        tools=tools,
+        frames=frames,
+        payload=payload,
+        strict=strict or None,
+        split=split,
+        again=again or None,
+    )
+    arm = robot_argument(robot).with_payload(payload)
+    with refusals_of("tools"):
+        tools_given = read_tools(arm, tool_file)
+    with refusals_of("frames"):
+        frames_given = read_frames(arm, frame_file)
+    cell = Cell(tools_given, frames_given)
+    with refusals_of("programs"):
+        files = program_files(paths, again=again)
+        progress("reading the programs")
+        read = read_programs(files)
+    with refusals_of("robot"):
+        result = corrected_programs(arm, read, cell, progress)
+    if strict:
+        _refuse_skipped(result)
+    language = language_called(read[0].language)
+    splits: tuple[ProgramSplit, ...] = ()
+    if split is not None:
+        progress("splitting moves")
+        splits = tuple(
+            split_program(language, correction, between, split)
+            for correction, between in zip(result.corrections, result.between, strict=True)
+        )
+    corrected = []
+    for number, correction in enumerate(result.corrections):
+        edits = _edits(correction, splits[number] if splits else None)
+        for index, source in enumerate(correction.program.sources):
+            file = next(file for file in files if file.path == source.path)
+            text = edited(source.text, [edit for edit in edits if edit.source == index])
+            corrected.append(FileCorrection(file, correction, index, text.encode("latin-1")))
+    corrected.sort(key=lambda one: files.index(one.file))
+    made = ProgramCorrection(
+        robot=arm,
+        files=tuple(corrected),
+        result=result,
+        splits=splits,
+        warnings=check_correction(arm, result, splits),
+        command=invocation,
+    )
+    if folder is not None:
+        with refusals_of("out"):
+            made.save(folder, progress)
+    return made
+
+
+def _refuse_skipped(result: CorrectedPrograms) -> None:
+    skipped = [
+        (correction.program.sources[one.source].where(one.line), one.reason)
+        for correction in result.corrections
+        for one in correction.skipped
+    ]
+    if skipped:
+        more = f", and {len(skipped) - 1} more" if len(skipped) > 1 else ""
+        where, reason = skipped[0]
+        raise InputError(
+            f"a target cannot be corrected{more}, and `strict` refuses that",
+            parameter="strict",
+            where=where,
+            came=reason,
+        )
+
+
+def _edits(correction: Correction, split: ProgramSplit | None) -> list[Edit]:
+    """Return all edits of a program; where split moves have new words, the numbers in the old ones are gone."""
+    if split is None:
+        return [*correction.edits]
+    cut = sorted((edit.source, edit.start, edit.stop) for edit in split.edits if edit.start < edit.stop)
+
+    def stays(edit: Edit) -> bool:
+        at = bisect_right(cut, (edit.source, edit.start, math.inf)) - 1
+        return at < 0 or cut[at][0] != edit.source or edit.start >= cut[at][2]
+
+    return [*split.edits, *filter(stays, correction.edits)]

@@ -1,0 +1,225 @@
+"""From a robot file to a robot."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+from truearm.errors import InputError, nearest_names
+from truearm.files import read_yaml, shown_entry
+from truearm.modeling.conventions import convention
+from truearm.modeling.effects import EFFECTS, NON_NEGATIVE
+from truearm.modeling.fixtures import Fixture
+from truearm.modeling.formats.robot_file.schema import JointEntry, RobotFile
+from truearm.modeling.parameters import Parameter
+from truearm.modeling.parts import NO_PAYLOAD, Inertia, Joint, LinkMass, Payload, Target, Tool, Truth
+from truearm.modeling.robot import Robot
+from truearm.units import SHOWN_AS, sized_si, to_si
+
+
+def read_robot(path: Path) -> Robot:
+    """Read a robot file."""
+    return robot_from_file(read_yaml(path, RobotFile), str(path))
+
+
+def robot_from_file(content: RobotFile, where: str) -> Robot:
+    """Build the robot that a checked file describes; `where` names the file in messages."""
+    length, angle = content.units.length, content.units.angle
+
+    def si(value: float, unit: str, entry: str, *, deviation: bool = False) -> float:
+        return sized_si(value, unit, f"{where}, {entry}", deviation=deviation)
+
+    def metres(values: tuple[float, float, float], entry: str) -> tuple[float, float, float]:
+        x, y, z = (si(v, length, entry) for v in values)
+        return x, y, z
+
+    joints = tuple(
+        _joint(content, number, entry, f"{where}, joints[{number}]") for number, entry in enumerate(content.joints, 1)
+    )
+    names = [joint.name for joint in joints]
+    for number, name in enumerate(names, 1):
+        if name in names[: number - 1]:
+            raise InputError(
+                "two joints have the same name",
+                where=f"{where}, joints[{number}]",
+                came=name,
+                cure=f"joints[{names.index(name) + 1}] has it too: rename one of them.",
+            )
+    numbered = [("link", "masses", mass.link) for mass in content.masses]
+    for name, truth in content.truths.items():
+        numbered += [("joint", f"truths.{name}.compliance", joint) for joint in truth.compliance]
+    for kind, part, number in numbered:
+        if not 1 <= number <= len(joints):
+            raise InputError(
+                f"there is no such {kind}", where=f"{where}, {part}", came=number, allowed=f"1 to {len(joints)}"
+            )
+    robot = Robot(
+        name=content.name,
+        title=content.title or content.name,
+        source=content.source,
+        convention_name=content.convention,
+        joints=joints,
+        flange=content.flange.transform(length, f"{where}, flange"),
+        controller=content.controller.controller(joints, length, angle, f"{where}, controller"),
+        masses=tuple(
+            LinkMass(
+                m.link,
+                si(m.mass, "1", f"masses[{i}].mass"),
+                metres(m.cog, f"masses[{i}].cog"),
+                _inertia(m.inertia, f"{where}, masses[{i}].inertia"),
+            )
+            for i, m in enumerate(content.masses, 1)
+        ),
+        payload=NO_PAYLOAD
+        if content.payload is None
+        else Payload(si(content.payload.mass, "1", "payload.mass"), metres(content.payload.cog, "payload.cog")),
+        gravity=content.gravity,
+        base_quaternion=content.base_quaternion,
+        targets=tuple(Target(t.name, t.quaternion) for t in content.targets),
+        fixtures=tuple(Fixture(f.name, f.kind, f.quaternion or (1.0, 0.0, 0.0, 0.0)) for f in content.fixtures),
+        effect_names=tuple(content.effects),
+        priors={
+            unit: si(value, file_unit, f"priors.{entry}", deviation=True)
+            for unit, entry, value, file_unit in (
+                ("m", "length", content.priors.length, length),
+                ("rad", "angle", content.priors.angle, angle),
+            )
+            if value is not None
+        },
+        tools={
+            name: Tool(
+                {t: metres(p, f"tools.{name}.targets.{t}") for t, p in tool.targets.items()},
+                si(tool.mass, "1", f"tools.{name}.mass"),
+                metres(tool.cog, f"tools.{name}.cog"),
+            )
+            for name, tool in content.tools.items()
+        },
+        history=tuple(content.history),
+    )
+    return _with_values(robot, content, where)
+
+
+def _with_values(robot: Robot, content: RobotFile, where: str) -> Robot:
+    """Return a robot with the values of parameters and truths that its file states."""
+    shown = {**SHOWN_AS, "m": content.units.length, "rad": content.units.angle}
+
+    def si(value: float, unit: str, entry: str, *, deviation: bool = False) -> float:
+        return sized_si(value, unit, f"{where}, {entry}", deviation=deviation)
+
+    def known(name: str, entry: str) -> Parameter:
+        if name in robot.parameters:
+            return robot.parameters[name]
+        near = nearest_names(name, robot.parameters)
+        cure = f"Did you mean {' or '.join(near)}?" if near else None
+        for effect in EFFECTS:
+            if name in [p.name for p in effect(robot.layout).parameters]:
+                cure = f"It belongs to the joint effect {effect.name}: add that to the entry effects."
+        raise InputError("the robot has no such parameter", where=f"{where}, {entry}", came=name, cure=cure)
+
+    truths = {
+        truth_name: Truth(
+            truth.source,
+            {
+                n: si(v, shown[known(n, f"truths.{truth_name}").unit], f"truths.{truth_name}.values.{n}")
+                for n, v in truth.values.items()
+            },
+            {n: si(v, "1", f"truths.{truth_name}.compliance.{n}") for n, v in truth.compliance.items()},
+        )
+        for truth_name, truth in content.truths.items()
+    }
+    parameters = []
+    for name, entry in content.parameters.items():
+        place = f"parameters.{name}"
+        plain = known(name, "parameters")
+        unit = shown[plain.unit]
+        for key, stated in (("nominal", entry.nominal), ("value", entry.value)):
+            if plain.group in NON_NEGATIVE and stated < 0.0 and not content.history:
+                raise InputError(
+                    "no joint has a negative one",
+                    where=f"{where}, {place}.{key}",
+                    came=f"{stated:g} {unit}",
+                    allowed="0 or more",
+                )
+        if entry.unit != unit:
+            raise InputError(
+                "the unit differs from the file's", where=f"{where}, {place}", came=entry.unit, allowed=unit
+            )
+        parameters.append(
+            Parameter(
+                name,
+                plain.unit,
+                plain.group,
+                nominal=si(entry.nominal, unit, f"{place}.nominal"),
+                value=si(entry.value, unit, f"{place}.value"),
+                prior=si(entry.prior, unit, f"{place}.prior", deviation=True),
+                deviation=None if entry.deviation is None else to_si(entry.deviation, unit),
+                informed=entry.informed,
+            )
+        )
+    return replace(robot, truths=truths, known={p.name: p for p in parameters})
+
+
+def _joint(content: RobotFile, number: int, entry: JointEntry, where: str) -> Joint:
+    table = convention(content.convention)
+    units = table.row_units(entry.type)
+    shown = {"m": content.units.length, "rad": content.units.angle, "1": "1"}
+    vectors = [name for name in table.vectors if f"{name}_x" in units]
+    allowed = [*(c for c in units if c.rpartition("_")[0] not in vectors), *vectors]
+    row: dict[str, float] = {}
+    for column, value in (entry.model_extra or {}).items():
+        if column in vectors:
+            unit = units[f"{column}_x"]
+            row |= _vector(column, value, shown[unit], f"{where}.{column}", direction=unit == "1")
+            continue
+        if column not in allowed:
+            near = nearest_names(column, allowed)
+            raise InputError(
+                f"a joint of convention {content.convention} has no such entry",
+                where=where,
+                came=column,
+                allowed=", ".join(["name", "type", "limits", "transmission_periods", *allowed]),
+                cure=f"Did you mean {' or '.join(near)}?" if near else None,
+            )
+        row[column] = sized_si(_number(value, f"{where}.{column}"), shown[units[column]], f"{where}.{column}")
+    fault = table.fault(row, entry.type)
+    if fault:
+        raise InputError(fault, where=where)
+    unit = content.units.angle if entry.type == "revolute" else content.units.length
+    limits = None
+    if entry.limits is not None:
+        low, high = entry.limits
+        if not low < high:
+            raise InputError("the lower limit must be below the upper one", where=f"{where}.limits", came=[low, high])
+        limits = (sized_si(low, unit, f"{where}.limits"), sized_si(high, unit, f"{where}.limits"))
+    elif entry.type == "prismatic":
+        raise InputError(
+            "a prismatic joint must have limits",
+            where=where,
+            allowed=f"limits: [LOWEST, HIGHEST] in {unit}",
+            cure="Give what the controller allows.",
+        )
+    return Joint(entry.name or f"joint_{number}", entry.type, row, limits, entry.transmission_periods)
+
+
+def _vector(name: str, value: object, unit: str, where: str, *, direction: bool) -> dict[str, float]:
+    if not isinstance(value, list) or len(value) != 3:
+        raise InputError("three numbers belong here", where=where, came=shown_entry(value), allowed="[x, y, z]")
+    numbers = [_number(v, where) for v in value]
+    if direction and abs(math.hypot(*numbers) - 1.0) > 1e-6:
+        raise InputError("a direction must have length 1", where=where, came=value)
+    return {f"{name}_{a}": sized_si(v, unit, where) for a, v in zip("xyz", numbers, strict=True)}
+
+
+def _inertia(moments: Inertia, where: str) -> Inertia:
+    xx, yy, zz, xy, xz, yz = (sized_si(v, "1", where) for v in moments)
+    return xx, yy, zz, xy, xz, yz
+
+
+def _number(value: object, where: str) -> float:
+    try:
+        if not isinstance(value, bool) and isinstance(value, int | float) and math.isfinite(value):
+            return float(value)
+    except OverflowError:  # a whole number that no float can hold
+        pass
+    raise InputError("a number belongs here", where=where, came=shown_entry(value), allowed="a finite number")

@@ -1,0 +1,150 @@
+"""From a robot to a robot file."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from truearm.modeling.controller import AS_THE_MODEL
+from truearm.modeling.formats.controller_entry import controller_entry
+from truearm.modeling.formats.entries import NAME, place_entry
+from truearm.modeling.formats.robot_file.schema import SCHEMA
+from truearm.modeling.parameters import Parameter
+from truearm.modeling.parts import GRAVITY, NO_PAYLOAD, Joint
+from truearm.modeling.robot import Robot
+from truearm.modeling.transform import Transform
+from truearm.units import SHOWN_AS, written
+
+
+def robot_text(robot: Robot) -> str:
+    """Return the robot as the text of a robot file, in mm and degrees."""
+    from ruamel.yaml import YAML
+    from ruamel.yaml.comments import CommentedMap, CommentedSeq
+    from ruamel.yaml.scalarstring import DoubleQuotedScalarString
+
+    def flow(content: Mapping[str, Any]) -> CommentedMap:
+        made = CommentedMap(content)
+        made.fa.set_flow_style()
+        return made
+
+    def listed(content: list[Any]) -> CommentedSeq:
+        made = CommentedSeq(content)
+        made.fa.set_flow_style()
+        return made
+
+    def flowing(content: Any) -> Any:
+        """Return an entry with its lists of numbers, and the rows of its tables, on one line each."""
+        if isinstance(content, dict):
+            return {key: flowing(part) for key, part in content.items()}
+        if isinstance(content, list):
+            return [flow(row) for row in content] if isinstance(content[0], dict) else listed(content)
+        return content
+
+    def mm(values: tuple[float, float, float]) -> CommentedSeq:
+        return listed([written(v, "mm") for v in values])
+
+    def text(words: str) -> str:  # the writer leaves some texts without the quotes that its reader needs
+        return words if re.fullmatch(NAME, words) else DoubleQuotedScalarString(words)
+
+    shown = SHOWN_AS
+
+    def joint(j: Joint) -> CommentedMap:
+        row: dict[str, Any] = {"name": j.name, "type": j.kind}
+        units = robot.convention.row_units(j.kind)
+        vectors = [name for name in robot.convention.vectors if f"{name}_x" in j.row]
+        entries = {c: written(v, shown[units[c]]) for c, v in j.row.items()}
+        row |= {name: listed([entries.pop(f"{name}_{a}") for a in "xyz"]) for name in vectors} | entries
+        if j.limits:
+            row["limits"] = listed([written(v, "deg" if j.kind == "revolute" else "mm") for v in j.limits])
+        if j.transmission_periods:
+            row["transmission_periods"] = j.transmission_periods
+        return flow(row)
+
+    content: dict[str, Any] = {
+        "truearm": SCHEMA,
+        "name": robot.name,
+        "title": robot.title,
+        "source": robot.source,
+        "units": flow({"length": "mm", "angle": "deg"}),
+        "convention": robot.convention_name,
+        "joints": [joint(j) for j in robot.joints],
+    }
+    if robot.flange != Transform():
+        content["flange"] = flowing(place_entry(robot.flange))
+    if robot.controller != AS_THE_MODEL:
+        content["controller"] = flowing(controller_entry(robot.controller, robot.joints))
+    if robot.masses:
+        content["masses"] = [
+            flow(
+                {"link": m.joint, "mass": m.mass, "cog": mm(m.cog)}
+                | ({"inertia": listed(list(m.inertia))} if any(m.inertia) else {})
+            )
+            for m in robot.masses
+        ]
+    if robot.payload != NO_PAYLOAD:
+        content["payload"] = flow({"mass": robot.payload.mass, "cog": mm(robot.payload.cog)})
+    if robot.gravity != GRAVITY:
+        content["gravity"] = listed(list(robot.gravity))
+    if robot.tools:
+        content["tools"] = {
+            name: {"targets": {text(t): mm(p) for t, p in tool.targets.items()}, "mass": tool.mass, "cog": mm(tool.cog)}
+            for name, tool in robot.tools.items()
+        }
+    if robot.truths:
+        content["truths"] = {
+            name: {
+                "source": truth.source,
+                "values": {n: written(v, shown[robot.parameters[n].unit]) for n, v in truth.values.items()},
+                "compliance": dict(truth.compliance),
+            }
+            for name, truth in robot.truths.items()
+        }
+    if robot.priors:
+        names = {"m": "length", "rad": "angle"}
+        content["priors"] = {names[u]: written(v, shown[u]) for u, v in robot.priors.items()}
+    if robot.effect_names:
+        content["effects"] = list(robot.effect_names)
+    if robot.base_quaternion != (1.0, 0.0, 0.0, 0.0):
+        content["base_quaternion"] = listed(list(robot.base_quaternion))
+    if robot.targets:
+        content["targets"] = [
+            flow({"name": text(t.name)} | ({"quaternion": listed(list(t.quaternion))} if t.quaternion else {}))
+            for t in robot.targets
+        ]
+    if robot.fixtures:
+        content["fixtures"] = [
+            flow(
+                {"name": text(f.name), "kind": f.kind}
+                | ({} if f.kind == "point" else {"quaternion": listed(list(f.quaternion))})
+            )
+            for f in robot.fixtures
+        ]
+    if robot.known:
+        content["parameters"] = {
+            text(name): flow(_parameter(robot.known[name], shown)) for name in robot.parameters if name in robot.known
+        }
+    if robot.history:
+        content["history"] = list(robot.history)
+    yaml = YAML()
+    yaml.width = 4096
+    yaml.indent(mapping=2, sequence=4, offset=2)
+    stream = io.StringIO()
+    yaml.dump(content, stream)
+    return stream.getvalue()
+
+
+def _parameter(p: Parameter, shown: Mapping[str, str]) -> dict[str, Any]:
+    unit = shown[p.unit]
+    made: dict[str, Any] = {
+        "unit": unit,
+        "nominal": written(p.nominal, unit),
+        "value": written(p.value, unit),
+        "prior": written(p.prior, unit),
+    }
+    if p.deviation is not None:
+        made["deviation"] = written(p.deviation, unit)
+    if p.informed is not None:
+        made["informed"] = p.informed
+    return made

@@ -1,0 +1,51 @@
+"""Files to begin with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from truearm.results.record import Record
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ExampleSession(Record):
+    """A small complete session to imitate.
+
+    Attributes
+    ----------
+    files
+        A robot, its data, data to check with, the commands.
+    """
+
+    files: tuple[Path, ...]
+
+    def summary(self) -> dict[str, Any]:
+        """Return it as JSON holds it."""
+        return {"files": [str(file) for file in self.files]}
+
+    def lines(self) -> list[str]:
+        """Return a line for each file."""
+        return [str(file) for file in self.files]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RobotTemplate(Record):
+    """A commented robot file to fill in.
+
+    Attributes
+    ----------
+    file
+        The file.
+    """
+
+    file: Path
+
+    def summary(self) -> dict[str, Any]:
+        """Return it as JSON holds it."""
+        return {"file": str(self.file)}
+
+    def lines(self) -> list[str]:
+        """Return what to do with it."""
+        return [f"{self.file}: fill it in, then look at it with 'truearm show {self.file}'."]

@@ -1,0 +1,52 @@
+"""A robot for other programs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from truearm.modeling.robot import Robot
+from truearm.results.record import Record
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ExportedRobot(Record):
+    """A robot for other programs, and what the format cannot hold.
+
+    Attributes
+    ----------
+    robot
+        The robot.
+    format
+        Name of the format.
+    text
+        Content of the file.
+    frames
+        Which frames its numbers refer to.
+    left_out
+        What the format cannot hold, one sentence each.
+    file
+        The file; None if none was written.
+    """
+
+    robot: Robot
+    format: str
+    text: str
+    frames: str
+    left_out: tuple[str, ...]
+    file: Path | None = None
+
+    def summary(self) -> dict[str, Any]:
+        """Return it as JSON holds it."""
+        return {
+            "file": None if self.file is None else str(self.file),
+            "format": self.format,
+            "frames": self.frames,
+            "warnings": [{"code": "left-out", "message": message} for message in self.left_out],
+        }
+
+    def lines(self) -> list[str]:
+        """Return what was written, and then what was left out."""
+        text = f"{self.robot.name} as {self.format}. {self.frames}"
+        return [text if self.file is None else f"{self.file}: {text}", *self.left_out]

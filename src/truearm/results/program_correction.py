@@ -1,0 +1,258 @@
+"""Corrected programs, ready to be written."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from truearm.compensation.advice import frame_words
+from truearm.compensation.gauge import turns_between
+from truearm.compensation.program_correction import CorrectedPrograms, Correction
+from truearm.compensation.program_files import ProgramFile, language_called, recorded, write_programs
+from truearm.compensation.programs.program import Program, Skipped, Source
+from truearm.compensation.split import ProgramSplit
+from truearm.files import writable_folder
+from truearm.modeling.chain import Array
+from truearm.modeling.robot import Robot
+from truearm.notices import Notice
+from truearm.results.record import Record, notice_lines
+
+#: The report beside the corrected programs.
+REPORT: Final = "compensation.html"
+#: Skipped targets explained one by one where a person reads.
+_EXPLAINED: Final = 10
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FileCorrection(Record):
+    """One corrected file of a program.
+
+    Attributes
+    ----------
+    file
+        As it was found.
+    correction
+        Of the program that it is part of.
+    source
+        Which file of that program, from 0.
+    text
+        Its new bytes.
+    """
+
+    file: ProgramFile
+    correction: Correction
+    source: int
+    text: bytes
+
+    @property
+    def name(self) -> str:
+        """Its name in the folder of results."""
+        return self.file.name
+
+    @property
+    def language(self) -> str:
+        """The robot language."""
+        return self.correction.program.language
+
+    @cached_property
+    def rows(self) -> tuple[int, ...]:
+        """Indices of the targets in this file."""
+        return tuple(i for i, target in enumerate(self.correction.program.targets) if target.source == self.source)
+
+    @cached_property
+    def moved(self) -> Array:
+        """By how much each corrected target was moved [m], ``(n,)``."""
+        return np.asarray(self.correction.moved[[row for row in self.rows if self.correction.corrected[row]]])
+
+    @property
+    def targets(self) -> int:
+        """How many targets it has."""
+        return len(self.rows)
+
+    @property
+    def corrected(self) -> int:
+        """How many of them were corrected."""
+        return len(self.moved)
+
+    @property
+    def mean_shift(self) -> float:
+        """By how much targets were moved on average [m]."""
+        return float(self.moved.mean()) if self.corrected else 0.0
+
+    @property
+    def largest_shift(self) -> float:
+        """By how much a target was moved at most [m]."""
+        return float(self.moved.max()) if self.corrected else 0.0
+
+    @cached_property
+    def skipped(self) -> tuple[Skipped, ...]:
+        """What stays as it is, and why."""
+        return tuple(one for one in self.correction.skipped if one.source == self.source)
+
+    def summary(self) -> dict[str, Any]:
+        """Return it as JSON holds it, lengths in mm."""
+        millimetres = self.moved * 1e3
+        return {
+            "file": self.name,
+            "language": self.language,
+            "targets": self.targets,
+            "corrected": self.corrected,
+            "skipped": [{"line": one.line, "reason": one.reason} for one in self.skipped],
+            "shift_mm": {
+                "mean": float(millimetres.mean()) if self.corrected else 0.0,
+                "max": float(millimetres.max()) if self.corrected else 0.0,
+            },
+        }
+
+    def lines(self) -> list[str]:
+        """Return how many targets were corrected and by how much, and what was skipped."""
+        text = (
+            f"{self.name}  {self.language}: {self.corrected} of {self.targets} targets corrected, "
+            f"moved by {self.mean_shift * 1e3:.3f} mm on average, {self.largest_shift * 1e3:.3f} mm at most"
+        )
+        return [text, *(f"  {self.name}, line {one.line}: {one.reason}" for one in self.skipped)]
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedRun:
+    """How far a simulated robot is from each target of a program [m], ``(n,)``.
+
+    Attributes
+    ----------
+    original, corrected
+        With the program as it was, and as it is now.
+    robot
+        Which robot, in words.
+    """
+
+    original: Array
+    corrected: Array
+    robot: str
+
+    def lines(self) -> list[str]:
+        """Return it in words and figures."""
+        return [
+            f"Distance of {self.robot} from where the program meant it to be:",
+            *(
+                f"  {name:17}  mean {1e3 * missed.mean():.3f}  max {1e3 * missed.max():.3f} mm"
+                for name, missed in (("original program", self.original), ("corrected program", self.corrected))
+            ),
+        ]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ProgramCorrection(Record):
+    """Corrected programs, ready to be written.
+
+    Attributes
+    ----------
+    robot
+        The calibrated robot, with the payload that holds.
+    files
+        In the order of the programs.
+    result
+        How they were corrected.
+    splits
+        How their moves are split, one a program; empty if they are not.
+    warnings
+        What to know about it.
+    command
+        How to do it again.
+    simulated
+        What a simulated robot does with the programs, where there is one.
+    """
+
+    robot: Robot
+    files: tuple[FileCorrection, ...]
+    result: CorrectedPrograms
+    splits: tuple[ProgramSplit, ...]
+    warnings: tuple[Notice, ...]
+    command: str
+    simulated: SimulatedRun | None = None
+
+    def summary(self) -> dict[str, Any]:
+        """Return it as JSON holds it, lengths in mm."""
+        return {
+            "programs": [file.summary() for file in self.files],
+            "warnings": [{"code": notice.code, "message": notice.message} for notice in self.warnings],
+        }
+
+    def lines(self) -> list[str]:
+        """Return a line for each file, what was skipped and what to know."""
+        width = max(len(file.name) for file in self.files)
+        parts = [(file, file.lines()) for file in self.files]
+        text = [f"{file.name:{width}}{head.removeprefix(file.name)}" for file, (head, *_) in parts]
+        skipped = [line for _, (_, *lines) in parts for line in lines]
+        text += skipped[:_EXPLAINED]
+        if len(skipped) > _EXPLAINED:
+            text.append(f"  and {len(skipped) - _EXPLAINED} more; the JSON summary lists all")
+        for split in self.splits:
+            if split.moves:
+                moves, more = split.moves, split.added
+                text.append(f"  {moves} move{'s'[: moves > 1]} split by {more} more target{'s'[: more > 1]}")
+        text += notice_lines(self.warnings)
+        return text if self.simulated is None else [*text, *self.simulated.lines()]
+
+    @property
+    def frame_words(self) -> list[str]:
+        """What was taken for the real base and flange, in words."""
+        return frame_words(self.result.frames)
+
+    def applied(self) -> dict[str, Any]:
+        """Return what the records beside the programs say was applied, in mm and deg."""
+        frames, payload = self.result.frames, self.robot.payload
+        made: dict[str, Any] = {
+            "robot": self.robot.name,
+            "history": list(self.robot.history),
+            "payload_kg": payload.mass,
+            "tools": frames.tools,
+            "frames": frames.frames,
+        }
+        for name, provenance, shift in (
+            ("base", frames.frames, frames.base),
+            ("flange", frames.tools, frames.flange),
+        ):
+            if provenance == "assumed":
+                made[f"{name}_shift"] = {
+                    "mm": [round(float(v) * 1e3, 6) for v in shift[:3, 3]],
+                    "rotation_vector_deg": [
+                        round(math.degrees(v), 7) for v in turns_between(np.eye(4)[None], shift[None])[0].tolist()
+                    ],
+                }
+        return made
+
+    def as_written(self) -> tuple[Program, ...]:
+        """Return the programs as they are read again from their new texts."""
+        language = language_called(self.files[0].language)
+        return language.programs([Source(one.file.path, one.text.decode("latin-1")) for one in self.files])
+
+    def save(self, folder: str | Path, progress: Callable[[str], None] = lambda _: None) -> tuple[Path, ...]:
+        """Write programs, their records and the report ``compensation.html`` into a folder, all or nothing.
+
+        Returns
+        -------
+        The files written.
+
+        Raises
+        ------
+        InputError
+            If a file would be overwritten that was read, or that truearm has not written.
+        """
+        from truearm.reporting.program_report import program_html
+
+        folder = writable_folder(Path(folder))
+        progress("drawing the report")
+        files: dict[str, str | bytes] = {}
+        for one in self.files:
+            files[one.name] = one.text
+            files[f"{one.name}.truearm.json"] = recorded(one.file, one.text, one.language, self.applied())
+        files[REPORT] = program_html(self)
+        progress("writing the files")
+        write_programs(folder, [one.file.path for one in self.files], files)
+        return tuple(folder / name for name in files)

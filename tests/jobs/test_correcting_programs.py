@@ -1,0 +1,131 @@
+"""Programs corrected and restored from Python: what is written where, and what is said of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import truearm
+from truearm import InputError, Robot
+from truearm.modeling.formats.robot_file import robot_text
+from truearm.results.program_correction import SimulatedRun
+
+
+def calibrated() -> Robot:
+    return truearm.load_robot("irb120").with_values({"a_3": 0.2708, "alpha_4": -1.5695, "d_4": 0.3024})
+
+
+@pytest.fixture
+def program(tmp_path: Path) -> Path:
+    path = tmp_path / "plate.mod"
+    path.write_text((files("truearm.examples") / "plate.mod").read_text())
+    return path
+
+
+def test_nothing_is_written_without_a_folder(program: Path) -> None:
+    before = program.read_bytes()
+    correction = truearm.compensate(calibrated(), [program])
+    assert program.read_bytes() == before
+    assert [path.name for path in program.parent.iterdir()] == ["plate.mod"]
+    (file,) = correction.files
+    assert (file.name, file.language, file.targets, file.corrected) == ("plate.mod", "RAPID", 44, 44)
+    assert file.text != before
+    assert 0.0 < file.mean_shift < file.largest_shift < 3e-3
+    assert file.summary()["shift_mm"]["max"] == pytest.approx(1e3 * file.largest_shift)
+    assert [path.name for path in correction.save(program.parent / "out")] == [
+        "plate.mod",
+        "plate.mod.truearm.json",
+        "compensation.html",
+    ]
+    assert (program.parent / "out" / "plate.mod").read_bytes() == file.text
+
+
+def test_the_call_that_made_it_is_in_the_report(program: Path) -> None:
+    robot = program.parent / "calibrated.yaml"
+    robot.write_text(robot_text(calibrated()))
+    correction = truearm.compensate(robot, [program], payload="1kg,0mm,0mm,50mm", split=1e-5, out=program.parent / "o")
+    assert correction.command == (
+        f"truearm.compensate('{robot}', ['{program}'], payload='1kg,0mm,0mm,50mm', split=1e-05)"
+    )
+    assert correction.robot.payload.mass == 1.0
+    page = (program.parent / "o" / "compensation.html").read_text()
+    assert "split=1e-05" in page
+    (split,) = correction.splits
+    assert split.added > 0
+    assert f"{split.moves} straight or circular moves were split by {split.added} more targets" in page
+    assert f"  {split.moves} moves split by {split.added} more targets" in correction.lines()
+    assert truearm.compensate(calibrated(), [program]).command == f"truearm.compensate(ROBOT, ['{program}'])"
+
+
+def test_what_a_simulated_robot_does_is_said_last(program: Path) -> None:
+    run = SimulatedRun(np.array([1e-3, 3e-3]), np.array([1e-4, 2e-4]), "the twin")
+    correction = replace(truearm.compensate(calibrated(), [program]), simulated=run)
+    assert correction.lines()[-3:] == [
+        "Distance of the twin from where the program meant it to be:",
+        "  original program   mean 2.000  max 3.000 mm",
+        "  corrected program  mean 0.150  max 0.200 mm",
+    ]
+
+
+def test_originals_are_restored(program: Path) -> None:
+    out = program.parent / "out"
+    truearm.compensate(calibrated(), [program], out=out)
+    restored = truearm.revert([out / "plate.mod"])
+    assert restored.files[0].original == program.read_bytes()
+    assert restored.folder is None
+    assert repr(restored) == "plate.mod: as it was before the correction"
+    back = program.parent / "back"
+    restored = truearm.revert([out / "plate.mod"], out=back)
+    assert restored.paths == (back / "plate.mod",)
+    assert (back / "plate.mod").read_bytes() == program.read_bytes()
+    with pytest.raises(InputError, match="would be overwritten") as refusal:
+        truearm.revert([out / "plate.mod"], out=out)
+    assert refusal.value.parameter == "out"
+    with pytest.raises(InputError, match="no record beside this program") as refusal:
+        truearm.revert([program], out=back)
+    assert refusal.value.parameter == "programs"
+
+
+def test_refusals_name_the_parameter(program: Path) -> None:
+    cell = program.parent / "cell.yaml"
+    cell.write_text(
+        "truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\n"
+        "tools:\n  tElse: {of: flange}\nframes:\n  wobjElse: {of: base}\n"
+    )
+    robot = calibrated()
+    for keywords, parameter, said in (
+        ({"out": program.parent}, "out", "would be overwritten"),
+        ({"tools": cell}, "tools", r"no tool that the programs use is in the file.*or leave out `tools`"),
+        ({"frames": cell}, "frames", r"no frame that the programs use is in the file.*or leave out `frames`"),
+        ({"tools": program.parent / "none.yaml"}, "tools", "none.yaml"),
+        ({"frames": program.parent / "none.yaml"}, "frames", "none.yaml"),
+        ({"split": 0.5}, "split", r"cannot be split by this distance; got '500 mm'; allowed: 0.001 to 100 mm"),
+    ):
+        with pytest.raises(InputError, match=said) as refusal:
+            truearm.compensate(robot, [program], **keywords)
+        assert refusal.value.parameter == parameter
+    with pytest.raises(InputError, match="not calibrated") as refusal:
+        truearm.compensate("irb120", [program])
+    assert refusal.value.parameter == "robot"
+    program.write_text(program.read_text().replace("[[20.0,20.0,0.0]", "[[2000.0,20.0,0.0]"))
+    assert "line 9: out of reach" in repr(truearm.compensate(robot, [program]))
+    with pytest.raises(InputError, match="cannot be corrected, and 2 more, and `strict` refuses that") as refusal:
+        truearm.compensate(robot, [program], strict=True)
+    assert refusal.value.parameter == "strict"
+
+
+def test_of_many_skipped_targets_the_first_are_listed(program: Path) -> None:
+    move = "    MoveL pNowhere,v100,fine,tool0;\n"
+    program.write_text(program.read_text().replace("  ENDPROC", move * 12 + "  ENDPROC", 1))
+    correction = truearm.compensate(calibrated(), [program])
+    (file,) = correction.files
+    assert len(file.skipped) > 10
+    assert repr(file).startswith("plate.mod  RAPID: ")
+    assert len(file.lines()) == 1 + len(file.skipped)
+    assert len(repr(file)) <= 2000
+    assert f"  and {len(file.skipped) - 10} more; the JSON summary lists all" in correction.lines()
+    assert len(correction.summary()["programs"][0]["skipped"]) == len(file.skipped)

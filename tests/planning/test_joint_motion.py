@@ -259,7 +259,7 @@ NAN = np.full((3, 3), np.nan)
         ("times do not rise", lambda: joint_motion(katana(), changed(time=-changed().time))),
         ("trajectory, velocity: a trajectory has three", lambda: joint_motion(katana(), changed(velocity=NAN))),
         ("NaN or infinity", lambda: joint_motion(katana(), changed(position=np.nan * changed().position))),
-        ("wrong length", lambda: joint_motion(katana(), changed(), seed=[0.0, 1.0])),
+        ("wrong shape", lambda: joint_motion(katana(), changed(), seed=[0.0, 1.0])),
     ],
 )
 def test_refusals(words: str, make: Callable[[], object]) -> None:

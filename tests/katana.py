@@ -12,7 +12,7 @@ from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.simulation.twin import Twin, measure
-from truearm.studies.katana import NAMES
+from truearm.studies.katana.robot import NAMES
 
 #: One step of a parameter as the document counts them: rad and mm.
 UNIT: Final = np.array([0.2 if n == "target_tip_y" else 1e-3 if n in NAMES[-4:] else 1.0 for n in NAMES])

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from tests.simulated import campaign
 
+from truearm.errors import InputError
 from truearm.identification.solving.fit import identify
 from truearm.identification.solving.models import MODELS
 from truearm.jobs.calibrate import calibrate
@@ -259,3 +260,39 @@ def test_hysteresis_of_a_simulated_robot_shows(robot: str) -> None:
     late = replace(data, position=position + rng.normal(0.0, 0.05e-3, position.shape))
     assert "joints-not-settled" in {n.code for n in calibrate(robot, late).warnings}
     assert "joints-not-settled" not in {n.code for n in calibrate(robot, data).warnings}
+
+
+def test_one_target_a_configuration_is_a_campaign() -> None:
+    _, data = campaign("irb120", 46, 0.05e-3, 17)
+    in_turn = data.of_readings(data.target == data.configuration % 3)
+    assert codes(in_turn, None) == set()
+    twice = data.of_readings((data.target == data.configuration % 3) | (data.configuration == 4))
+    (missing,) = check(twice).warnings
+    assert missing.message.startswith("90 readings are missing (1 29, 2 31, 3 30). They are left out;")
+
+
+def test_messages_count_in_words() -> None:
+    _, data = campaign("irb120", 10, 0.05e-3, 17)
+
+    def told(broken: Dataset, robot: str | None = None) -> list[str]:
+        return [notice.message for notice in check(robot, broken).warnings]
+
+    lost = moved_readings(data, np.array([4]), np.array(np.nan))
+    assert told(lost) == ["1 reading is missing (2 1). It is left out; nothing needs to be done."]
+    (far,) = told(moved_readings(data, np.array([4]), np.array([5e-3, 5e-3, 8e-3])))
+    assert far.startswith("1 reading is far from where it must be (configuration/target): 2/2 (")
+    assert far.endswith("Measure it again or leave it out; `loss=cauchy` lets it count little.")
+    (wrong,) = told(moved_readings(data, np.array([4]), np.array([0.3, 0.0, 0.0])))
+    assert wrong.startswith("1 reading was taken from another point than it names (configuration/target): 2/2 (")
+    again = np.append(np.arange(30), 4)
+    copied = replace(
+        data,
+        configuration=data.configuration[again],
+        target=data.target[again],
+        position=data.position[again],
+        sigma=None,
+    )
+    (repeated,) = told(copied)
+    assert repeated.startswith("1 reading repeats another one to the last digit (target at configurations): 2 at 2 and")
+    with pytest.raises(InputError, match="got '1 joint column'; allowed: 6"):
+        told(replace(data, joints=data.joints[:, :1], joint_kinds=("revolute",)), "irb120")

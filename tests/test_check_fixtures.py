@@ -103,7 +103,7 @@ def test_strings_from_unknown_points_are_a_closed_loop(count: int) -> None:
     """Four strings in turn: whatever part of the readings a search looks at, every string must be in it."""
     _, data = campaign("strings", count)
     fit = identify(ROBOT, replace(data, setup=None), GEOMETRIC)
-    assert fit.trusted == ("base",)
+    assert fit.gauge_freedoms == ("base",)
     assert fit.excess == 1.0
 
 
@@ -123,26 +123,26 @@ def test_a_robot_of_a_closed_loop_does_not_know_where_an_instrument_stands() -> 
 
 
 @pytest.mark.parametrize("device", ["ballbar", "gauges", "two-spheres", "plane"])
-def test_how_well_positions_are_told_is_true(device: str) -> None:
+def test_the_stated_accuracy_of_positions_is_true(device: str) -> None:
     """The figure of the warning against true positions anywhere, best rigid motion and size taken out: within 3 times.
 
     Three robots each; what a figure for the mean leaves to chance is in the factor.
     """
-    told, true = [], []
+    stated, true = [], []
     for seed in (1, 2, 3):
         twin, data = campaign(device, 60, seed)
         fit = identify(ROBOT, data, GEOMETRIC)
         (notice,) = (n for n in check_fit(fit) if n.code == "closed-loop")
-        told.append(float(notice.message.split("told to about ")[1].split(" mm")[0]))
+        stated.append(float(notice.message.split("accurate to about ")[1].split(" mm")[0]))
         q = ROBOT.random_configurations(150, np.random.default_rng(seed))
         at = twin.frames(q)[data.targets[0]][:, :3, 3]
         got = fit.robot.world_poses(q, data.targets[0])[0]
         a, b = got - got.mean(axis=0), at - at.mean(axis=0)
         U, s, Vt = np.linalg.svd(a.T @ b)
         turn = np.diag([1.0, 1.0, np.linalg.det(U @ Vt)])
-        grown = np.trace(np.diag(s) @ turn) / np.sum(a * a) if "size" in fit.trusted else 1.0
+        grown = np.trace(np.diag(s) @ turn) / np.sum(a * a) if "size" in fit.gauge_freedoms else 1.0
         true.append(1e3 * float(np.linalg.norm(grown * a @ U @ turn @ Vt - b, axis=1).mean()))
-    assert 1 / 3 < np.mean(true) / np.mean(told) < 3
+    assert 1 / 3 < np.mean(true) / np.mean(stated) < 3
 
 
 @pytest.mark.parametrize("device", ["ballbar", "gauges", "five-lasers", "stereo", "measurement-arm"])
@@ -156,7 +156,7 @@ def test_readings_beyond_the_range_of_a_device_are_named(device: str) -> None:
         far = replace(data, position=data.position + moved)
     found = [notice.message for notice in check(far, device=device).warnings if notice.code == "beyond-range"]
     assert len(found) == 1
-    assert f"1 readings are beyond what the device {device} can read (configuration/target): 5/" in found[0]
+    assert f"1 reading is beyond what the device {device} can read (configuration/target): 5/" in found[0]
 
 
 def test_a_device_without_a_range_reads_all() -> None:

@@ -20,17 +20,34 @@ from truearm.jobs import JOBS
 from truearm.version import __version__
 
 if TYPE_CHECKING:
+    from truearm.jobs.axes import axes
     from truearm.jobs.calibrate import calibrate
     from truearm.jobs.check import check
     from truearm.jobs.compensate import compensate
     from truearm.jobs.convert import convert
     from truearm.jobs.demo import demo
+    from truearm.jobs.devices import devices
+    from truearm.jobs.distances import distances
     from truearm.jobs.example import example
     from truearm.jobs.export import export
+    from truearm.jobs.hexapod_enumerate import hexapod_enumerate
+    from truearm.jobs.hexapod_plan import hexapod_plan
+    from truearm.jobs.hexapod_solve import hexapod_solve
+    from truearm.jobs.hexapod_uncertainty import hexapod_uncertainty
+    from truearm.jobs.hexapod_world_frame import hexapod_world_frame
+    from truearm.jobs.import_circle import import_circle
+    from truearm.jobs.import_matrices import import_matrices
+    from truearm.jobs.import_table import import_table
+    from truearm.jobs.inverse import inverse
+    from truearm.jobs.lines import lines
     from truearm.jobs.load_data import load_data
     from truearm.jobs.load_robot import load_robot
     from truearm.jobs.new_robot import new_robot
+    from truearm.jobs.plan import plan
     from truearm.jobs.revert import revert
+    from truearm.jobs.robots import robots
+    from truearm.jobs.simulate import simulate
+    from truearm.jobs.tolerance import tolerance
     from truearm.jobs.validate import validate
     from truearm.measurement.dataset import Dataset
     from truearm.modeling.parameters import Parameter
@@ -46,17 +63,34 @@ __all__ = [
     "Payload",
     "Robot",
     "__version__",
+    "axes",
     "calibrate",
     "check",
     "compensate",
     "convert",
     "demo",
+    "devices",
+    "distances",
     "example",
     "export",
+    "hexapod_enumerate",
+    "hexapod_plan",
+    "hexapod_solve",
+    "hexapod_uncertainty",
+    "hexapod_world_frame",
+    "import_circle",
+    "import_matrices",
+    "import_table",
+    "inverse",
+    "lines",
     "load_data",
     "load_robot",
     "new_robot",
+    "plan",
     "revert",
+    "robots",
+    "simulate",
+    "tolerance",
     "validate",
 ]
 

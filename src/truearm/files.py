@@ -267,7 +267,7 @@ def writable_folder(folder: Path) -> Path:
                 if not parent.is_dir():
                     raise InputError("this is a file, a folder is needed", where=str(parent))
                 if not os.access(parent, os.W_OK | os.X_OK):
-                    raise InputError("the folder cannot be written to", where=str(parent), cure="Choose another --out.")
+                    raise InputError("the folder cannot be written to", where=str(parent), cure="Choose another `out`.")
                 break
     except OSError as error:
         raise InputError(f"the folder cannot be used ({_reason(error)})", where=str(folder)) from error
@@ -298,7 +298,7 @@ def refuse_overwriting(out: Path, inputs: Iterable[Path]) -> None:
             same = False
         if same:
             raise InputError(
-                "this file is read, and would be overwritten", where=str(out), cure="Choose another --out."
+                "this file is read, and would be overwritten", where=str(out), cure="Choose another `out`."
             )
 
 

@@ -11,7 +11,7 @@ import re
 from functools import cache
 from typing import Final
 
-from truearm.errors import InputError
+from truearm.errors import InputError, did_you_mean
 
 # How many of the unit make one SI unit (lengths and grams, as divisors) or how much SI one unit is (angles, inch):
 # mm to m divides by 1000, which is correctly rounded, where multiplying by 0.001 is not.
@@ -127,11 +127,13 @@ def checked_unit(
     """Return `unit` if it is one of `allowed`, else refuse it, naming a place in a file or a parameter of a job."""
     if unit in allowed:
         return unit
+    # A file's unit says what its numbers are, so that no other is offered for it.
+    meant = did_you_mean(unit, allowed) if unit and parameter is not None else None
     raise InputError(
         "no unit is given" if not unit else "the unit is not one that fits here",
         parameter=parameter,
         where=where,
         came=unit or None,
         allowed=", ".join(allowed),
-        cure="Units are never guessed: name it.",
+        cure=" ".join(filter(None, (meant, "Units are never guessed: name it."))),
     )

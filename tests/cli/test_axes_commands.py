@@ -80,12 +80,12 @@ def test_measured_lines_are_judged(truearm: Truearm, kr5: Path, tmp_path: Path) 
 def test_refusals(truearm: Truearm, kr5: Path, small: Path, tmp_path: Path) -> None:
     for words, part in (
         (("axes", small / "data.csv", "irb120", "--out", tmp_path), "one joint moves alone"),
-        (("axes", kr5, "kr5", "--frame", "table", "--out", tmp_path), "there is no such frame"),
+        (("axes", kr5, "kr5", "--frame", "table", "--out", tmp_path), "there is no frame of this name"),
         (("tolerance", "kr5", "--depth", "50"), "not described by joint errors"),
-        (("tolerance", "kr5", "--depth", "0", "--lean", "1"), "a hole needs a depth"),
-        (("tolerance", "kr5", "--depth", "50", "--lean", "-1"), "cannot be negative"),
-        (("tolerance", "kr5", "--depth", "50,40"), "6 numbers in mm"),
-        (("lines", "kr5", "--centre", "850,0"), "3 numbers in mm"),
+        (("tolerance", "kr5", "--depth", "0", "--lean", "1"), "--depth: a hole needs a depth"),
+        (("tolerance", "kr5", "--depth", "50", "--lean", "-1"), "--lean: the length is out of range; got '-0.001 m'"),
+        (("tolerance", "kr5", "--depth", "50,40"), "6 lengths, or one for all"),
+        (("lines", "kr5", "--centre", "850,0"), "3 lengths"),
         (("lines", "kr5", "--centre", "2850,0,600"), "cannot go to a pose"),
         (("lines", "kr5", "--centre", "850,0,600", "--truth", "random", "--data", "x.csv"), "only one of them"),
         (("lines", "kr5", "--centre", "850,0,600", "--model", "kr5"), "not described by joint errors"),
@@ -95,4 +95,4 @@ def test_refusals(truearm: Truearm, kr5: Path, small: Path, tmp_path: Path) -> N
         assert part in run.err, run.err
     truearm("convert", "irb120", "--convention", "joint-errors", "--out", tmp_path / "other.yaml")
     other = truearm("lines", "kr5", "--centre", "850,0,600", "--model", tmp_path / "other.yaml")
-    assert "belong to another robot than kr5" in other.err
+    assert "--model: these joint errors belong to another robot than kr5" in other.err

@@ -35,7 +35,7 @@ def test_an_interrupted_run(truearm: Truearm, monkeypatch: pytest.MonkeyPatch) -
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("truearm.library.load_robot", interrupted)
+    monkeypatch.setattr("truearm.jobs.load_robot.load_robot", interrupted)
     run = truearm("show", "irb120")
     assert (run.code, run.out, run.err) == (130, "", "")
 
@@ -53,7 +53,7 @@ def test_what_only_shows_while_running(
     def fails(*_: object) -> None:
         raise error
 
-    monkeypatch.setattr("truearm.library.load_robot", fails)
+    monkeypatch.setattr("truearm.jobs.load_robot.load_robot", fails)
     run = truearm("show", "irb120")
     assert run.code == 2
     assert message in run.err
@@ -73,6 +73,6 @@ def test_a_fault_of_the_program_is_not_hidden(truearm: Truearm, monkeypatch: pyt
     def fails(*_: object) -> None:
         raise ValueError("a fault")
 
-    monkeypatch.setattr("truearm.library.load_robot", fails)
+    monkeypatch.setattr("truearm.jobs.load_robot.load_robot", fails)
     with pytest.raises(ValueError, match="a fault"):
         truearm("show", "irb120")

@@ -51,9 +51,10 @@ def test_one_pose(truearm: Truearm) -> None:
         ("the length B1-B2 is beyond", ["--pose", "7", "--legs", "300,300,300,300,300,300", "--base", "310,300,300"]),
         ("B1, B2, B3 lie on one line", ["--range", "400", "--base", "300,300,600"]),
         ("legs of these lengths do not meet", ["--range", "400", "--legs", "100,100,100,300,300,300"]),
-        ("numbers separated by commas", ["--legs", "300,300"]),
-        ("there is no such pose", ["--pose", "73"]),
-        ("is no data file", ["--out", "data.csv"]),
+        ("6 numbers belong here; got 2", ["--legs", "300,300"]),
+        ("numbers separated by commas", ["--legs", "300;300"]),
+        ("--pose: the number is out of range; got 73; allowed: 1 to 72", ["--pose", "73"]),
+        ("--out: one pose without joint positions is no data file", ["--out", "data.csv"]),
         ("too large to be meant", ["--legs", "1e12,300,300,300,300,300"]),
     ],
 )
@@ -115,7 +116,12 @@ def _legs(design: str) -> list[str]:
 
 def test_a_wrong_fixture_and_a_plan_over_its_robot(truearm: Truearm, tmp_path: Path) -> None:
     out = tmp_path / "sheet.csv"
-    for fixture, words in (("1,2", "numbers separated"), ("0,0,0,1,1,0,0", "length 1"), ("9000,0,0,0", "none of the")):
+    for fixture, words in (
+        ("1,2", "--fixture: the fixture has 4 or 7 numbers"),
+        ("1,a", "numbers separated"),
+        ("0,0,0,1,1,0,0", "length 1"),
+        ("9000,0,0,0", "none of the"),
+    ):
         run = truearm("hexapod", "plan", "irb120", "--fixture", fixture, "--out", out)
         assert run.code == 2
         assert words in run.err

@@ -81,7 +81,9 @@ def test_seed_target_frame_and_free_orientation(truearm: Truearm, poses: Path, t
     assert _rows(out)[0]["orientation_error [mrad]"] == ""
     assert _rows(out)[0]["branch"] == ""
     assert truearm("ik", "irb120", poses, "--axis-only", "--out", out).code == 0
-    assert truearm("ik", "irb120", plain, "--out", out).code == 2
+    run = truearm("ik", "irb120", plain, "--out", out)
+    assert run.code == 2
+    assert "Add them, or say --position-only." in run.err
 
 
 def test_what_is_not_reached_is_explained_and_ends_with_3(truearm: Truearm, tmp_path: Path) -> None:
@@ -104,13 +106,13 @@ def test_what_is_not_reached_is_explained_and_ends_with_3(truearm: Truearm, tmp_
 @pytest.mark.parametrize(
     ("words", "options"),
     [
-        ("no such branch", ["--branch", "left"]),
+        ("--branch: there is no such branch", ["--branch", "left"]),
         ("wrong length", ["--seed-joints", "1,2,3"]),
         ("numbers separated by commas", ["--seed-joints", "a,b"]),
-        ("NaN and infinity cannot be used", ["--seed-joints", "nan,0,0,0,0,0"]),
+        ("--seed-joints: NaN and infinity are no values", ["--seed-joints", "nan,0,0,0,0,0"]),
         ("no target of this name", ["--target", "gripper"]),
-        ("no frame of this name", ["--frame", "tool"]),
-        ("only one of them", ["--position-only", "--axis-only"]),
+        ("--frame: there is no frame of this name", ["--frame", "tool"]),
+        ("--position-only, --axis-only: only one of them", ["--position-only", "--axis-only"]),
     ],
 )
 def test_refusals(truearm: Truearm, poses: Path, tmp_path: Path, words: str, options: list[str]) -> None:

@@ -85,7 +85,7 @@ def test_every_model_with_joint_effects(
         assert rows["compliance_3"]["value"] == pytest.approx(0.130, abs=0.01)
     assert summary["validation"]["position_mm"]["mean"] < summary["nominal"]["position_mm"]["mean"] / 5
     codes = {warning["code"]: warning["message"] for warning in summary["warnings"]}
-    assert f"a URDF cannot hold: {', '.join(EFFECTS[model])} (" in codes["urdf-partial"]
+    assert f"A URDF cannot hold {', '.join(EFFECTS[model])} (" in codes["urdf-partial"]
     assert "compliance_1" in codes["effects-uninformed"]
     assert "compliance_2" not in codes["effects-uninformed"]
     again = json.loads(truearm("validate", tmp_path / "calibrated.yaml", data, "--json").out)["position_mm"]
@@ -145,7 +145,7 @@ def test_a_wall_loads_the_first_axis(truearm: Truearm, folder: Path, tmp_path: P
     assert "Payload: 2.7 kg at x 50  y 25  z 100 mm of the flange" in shown.out
     assert "Joint effects: compliance" in shown.out
     assert "Free fall</dt><dd>(-9.81, 0, 0) m/s²" in (tmp_path / "report.html").read_text()
-    assert result(tmp_path)["command"].endswith(f"--payload {PAYLOAD} --gravity -9.81,0,0")
+    assert result(tmp_path)["command"].endswith(f"--payload {PAYLOAD} --gravity -9.81,0,0 --out DIR")
 
 
 def test_inverse_kinematics_lift_what_is_heavier(truearm: Truearm, elastic: Path, tmp_path: Path) -> None:

@@ -32,6 +32,8 @@ def test_it_writes_its_files_and_compares(truearm: Truearm, quick: None, tmp_pat
     run = truearm("study", "irb120-simulation", "--seeds", "1", "--out", tmp_path / "new")
     assert run.code == 0
     assert sorted(path.name for path in (tmp_path / "new").iterdir()) == ["report.html", "study.json"]
+    page = (tmp_path / "new" / "report.html").read_text()
+    assert "<pre>truearm study irb120-simulation --seeds 1 --out DIR</pre>" in page
     assert "agrees  after, drawn errors:" in run.out
     assert "published 0.004 mm" in run.out
 
@@ -44,10 +46,10 @@ def test_json_is_what_the_file_holds(truearm: Truearm, quick: None, tmp_path: Pa
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("irb120-sim",), "there is no such study"),
-        (("irb120-faro",), "this study needs measured data"),
+        (("irb120-sim",), "NAME: there is no such study"),
+        (("irb120-faro",), "--data: this study needs measured data"),
         (("irb120-faro", "--data", "nowhere"), "a file of the measured data is missing"),
-        (("irb120-axes", "--data", "nowhere"), "this study simulates its data"),
+        (("irb120-axes", "--data", "nowhere"), "--data: this study simulates its data; got 'nowhere'. Leave --data"),
     ],
 )
 def test_refusals(truearm: Truearm, tmp_path: Path, words: tuple[str, ...], said: str) -> None:

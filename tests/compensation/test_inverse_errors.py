@@ -14,9 +14,10 @@ from truearm.compensation.inverse_errors import design, fake_targets, inverted
 from truearm.errors import InputError
 from truearm.library import load_robot
 from truearm.modeling.transform import IDENTITY, Transform
-from truearm.planning.poses.seven_lines import DIRECTIONS, SevenLines, readings, seven_lines
+from truearm.planning.poses.seven_lines import DIRECTIONS, SevenLines, seven_lines, usable_joints
+from truearm.results.line_test import LineTest
 from truearm.simulation.twin import Twin, measure
-from truearm.validation.line_test import LineErrors, from_data, on_twin, reduction, summary
+from truearm.validation.line_test import LineErrors, from_data, on_twin, reduction
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +57,7 @@ def test_the_fake_target_mirrors_the_error(lines: SevenLines) -> None:
 
 def test_readings_for_it_bring_the_robot_there(lines: SevenLines) -> None:
     robot, joints = with_table_3(), lines.joints(load_robot("kr5"))
-    commanded = readings(fake_targets(robot, joints).solutions, lines.labels, "lines")
+    commanded = usable_joints(fake_targets(robot, joints).solutions, lines.labels, "lines")
     left = np.linalg.norm(robot.world_poses(commanded)[0] - lines.position, axis=1)
     before = np.linalg.norm(robot.world_poses(joints)[0] - lines.position, axis=1)
     assert left.max() < 5e-6  # second order
@@ -130,11 +131,13 @@ def test_twin_and_data_show_the_same_errors(lines: SevenLines) -> None:
 def test_summary_says_by_how_much_the_largest_error_fell(lines: SevenLines) -> None:
     before, after = (LineErrors(lines, np.full(77, error)) for error in (4e-3, 1e-3))
     assert reduction(before, after, "xy") == pytest.approx(75.0)
-    said = summary(before, after)
+    robot = load_robot("kr5")
+    joints = lines.joints(robot)
+    said = LineTest(robot, lines, joints, True, before, after).summary()
     assert said["poses"] == 77
     assert [line["direction"] for line in said["lines"]] == list(DIRECTIONS)
     assert said["lines"][0]["after_mm"] == pytest.approx({"mean": 1.0, "max": 1.0})
-    assert "after_mm" not in summary(before, None)["lines"][0]
+    assert "after_mm" not in LineTest(robot, lines, joints, False, before, None).summary()["lines"][0]
 
 
 def test_scatter_is_what_a_perfect_robot_shows(lines: SevenLines) -> None:

@@ -13,7 +13,7 @@ from truearm.library import load_robot
 from truearm.modeling.chain import Array
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import Twin
-from truearm.studies.katana import NAMES, PERTURBATIONS
+from truearm.studies.katana.robot import NAMES, PERTURBATIONS
 
 HALF = math.radians(0.025)
 EIGHTY = math.radians(80)

@@ -23,7 +23,7 @@ from truearm.measurement.statistics import errors_of
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.simulation.twin import Twin
-from truearm.studies.katana import NAMES, PERTURBATIONS, UNITS
+from truearm.studies.katana.robot import NAMES, PERTURBATIONS, UNITS
 
 NOISE = 1e-5
 Method = Callable[..., PoseByPose]

@@ -80,16 +80,16 @@ def test_data_that_move_too_few_joints_lose_rank_and_say_so() -> None:
     still = replace(data, joints=joints, position=positions)
     fit = identify(load_robot("irb120"), still, GEOMETRIC)
     assert fit.status is Status.RANK_LOSS
-    assert any(name.startswith(("base", "target")) for name in fit.unseen)
+    assert any(name.startswith(("base", "target")) for name in fit.unobservable)
     dropped = identify(load_robot("irb120"), still, GEOMETRIC, redundancy="drop")
     assert dropped.status is Status.RANK_LOSS
-    assert "theta_offset_2" in dropped.unseen
+    assert "theta_offset_2" in dropped.unobservable
 
 
 def test_too_few_equations_without_priors_are_refused() -> None:
     _, data = campaign("irb120", 4, 0.0, 2)
     with pytest.raises(
-        InputError, match=r"fewer equations than unknowns.*36 equations for 40 unknown.*at least 14.*redundancy prior"
+        InputError, match=r"fewer equations than unknowns.*36 equations for 40 unknown.*at least 14.*`redundancy=prior`"
     ):
         identify(load_robot("irb120"), data, GEOMETRIC, redundancy="drop")
 
@@ -104,8 +104,8 @@ def test_a_joint_that_never_moved_is_a_loss_of_rank(still: list[int]) -> None:
         fit = identify(load_robot("irb120"), replace(data, joints=joints, position=positions), GEOMETRIC,
                        redundancy=redundancy)  # fmt: skip
         assert fit.status is Status.RANK_LOSS, redundancy
-        assert fit.unseen
-        assert all(fit.parameter_status(name) == "not-determined" for name in fit.unseen)
+        assert fit.unobservable
+        assert all(fit.parameter_status(name) == "not-determined" for name in fit.unobservable)
 
 
 def test_a_single_target_on_the_last_axis_leaves_honest_deviations() -> None:

@@ -23,7 +23,7 @@ from truearm.simulation.devices import DEVICES, measured_with, named_device
 from truearm.simulation.devices.device import recorded
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import Twin
-from truearm.studies import katana
+from truearm.studies.katana.tilting import twin as tilting_twin
 
 NOMINAL = load_robot("irb120")
 GEOMETRIC = {m.name: m for m in MODELS}["geometric"]
@@ -262,9 +262,9 @@ def test_a_closed_loop_names_what_joints_that_never_moved_leave_open(device: str
     )  # fmt: skip
     fit = identify(NOMINAL, readings, GEOMETRIC)
     assert fit.status is Status.RANK_LOSS
-    assert fit.unseen
-    assert not any(name.startswith(("base_", "fixture_")) for name in fit.unseen)
-    assert all(fit.parameter_status(name) == "not-determined" for name in fit.unseen)
+    assert fit.unobservable
+    assert not any(name.startswith(("base_", "fixture_")) for name in fit.unobservable)
+    assert all(fit.parameter_status(name) == "not-determined" for name in fit.unobservable)
 
 
 # -- refusals ----------------------------------------------------------------------------------------------
@@ -334,7 +334,7 @@ def test_only_places_are_fitted_where_nothing_else_is_asked() -> None:
 def test_readings_that_the_model_cannot_follow_do_not_overrule_the_priors(device: str) -> None:
     """The joints lean and have play, the model is rigid, and the readings claim micrometres."""
     arm = load_robot("katana450")
-    twin = katana.twin(arm)
+    twin = tilting_twin(arm)
     data = measured_with(named_device(device), arm, twin, 48, np.random.default_rng(3))
     fit = identify(arm.with_payload(twin.robot.payload), data, GEOMETRIC)
     moved = [abs(p.value - p.nominal) / p.prior for p in fit.robot.parameters.values() if p.group in GEOMETRIC.groups]

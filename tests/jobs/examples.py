@@ -4,14 +4,23 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from tests.identification.test_axes import runs
 from tests.simulated import campaign
 
 from truearm.library import load_robot
+from truearm.measurement.hexapod.geometry import triangle
 from truearm.measurement.readers.canonical import csv_text
+from truearm.modeling.inverse import inverse
+from truearm.modeling.transform import IDENTITY
+from truearm.planning.hexapod.tool import with_cups
+from truearm.simulation.truths import truth_twin
+from truearm.simulation.twin import measure
 
 Arguments = dict[str, Any]
 
@@ -31,6 +40,72 @@ def _calibrated(folder: Path) -> Path:
     if not path.exists():
         truearm.calibrate("irb120", _data(folder), model="offsets", out=folder / "result")
     return path
+
+
+def _poses(_: Path) -> Arguments:
+    """Return two poses of an IRB 120 that are easily reached."""
+    q = np.radians([[10.0, 20.0, -30.0, 40.0, 50.0, 60.0], [-70.0, 30.0, 0.0, -20.0, 40.0, 0.0]])
+    at = load_robot("irb120").forward_kinematics(q)
+    return {"robot": "irb120", "poses": at.position.T, "rotations": at.matrix(), "seed": q, "branch": "front-up-noflip"}
+
+
+def _written(path: Path, text: str) -> Path:
+    path.write_text(text)
+    return path
+
+
+def _matrices(folder: Path) -> Arguments:
+    joints = _written(folder / "joints.txt", "0 10 20 30 40 50\n5 10 25 30 45 50\n")
+    points = _written(folder / "points.txt", "100 200 300\n0 0 0\n")
+    names = {"targets": {"1": points}, "references": {"base": points}}
+    return {"joints": joints, **names, "angle_unit": "deg", "length_unit": "mm"}
+
+
+def _table(folder: Path) -> Arguments:
+    mapping = """\
+truearm: truearm-mapping/1
+length_unit: mm
+configuration: {each: row}
+joints: {columns: [q1, q2], unit: deg}
+readings: [{target: tip, x: x, y: y, z: z}]
+"""
+    rows = "q1,q2,x,y,z\n10,20,100,200,300\n15,25,110,210,310\n"
+    return {"file": _written(folder / "table.csv", rows), "mapping": _written(folder / "mapping.yaml", mapping)}
+
+
+def _circle(folder: Path) -> Arguments:
+    from tests.measurement.test_drawn_circles import drawn
+
+    rows = "configuration,joint_1 [deg],joint_2 [deg],angle [deg],height [mm]\n1,10,20,0,0.5\n2,12,22,180,-0.2\n"
+    points = _written(folder / "page.csv", rows)
+    return {"scans": {"a": drawn(folder / "page.png")}, "points": {"a": points}, "dpi": 300.0, "sigma": 2e-5}
+
+
+def _axis_runs(folder: Path) -> Path:
+    """Runs in which one joint of a KR5 with joint errors moves at a time, in its own frame."""
+    path = folder / "axes.csv"
+    if not path.exists():
+        rng = np.random.default_rng(0)
+        twin = truth_twin(load_robot("kr5"), "axis-tests", rng)
+        own = replace(twin, robot=twin.robot.with_frames(IDENTITY, {"smr": (0.1, 0.05, 0.03)}))
+        path.write_text(csv_text(measure(own, runs(20.0, (0, -90, 90, 0, 30, 0)), 2e-5, rng)))
+    return path
+
+
+def _joint_errors(folder: Path) -> Path:
+    import truearm
+
+    path = folder / "axes" / "joint-errors.yaml"
+    if not path.exists():
+        truearm.axes("kr5", _axis_runs(folder), frame="robot", out=folder / "axes")
+    return path
+
+
+def _touches() -> Arguments:
+    robot, _ = with_cups(load_robot("irb120"))
+    cups = triangle([0.3003, 0.3, 0.2996], "B") + np.array([0.25, -0.1, 0.1])
+    found = inverse(robot, cups, np.broadcast_to(np.diag([1.0, -1.0, -1.0]), (3, 3, 3)), target="1")
+    return {"robot": "irb120", "touches": found.joints, "base": (0.3003, 0.3, 0.2996), "target": "1"}
 
 
 def _program(folder: Path) -> Path:
@@ -85,6 +160,37 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "gravity": (0.0, 0.0, -9.81),
     },
     "validate": lambda folder: {"robot": _calibrated(folder), "data": _data(folder)},
+    "import_table": _table,
+    "import_matrices": _matrices,
+    "import_circle": _circle,
+    "distances": lambda folder: {"robot": _calibrated(folder), "data": _data(folder), "payload": "1kg,0mm,0mm,50mm"},
+    "plan": lambda _: {"robot": "irb120", "poses": 12, "candidates": 40, "device": "ballbar", "seed": 1},
+    "simulate": lambda _: {"robot": "irb120", "truth": "random", "poses": 3, "noise": 1e-4, "device": "tracker"},
+    "inverse": _poses,
+    "robots": lambda _: {},
+    "devices": lambda _: {},
+    "axes": lambda folder: {"robot": "kr5", "data": _axis_runs(folder), "frame": "robot"},
+    "tolerance": lambda folder: {"robot": _joint_errors(folder), "depth": 0.05, "lean": (1e-5,) * 6, "position": 1e-4},
+    "lines": lambda folder: {
+        "robot": "kr5",
+        "centre": (0.85, 0.0, 0.6),
+        "size": (0.3, 0.4, 0.2),
+        "joint_errors": _joint_errors(folder),
+        "truth": "axis-tests",
+        "noise": 1e-5,
+        "repeats": 2,
+    },
+    "hexapod_enumerate": lambda _: {},
+    "hexapod_uncertainty": lambda _: {"trials": 100, "seed": 1},
+    "hexapod_plan": lambda _: {
+        "robot": "irb120",
+        "fixture": (0.22, 0.0, 0.1, -0.5),
+        "tool": "triangular",
+        "distinct": True,
+        "branches": ["front-up"],
+    },
+    "hexapod_solve": lambda _: {"pose": 7, "legs": (0.3,) * 6, "base": (0.3,) * 3, "tool": (0.15,) * 3},
+    "hexapod_world_frame": lambda _: _touches(),
     "compensate": lambda folder: {
         "robot": _calibrated(folder),
         "programs": [_program(folder)],

@@ -15,16 +15,19 @@ from truearm.measurement.readers.drawn_circles import Page, read_drawn_circles
 HEADER = "configuration,joint_1 [deg],joint_2 [deg],angle [deg],height [mm]"
 
 
-@pytest.fixture(scope="module")
-def scan(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A circle of 25 mm with a gap at 90 deg, drawn dot by dot."""
+def drawn(path: Path) -> Path:
+    """Draw a circle of 25 mm with a gap at 90 deg, dot by dot, and return the file."""
     pitch = 25.4e-3 / 300
     x, y = np.meshgrid(pitch * np.arange(830), pitch * np.arange(800)[::-1])
     away, around = np.hypot(x - 0.035, y - 0.034), np.arctan2(y - 0.034, x - 0.035)
     ink = np.clip((0.25e-3 - np.abs(away - 0.025)) / pitch + 0.5, 0, 1) * (np.abs(around - np.pi / 2) > 0.1)
-    path = tmp_path_factory.mktemp("scan") / "page.png"
     Image.fromarray(np.uint8(245 - 180 * ink)).save(path, dpi=(300, 300))
     return path
+
+
+@pytest.fixture(scope="module")
+def scan(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return drawn(tmp_path_factory.mktemp("scan") / "page.png")
 
 
 def table(folder: Path, *rows: str, header: str = HEADER, name: str = "points.csv") -> Path:

@@ -59,7 +59,7 @@ def test_units_are_taken_as_given(tmp_path: Path) -> None:
         (
             JOINTS,
             "1 2 3\n",
-            ["a.txt", "not as many rows as", "q.txt", "1 rows", "allowed: 3 rows", "zeros or NaN"],
+            ["a.txt", "not as many rows as", "q.txt", "1 row'", "allowed: 3 rows", "zeros or NaN"],
         ),
         (JOINTS, "1 2 3\n1 2\n1 2 3", ["a.txt, line 2", "three numbers", "2 numbers", "allowed: 3 numbers"]),
         (
@@ -105,16 +105,16 @@ def test_refusals(tmp_path: Path, joints: str, target: str, parts: list[str]) ->
 
 def test_names_and_units_are_checked(tmp_path: Path) -> None:
     joints, target = write(tmp_path, "q.txt", JOINTS), write(tmp_path, "a.txt", GOOD)
-    with pytest.raises(InputError, match=r"--angle-unit: .*'grad'; allowed: deg, rad"):
+    with pytest.raises(InputError, match=r"angle_unit: .*'grad'; allowed: deg, rad"):
         read_matrices(joints, {"a": target}, {}, "grad", "mm")
-    with pytest.raises(InputError, match=r"--length-unit: .*'cm'; allowed: mm, m"):
+    with pytest.raises(InputError, match=r"length_unit: .*'cm'; allowed: mm, m"):
         read_matrices(joints, {"a": target}, {}, "deg", "cm")
-    with pytest.raises(InputError, match=r"no target is given.* --target NAME=FILE"):
+    with pytest.raises(InputError, match=r"targets: no target is given"):
         read_matrices(joints, {}, {"a": target}, "deg", "mm")
     with pytest.raises(InputError, match=r"'a' is given as a target and as a reference.*different names"):
         read_matrices(joints, {"a": target}, {"a": target}, "deg", "mm")
     for name in ("", " a", "a\nb", "a\tb"):
-        with pytest.raises(InputError, match=r"a point needs a name.*NAME=FILE"):
+        with pytest.raises(InputError, match=r"a point needs a name.*without blanks"):
             read_matrices(joints, {name: target}, {}, "deg", "mm")
 
 

@@ -252,7 +252,7 @@ def test_the_guides_examples_all_say_the_same(guide: Path) -> None:
         ),
         (LONG, MAP.replace("unit: deg", "unit: grad"), ["map.yaml, joints.unit", "allowed: deg, rad", "got 'grad'"]),
         (LONG, MAP.replace("  unit: deg\n", ""), ["map.yaml, joints", "give either unit:", "units:"]),
-        (LONG, MAP.replace("unit: deg", "units: [deg]"), ["map.yaml, joints", "2 columns and 1 units"]),
+        (LONG, MAP.replace("unit: deg", "units: [deg]"), ["map.yaml, joints", "2 columns and 1 unit"]),
         (LONG, MAP + "  key: pose\n", ["map.yaml, joints", "name it with file:"]),
         (LONG, MAP.replace("{column: pose}", "{}"), ["map.yaml, configuration", "each: row"]),
         (LONG, MAP.replace("configuration: {column: pose}\n", ""), ["map.yaml", "from one place", "?P<configuration>"]),

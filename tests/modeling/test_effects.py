@@ -26,8 +26,8 @@ from truearm.simulation.truths import joint_truths
 from truearm.simulation.twin import Twin
 from truearm.simulation.twin_joint import JointTruth
 
-#: All together; of clearance in one form, and the twin knows temperatures where warm-up knows only an order.
-NAMES = tuple(effect.name for effect in EFFECTS if effect.name not in ("clearance-linear-contact", "warm-up"))
+#: All together; of clearance in one form.
+NAMES = tuple(effect.name for effect in EFFECTS if effect.name != "clearance-linear-contact")
 
 
 def loaded_arm(effects: tuple[str, ...], seed: int) -> Robot:
@@ -64,8 +64,11 @@ def test_effects_are_those_of_the_twin(effects: tuple[str, ...]) -> None:
     assert at.approach is not None
     assert at.temperature is not None
     assert at.wrench is not None
+    assert at.number is not None
     twin = Twin(robot, joint_truths(robot), "document" if "clearance-linear-contact" in effects else "exact")
-    postures = twin.postures(at.joints, approach=at.approach, temperature=at.temperature, wrench=at.wrench)
+    postures = twin.postures(
+        at.joints, approach=at.approach, number=at.number, temperature=at.temperature, wrench=at.wrench
+    )
     true = np.array([posture.targets["tip"] for posture in postures])
     position, rotation = robot.world_poses(at, "tip")
     assert_allclose(position, true[:, :3, 3], rtol=0, atol=1e-11)

@@ -203,7 +203,7 @@ def test_branches_that_have_no_names() -> None:
 ELASTIC = ("compliance",)
 FULL = ("compliance", "hardening", "fourier", "backlash", "approach")
 TILTING = ("compliance", "bearing-compliance", "clearance", "backlash")
-EFFECTS = pytest.mark.parametrize("effects", [ELASTIC, FULL, TILTING, (*NAMES, "warm-up")], ids="+".join)
+EFFECTS = pytest.mark.parametrize("effects", [ELASTIC, FULL, TILTING, NAMES], ids="+".join)
 
 
 @EFFECTS

@@ -7,7 +7,7 @@ from tests.katana import katana
 
 from truearm.identification.solving.influence import Influence, influence
 from truearm.reporting.influence_figures import influence_figure
-from truearm.studies.katana import NAMES, PERTURBATIONS
+from truearm.studies.katana.robot import NAMES, PERTURBATIONS
 
 
 def test_the_picture_shows_average_and_range_in_mm() -> None:

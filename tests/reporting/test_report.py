@@ -304,7 +304,7 @@ def test_drop_names_every_combination() -> None:
 
 def test_bounds_and_rank_loss_are_marked() -> None:
     report = made()
-    fit = replace(report.fit, at_bound=("a_3",), unseen=("d_4",))
+    fit = replace(report.fit, at_bound=("a_3",), unobservable=("d_4",))
     html = report_html(replace(report, fit=fit))
     assert re.search(r'<tr class="at-bound"><td><code>a_3</code>.*<td>at bound</td></tr>', html)
     assert re.search(r'<tr class="not-determined"><td><code>d_4</code>.*<td>not determined</td></tr>', html)

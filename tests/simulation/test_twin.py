@@ -21,6 +21,7 @@ from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 from truearm.simulation import twin as twin_module
 from truearm.simulation import twin_body, twin_joint
+from truearm.simulation.devices import measured_with, named_device
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import Posture, Twin, directions, measure
 from truearm.simulation.twin_joint import Contact, JointTruth
@@ -413,3 +414,42 @@ def test_conditions_of_another_shape_are_refused(name: str) -> None:
 def test_readings_of_another_shape_are_refused() -> None:
     with pytest.raises(InputError, match=r"joint readings; got 'an array of shape \(3, 1\)'; allowed: \(3, 2\)"):
         measure(Twin(planar(0.5, 0.4)), np.zeros((3, 1)), 0.0, RNG(0))
+
+
+# -- the order of measurement --------------------------------------------------------------------------------
+
+
+def warming_up() -> Robot:
+    """An arm whose links are a thousandth short when a campaign begins."""
+    arm = load_robot("irb120").with_effects(["warm-up"])
+    grown = {name: 1e-3 for name in arm.parameters if name.startswith("warm_up_") and name != "warm_up_rate"}
+    return arm.with_values({**grown, "warm_up_rate": 0.05})
+
+
+def test_links_grow_while_a_campaign_is_measured() -> None:
+    rng = RNG(0)
+    twin = truth_twin(warming_up(), "nominal", rng)
+    data = measure(twin, twin.robot.random_configurations(30, rng), 0.0, rng)
+    for name in data.targets:
+        read = data.position[data.target == data.targets.index(name)]
+        assert_allclose(twin.robot.world_poses(data.postures, name)[0], read, rtol=0, atol=1e-12)
+        warm = np.linalg.norm(twin.robot.world_poses(data.joints, name)[0] - read, axis=1)
+        assert warm[0] > 1e-4
+        assert warm[-1] < 0.5 * warm[:5].mean()
+    later = measure(twin, data.joints, 0.0, rng, number=np.arange(100.0, 130.0))
+    assert later.number is not None
+    assert later.number[0] == 100.0
+    assert np.abs(later.position - data.position).max() > 1e-4
+    shown = twin.frames(data.joints)["1"][:, :3, 3]
+    assert_allclose(twin.robot.world_poses(data.joints, "1")[0], shown, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("device", ["tracker", "hexapod", "touch-up"])
+def test_devices_measure_in_order(device: str) -> None:
+    instrument, nominal = named_device(device), load_robot("irb120")
+    read = []
+    for arm in (nominal, warming_up()):
+        rng = RNG(1)
+        read.append(measured_with(instrument, nominal, truth_twin(arm, "nominal", rng), 12, rng, 0.0))
+    plain, warm = (data.position if device == "tracker" else data.joints for data in read)  # the others are jogged
+    assert np.abs(warm[:3] - plain[:3]).max() > 1e-4

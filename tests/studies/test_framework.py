@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from truearm.errors import InputError
 from truearm.reporting.drawing import axis, figure
-from truearm.studies import STUDIES, run_study
+from truearm.studies import STUDIES, Entry, run_study
+from truearm.studies.regions import IRB120
+from truearm.studies.seeds import Seed, median_of, over_seeds
 from truearm.studies.study import Picture, Row, Study, Table, number
 
 HOSTILE = "</script><b>"
@@ -31,6 +37,7 @@ def small() -> Study:
         tables=(Table("A table", "Words.", rows), Table("Another", "No figures printed.", rows[2:])),
         pictures=(Picture("line", "A line", "Words.", drawn),),
         notes=("A note.",),
+        command=f"again {HOSTILE}",
     )
 
 
@@ -93,16 +100,48 @@ def test_the_report_is_one_page_that_trusts_no_text() -> None:
     assert "http-equiv" in page
     assert "<link" not in page
     assert '<div class="figure" id="line"' in page
+    assert "<pre>again &lt;/script&gt;" in page
     assert "1 figure agrees with the published one, 1 differs; 3 seeds." in page
 
 
-def test_every_study_names_a_module_that_has_it() -> None:
-    from importlib import import_module
+def test_a_report_without_a_command_shows_none() -> None:
+    assert "<pre>" not in replace(small(), command="").html()
 
+
+def test_every_seed_has_its_own_numbers_and_says_what_it_does() -> None:
+    said: list[str] = []
+
+    def one(seed: Seed) -> float:
+        seed.step("drawing")
+        return float(seed.generator().standard_normal())
+
+    outcomes = over_seeds(2, said.append, one, "robot")
+    assert outcomes == tuple(float(np.random.default_rng(seed).standard_normal()) for seed in (0, 1))
+    assert said == ["robot 1 of 2", "robot 1 of 2: drawing", "robot 2 of 2", "robot 2 of 2: drawing"]
+
+
+def test_the_median_is_over_the_seeds() -> None:
+    assert median_of((3.0, 1.0, 9.0), lambda outcome: 2.0 * outcome) == 6.0
+
+
+def test_a_region_is_drawn_from_evenly() -> None:
+    drawn = IRB120.draw(4000, np.random.default_rng(0))
+    low, high = IRB120.limits
+    assert drawn.shape == (4000, 6)
+    assert drawn.min(axis=0) == pytest.approx(low, abs=0.01)
+    assert drawn.max(axis=0) == pytest.approx(high, abs=0.01)
+    assert drawn.mean(axis=0) == pytest.approx((low + high) / 2, abs=0.1)
+
+
+@pytest.mark.parametrize("entry", STUDIES, ids=[entry.name for entry in STUDIES])
+def test_every_study_is_a_folder_that_runs_and_shows(entry: Entry) -> None:
+    assert callable(import_module(entry.module).study)
+    assert all(find_spec(f"{entry.module}.{part}") for part in ("run", "tables", "pictures"))
+
+
+def test_studies_are_listed_by_name() -> None:
     names = [entry.name for entry in STUDIES]
     assert names == sorted(names)
-    for entry in STUDIES:
-        assert callable(import_module(entry.module).study)
 
 
 def test_an_unknown_study_is_refused_with_the_nearest_names() -> None:
@@ -121,7 +160,7 @@ def test_data_for_a_simulation_are_refused(tmp_path: Path) -> None:
 
 
 def test_missing_data_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"--data: this study needs measured data.*joints_commanded\.txt"):
+    with pytest.raises(InputError, match=r"data: this study needs measured data.*joints_commanded\.txt"):
         run_study("irb120-faro")
     (tmp_path / "joints_commanded.txt").write_text("0 0 0 0 0 0\n")
     with pytest.raises(InputError, match=r"target_1\.txt: a file of the measured data is missing"):

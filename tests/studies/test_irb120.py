@@ -10,7 +10,7 @@ import pytest
 
 from truearm.errors import InputError
 from truearm.studies import irb120_axes, irb120_faro, irb120_simulation
-from truearm.studies.single_joint import AxisTest, run_out, turn_of
+from truearm.studies.irb120_axes.single_joint import AxisTest, run_out, turn_of
 from truearm.studies.study import Study
 
 
@@ -57,8 +57,19 @@ def test_run_out_fills_up_to_the_printed_range() -> None:
     angle = np.arange(-180.0, 181.0, 5.0)
     places = np.column_stack([np.cos(np.radians(angle)), np.sin(np.radians(angle)), np.zeros(len(angle))])
     turn = turn_of(np.concatenate([places, places[::-1]]), test)
-    amplitude, _ = run_out(turn, test)
-    assert amplitude == pytest.approx(0.045, abs=0.006)  # 2 a cos(half the lag's way): between a sum and less
+    assert run_out(turn, test).amplitude == pytest.approx(
+        0.045, abs=0.006
+    )  # 2 a cos(half the lag's way): between a sum and less
+
+
+def test_no_run_out_is_chosen_where_noise_makes_more_than_the_printed_range() -> None:
+    test = AxisTest(-180, 180, 5, 0.0, 0.001, 0.0)
+    angle = np.radians(np.arange(-180.0, 181.0, 5.0))
+    places = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(len(angle))])
+    noise = np.random.default_rng(0).normal(0.0, 1e-3, (2 * len(angle), 3))
+    turn = turn_of(np.concatenate([places, places[::-1]]) + noise, test)
+    assert turn.angular > test.angular
+    assert run_out(turn, test).amplitude == 0.0
 
 
 def test_single_joints() -> None:
@@ -87,10 +98,9 @@ def part(measured_data: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_the_measured_robot(part: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(irb120_faro, "_EFFECTS", ("bearing-compliance",))
-    monkeypatch.setattr(irb120_faro, "_TOGETHER", ("bearing-compliance", "hardening", "warm-up"))
-    study = irb120_faro.study(1, silent, part, many=100, searches=(0, 0))
+def test_the_measured_robot(part: Path) -> None:
+    one, together = ("bearing-compliance",), ("bearing-compliance", "hardening", "warm-up")
+    study = irb120_faro.study(1, silent, part, many=100, searches=(0, 0), effects=one, together=together)
     found = medians(study)
     document = study.tables[0].title
     assert found[document, "elastic, no beta: mean"] == pytest.approx(0.146, rel=0.25)

@@ -9,20 +9,25 @@ import pytest
 
 from truearm.simulation.devices import named_device
 from truearm.simulation.truths import truth_twin
-from truearm.studies import irb120_instruments_tables
 from truearm.studies.irb120_devices import study
-from truearm.studies.irb120_setups import SETUPS, shares, twin_of, visible_configurations
-from truearm.studies.irb120_twin import Truth, driven, running_out
+from truearm.studies.irb120_devices.setups import SETUPS, shares, twin_of, visible_configurations
+from truearm.studies.irb120_devices.twin import Truth, driven, running_out
 from truearm.studies.study import Study
 
 
 @pytest.fixture(scope="module")
 def small() -> Study:
     devices = [named_device(name) for name in ("tracker", "ballbar", "point")]
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(irb120_instruments_tables, "ZONED", ("geometric", "elastic"))
-        patch.setattr(irb120_instruments_tables, "DIVISIONS", {"2 x 1 x 2": (2, 1, 2)})
-        return study(1, lambda _: None, unseen=12, candidates=100, devices=devices, training=(30, 150))
+    return study(
+        1,
+        lambda _: None,
+        unseen=12,
+        candidates=100,
+        devices=devices,
+        training=(30, 150),
+        zoned=("geometric", "elastic"),
+        divisions=((2, 1, 2),),
+    )
 
 
 def medians(found: Study, title: str) -> dict[str, float]:
@@ -73,7 +78,7 @@ def test_zones_and_tool(small: Study) -> None:
 def test_visibility_by_spherical_caps() -> None:
     """Directions spread evenly over the sphere would be seen by the share of the caps: the region is near to that."""
     rng = np.random.default_rng(0)
-    tracker, planar, spatial = (shares(setup, 4000, rng)["of all configurations"] for setup in SETUPS)
+    tracker, planar, spatial = (shares(setup, 4000, rng).seen for setup in SETUPS)
     assert tracker == pytest.approx(100.0 * 3.0 * 0.5 * (1.0 - np.cos(np.radians(30.0))), rel=0.25)
     assert planar == pytest.approx(100.0 * (1.0 - np.cos(np.radians(15.0))), rel=0.25)
     assert spatial == 100.0

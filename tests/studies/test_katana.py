@@ -8,20 +8,9 @@ import numpy as np
 import pytest
 
 from truearm.simulation.twin import Twin
-from truearm.studies.katana import (
-    NAMES,
-    TILTING,
-    TIP,
-    compliance,
-    katana,
-    knowing,
-    pose_errors,
-    published,
-    tip_poses,
-    true_poses,
-    twin,
-    zxz,
-)
+from truearm.studies.katana.pose_errors import pose_errors, tip_poses, true_poses, zxz
+from truearm.studies.katana.robot import NAMES, TIP, katana, published
+from truearm.studies.katana.tilting import TILTING, compliance, twin, with_tilting
 from truearm.studies.katana_influence import study as influence_study
 from truearm.studies.katana_tilting import study as tilting_study
 from truearm.studies.katana_trajectory import study as trajectory_study
@@ -82,7 +71,7 @@ def test_a_stiffness_of_table_4_4_is_kilogram_force_metres_a_degree() -> None:
 
 def test_twin_and_model_tilt_alike() -> None:
     q = katana().random_configurations(20, np.random.default_rng(3))
-    model = knowing(katana(), TILTING)
+    model = with_tilting(katana(), TILTING)
     true = true_poses(twin(katana()), q)[0]
     left = np.linalg.norm(model.world_poses(q, TIP)[0] - true, axis=1)
     assert np.quantile(left, 0.25) < 1e-9  # elsewhere some moment is near zero, where the twin's backlash jumps

@@ -8,15 +8,17 @@ import pytest
 from truearm.measurement.observations import compared
 from truearm.simulation.devices import measured_with, named_device
 from truearm.simulation.twin import Twin
-from truearm.studies.katana import katana
-from truearm.studies.katana_campaigns import USED, Counts, OnPage, together
+from truearm.studies.katana.robot import katana
 from truearm.studies.katana_devices import study
+from truearm.studies.katana_devices.page import OnPage
+from truearm.studies.katana_devices.run import together
+from truearm.studies.katana_devices.setup import USED, Counts
 from truearm.studies.study import Study
 
 
 @pytest.fixture(scope="module")
 def found() -> Study:
-    return study(1, lambda _: None, Counts(registry=16, touched=16, drawn=72, unseen=20))
+    return study(1, lambda _: None, Counts(registry=16, touched=16, drawn=24, unseen=20))
 
 
 def value(found: Study, table: str, what: str) -> float:
@@ -65,7 +67,7 @@ def test_the_page_shows_a_part_of_the_true_error(found: Study) -> None:
 def test_what_the_page_shows_is_outward_and_upward() -> None:
     three = np.array([3e-1, 0.0])
     page = OnPage(along=np.zeros(2), outward=three, height=np.array([4e-1, 0.0]), distance=three, moved=three)
-    assert page.seen == pytest.approx(0.25)
+    assert page.shown == pytest.approx(0.25)
 
 
 def test_two_campaigns_together_keep_every_reading() -> None:

@@ -3,22 +3,26 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from truearm.studies.li import (
+from truearm.studies.li_table import study
+from truearm.studies.li_table.arm import (
     BEYOND,
     PLACE,
     arm,
     at_bounds,
     board,
-    by_hand,
     fit,
     following_errors,
     tables,
+    touched_by_hand,
     truth,
     verification,
 )
-from truearm.studies.li_run import METHODS, THEIRS, TOGETHER, UNBOUNDED
-from truearm.studies.li_table import study
+from truearm.studies.li_table.run import Followed, Following
+from truearm.studies.li_table.tables import METHOD_WORDS, SURFACE_WORDS
 from truearm.studies.study import Row, Study, Table
+
+THEIRS, UNBOUNDED = METHOD_WORDS["distances"], METHOD_WORDS["unbounded"]
+TOGETHER = SURFACE_WORDS["together"]
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +50,9 @@ def test_the_board_has_a_circle_and_a_straight_path() -> None:
 def test_the_documents_bounds_hold() -> None:
     rng, nominal = np.random.default_rng(0), arm()
     twin = truth(nominal, rng, BEYOND)
-    data = by_hand(tables(board())["normal"], twin, rng)  # in the table's frame: nothing fits, so bounds must hold
+    data = touched_by_hand(
+        tables(board())["normal"], twin, rng
+    )  # in the table's frame: nothing fits, so bounds must hold
     fitted = fit(nominal, data, "distances", True)
     for p in fitted.parameters.values():
         if p.group in ("joint zero", "geometry"):
@@ -60,6 +66,14 @@ def test_a_robot_that_knows_itself_follows() -> None:
     twin = truth(arm(), np.random.default_rng(1))
     assert following_errors(twin.robot, twin, verification()).max() < 1e-6
     assert 20.0 < following_errors(arm(), twin, verification()).mean() < 22.0
+
+
+def test_gains_are_those_of_the_mean_errors() -> None:
+    before = Followed(points=np.array([1.0, 3.0]), path=np.array([2.0, 8.0]))
+    after = Followed(points=np.array([0.5, 0.5]), path=np.array([0.0, 6.0]))
+    following = Following(before, {"roll": after})
+    assert following.gain_at_points("roll") == pytest.approx(75.0)
+    assert following.gain_on_path("roll") == pytest.approx(40.0)
 
 
 def test_with_play(found: Study) -> None:
@@ -76,7 +90,7 @@ def test_without_play(found: Study) -> None:
     ways = named(found, "Without play")
     bounded, unbounded = row(ways, f"normal: {THEIRS}"), row(ways, f"normal: {UNBOUNDED}")
     assert all(2 * a < b for a, b in zip(bounded.ours, unbounded.ours, strict=True))
-    assert all(row(ways, f"{TOGETHER}: {method}").highest < 0.3 for method in METHODS)
+    assert all(row(ways, f"{TOGETHER}: {method}").highest < 0.3 for method in METHOD_WORDS.values())
 
 
 def test_geometry_beyond_the_bounds_is_still_mostly_taken_away(found: Study) -> None:

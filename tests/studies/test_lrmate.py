@@ -10,21 +10,10 @@ from truearm.measurement.hexapod.geometry import triangle
 from truearm.modeling.transform import Transform
 from truearm.simulation.twin import Twin, measure
 from truearm.simulation.twin_joint import JointTruth
-from truearm.studies.lrmate import (
-    FIXTURE,
-    NAMES,
-    REFERENCE,
-    Cups,
-    allowed_configurations,
-    identified_as_printed,
-    invented_twin,
-    judged,
-    nominal_robot,
-    standing_in,
-    touches,
-    unseen,
-)
 from truearm.studies.lrmate_hexapod import study
+from truearm.studies.lrmate_hexapod.identification import NAMES, Cups, identified_as_printed, rebased
+from truearm.studies.lrmate_hexapod.judgement import allowed_configurations, held_out, judged
+from truearm.studies.lrmate_hexapod.robot import FIXTURE, REFERENCE, invented_twin, nominal_robot, touches
 from truearm.studies.study import Study, Table
 
 
@@ -85,7 +74,7 @@ def test_another_world_changes_no_distance_and_is_undone() -> None:
     robot, _ = nominal_robot()
     q = robot.random_configurations(6, np.random.default_rng(0))
     position, rotation = robot.world_poses(q, "2")
-    there, turned = standing_in(robot, FIXTURE).world_poses(q, "2")
+    there, turned = rebased(robot, FIXTURE).world_poses(q, "2")
     assert there @ FIXTURE.rotation.T + np.array(FIXTURE.translation) == pytest.approx(position, abs=1e-14)
     assert FIXTURE.rotation @ turned == pytest.approx(rotation, abs=1e-14)
 
@@ -110,8 +99,8 @@ def test_the_printed_identification_finds_a_robot_of_its_own_kind() -> None:
     known = elastic.with_values({f"compliance_{number}": c for number, c in truth.compliance.items()})
     found = identified_as_printed(robot, known, data, Cups(at, sides))
     assert [found.values[name] for name in NAMES] == pytest.approx([known.values[name] for name in NAMES], abs=1e-7)
-    held_out = unseen(robot, twin, allowed_configurations(robot, 30, rng)).seen_from(frame)
-    errors = judged(found, held_out)
+    truth_elsewhere = held_out(robot, twin, allowed_configurations(robot, 30, rng)).seen_from(frame)
+    errors = judged(found, truth_elsewhere)
     assert errors.position.max() < 1e-7
     assert errors.orientation.max() < 1e-6
     assert errors.pairs.maximum < 2e-7

@@ -53,14 +53,20 @@ def read_gravity(text: str | None) -> tuple[float, float, float] | None:
     return x, y, z
 
 
-def read_lengths(text: str, where: str, count: int) -> list[float]:
-    """Return `count` lengths [m] of a text in mm; one number stands for all."""
-    from truearm.units import as_number, sized_si
+def read_lengths(text: str, parameter: str) -> float | list[float]:
+    """Return lengths [m] of a text in mm, a single one as a number."""
+    from truearm.units import sized_si
+
+    found = [sized_si(number, "mm", parameter=parameter) for number in read_numbers(text, parameter, "numbers in mm")]
+    return found[0] if len(found) == 1 else found
+
+
+def read_numbers(text: str, parameter: str, allowed: str) -> list[float]:
+    """Return the numbers of a text in which commas separate them."""
+    from truearm.units import as_number
 
     numbers = [as_number(part.strip()) for part in text.split(",")]
-    if None in numbers or len(numbers) not in (1, count):
-        raise InputError(
-            "numbers separated by commas belong here", where=where, came=text, allowed=f"{count} numbers in mm"
-        )
-    found = [sized_si(number, "mm", where) for number in numbers if number is not None]
-    return found * count if len(found) == 1 else found
+    known = [number for number in numbers if number is not None]
+    if len(known) < len(numbers):
+        raise InputError("numbers separated by commas belong here", parameter=parameter, came=text, allowed=allowed)
+    return known

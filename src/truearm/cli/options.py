@@ -18,7 +18,7 @@ C = TypeVar("C", bound=Callable[..., Any])
 _running: ContextVar[typer.Context | None] = ContextVar("_running", default=None)
 
 #: Parameters that say where results go or how they are printed: running again elsewhere is the same run.
-_OUTPUT = {"out": "DIR", "json": None}
+_OUTPUT = ("out", "json")
 
 
 class CommandError(Exception):
@@ -57,7 +57,13 @@ class Commands(typer.Typer):
 
 def spelled(text: str) -> str:
     """Return a text of the library with options of the running command instead of parameters in backticks."""
-    return with_parameters(text, lambda name, value: f"{_option(name)} {value}" if value else _option(name))
+
+    def one(name: str, value: str | None) -> str:
+        if value is None:
+            return _option(name)
+        return _flag(f"{name}_{value}") or f"{_option(name)} {value}"
+
+    return with_parameters(text, one)
 
 
 def command_line() -> str:
@@ -71,7 +77,7 @@ def command_line() -> str:
         if isinstance(parameter, TyperArgument):
             words += map(str, value if isinstance(value, list | tuple) else [value])
         elif name in _OUTPUT:
-            end = [max(parameter.opts, key=len), str(_OUTPUT[name])] if _OUTPUT[name] else end
+            end = [max(parameter.opts, key=len), str(parameter.metavar)] if name == "out" else end
         elif value is True and _given(context, name):
             words.append(max(parameter.opts, key=len))
         elif value is not None and value is not False and _given(context, name):
@@ -83,6 +89,13 @@ def command_line() -> str:
 def _given(context: typer.Context, name: str) -> bool:
     source = context.get_parameter_source(name)
     return source is not None and source.name != "DEFAULT"
+
+
+def _flag(name: str) -> str | None:
+    """Return the option that stands for one value of a parameter, where the running command has one."""
+    context = _running.get()
+    known = {} if context is None else {parameter.name: parameter for parameter in context.command.params}
+    return max(known[name].opts, key=len) if name in known else None
 
 
 def _option(name: str) -> str:

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from truearm.cli.options import command_line
 from truearm.cli.output import Json, print_json, progress
 from truearm.studies import STUDIES
 
@@ -14,7 +15,7 @@ HELP = "\n\n".join(
     [
         "Make a published experiment again and set our figures beside the printed ones, over several seeds.",
         "Writes report.html and study.json into DIR. The studies:",
-        *(f"{entry.name}: {entry.about}" for entry in STUDIES),
+        *(f"{entry.name}: {entry.about}{' (with --data)' if entry.files else ''}" for entry in STUDIES),
     ]
 )
 
@@ -30,13 +31,15 @@ def study(
     json: Json = False,
 ) -> None:
     """Make a published experiment again."""
+    from dataclasses import replace
+
     from truearm.files import writable_folder
     from truearm.studies import run_study
     from truearm.studies.study import STUDY_FILES
 
     writable_folder(out)
     with progress() as say:
-        finished = run_study(name, seeds, data, say)
+        finished = replace(run_study(name, seeds, data, say), command=command_line())
         say("writing the report")
         finished.save(out)
     if json:

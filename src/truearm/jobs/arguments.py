@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from numbers import Integral, Real
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -16,8 +16,13 @@ from truearm.files import new_file, refuse_overwriting, writable_file, writable_
 from truearm.library import is_robot, load_robot, urdf_source
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.readers.canonical import read_csv
+from truearm.modeling.chain import Array
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
+from truearm.units import believable, sized_si
+
+if TYPE_CHECKING:
+    from truearm.simulation.devices import Device
 
 T = TypeVar("T")
 
@@ -28,8 +33,15 @@ def refusals_of(parameter: str) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        error.parameter = error.parameter or parameter
+        if error.parameter is None:
+            _name(error, parameter)
         raise
+
+
+def _name(error: InputError, parameter: str) -> None:
+    """Let a refusal name a parameter."""
+    error.parameter = parameter
+    error.args = (error.told(str),)
 
 
 def robot_argument(robot: object, parameter: str = "robot") -> Robot:
@@ -37,9 +49,12 @@ def robot_argument(robot: object, parameter: str = "robot") -> Robot:
     if isinstance(robot, Robot):
         return robot
     if isinstance(robot, str | Path):
-        with refusals_of(parameter):
+        try:
             return load_robot(robot)
-    raise _wrong_kind("a robot belongs here", robot, parameter, "a Robot, a library id, a robot file or a URDF")
+        except InputError as error:  # the library calls whatever it is given the robot
+            _name(error, parameter)
+            raise
+    raise wrong_kind("a robot belongs here", robot, parameter, "a Robot, a library id, a robot file or a URDF")
 
 
 def data_argument(data: object, parameter: str = "data") -> Dataset:
@@ -58,7 +73,7 @@ def data_argument(data: object, parameter: str = "data") -> Dataset:
             )
         with refusals_of(parameter):
             return read_csv(path)
-    raise _wrong_kind("measurements belong here", data, parameter, "a Dataset, or a canonical CSV file")
+    raise wrong_kind("measurements belong here", data, parameter, "a Dataset, or a canonical CSV file")
 
 
 def path_argument(path: object, parameter: str) -> Path:
@@ -67,7 +82,7 @@ def path_argument(path: object, parameter: str) -> Path:
         if str(path):
             return Path(path)
         raise InputError("no file is given", parameter=parameter, came=str(path))
-    raise _wrong_kind(
+    raise wrong_kind(
         "a path belongs here", path, parameter, "the path of a file or folder, as a text or a pathlib.Path"
     )
 
@@ -108,6 +123,16 @@ def _files_of(given: Iterable[object]) -> list[Path]:
     return [(urdf_source(value) or (Path(value), None))[0] for value in named]
 
 
+def files_argument(files: object, parameter: str) -> dict[str, Path]:
+    """Return the files that were given by name."""
+    if not isinstance(files, Mapping):
+        raise wrong_kind("files by name belong here", files, parameter, "a dict of names and paths")
+    for name in files:
+        if not isinstance(name, str):
+            raise wrong_kind("a name belongs here", name, parameter, "a text")
+    return {name: path_argument(path, parameter) for name, path in files.items()}
+
+
 def payload_argument(payload: object, parameter: str = "payload") -> Payload | None:
     """Return the payload that was given, or that a text such as ``2.7kg,50mm,25mm,100mm`` names; None for None."""
     return None if payload is None else Payload.of(payload, parameter)
@@ -124,10 +149,10 @@ def gravity_argument(gravity: object, parameter: str = "gravity") -> tuple[float
 def numbers_argument(values: object, parameter: str, count: int, allowed: str) -> tuple[float, ...]:
     """Return `count` finite numbers."""
     if isinstance(values, str | bytes) or not isinstance(values, Iterable):
-        raise _wrong_kind(f"{count} numbers belong here", values, parameter, allowed)
+        raise wrong_kind(f"{count} numbers belong here", values, parameter, allowed)
     found = [*values]
     if len(found) != count:
-        raise InputError(f"{count} numbers belong here", parameter=parameter, came=f"{len(found)}", allowed=allowed)
+        raise InputError(f"{count} numbers belong here", parameter=parameter, came=len(found), allowed=allowed)
     return tuple(number_argument(value, parameter) for value in found)
 
 
@@ -135,7 +160,7 @@ def whole_argument(value: object, parameter: str, lowest: int = 0, highest: int 
     """Return a whole number within limits."""
     span = f"{lowest} or more" if highest is None else f"{lowest} to {highest}"
     if isinstance(value, bool | np.bool_) or not isinstance(value, Integral):
-        raise _wrong_kind("a whole number belongs here", value, parameter, span)
+        raise wrong_kind("a whole number belongs here", value, parameter, span)
     number = int(value)
     if number < lowest or (highest is not None and number > highest):
         raise InputError("the number is out of range", parameter=parameter, came=number, allowed=span)
@@ -146,18 +171,88 @@ def number_argument(value: object, parameter: str, lowest: float = -math.inf, al
     """Return a finite number, `lowest` or more."""
     span = allowed or ("a finite number" if lowest == -math.inf else f"a finite number, {lowest:g} or more")
     if isinstance(value, bool | np.bool_) or not isinstance(value, Real):
-        raise _wrong_kind("a number belongs here", value, parameter, span)
+        raise wrong_kind("a number belongs here", value, parameter, span)
     number = float(value)
     if not math.isfinite(number) or number < lowest:
         raise InputError("the number cannot be used", parameter=parameter, came=number, allowed=span)
     return number
 
 
+def length_argument(value: object, parameter: str, lowest: float = -math.inf) -> float:
+    """Return a length that can be meant [m], `lowest` or more."""
+    length = number_argument(value, parameter, allowed="a length")
+    least, most = believable("m")
+    if not max(least, lowest) <= length <= most:
+        span = f"up to {most:g} m" if lowest == -math.inf else f"{lowest:g} m to {most:g} m"
+        raise InputError("the length is out of range", parameter=parameter, came=f"{length:g} m", allowed=span)
+    return length
+
+
+def deviation_argument(value: object, parameter: str) -> float:
+    """Return a standard deviation of lengths that can be meant [m]."""
+    return sized_si(number_argument(value, parameter), "m", parameter=parameter, deviation=True)
+
+
+def lengths_argument(
+    values: object, parameter: str, count: int, lowest: float = -math.inf, *, one_for_all: bool = False
+) -> tuple[float, ...]:
+    """Return `count` lengths [m], each `lowest` or more.
+
+    Parameters
+    ----------
+    one_for_all
+        Whether a single number may stand for all of them.
+    """
+    if one_for_all and isinstance(values, Real):
+        return (length_argument(values, parameter, lowest),) * count
+    found = numbers_argument(values, parameter, count, f"{count} lengths{', or one for all' if one_for_all else ''}")
+    return tuple(length_argument(value, parameter, lowest) for value in found)
+
+
+def array_argument(values: object, parameter: str, shape: tuple[int | None, ...], allowed: str) -> Array:
+    """Return an array of finite numbers, or refuse what is none.
+
+    Parameters
+    ----------
+    shape
+        With None where any length will do.
+    allowed
+        What belongs here, for the message.
+    """
+    try:
+        found = np.asarray(values)
+    except ValueError as error:  # rows of different lengths
+        raise wrong_kind("an array of numbers belongs here", values, parameter, allowed) from error
+    if found.dtype.kind not in "iuf":
+        raise wrong_kind("an array of numbers belongs here", values, parameter, allowed)
+    array = found.astype(np.float64)
+    fits = array.ndim == len(shape) and all(n in (None, m) for n, m in zip(shape, array.shape, strict=True))
+    if not fits or array.size == 0:
+        raise InputError(
+            "the array has another shape", parameter=parameter, came=f"shape {array.shape}", allowed=allowed
+        )
+    if not np.isfinite(array).all():
+        raise InputError(
+            "NaN and infinity are no values",
+            parameter=parameter,
+            came=f"{array[~np.isfinite(array)][0]}",
+            allowed=allowed,
+        )
+    return array
+
+
 def flag_argument(value: object, parameter: str) -> bool:
     """Return True or False."""
     if isinstance(value, bool | np.bool_):
         return bool(value)
-    raise _wrong_kind("yes or no belongs here", value, parameter, "True, False")
+    raise wrong_kind("yes or no belongs here", value, parameter, "True, False")
+
+
+def name_argument(value: object, parameter: str) -> str:
+    """Return a name."""
+    if isinstance(value, str):
+        return value
+    raise wrong_kind("a name belongs here", value, parameter, "a text")
 
 
 def choice_argument(value: object, parameter: str, known: Mapping[str, T], what: str | None = None) -> T:
@@ -169,7 +264,7 @@ def choice_argument(value: object, parameter: str, known: Mapping[str, T], what:
         What it is the name of, for the message; the parameter if None.
     """
     if not isinstance(value, str):
-        raise _wrong_kind("a name belongs here", value, parameter, ", ".join(known))
+        raise wrong_kind("a name belongs here", value, parameter, ", ".join(known))
     if value in known:
         return known[value]
     raise InputError(
@@ -184,14 +279,21 @@ def choice_argument(value: object, parameter: str, known: Mapping[str, T], what:
 def choices_argument(values: object, parameter: str, known: Collection[str], what: str) -> tuple[str, ...]:
     """Return a sequence of names of those that are known."""
     if isinstance(values, str | bytes) or not isinstance(values, Sequence):
-        raise _wrong_kind("a sequence of names belongs here", values, parameter, ", ".join(known))
+        raise wrong_kind("a sequence of names belongs here", values, parameter, ", ".join(known))
     return tuple(choice_argument(value, parameter, {name: name for name in known}, what) for value in values)
+
+
+def device_argument(device: object, parameter: str = "device") -> Device:
+    """Return the instrument of a name."""
+    from truearm.simulation.devices import DEVICES  # with its inverse kinematics, only where it is asked for
+
+    return choice_argument(device, parameter, {known.name: known for known in DEVICES})
 
 
 def paths_argument(paths: object, parameter: str, what: str) -> list[Path]:
     """Return a sequence of at least one path; `what` one path is, for the message."""
     if isinstance(paths, str | bytes) or not isinstance(paths, Sequence):
-        raise _wrong_kind(f"a sequence of {what}s belongs here", paths, parameter, "a list of paths")
+        raise wrong_kind(f"a sequence of {what}s belongs here", paths, parameter, "a list of paths")
     if not paths:
         raise InputError(f"no {what} is given", parameter=parameter, came="nothing", allowed="one or more")
     return [path_argument(path, parameter) for path in paths]
@@ -216,7 +318,8 @@ def _written(value: object) -> str:
     return repr(value) if plain else type(value).__name__.upper()
 
 
-def _wrong_kind(what: str, came: object, parameter: str, allowed: str) -> InputError:
+def wrong_kind(what: str, came: object, parameter: str, allowed: str) -> InputError:
+    """Return the refusal of a value of another kind than belongs here."""
     text = repr(came) if isinstance(came, str | bytes | int | float | None) else f"an object of type {kind_of(came)}"
     return InputError(what, parameter=parameter, came=came if isinstance(came, str) else text, allowed=allowed)
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from truearm.errors import InputError
 from truearm.identification.judging.plausibility import check_against
-from truearm.jobs.arguments import choice_argument, data_argument, robot_argument
+from truearm.jobs.arguments import data_argument, device_argument, robot_argument
 from truearm.library import is_robot
 from truearm.measurement.checks import check_data, check_joints, check_range
 from truearm.measurement.dataset import Dataset
@@ -54,9 +54,7 @@ def notices_of(data: Dataset, robot: Robot | None = None, device: str | None = N
     """Return one notice for each kind of fault; none for believable data."""
     ranged: tuple[Notice, ...] = ()
     if device is not None:
-        from truearm.simulation.devices import DEVICES  # with its inverse kinematics, only where it is asked for
-
-        ranged = tuple(check_range(data, choice_argument(device, "device", {d.name: d for d in DEVICES})))
+        ranged = tuple(check_range(data, device_argument(device)))
     if robot is None:
         return (*ranged, *check_data(data))
     check_joints(robot, data)

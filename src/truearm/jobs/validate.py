@@ -39,7 +39,22 @@ def validate(
     InputError
         If the robot has no targets, or the data name others.
     """
-    robot, data = robot_argument(robot), data_argument(data)
+    data = data_argument(data)
+    robot = as_measured(robot, data, payload, gravity)
+    identified = {p.group for p in robot.parameters.values() if p.deviation is not None}
+    if data.anchored and robot.fixtures and identified and "base" not in identified:
+        raise InputError(
+            "the robot was calibrated without any instrument's frame, so it does not know where this one stands",
+            where=data.source,
+            cure="Place it first: calibrate the calibrated robot with `model=frames`, or compare distances with "
+            "'truearm distances'.",
+        )
+    return Validation(data.source, errors_of(robot, data))
+
+
+def as_measured(robot: object, data: Dataset, payload: object, gravity: object) -> Robot:
+    """Return the robot with what it carried when data were measured, or refuse what it cannot be judged by."""
+    robot = robot_argument(robot)
     if not robot.targets:
         raise InputError(
             "the robot has no targets, so it cannot say where the instrument should have seen them",
@@ -54,18 +69,10 @@ def validate(
             where=data.source,
             cure="Add the column temperature [degC].",
         )
-    identified = {p.group for p in robot.parameters.values() if p.deviation is not None}
-    if data.anchored and robot.fixtures and identified and "base" not in identified:
-        raise InputError(
-            "the robot was calibrated without any instrument's frame, so it does not know where this one stands",
-            where=data.source,
-            cure="Place it first: calibrate the calibrated robot with `model=frames`, or compare distances with "
-            "'truearm distances'.",
-        )
     for name in data.targets:
         robot.target(name)
     for name in data.fixtures:
         robot.fixture(name)
     if not data.has_reading.any():
         raise InputError("there is no reading at all", where=data.source, cure="Fill in x, y and z, or distance.")
-    return Validation(data.source, errors_of(robot, data))
+    return robot

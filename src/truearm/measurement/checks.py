@@ -18,14 +18,14 @@ from truearm.errors import InputError
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
-from truearm.notices import Notice
+from truearm.notices import Notice, counted
 
 Suspicion = Literal["outliers", "targets-swapped", "target-mistaken"]
 
-#: A distance, or a place, that holds better than this is never doubted [m].
 #: Temperatures of working arms [degC].
 _COLDEST: Final = -30.0
 _WARMEST: Final = 80.0
+#: A distance, or a place, that holds better than this is never doubted [m].
 _HOLDS: Final = 1e-4
 #: How many robust deviations a distance or a place may be off.
 _DEVIATIONS: Final = 10.0
@@ -109,8 +109,8 @@ def check_range(data: Dataset, device: Ranged) -> list[Notice]:
     return [
         Notice(
             "beyond-range",
-            f"{len(beyond)} readings are beyond what the device {device.name} can read (configuration/target): {words}."
-            f" It is a {device.summary}. Check the units, and that it was this device.",
+            f"{counted(len(beyond), 'reading')} {_are(beyond)} beyond what the device {device.name} can read "
+            f"(configuration/target): {words}. It is a {device.summary}. Check the units, and that it was this device.",
         )
     ]
 
@@ -119,26 +119,33 @@ def suspect_notices(suspects: Sequence[Suspect]) -> list[Notice]:
     """Return one notice for each kind of suspicion."""
     advice = {
         "outliers": (
+            "reading is far from where it must be",
+            "Measure it again or leave it out; `loss=cauchy` lets it count little.",
             "readings are far from where they must be",
-            "Measure them again or leave them out; --loss cauchy lets them count little.",
+            "Measure them again or leave them out; `loss=cauchy` lets them count little.",
         ),
         "targets-swapped": (
+            "target was taken for another one of its configuration",
+            "Exchange their names in the file.",
             "targets of the same configuration were taken for each other",
             "Exchange their names in the file.",
         ),
         "target-mistaken": (
+            "reading was taken from another point than it names",
+            "Leave these cells empty, or measure it again.",
             "readings were taken from another point than they name",
             "Leave these cells empty, or measure them again.",
         ),
     }
     notices = []
-    for code, (what, cure) in advice.items():
+    for code, words in advice.items():
         mine = list(dict.fromkeys(s for s in suspects if s.code == code))
         distinct = {(s.configuration, s.target): s for s in reversed(mine)}
         if distinct:
             ordered = [s for s in mine if distinct.get((s.configuration, s.target)) is s]
-            words = [f"{s.configuration}/{s.target}{f' ({s.words})' if s.words else ''}" for s in ordered]
-            message = f"{len(ordered)} {what} (configuration/target): {_listed(words)}. {cure}"
+            what, cure = words[:2] if len(ordered) == 1 else words[2:]
+            named = [f"{s.configuration}/{s.target}{f' ({s.words})' if s.words else ''}" for s in ordered]
+            message = f"{len(ordered)} {what} (configuration/target): {_listed(named)}. {cure}"
             notices.append(Notice(code, message))
     return notices
 
@@ -307,8 +314,8 @@ def _moved(data: Dataset) -> list[Notice]:
         Notice(
             "reference-moved",
             f"Reference points moved by up to {float(np.nanmax(off)) * 1e3:.2f} mm ({', '.join(names)}; "
-            f"{len(where)} configurations: {_listed([data.labels[c] for c in where])}). The robot's table or the "
-            "instrument moved: where three points moved together the motion is removed, elsewhere leave these "
+            f"{counted(len(where), 'configuration')}: {_listed([data.labels[c] for c in where])}). The robot's table "
+            "or the instrument moved: where three points moved together the motion is removed, elsewhere leave these "
             "configurations out or measure them again.",
         )
     ]
@@ -326,7 +333,7 @@ def check_joints(robot: Robot, data: Dataset) -> None:
         raise InputError(
             "the number of joints differs from the robot's",
             where=data.source,
-            came=f"{data.joints.shape[1]} joint columns",
+            came=counted(data.joints.shape[1], "joint column"),
             allowed=f"{len(robot.joints)} ({robot.name})",
             cure="Give one column joint_i for each joint of the robot, base first.",
         )
@@ -347,17 +354,20 @@ def _missing(data: Dataset) -> list[Notice]:
     counts = {}
     for part in [data] if data.references is None else [data, data.references]:
         empty = ~part.has_reading
-        read = {(c, t) for c, t in zip(part.configuration.tolist(), part.target.tolist(), strict=True)}
+        read = set(zip(part.configuration.tolist(), part.target.tolist(), strict=True))
+        # Against fixtures, and by several instruments, not every target is read at every configuration; nor where
+        # targets are measured in turn, one at each configuration.
+        in_turn = len(part.targets) > 1 and len(read) == len({c for c, _ in read})
+        everywhere = data.fixture is None and not in_turn
         for t, name in enumerate(part.targets):
-            # Against fixtures, and by several instruments, not every target is read at every configuration.
-            everywhere = data.fixture is None
             absent = part.configurations - sum((c, t) in read for c in range(part.configurations)) if everywhere else 0
             counts[name] = int((empty & (part.target == t)).sum()) + absent
     total = sum(counts.values())
     if total == 0:
         return []
     words = ", ".join(f"{name} {count}" for name, count in counts.items() if count)
-    return [Notice("missing", f"{total} readings are missing ({words}). They are left out; nothing needs to be done.")]
+    left = "is missing ({}). It is left out" if total == 1 else "are missing ({}). They are left out"
+    return [Notice("missing", f"{counted(total, 'reading')} {left.format(words)}; nothing needs to be done.")]
 
 
 def _duplicates(data: Dataset) -> list[Notice]:
@@ -375,10 +385,15 @@ def _duplicates(data: Dataset) -> list[Notice]:
     return [
         Notice(
             "duplicates",
-            f"{len(found)} readings repeat another one to the last digit (target at configurations): "
-            f"{_listed(found)}. Rows were copied, or the instrument stood still: remove them, they count twice.",
+            f"{counted(len(found), 'reading')} repeat{'s' if len(found) == 1 else ''} another one to the last digit "
+            f"(target at configurations): {_listed(found)}. Rows were copied, or the instrument stood still: remove "
+            f"{'it, it counts' if len(found) == 1 else 'them, they count'} twice.",
         )
     ]
+
+
+def _are(things: Sequence[object]) -> str:
+    return "is" if len(things) == 1 else "are"
 
 
 def _listed(words: Sequence[str]) -> str:

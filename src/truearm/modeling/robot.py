@@ -21,7 +21,7 @@ from truearm.modeling.parameters import Parameter
 from truearm.modeling.parts import Payload, checked_gravity
 from truearm.modeling.placing import placed, with_fixtures_beside
 from truearm.modeling.postures import Postures
-from truearm.modeling.robot_description import RobotDescription
+from truearm.modeling.robot_data import RobotData
 from truearm.modeling.robot_parameters import by_parameters
 from truearm.modeling.transform import Transform
 
@@ -33,10 +33,10 @@ Values = Mapping[str, float | Array]
 
 
 @dataclass(frozen=True, repr=False)
-class Robot(RobotDescription):
+class Robot(RobotData):
     """A serial robot, nominal or calibrated.
 
-    Its data are those of :class:`~truearm.modeling.robot_description.RobotDescription`. Poses are asked for with
+    Its data are those of :class:`~truearm.modeling.robot_data.RobotData`. Poses are asked for with
     :meth:`forward`, joint positions with :meth:`inverse`, derivatives with :meth:`jacobian`.
     """
 

@@ -14,10 +14,10 @@ from truearm.modeling.postures import Postures
 
 if TYPE_CHECKING:
     from truearm.modeling.robot import Robot
-    from truearm.modeling.robot_description import RobotDescription
+    from truearm.modeling.robot_data import RobotData
 
 
-def all_parameters(robot: RobotDescription) -> Mapping[str, Parameter]:
+def all_parameters(robot: RobotData) -> Mapping[str, Parameter]:
     """Return all parameters by name: base, joints, effects, targets, fixtures."""
     zeros = {f"{robot.convention.zero(j.kind)}_{i}" for i, j in enumerate(robot.joints, 1)}
     found: dict[str, Parameter] = {}

@@ -10,8 +10,9 @@ import numpy as np
 from truearm.planning.choosing.measurement_plan import MeasurementPlan
 from truearm.planning.choosing.prediction import Prediction
 from truearm.reporting.drawing import AFTER, BEFORE, CAMERA, Figure, axis, base_axes, figure, scene_axis
-from truearm.reporting.numbers import rounded, rounded_to, significant
+from truearm.reporting.numbers import rounded, rounded_to
 from truearm.reporting.page import page
+from truearm.results.plan import Plan
 
 _INDEX_WORDS: Final = {
     "O1": "geometric mean of the singular values, per square root of the poses",
@@ -22,31 +23,18 @@ _INDEX_WORDS: Final = {
 }
 
 
-def plan_html(plan: MeasurementPlan, command: str) -> str:
-    """Return the page of a plan; `command` is how to make it again."""
+def plan_html(planned: Plan) -> str:
+    """Return the page of a plan."""
+    plan = planned.made
     figures = {"number": number_figure(plan.prediction, len(plan.joints)), "workspace": workspace_figure(plan)}
     return page(
         "plan.html.jinja",
         figures,
         plan=plan,
-        command=command,
-        words=answer(plan),
+        command=planned.command,
+        words=planned.answer,
         indices=[(name, _INDEX_WORDS[name], f"{value:.4g}") for name, value in plan.indices.items()],
     )
-
-
-def answer(plan: MeasurementPlan) -> tuple[str, ...]:
-    """Return how accurate the calibration will be and how many poses it needs, in words."""
-    told = plan.prediction
-    planned, floor = (significant(value * 1e3, 3) for value in (told.planned, told.floor))
-    count = len(plan.joints)
-    first = (
-        f"Measured at these {count} configurations, the {plan.model.name} model will miss readings elsewhere by"
-        f" {planned} mm on average. No number of poses brings that below {floor} mm, the noise."
-    )
-    if told.enough is None:
-        return first, "More poses than were looked at are needed to come within 10 % of that."
-    return first, f"{told.enough} well-chosen poses are enough to come within 10 % of that."
 
 
 def number_figure(told: Prediction, planned: int) -> Figure:

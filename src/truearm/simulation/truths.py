@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from truearm.errors import InputError, nearest_names
+from truearm.errors import InputError, did_you_mean
 from truearm.files import exists
 from truearm.library import load_robot
 from truearm.modeling.chain import Array
@@ -17,6 +17,7 @@ from truearm.modeling.effects.linear_contact import LinearContactClearance
 from truearm.modeling.parts import NO_PAYLOAD, Payload, Tool
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform, rotation_from_quaternion
+from truearm.notices import counted
 from truearm.simulation.twin import Twin
 from truearm.simulation.twin_joint import PERFECT, Contact, JointTruth
 
@@ -32,7 +33,7 @@ def truth_names(robot: Robot) -> tuple[str, ...]:
     return ("nominal", "random", *robot.truths)
 
 
-def truth_twin(robot: Robot, truth: str, rng: np.random.Generator) -> Twin:
+def truth_twin(robot: Robot, truth: Robot | str | Path, rng: np.random.Generator) -> Twin:
     """Return the twin of a robot.
 
     Parameters
@@ -41,7 +42,7 @@ def truth_twin(robot: Robot, truth: str, rng: np.random.Generator) -> Twin:
         The nominal robot.
     truth
         ``nominal``; ``random``, geometry and joint zeros drawn from their priors; the name of one of the robot
-        file's truths; or a robot file, whose own base and targets are used if it has targets.
+        file's truths; or a robot or its file, whose own base and targets are used if it has targets.
     rng
         For ``random``.
 
@@ -51,8 +52,10 @@ def truth_twin(robot: Robot, truth: str, rng: np.random.Generator) -> Twin:
         If there is no such truth, or the file is of another kind of robot.
     """
     tool = next(iter(robot.tools.values()), DEFAULT_TOOL)
+    if isinstance(truth, Robot):
+        return _twin_of(robot, truth, truth.name)
     if truth in robot.truths:
-        published = robot.truths[truth]
+        published = robot.truths[str(truth)]
         true = robot.with_values(published.values)
         joints = joint_truths(true)
         for number, compliance in published.compliance.items():
@@ -69,22 +72,26 @@ def truth_twin(robot: Robot, truth: str, rng: np.random.Generator) -> Twin:
         return Twin(stationed(robot.with_values(drawn), tool), joint_truths(robot), _contact(robot))
     if not Path(truth).suffix and not exists(Path(truth)):
         known = truth_names(robot)
-        near = nearest_names(truth, known)
         raise InputError(
             f"{robot.name} has no truth of this name",
-            where="--truth",
-            came=truth,
+            parameter="truth",
+            came=str(truth),
             allowed=f"{', '.join(known)}, or a robot file",
-            cure=f"Did you mean {' or '.join(near)}?" if near else None,
+            cure=did_you_mean(str(truth), known),
         )
-    other = load_robot(truth)
+    return _twin_of(robot, load_robot(truth), str(truth))
+
+
+def _twin_of(robot: Robot, other: Robot, where: str) -> Twin:
+    """Return the twin that another robot describes, of the same kind as the nominal one."""
     if [j.kind for j in other.joints] != [j.kind for j in robot.joints]:
         raise InputError(
             f"this robot has other joints than {robot.name}",
-            where=truth,
-            came=f"{len(other.joints)} joints",
+            where=where,
+            came=counted(len(other.joints), "joint"),
             allowed=f"{len(robot.joints)}, of the same kinds",
         )
+    tool = next(iter(robot.tools.values()), DEFAULT_TOOL)
     return Twin(other if other.targets else stationed(other, tool), joint_truths(other), _contact(other))
 
 
@@ -116,6 +123,7 @@ def joint_truths(robot: Robot) -> dict[int, JointTruth]:
             gear=sines(number),
             hysteresis=of("approach", number),
             growth=of("thermal_growth", number),
+            warm_up=of("warm_up", number),
         )
         for number in range(1, len(robot.joints) + 1)
     }

@@ -7,6 +7,7 @@ of the models, so a mistake there cannot hide by appearing on both sides.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -34,14 +35,18 @@ from truearm.simulation.twin_joint import PERFECT, Contact, JointTruth
 REFERENCE_TEMPERATURE: Final = 20.0
 _ROUNDS: Final = 50
 _SETTLED: Final = 1e-13
+#: No arm begins this many powers of e away from where it ends.
+_LARGEST_POWER: Final = 30.0
 
 
 class Conditions(TypedDict, total=False):
-    """Under what `n` configurations are held; what is left out is at rest, unloaded and at 20 degC.
+    """Under what `n` configurations are held; what is left out is at rest, unloaded, warmed up and at 20 degC.
 
     approach
         Direction of the last move of each joint, +1, -1 or 0 for unknown, ``(n, joints)``; if left out, it follows
         from the order of the configurations.
+    number
+        How many configurations the arm was brought to before, ``(n,)``: it warms up on the way.
     temperature
         Of the arm [degC], ``(n,)``.
     wrench
@@ -51,6 +56,7 @@ class Conditions(TypedDict, total=False):
     """
 
     approach: Array
+    number: Array
     temperature: Array
     wrench: Array
     velocity: Array
@@ -106,7 +112,7 @@ class Twin:
             where = f"joint {number} of the twin of {self.robot.name}"
             if not 1 <= number <= count:
                 raise InputError("the robot has no such joint", where=where, allowed=f"1 to {count}")
-            link = self._cold[number - 1]
+            link = self._plain[number - 1]
             if (truth.clearance or truth.bearing) and not (link.turns and link.generator[1, 0] == 1.0):
                 raise InputError("only a joint that turns about its frame's z can tilt", where=where)
 
@@ -135,17 +141,31 @@ class Twin:
         rest = np.zeros((n, count))
         joints = _shaped("joint readings", joints, (n, count))
         approach = _shaped("approach", conditions.get("approach", directions(joints)), (n, count))
+        number = None if "number" not in conditions else _shaped("number", conditions["number"], (n,))
+        cold = np.zeros(n) if number is None else self._cold_share(number)
         temperature = _shaped("temperature", conditions.get("temperature", np.full(n, REFERENCE_TEMPERATURE)), (n,))
         wrench = _shaped("wrench", conditions.get("wrench", np.zeros((n, 6))), (n, 6))
         velocity = _shaped("velocity", conditions.get("velocity", rest), (n, count))
         acceleration = _shaped("acceleration", conditions.get("acceleration", rest), (n, count))
-        rows = zip(joints, approach, temperature, wrench, velocity, acceleration, strict=True)
+        rows = zip(joints, approach, temperature, cold, wrench, velocity, acceleration, strict=True)
         return tuple(self._settled(*row) for row in rows)
 
+    def _cold_share(self, number: Array) -> Array:
+        """Return how much of the growth is still to come behind some configurations: ``exp(-rate number)``, bounded."""
+        rate = self.robot.values.get("warm_up_rate", 0.0)
+        return np.array([math.exp(min(-rate * before, _LARGEST_POWER)) for before in number])
+
     def _settled(
-        self, reading: Array, approach: Array, temperature: float, wrench: Array, velocity: Array, acceleration: Array
+        self,
+        reading: Array,
+        approach: Array,
+        temperature: float,
+        cold: float,
+        wrench: Array,
+        velocity: Array,
+        acceleration: Array,
     ) -> Posture:
-        links = self._links(temperature - REFERENCE_TEMPERATURE)
+        links = self._links(temperature - REFERENCE_TEMPERATURE, cold)
         numbers = range(1, len(links) + 1)
         truths = [self.joints.get(number, PERFECT) for number in numbers]
         geared = np.array([self.robot.values.get(f"gain_{number}", 1.0) for number in numbers]) * reading
@@ -202,13 +222,14 @@ class Twin:
             deflection=deflection,
         )
 
-    def _links(self, warmer: float) -> tuple[Link, ...]:
-        """Return the links of an arm that is some kelvin warmer than the reference."""
-        grown = {number: truth.growth * warmer for number, truth in self.joints.items() if truth.growth * warmer}
+    def _links(self, warmer: float, cold: float) -> tuple[Link, ...]:
+        """Return the links of an arm some kelvin warmer than the reference, a share of whose warming up is to come."""
+        growths = {number: truth.growth * warmer - truth.warm_up * cold for number, truth in self.joints.items()}
+        grown = {number: growth for number, growth in growths.items() if growth}
         if not grown:
-            return self._cold
+            return self._plain
         return tuple(
-            self._link(number, grown[number]) if number in grown else cold for number, cold in enumerate(self._cold, 1)
+            self._link(number, grown[number]) if number in grown else link for number, link in enumerate(self._plain, 1)
         )
 
     def _link(self, number: int, growth: float) -> Link:
@@ -216,7 +237,7 @@ class Twin:
         return Link.made_of(self.robot.link_elements[number - 1], self.robot.values, growth, masses)
 
     @cached_property
-    def _cold(self) -> tuple[Link, ...]:
+    def _plain(self) -> tuple[Link, ...]:
         return tuple(self._link(number, 0.0) for number in range(1, len(self.robot.joints) + 1))
 
     @cached_property
@@ -263,9 +284,10 @@ def measure(
     noise
         Standard deviation of each coordinate [m]; declared in the data unless it is zero.
     conditions
-        See :class:`Conditions`.
+        See :class:`Conditions`. Where the number is left out, the configurations are measured in their order.
     """
     robot = twin.robot
+    conditions.setdefault("number", np.arange(float(len(joints))))
     names = tuple(target.name for target in robot.targets)
     frames = twin.frames(joints, **conditions)
     position = np.stack([frames[name][:, :3, 3] for name in names], axis=1).reshape(-1, 3)
@@ -282,7 +304,7 @@ def measure(
         position=position,
         sigma=np.full(n * len(names), noise) if noise > 0 else None,
         approach=conditions.get("approach", directions(joints)),
-        number=np.arange(float(n)),
+        number=conditions["number"],
         temperature=conditions.get("temperature"),
         wrench=conditions.get("wrench"),
     )

@@ -38,6 +38,8 @@ class JointTruth:
         What the joint turns too far [rad] when its last move was forward, and too little when it was backward.
     growth
         Thermal growth of the lengths of the link behind the joint [1/K].
+    warm_up
+        Share by which those lengths are shorter when a campaign begins than when the arm is warm.
     """
 
     compliance: float = 0.0
@@ -49,6 +51,7 @@ class JointTruth:
     gear: tuple[tuple[int, float, float], ...] = ()
     hysteresis: float = 0.0
     growth: float = 0.0
+    warm_up: float = 0.0
 
     def turn(self, reading: float, approach: float, load: float) -> float:
         """Return what the joint turns, or slides, beyond its reading [rad or m].

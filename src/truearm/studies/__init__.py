@@ -1,6 +1,7 @@
 """Published experiments made again: ours beside the document's, over several seeds.
 
-One study a file. What is here is light: the command's help reads it.
+One study a folder: `run` repeats the experiment once a seed and returns records, `tables` and `pictures` show them, and
+the folder itself tells what came out. What is here is light: the command's help reads it.
 """
 
 from __future__ import annotations
@@ -29,84 +30,73 @@ class Entry:
         As the command line spells it.
     about
         What it does, in a few words.
-    module
-        Where its function ``study(seeds, progress)`` is; ``study(seeds, progress, folder)`` if it needs data.
     files
         Measured data that its folder must hold; none for a study on digital twins.
     """
 
     name: str
     about: str
-    module: str
     files: tuple[str, ...] = ()
+
+    @property
+    def module(self) -> str:
+        """Its folder, whose function ``study(seeds, progress)`` runs it; it takes a folder too if it needs data."""
+        return f"{__name__}.{self.name.replace('-', '_')}"
 
 
 STUDIES: Final = (
     Entry(
         "hexapod-device",
         "what one ballbar between six cups can measure, and how well (Nubiola 3)",
-        "truearm.studies.hexapod_device",
     ),
     Entry(
         "irb120-axes",
         "one joint of an IRB 120 turned at a time: compliance, run-out and backlash (Nubiola 2.4)",
-        "truearm.studies.irb120_axes",
     ),
     Entry(
         "irb120-devices",
         "a simulated IRB 120 calibrated with tracker, cameras and every other instrument (Nubiola 1.7, 2.2 to 2.7)",
-        "truearm.studies.irb120_devices",
     ),
     Entry(
         "irb120-faro",
-        "a measured IRB 120: what every model leaves, and where it comes from (with --data)",
-        "truearm.studies.irb120_faro",
+        "a measured IRB 120: what every model leaves, and where it comes from",
         ("joints_commanded.txt", *(f"{kind}_{number}.txt" for kind in ("target", "base") for number in (1, 2, 3))),
     ),
     Entry(
         "irb120-hexapod",
         "a simulated IRB 120 judged and calibrated with one ballbar (Nubiola 2.6.3 and 3.5)",
-        "truearm.studies.irb120_hexapod",
     ),
     Entry(
         "irb120-simulation",
         "calibration of a simulated IRB 120, without noise and with noise and wrong masses (Nubiola 2.6)",
-        "truearm.studies.irb120_simulation",
     ),
     Entry(
         "katana-devices",
         "a simulated Katana 450 calibrated with every instrument, and the circle it draws (Patel 3.3 and 5.5.2)",
-        "truearm.studies.katana_devices",
     ),
     Entry(
         "katana-influence",
         "influence of each parameter, and identification by it, on a simulated Katana 450 (Patel 3.5 to 3.7)",
-        "truearm.studies.katana_influence",
     ),
     Entry(
         "katana-tilting",
         "joints that tilt, found by inclinometers before the geometry, on a simulated Katana 450 (Patel 4)",
-        "truearm.studies.katana_tilting",
     ),
     Entry(
         "katana-trajectory",
         "a circle predicted, corrected and followed by a simulated Katana 450 (Patel 5)",
-        "truearm.studies.katana_trajectory",
     ),
     Entry(
         "kr5-gdt",
         "a KUKA KR 5: joint errors from circles, tolerances, seven lines before and after compensation (KR5 paper)",
-        "truearm.studies.kr5_gdt",
     ),
     Entry(
         "li-table",
         "an arm of three joints that touches a tilted table of known points, fitted in bounds (Li et al.)",
-        "truearm.studies.li_table",
     ),
     Entry(
         "lrmate-hexapod",
         "an LR Mate calibrated with one ballbar in two steps, and with a tracker; its truth is invented (Nubiola 4)",
-        "truearm.studies.lrmate_hexapod",
     ),
 )
 
@@ -132,11 +122,13 @@ def run_study(name: str, seeds: int = 10, data: str | Path | None = None, progre
     """
     entry = _entry(name)
     if seeds < 1:
-        raise InputError("at least one seed is needed", where="--seeds", came=seeds, allowed="1 or more")
+        raise InputError("at least one seed is needed", parameter="seeds", came=seeds, allowed="1 or more")
     study = import_module(entry.module).study
     if not entry.files:
         if data is not None:
-            raise InputError("this study simulates its data", where="--data", came=str(data), cure="Leave --data out.")
+            raise InputError(
+                "this study simulates its data", parameter="data", came=str(data), cure="Leave `data` out."
+            )
         return cast("Study", study(seeds, progress))
     return cast("Study", study(seeds, progress, _folder(entry, data)))
 
@@ -149,7 +141,7 @@ def _entry(name: str) -> Entry:
     near = nearest_names(name, names)
     raise InputError(
         "there is no such study",
-        where="NAME",
+        parameter="name",
         came=name,
         allowed=", ".join(names),
         cure=f"Did you mean {' or '.join(near)}?" if near else None,
@@ -160,7 +152,7 @@ def _folder(entry: Entry, data: str | Path | None) -> Path:
     needed = f"a folder with {', '.join(entry.files)}"
     if data is None:
         raise InputError(
-            "this study needs measured data, which truearm does not bring along", where="--data", allowed=needed
+            "this study needs measured data, which truearm does not bring along", parameter="data", allowed=needed
         )
     folder = Path(data)
     missing = [name for name in entry.files if not (folder / name).is_file()]

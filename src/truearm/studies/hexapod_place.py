@@ -40,7 +40,7 @@ def placed(outer: Transform, inner: Transform) -> Transform:
 
 
 def touched(robot: Robot, fixture: Transform) -> Array:
-    """Return joint readings that bring the robot's first cup to the base cups, the flange looking at the fixture."""
+    """Return joint positions that bring the robot's first cup to the base cups, the flange looking at the fixture."""
     down = fixture.rotation @ _DOWN
     return touching(robot, robot.targets[0].name, fixture, DEVICE.base, down)
 

@@ -146,8 +146,8 @@ class Study:
         What was found.
     notes
         How it was done, and what a reader must know, one thing each.
-    measured
-        Whether it is about measured data.
+    command
+        How to make it again, as whoever asked for it calls it; empty if that is not known.
     """
 
     name: str
@@ -158,7 +158,7 @@ class Study:
     tables: tuple[Table, ...]
     pictures: tuple[Picture, ...] = ()
     notes: tuple[str, ...] = ()
-    measured: bool = False
+    command: str = ""
 
     @property
     def rows(self) -> tuple[Row, ...]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -43,12 +42,12 @@ class LineErrors:
 def on_twin(
     lines: SevenLines, twin: Twin, joints: Array, scatter: float, repeats: int, rng: np.random.Generator
 ) -> LineErrors:
-    """Let a twin go to readings and see how far its flange is from the poses, in its own base frame.
+    """Let a twin go to joint positions and see how far its flange is from the poses, in its own base frame.
 
     Parameters
     ----------
     joints
-        Readings that are commanded, ``(7 k, joints)`` [rad].
+        Joint positions that are commanded, ``(7 k, joints)`` [rad].
     scatter
         Standard deviation of each coordinate of a repetition: the robot's and the instrument's [m].
     repeats
@@ -64,7 +63,7 @@ def on_twin(
 
 
 def _flange_of(twin: Twin, joints: Array) -> list[Array]:
-    """Return ``T_world_flange`` ``(4, 4)`` of a twin at each of some readings ``(n, joints)``."""
+    """Return ``T_world_flange`` ``(4, 4)`` of a twin at joint positions ``(n, joints)``."""
     flange = replace(twin, robot=replace(twin.robot, targets=(Target("flange", (1.0, 0.0, 0.0, 0.0)),)))
     return [posture.targets["flange"] for posture in flange.postures(joints)]
 
@@ -113,22 +112,6 @@ def from_data(lines: SevenLines, robot: Robot, data: Dataset) -> LineErrors:
         return LineErrors(lines, sums / counts)
 
 
-def summary(before: LineErrors, after: LineErrors | None) -> dict[str, Any]:
-    """Return what ``lines --json`` prints of errors before, and after compensation if that was tried."""
-    rows = []
-    for direction in DIRECTIONS:
-        row: dict[str, Any] = {"direction": direction, "before_mm": _shown(before, direction)}
-        if after is not None:
-            row["after_mm"] = _shown(after, direction)
-            row["reduction_percent"] = reduction(before, after, direction)
-        rows.append(row)
-    return {"poses": len(before.lines.labels), "lines": rows}
-
-
 def reduction(before: LineErrors, after: LineErrors, direction: str) -> float:
     """Return by how much the largest error of a line fell [percent]."""
     return 100.0 * (1.0 - after.largest(direction) / before.largest(direction))
-
-
-def _shown(errors: LineErrors, direction: str) -> dict[str, float]:
-    return {"mean": errors.mean(direction) * 1e3, "max": errors.largest(direction) * 1e3}

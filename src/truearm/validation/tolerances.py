@@ -56,7 +56,7 @@ def errors_of_tolerance(delta: float, towards: float, depth: float) -> tuple[flo
 def checked_depth(depth: float) -> float:
     """Return a hole's depth [m], or refuse one that is none."""
     if not depth > 0.0:
-        raise InputError("a hole needs a depth", where="depth", came=f"{depth * 1e3:g} mm", allowed="above 0 mm")
+        raise InputError("a hole needs a depth", parameter="depth", came=f"{depth * 1e3:g} mm", allowed="above 0 mm")
     return depth
 
 

@@ -20,7 +20,7 @@ from truearm.modeling.transform import Transform
 from truearm.simulation.devices import measured_with, named_device
 from truearm.simulation.devices.pencil import DRAWN_CIRCLE
 from truearm.simulation.twin import Twin
-from truearm.studies.katana import katana, published
+from truearm.studies.katana.robot import katana, published
 
 GEOMETRIC = next(model for model in MODELS if model.name == "geometric")
 STANDS = Transform((1.0, -0.4, 0.3), (0.8, 0.0, 0.6, 0.0))
@@ -108,7 +108,7 @@ def test_without_noise_the_true_robot_is_found(seed: int) -> None:
     truth = Twin(published("standard").with_frames(STANDS, {}))
     data = drawn(truth, 72, seed)
     fit = identify(katana(), data, GEOMETRIC, redundancy="drop")
-    assert fit.unseen == ()
+    assert fit.unobservable == ()
     assert max(fit.sigma.values()) < 1e-8
     for name in ("a_3", "a_4", "theta_offset_2", "theta_offset_3", "beta_3"):
         assert fit.robot.values[name] == pytest.approx(truth.robot.values[name], abs=1e-7)

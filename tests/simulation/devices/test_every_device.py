@@ -366,8 +366,8 @@ def test_a_level_plate_does_not_see_what_moves_the_arm_along_it() -> None:
     data = replace(data.of_readings(data.against == 0), fixtures=("plate_level",))
     fit = identify(nominal("irb120"), data, GEOMETRIC)
     assert fit.status is Status.RANK_LOSS
-    assert {"a_2", "d_2", "d_3"} <= set(fit.unseen)
-    assert {"a_1", "a_2", "d_1", "theta_offset_1"} <= set(fit.blind)
+    assert {"a_2", "d_2", "d_3"} <= set(fit.unobservable)
+    assert {"a_1", "a_2", "d_1", "theta_offset_1"} <= set(fit.unobservable_combinations)
     assert fit.parameter_status("theta_offset_3") == "identified"
 
 

@@ -6,8 +6,6 @@ Sklar's way and the S-model by Stone's, both from lines in space); KR5 paper, se
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Final
@@ -15,20 +13,17 @@ from typing import Any, Final
 import numpy as np
 
 from truearm.errors import InputError
-from truearm.identification.axes.circles import AxisCircle, AxisCircles, axis_circles
-from truearm.identification.axes.fit import NORMAL_95, AxisFit, fit_axes, measured_axes
-from truearm.identification.solving.redundancy import in_words
+from truearm.identification.axes.circles import AxisCircles, axis_circles
+from truearm.identification.axes.fit import AxisFit, fit_axes, measured_axes
 from truearm.identification.start_values.frames import initial_frames
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
 from truearm.modeling.conversion import converted
-from truearm.modeling.formats.robot_file import robot_text
 from truearm.modeling.lines import base_and_flange, frame_between, joint_axes
-from truearm.modeling.parameters import FreeParameters, Group
+from truearm.modeling.parameters import Group
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform, rotation_vector
 from truearm.notices import Notice
-from truearm.units import SHOWN_AS, from_si
 
 #: Tables of parameters that are made of the axes; parallel axes leave only Hayati's.
 TABLES: Final = ("standard-dh", "s-model", "hayati")
@@ -49,7 +44,7 @@ class AxisAnalysis:
     found
         The circles.
     measured
-        The axes at zero readings, four numbers each.
+        The axes with all joints at zero, four numbers each.
     calibrated
         The robot in its own convention.
     errors
@@ -97,7 +92,7 @@ class AxisAnalysis:
 
     @cached_property
     def flange(self) -> tuple[Transform, float, float]:
-        """Where the flange stands at zero readings by the last two axes, with the same deviations."""
+        """Where the flange stands with all joints at zero, by the last two axes, with the same deviations."""
         return self._frame(self._flange_of)
 
     def _frame(self, place: Any) -> tuple[Transform, float, float]:
@@ -177,7 +172,8 @@ class AxisAnalysis:
                 Notice(
                     "not-circular",
                     f"The points are {self.found.excess:.2g} times further from their circles than the declared"
-                    " deviations allow: the arm gives way, or something moved. All deviations are widened by that.",
+                    " deviations allow. The arm gives way, or something moved. All deviations are widened by that"
+                    " factor.",
                 )
             )
         misfit = self.calibrated.residual
@@ -186,77 +182,11 @@ class AxisAnalysis:
                 Notice(
                     "misfit",
                     f"The convention {self.nominal.convention_name} leaves {misfit:.2g} deviations between the robot's"
-                    " axes and the measured ones. Convert the robot to hayati, or to joint-errors, if axes are"
-                    " parallel; else the arm does not turn about fixed axes.",
+                    " axes and the measured ones. If axes are parallel, convert the robot to hayati or to joint-errors."
+                    " Otherwise the arm does not turn about fixed axes.",
                 )
             )
         return tuple(said)
-
-    # -- files ---------------------------------------------------------------------------------------------
-
-    def summary(self) -> dict[str, Any]:
-        """Return what ``axes.json`` holds."""
-        return {
-            "truearm": "truearm-axes/1",
-            "robot": self.nominal.name,
-            "configurations": self.data.configurations,
-            "left_out": self.found.left_out,
-            "frame": "robot" if self.in_robot_frame else "instrument",
-            "declared": self.found.declared,
-            "excess": self.found.excess,
-            "circles": [_circle(circle) for circle in self.found.circles],
-            "axes": self._axes(),
-            "base": _placed(self.base),
-            "flange": _placed(self.flange),
-            "targets": {t.name: [self.robot.values[t.parameter(a)] * 1e3 for a in "xyz"] for t in self.robot.targets},
-            "tables": {name: self._shown_table(name) for name in TABLES},
-            "joint_errors": joint_errors_summary(self.errors),
-            "warnings": [{"code": n.code, "message": n.message} for n in self.notices],
-        }
-
-    def files(self, summary: str) -> Mapping[str, str]:
-        """Return the content of the result files by name; `summary` is the text of ``axes.json``."""
-        return {
-            "calibrated.yaml": robot_text(self.robot),
-            "joint-errors.yaml": robot_text(self.robot_with_errors),
-            "axes.json": summary,
-        }
-
-    def _axes(self) -> list[dict[str, Any]]:
-        robot = self.measured.robot
-        made = []
-        for number, axis in enumerate(joint_axes(robot), 1):
-            mine = [p for p in self.measured.free.parameters if p.name.endswith(f"_{number}")]
-            made.append(
-                {
-                    "joint": number,
-                    "direction": axis.along.tolist(),
-                    "point_mm": (axis.point * 1e3).tolist(),
-                    "point_deviation_mm": max(p.deviation or 0.0 for p in mine if p.unit == "m") * 1e3,
-                    "direction_deviation_mrad": max(p.deviation or 0.0 for p in mine if p.unit == "rad") * 1e3,
-                }
-            )
-        return made
-
-    def _shown_table(self, name: str) -> dict[str, Any]:
-        try:
-            rows = self.table(name)
-        except InputError as refusal:
-            return {"refused": str(refusal)}
-        units = [converted(self.nominal, name).convention.row_units(j.kind) for j in self.nominal.joints]
-        return {
-            "rows": [
-                {
-                    column: {
-                        "unit": SHOWN_AS[unit[column]],
-                        "value": from_si(value, SHOWN_AS[unit[column]]),
-                        "deviation": from_si(deviation, SHOWN_AS[unit[column]]),
-                    }
-                    for column, (value, deviation) in row.items()
-                }
-                for row, unit in zip(rows, units, strict=True)
-            ]
-        }
 
 
 def analyse(robot: Robot, data: Dataset, *, in_robot_frame: bool = False) -> AxisAnalysis:
@@ -296,60 +226,3 @@ def analyse(robot: Robot, data: Dataset, *, in_robot_frame: bool = False) -> Axi
         errors=fit_axes(design, found.circles, groups),
         in_robot_frame=in_robot_frame,
     )
-
-
-def joint_errors_summary(fit: AxisFit) -> dict[str, Any]:
-    """Return what a fit in joint errors says: what was found, of what, and what circles cannot see."""
-    everything = FreeParameters((*fit.free.parameters, *(fit.robot.parameters[r.dropped] for r in fit.redundancies)))
-    found = []
-    for p in fit.free.parameters:
-        if p.group == "base":
-            continue
-        unit = SHOWN_AS[p.unit]
-        half = NORMAL_95 * (p.deviation or 0.0)
-        found.append(
-            {
-                "name": p.name,
-                "unit": unit,
-                "value": from_si(p.value, unit),
-                "deviation": from_si(p.deviation or 0.0, unit),
-                "interval": [from_si(p.value - half, unit), from_si(p.value + half, unit)],
-                "is": in_words(fit.combination(p.name), everything),
-            }
-        )
-    unseen = [
-        {"name": r.dropped, "combination": r.combination, "moves_flange": r.dropped in fit.felt}
-        for r in fit.redundancies
-    ]
-    return {"found": found, "unseen": unseen}
-
-
-def _circle(measured: AxisCircle) -> dict[str, Any]:
-    turn, circle = measured.turn, measured.circle
-    return {
-        "joint": measured.joint,
-        "target": measured.target,
-        "points": len(turn.reading),
-        "arc_deg": math.degrees(circle.arc),
-        "centre_mm": (circle.centre * 1e3).tolist(),
-        "centre_deviation_mm": circle.centre_deviation * 1e3,
-        "direction": circle.normal.tolist(),
-        "direction_deviation_mrad": circle.tilt_deviation * 1e3,
-        "radius_mm": circle.radius * 1e3,
-        "radius_deviation_mm": circle.radius_deviation * 1e3,
-        "radial_range_mm": float(np.ptp(circle.radial)) * 1e3,
-        "axial_range_mm": float(np.ptp(circle.axial)) * 1e3,
-        "tangential_range_mm": turn.tangential * 1e3,
-        "angular_range_deg": math.degrees(turn.angular),
-        "backlash_deg": None if turn.backlash is None else math.degrees(turn.backlash),
-    }
-
-
-def _placed(place: tuple[Transform, float, float]) -> dict[str, Any]:
-    transform, slide, turn = place
-    return {
-        "translation_mm": [v * 1e3 for v in transform.translation],
-        "quaternion": list(transform.quaternion),
-        "translation_deviation_mm": slide * 1e3,
-        "rotation_deviation_mrad": turn * 1e3,
-    }

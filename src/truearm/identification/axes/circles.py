@@ -39,7 +39,7 @@ class AxisCircle:
     target
         Name of the target.
     posture
-        Readings of all joints [rad], ``(joints,)``; that of the one that turned does not count.
+        Positions of all joints [rad], ``(joints,)``; that of the one that turned does not count.
     turn
         Circle and errors.
     """
@@ -100,9 +100,9 @@ def axis_circles(data: Dataset) -> AxisCircles:
     runs = find_runs(data)
     if not runs:
         raise InputError(
-            "in no part of the data one joint moves alone",
+            "there is no part of the data in which one joint moves alone",
             where=data.source,
-            allowed="four readings or more in a row of each joint while the others stand still",
+            allowed="four configurations or more in a row of each joint while the others stand still",
             cure="Measure axis by axis, or use 'truearm calibrate' on configurations that move every joint.",
         )
     found: list[AxisCircle] = []
@@ -242,7 +242,7 @@ def _rows(
             f"joint {measured.joint} does not turn as the robot file says",
             where=f"{robot.name}, target {measured.target}",
             came=f"an axis {math.degrees(math.acos(max(facing, -1.0))):.3g} deg away from the robot's",
-            cure="Check joint order and signs with 'truearm check DATA.csv ROBOT'.",
+            cure="Check joint order and signs with 'truearm check ROBOT DATA.csv'.",
         )
     origin = kinematics.position[:, 0]
     way = float((circle.centre - origin) @ circle.normal) / facing

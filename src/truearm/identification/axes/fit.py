@@ -26,7 +26,7 @@ from truearm.modeling.robot import Robot
 #: Half the width of the interval that holds a normal value in 95 of 100 cases, in deviations.
 NORMAL_95: Final = 1.959964
 #: A direction that moves the flange by less than this share of what its parameter alone does moves nothing.
-_FELT: Final = 1e-6
+_MOVES_NOTHING: Final = 1e-6
 _STEP: Final = 1e-2  # of a deviation, for derivatives of what is derived from axes
 
 
@@ -44,8 +44,8 @@ class AxisFit:
         Of them [SI], ``(parameters, parameters)``.
     redundancies
         Parameters held because circles cannot tell them apart, with the combination.
-    felt
-        Those of `redundancies` whose combination moves the flange somewhere: not a matter of convention, but lost.
+    moving_flange
+        Those of `redundancies` whose combination moves the flange somewhere: not a matter of convention, but a loss.
     residual
         Root mean square of the whitened differences between axes and circles over their degrees of freedom; None
         where there are no more numbers than parameters.
@@ -55,7 +55,7 @@ class AxisFit:
     free: FreeParameters
     covariance: Array
     redundancies: tuple[Redundancy, ...]
-    felt: tuple[str, ...]
+    moving_flange: tuple[str, ...]
     residual: float | None
 
     def derived(self, function: Callable[[Robot], Array]) -> tuple[Array, Array]:
@@ -111,7 +111,7 @@ def fit_axes(
             where=robot.name,
             came=f"no run of joint {', '.join(map(str, missing))}",
             allowed="a run of every joint",
-            cure="Measure it: four readings or more while the others stand still.",
+            cure="Measure it: four configurations or more while the others stand still.",
         )
     chosen = (p.restarted(p.value) for p in robot.parameters.values() if p.group in groups)
     # Of what cannot be told apart the last is held. That shall be the slides along joint axes.
@@ -135,7 +135,7 @@ def fit_axes(
         raise InputError(
             "the robot's axes cannot be brought onto the measured ones",
             where=robot.name,
-            cure="Check joint order and signs with 'truearm check DATA.csv ROBOT'.",
+            cure="Check joint order and signs with 'truearm check ROBOT DATA.csv'.",
         )
     kept = problem.free.without(held)
     R = np.linalg.qr(solution.jacobian * kept.prior, mode="r")
@@ -152,13 +152,13 @@ def fit_axes(
         free=FreeParameters(identified),
         covariance=covariance,
         redundancies=redundancies,
-        felt=_felt(made, redundancies),
+        moving_flange=_moving_flange(made, redundancies),
         residual=math.sqrt(square / freedom) if freedom > 0 else None,
     )
 
 
 def measured_axes(robot: Robot, circles: Sequence[AxisCircle]) -> AxisFit:
-    """Return the axes themselves, robot at zero readings: four numbers a joint, none of them redundant.
+    """Return the axes themselves, with all joints at zero: four numbers a joint, none of them redundant.
 
     Parameters
     ----------
@@ -168,11 +168,11 @@ def measured_axes(robot: Robot, circles: Sequence[AxisCircle]) -> AxisFit:
     return fit_axes(converted(robot, "zero-reference"), circles, ("geometry",))
 
 
-def _felt(robot: Robot, redundancies: Sequence[Redundancy], seed: int = 0) -> tuple[str, ...]:
+def _moving_flange(robot: Robot, redundancies: Sequence[Redundancy], seed: int = 0) -> tuple[str, ...]:
     """Return the held parameters whose combination moves the flange at random configurations."""
     q = robot.random_configurations(20, np.random.default_rng(seed))
     kinematics = robot.forward_kinematics(q)
-    felt = []
+    found = []
     for redundancy in redundancies:
         names = list(redundancy.members)
         weights = np.array([redundancy.members[n] for n in names])
@@ -180,7 +180,7 @@ def _felt(robot: Robot, redundancies: Sequence[Redundancy], seed: int = 0) -> tu
         for part in (linear, angular):
             together = np.tensordot(weights, part, axes=1)
             alone = max(float(np.abs(w * p).max()) for w, p in zip(weights, part, strict=True))
-            if float(np.abs(together).max()) > _FELT * alone:
-                felt.append(redundancy.dropped)
+            if float(np.abs(together).max()) > _MOVES_NOTHING * alone:
+                found.append(redundancy.dropped)
                 break
-    return tuple(felt)
+    return tuple(found)

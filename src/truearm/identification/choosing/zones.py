@@ -70,7 +70,7 @@ class Zones:
     zones: tuple[Zone, ...]
 
     def of(self, q: Array | Postures) -> IntArray:
-        """Return the index of the zone for joint readings ``(n, joints)``, -1 for the whole, ``(n,)``."""
+        """Return the index of the zone for joint positions ``(n, joints)``, -1 for the whole, ``(n,)``."""
         places = _flange(self.nominal, q)
         found = np.full(len(places), -1, dtype=np.intp)
         for index, zone in enumerate(self.zones):
@@ -83,7 +83,7 @@ class Zones:
         Parameters
         ----------
         joints
-            Joint readings ``(n, joints)``.
+            Joint positions ``(n, joints)``.
         """
         zone = self.of(joints)
         made = np.empty((len(joints), 3))

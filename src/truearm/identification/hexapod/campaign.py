@@ -37,7 +37,7 @@ class Campaign:
     Attributes
     ----------
     touches
-        Joint readings at the three base cups [rad or m], ``(3, joints)``.
+        Joint positions at the three base cups [rad or m], ``(3, joints)``.
     base_cups
         True places of the base cups in the twin's world [m], ``(3, 3)``.
     sides
@@ -63,12 +63,12 @@ class Campaign:
     final: Fit
 
     def frame_by(self, robot: Robot, target: str) -> WorldFrame:
-        """Return the fixture's frame in the robot's world by a model, from the readings at the cups (Nubiola, 4.3)."""
+        """Return the fixture's frame in the robot's world by a model, from the touches at the cups (Nubiola, 4.3)."""
         return world_frame(robot.world_poses(self.touches, target)[0], self.sides)
 
 
 def touching(robot: Robot, target: str, fixture: Transform, side: float, towards: Array) -> Array:
-    """Return joint readings that bring a target to the three base cups by the robot's own model, ``(3, joints)``.
+    """Return joint positions that bring a target to the three base cups by the robot's own model, ``(3, joints)``.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def two_steps(
     twin
         The true one; its targets are the cups, in the same order.
     touches
-        Joint readings at the base cups, from :func:`touching` with the first target.
+        Joint positions at the base cups, from :func:`touching` with the first target.
     wanted
         The device's poses for this tool.
     rows
@@ -175,7 +175,7 @@ def two_steps(
 
 
 def _corrected(robot: Robot, poses: Sequence[HexapodPose], near: Array) -> Array:
-    """Return readings near `near` that bring the calibrated cups to those of the poses, in the fixture's frame."""
+    """Return joint positions near `near` at which the calibrated cups are those of the poses."""
     on_flange = np.array([robot.world_poses(near[:1], target.name)[0][0] for target in robot.targets])
     position, rotation = robot.world_poses(near[:1])
     on_flange = (on_flange - position[0]) @ rotation[0]

@@ -2,14 +2,14 @@
 
 The first of the two stages of Patel, section 4.4.1: joint effects from inclinometers, geometry from poses after that.
 Readings are compared in pairs of postures, and only their differences are used. Between two loads on an arm that keeps
-its joint readings nothing but the joint effects differ: where an instrument sits, its zero, joint zeros and twists all
+its joint positions nothing but the joint effects differ: where an instrument sits, its zero, joint zeros and twists all
 cancel to first order. Where the arm moves between two postures, as it must if gravity is the only load, they do not
 cancel (a twist of 0.1 deg comes back as 0.017 deg after a turn by 10 deg, many times the resolution), so joint zeros,
 twists and the seats of the instruments are unknowns beside the effects, known beforehand as well as their priors say,
 and are forgotten afterwards.
 
 Inclinometers do not see a turn about a vertical axis. Poses of a target do: pairs of them, under two loads at the same
-joint readings, are compared in the same way (the document's joint 1).
+joint positions, are compared in the same way (the document's joint 1).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from truearm.errors import InputError
 from truearm.identification.inclinometers.inclination import (
-    ENOUGH,
+    DECIDING_MOMENTS,
     STEEPEST,
     change_derivatives,
     decided,
@@ -90,7 +90,7 @@ def calibrate_tilting(robot: Robot, readings: InclinometerReadings, poses: Datas
     readings
         Changes of inclination.
     poses
-        Positions of targets in pairs: configurations 0 and 1, 2 and 3 and so on have the same joint readings under
+        Positions of targets in pairs: configurations 0 and 1, 2 and 3 and so on have the same joint positions under
         two loads. Base and targets are found from them.
 
     Raises
@@ -157,7 +157,7 @@ class _Problem:
             raise InputError(
                 "no change of inclination can be used",
                 where="inclinometer readings",
-                allowed=f"axes within {math.degrees(STEEPEST):g} deg of the horizontal, and {ENOUGH}",
+                allowed=f"axes within {math.degrees(STEEPEST):g} deg of the horizontal, and {DECIDING_MOMENTS}",
             )
         return used
 
@@ -175,7 +175,7 @@ class _Problem:
             pair = reading.reshape(-1, 2)
             found[name] = pair[(pair >= 0).all(axis=1)]
         if not any(len(pair) for pair in found.values()):
-            raise InputError("no pair of poses can be used", where=poses.source, allowed=ENOUGH)
+            raise InputError("no pair of poses can be used", where=poses.source, allowed=DECIDING_MOMENTS)
         return found
 
     @property
@@ -264,7 +264,7 @@ def _check_pairs(poses: Dataset) -> None:
         raise InputError(
             "these poses are not in pairs",
             where=poses.source,
-            allowed="two configurations after each other with the same joint readings, under two loads",
+            allowed="two configurations after each other with the same joint positions, under two loads",
         )
     if poses.sigma is None:
         raise InputError("the poses declare no standard deviation", where=poses.source, cure="Fill in sigma.")

@@ -21,7 +21,9 @@ STEEPEST: Final = math.radians(60.0)
 #: Moments about, and across, an axis below these leave open where a joint leans [N m]: friction holds it, or the error
 #: of the moment decides.
 UNDECIDED: Final = (0.2, 0.05)
-ENOUGH: Final = f"moments above {UNDECIDED[0]:g} N m about and {UNDECIDED[1]:g} N m across the axis of every joint"
+DECIDING_MOMENTS: Final = (
+    f"moments above {UNDECIDED[0]:g} N m about and {UNDECIDED[1]:g} N m across the axis of every joint"
+)
 _UPRIGHT: Final = 0.01  # sine of the angle between gravity and an axis
 
 

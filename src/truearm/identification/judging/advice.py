@@ -47,41 +47,42 @@ def check_fit(fit: Fit) -> list[Notice]:
             found.append(
                 Notice(
                     "parallel-axes",
-                    f"Joints {names} are parallel and no beta lets them tilt against each other, so the model "
+                    f"Joints {names} are parallel. The model has no beta that lets them tilt against each other, so it "
                     f"cannot follow the real robot. {cure}",
                 )
             )
     if fit.status is Status.NOT_CONVERGED:
         found.append(Notice("not-converged", f"The fit did not converge. {Status.NOT_CONVERGED.advice}"))
-    if fit.unseen:
+    if fit.unobservable:
         found.append(
             Notice(
                 "rank-loss",
-                f"The training data do not determine {', '.join(fit.unseen)}, on which predictions elsewhere "
-                f"depend. {Status.RANK_LOSS.advice}",
+                f"The training data do not determine {', '.join(fit.unobservable)}, and predictions elsewhere depend "
+                f"on them. {Status.RANK_LOSS.advice}",
             )
         )
-    if fit.trusted:
-        words = "Nothing outside the robot says where it stands: its base is the world."
-        if "size" in fit.trusted:
-            words += " No length was measured either: the size of everything rests on the nominal lengths."
-        told = _positions_told(fit)
+    if fit.gauge_freedoms:
+        words, unknown = "No reading locates the robot, so its base frame is the world frame.", "base pose"
+        if "size" in fit.gauge_freedoms:
+            words += " No length was measured either, so the scale of the result is that of the nominal lengths."
+            unknown += " and scale"
         words += (
-            " The held-out error is one of readings; positions anywhere are told to about "
-            f"{told * 1e3:.2g} mm on average, but for that."
+            " The held-out error is one of readings. Predicted positions are accurate to about "
+            f"{_expected_position_error(fit) * 1e3:.2g} mm on average, up to the unknown {unknown}."
         )
-        if fit.blind:
-            words += f" Not seen, and left at nominal values: {'; '.join(fit.blind)}."
+        if fit.unobservable_combinations:
+            held = "; ".join(fit.unobservable_combinations)
+            words += f" Unobservable combinations of parameters, held at nominal values: {held}."
         found.append(Notice("closed-loop", words))
     if fit.at_bound:
-        found.append(Notice("at-bound", f"At a bound: {', '.join(fit.at_bound)}. {Status.AT_BOUND.advice}"))
+        found.append(Notice("at-bound", f"Parameters at a bound: {', '.join(fit.at_bound)}. {Status.AT_BOUND.advice}"))
     if fit.redundancies:
         combinations = "; ".join(f"{r.dropped} ({r.combination})" for r in fit.redundancies)
         found.append(
             Notice(
                 "redundant",
-                "Held at their nominal values, because the readings cannot tell the combination in brackets "
-                f"apart: {combinations}." + ("" if fit.unseen else " Predictions are not affected."),
+                f"Redundant parameters are held at their nominal values: {combinations}. The readings do not observe "
+                "the combinations in brackets." + ("" if fit.unobservable else " Predictions are not affected."),
             )
         )
     far = [
@@ -91,18 +92,18 @@ def check_fit(fit: Fit) -> list[Notice]:
         found.append(
             Notice(
                 "far-from-nominal",
-                f"{', '.join(far[:8])}{' and others' if len(far) > 8 else ''} moved by more than {_FAR:g} times what "
-                "the nominal values are believed to be good for. Is it this robot, in these units, with its joints in "
-                "this order? If so, say in the robot file what its numbers are good for (priors).",
+                f"{', '.join(far[:8])}{' and others' if len(far) > 8 else ''} moved by more than {_FAR:g} standard "
+                "deviations of their priors. Check that it is this robot, in these units, with its joints in this "
+                "order. If it is, enter wider priors in the robot file.",
             )
         )
     if fit.excess > 1.0:
         found.append(
             Notice(
                 "residuals-exceed-sigma",
-                f"The residuals are {fit.excess:.1f} times what the declared deviations allow: the robot does "
-                f"something that the {fit.model.name} model cannot express, or sigma is too small. The "
-                "deviations of the parameters are widened by that factor.",
+                f"The residuals are {fit.excess:.1f} times what the declared deviations allow. Either the robot does "
+                f"something that the {fit.model.name} model cannot express, or sigma is too small. The deviations of "
+                "the parameters are widened by that factor.",
             )
         )
     found += _check_effects(fit)
@@ -112,7 +113,7 @@ def check_fit(fit: Fit) -> list[Notice]:
         found.append(
             Notice(
                 "urdf-partial",
-                f"calibrated.urdf holds the geometry and the joint zeros; a URDF cannot hold: {effects} "
+                f"calibrated.urdf holds the geometry and the joint zeros only. A URDF cannot hold {effects} "
                 f"({', '.join(own[:6])}{', ..' if len(own) > 6 else ''}), nor the base "
                 "and the targets in the instrument's frame. calibrated.yaml holds everything.",
             )
@@ -134,7 +135,7 @@ def _check_effects(fit: Fit) -> list[Notice]:
         found.append(
             Notice(
                 "effects-idle",
-                f"The robot file has the joint effects {', '.join(idle)} at nothing, and the model "
+                f"The robot file has the joint effects {', '.join(idle)} with all values zero, and the model "
                 f"{fit.model.name} does not free them. Add `effects={idle[0]}`, or take them out of the file.",
             )
         )
@@ -146,17 +147,17 @@ def _check_effects(fit: Fit) -> list[Notice]:
         found.append(
             Notice(
                 "no-loads",
-                "The robot has no link masses and no payload, so nothing loads its joints and compliance cannot be "
-                "found. Give masses in the robot file, or `payload`.",
+                "The robot has no link masses and no payload, so nothing loads its joints. Compliance cannot be found. "
+                "Give masses in the robot file, or `payload`.",
             )
         )
     elif unknown:
         found.append(
             Notice(
                 "effects-uninformed",
-                f"The data say nothing about {', '.join(unknown)}: nothing loads these joints that way (gravity does "
-                "not turn a vertical axis), or there are too few configurations for so many effects. They stay near "
-                "nothing.",
+                f"The data say nothing about {', '.join(unknown)}. Either nothing loads these joints that way (gravity "
+                "does not turn a vertical axis), or there are too few configurations for so many effects. The values "
+                "stay near zero.",
             )
         )
     vague = [name for name in own if name not in unknown and (robot.parameters[name].informed or 1.0) < _HALF]
@@ -164,8 +165,8 @@ def _check_effects(fit: Fit) -> list[Notice]:
         found.append(
             Notice(
                 "too-many-effects",
-                f"Of {len(own)} parameters of joint effects the data know {len(vague)} less than half, "
-                f"{', '.join(vague[:8])}{' and others' if len(vague) > 8 else ''}: there are too few configurations "
+                f"Of {len(own)} parameters of joint effects, {len(vague)} rest more on their priors than on the data: "
+                f"{', '.join(vague[:8])}{' and others' if len(vague) > 8 else ''}. There are too few configurations "
                 f"for so many effects. Measure more{'' if fit.model.tried else ', or let `model=auto` choose'}.",
             )
         )
@@ -202,10 +203,10 @@ def _negative(fit: Fit) -> list[str]:
     return [found[place] for place in sorted(found)]
 
 
-def _positions_told(fit: Fit, seed: int = 0) -> float:
+def _expected_position_error(fit: Fit, seed: int = 0) -> float:
     """Return the mean error of the targets' positions that the covariance lets expect at random configurations [m].
 
-    What is taken on trust, where the base is and perhaps the size of everything, is left out of account.
+    The gauge freedoms, the pose of the base and perhaps the size of everything, are removed.
     """
     robot, names = fit.robot, fit.free.names
     q = robot.loaded(robot.random_configurations(_ANYWHERE, np.random.default_rng(seed)))
@@ -213,7 +214,10 @@ def _positions_told(fit: Fit, seed: int = 0) -> float:
     for target in robot.targets:
         kinematics = robot.forward_kinematics(q, target.name)
         (moved,) = gauge_motion_removed(
-            fit.trusted, robot, kinematics, [robot.position_jacobian(kinematics, q, names).reshape(len(names), -1).T]
+            fit.gauge_freedoms,
+            robot,
+            kinematics,
+            [robot.position_jacobian(kinematics, q, names).reshape(len(names), -1).T],
         )
         variance = np.sum((moved @ fit.covariance) * moved, axis=1).reshape(3, -1).mean(axis=0)
         lengths.append(math.sqrt(8.0 / math.pi) * np.sqrt(np.maximum(variance, 0.0)))

@@ -1,8 +1,8 @@
 """Were the joints at rest when they were read: residuals explained by the direction each joint arrived from.
 
-If readings were taken before the robot settled, or if a joint stops short by friction, the true joint differs from
-the reading by a small angle with the sign of the last move. These angles, one a joint, are fitted to what the
-identified model leaves over, after removing what its own parameters could still take.
+If joints were read before the robot settled, or if a joint stops short by friction, the true joint position differs
+from the recorded one by a small lag with the sign of the last move. These lags, one a joint, are fitted to the
+residuals of the identified model, after removing what its own parameters could still take.
 """
 
 from __future__ import annotations
@@ -19,7 +19,9 @@ from truearm.measurement.observations import OBSERVATIONS
 from truearm.measurement.sighting import Sighting
 from truearm.modeling.chain import Array
 from truearm.notices import Notice
+from truearm.units import from_si
 
+#: Part of the residuals that the direction of arrival must explain, and of the joints that must lag with one sign.
 _SHARE: Final = 0.05
 _MOST: Final = 2 / 3
 
@@ -32,19 +34,19 @@ class ArrivalLag:
     ----------
     share
         Part of the residual's root mean square that it explains, corrected for the number of joints.
-    angles
-        Angle by which each joint lags behind its reading, with the sign of the last move [rad; m].
+    lags
+        True minus recorded position of each joint, times the sign of the last move [rad; m for sliding joints].
     """
 
     share: float
-    angles: Array
+    lags: Array
 
     @property
     def fires(self) -> bool:
         """Whether it explains at least 5 % with one sign on most joints."""
-        positive = int((self.angles > 0).sum())
-        same = max(positive, len(self.angles) - positive)
-        return self.share >= _SHARE and same > _MOST * len(self.angles)
+        positive = int((self.lags > 0).sum())
+        same = max(positive, len(self.lags) - positive)
+        return self.share >= _SHARE and same > _MOST * len(self.lags)
 
 
 def arrival_lag(fit: Fit, data: Dataset) -> ArrivalLag | None:
@@ -53,12 +55,12 @@ def arrival_lag(fit: Fit, data: Dataset) -> ArrivalLag | None:
     Parameters
     ----------
     data
-        All readings, with the configurations in the order in which they were measured.
+        All readings. Without the number of each configuration in the campaign, they are taken to be in measuring order.
     """
     noise = {observation.name: fit.sigma.get(observation.name, 1.0) for observation in OBSERVATIONS}
     problem = Problem(fit.robot, replace(data, setup=None), fit.free, noise)
     r, J = problem.linearised(np.array([fit.robot.values[name] for name in fit.free.names]))
-    arrived = np.sign(np.diff(data.joints, axis=0, prepend=data.joints[:1])).T[:, None, :]
+    arrived = _last_moves(data).T[:, None, :]
     H = np.concatenate([_by_arrival(fit, block, arrived) for block in problem.blocks], axis=1).T
     U, s, _ = np.linalg.svd(J * fit.free.prior, full_matrices=False)
     basis = U[:, s > 1e-8 * s[0]]
@@ -66,14 +68,22 @@ def arrival_lag(fit: Fit, data: Dataset) -> ArrivalLag | None:
     if free < 4 * H.shape[1]:
         return None
     left, moved = r - basis @ (basis.T @ r), H - basis @ (basis.T @ H)
-    angles = np.linalg.lstsq(moved, left, rcond=1e-10)[0]
+    lags = np.linalg.lstsq(moved, left, rcond=1e-10)[0]
     before = float(left @ left) / free
-    after = float(np.sum((left - moved @ angles) ** 2)) / (free - H.shape[1])
-    return ArrivalLag(1.0 - float(np.sqrt(after / before)) if before > 0 else 0.0, -angles)
+    after = float(np.sum((left - moved @ lags) ** 2)) / (free - H.shape[1])
+    return ArrivalLag(1.0 - float(np.sqrt(after / before)) if before > 0 else 0.0, -lags)
+
+
+def _last_moves(data: Dataset) -> Array:
+    """Return the sign of each joint's move from the configuration measured before, ``(configurations, joints)``."""
+    order = np.arange(data.configurations) if data.number is None else np.argsort(data.number, kind="stable")
+    moves = np.zeros_like(data.joints)
+    moves[order[1:]] = np.sign(np.diff(data.joints[order], axis=0))
+    return moves
 
 
 def _by_arrival(fit: Fit, block: Block, arrived: Array) -> Array:
-    """Return how the whitened readings of a block move with the lag of each joint, ``(joints, rows)``."""
+    """Return how the whitened residuals of a block move with the lag of each joint, ``(joints, rows)``."""
     robot = fit.robot
     kinematics = robot.forward_kinematics(block.data.postures, block.target)
     seen = Sighting(
@@ -95,13 +105,14 @@ def check_arrival_lag(fit: Fit, data: Dataset) -> list[Notice]:
     found = arrival_lag(fit, data)
     if found is None or not found.fires:
         return []
-    shown = ", ".join(f"{np.rad2deg(a):+.3f}" for a in found.angles)
+    units = ["deg" if kind == "revolute" else "mm" for kind in data.joint_kinds]
+    shown = ", ".join(f"{from_si(lag, unit):+.3f} {unit}" for lag, unit in zip(found.lags.tolist(), units, strict=True))
     return [
         Notice(
             "joints-not-settled",
-            f"The direction from which each joint arrived explains {found.share:.0%} of the residuals (true joint "
-            f"against reading, times the sign of the last move: {shown} deg). Either the joints were read before "
-            "the robot had settled (use the commanded joints, or read later), or the joints have hysteresis "
-            "(arrive from one side only).",
+            f"The direction from which each joint arrived explains {found.share:.0%} of the residuals. The true joint "
+            f"positions differ from the recorded ones by {shown}, times the sign of the last move. Either the joints "
+            "were read before the robot had settled: use the commanded joints, or read later. Or the joints have "
+            "hysteresis: arrive from one side only.",
         )
     ]

@@ -85,7 +85,7 @@ def monte_carlo(
     robot
         The nominal robot, with its targets; its priors say what true robots are like.
     q
-        Joint readings of the calibration, ``(configurations, joints)``.
+        Joint positions of the calibration, ``(configurations, joints)``.
     model
         Which parameters are free. Those of joints and links are drawn, base and targets are only identified.
     sigma
@@ -93,7 +93,7 @@ def monte_carlo(
     trials
         Number of calibrations.
     held_out
-        Joint readings at which the calibrated robots are judged, ``(configurations, joints)``.
+        Joint positions at which the calibrated robots are judged, ``(configurations, joints)``.
     """
     problem = _of_itself(model.prepared(robot), q, model, sigma)
     free = problem.free

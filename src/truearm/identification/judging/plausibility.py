@@ -36,7 +36,7 @@ _GOOD_FROM_FIXTURES: Final = 6e-3
 #: A slip explains the data if they fit this many times better with it mended.
 _BETTER: Final = 4.0
 #: Configurations looked at; more tell nothing new.
-_ENOUGH: Final = 60
+_CONFIGURATIONS_TRIED: Final = 60
 #: A reading is doubted beyond this many median residuals, and at least so far off [m].
 _FAR: Final = 20.0
 _FAR_AT_LEAST: Final = 1e-3
@@ -103,7 +103,7 @@ def _beyond_limits(robot: Robot, data: Dataset) -> list[Notice]:
     return [
         Notice(
             "beyond-limits",
-            f"Joint readings lie beyond the limits of {robot.name}: {'; '.join(words)}. Check units, joint order and "
+            f"Joint positions are beyond the limits of {robot.name}: {'; '.join(words)}. Check units, joint order and "
             "the limits in the robot file.",
         )
     ]
@@ -149,9 +149,9 @@ def _fixture_slips(robot: Robot, data: Dataset) -> list[Notice]:
     return [
         Notice(
             "fixtures-unlikely",
-            "With base, targets and fixtures where they suit the readings best, the nominal robot still misses half of "
-            f"these by more than {size * 1e3:.3g} mm. Are the fixtures those that the rows name, and do they stand "
-            "where the rows of the role fixture say?",
+            "The nominal robot does not fit the readings against fixtures. Half of them are off by more than "
+            f"{size * 1e3:.3g} mm, with base, targets and fixtures where they fit best. Check that the rows name the "
+            "right fixtures, and the places in the rows of the role fixture.",
         )
     ]
 
@@ -190,7 +190,7 @@ def _unlike_its_readings(fit: Fit, data: Dataset) -> list[Notice]:
     return [
         Notice(
             "fixture-misplaced",
-            f"What the file says of fixtures does not agree with what was measured from them: {', '.join(found)}. "
+            f"Fixtures are not where, or not as far apart, as the file says: {', '.join(found)}. "
             "Check the names, units and numbers of these rows.",
         )
     ]
@@ -266,8 +266,8 @@ def _joint_slips(data: Dataset, at_once: int = 3) -> Iterator[_Slip]:
             joints = data.joints.copy()
             joints[:, group] *= -1
             which = " and ".join(str(i + 1) for i in group)
-            words = f"The sign of joint {which} is opposite to the robot's: the data fit with it turned. "
-            yield _Slip("joint-sign", words + "Turn it in the data or mend the robot file", with_joints(joints))
+            words = f"The sign of joint {which} is opposite to the robot's: the data fit with it changed. "
+            yield _Slip("joint-sign", words + "Change it in the data, or correct the robot file", with_joints(joints))
     for a, b in combinations(range(count), 2):
         joints = data.joints.copy()
         joints[:, [a, b]] = joints[:, [b, a]]
@@ -276,9 +276,9 @@ def _joint_slips(data: Dataset, at_once: int = 3) -> Iterator[_Slip]:
 
 
 def _some(data: Dataset) -> Dataset:
-    if data.configurations <= _ENOUGH:
+    if data.configurations <= _CONFIGURATIONS_TRIED:
         return data
-    return data.of_configurations(np.linspace(0, data.configurations - 1, _ENOUGH).astype(np.intp))
+    return data.of_configurations(np.linspace(0, data.configurations - 1, _CONFIGURATIONS_TRIED).astype(np.intp))
 
 
 def _only(data: Dataset, target: int) -> Dataset:

@@ -15,7 +15,7 @@ from truearm.identification.solving.solver import Solvable
 from truearm.modeling.chain import Array
 
 _STEPS: Final = 60
-_ENOUGH: Final = 1e-9  # share of the objective that a step must promise
+_LEAST_PROMISE: Final = 1e-9  # share of the objective that a step must promise
 _SMALLEST: Final = 1e-9  # longest step [priors] below which steps that fail are given up
 
 
@@ -46,7 +46,7 @@ def least_absolute(problem: Solvable, bounds: tuple[Array, Array] | None = None)
         cost = float(np.abs(here.residual).sum())
         room = np.stack([np.maximum((low - x) / prior, -longest), np.minimum((high - x) / prior, longest)], axis=1)
         step, promised = _linear_program(here.jacobian * prior, here.residual, room)
-        if cost - promised <= _ENOUGH * cost:
+        if cost - promised <= _LEAST_PROMISE * cost:
             break
         trial = problem.at(np.clip(x + step * prior, low, high))
         if float(np.abs(trial.residual).sum()) < cost:

@@ -59,10 +59,10 @@ class Status(Enum):
         """What to do about it."""
         return {
             Status.CONVERGED: "Judge the fit by its held-out error.",
-            Status.AT_BOUND: "A parameter stopped at a bound: widen the bound if it was a guess.",
+            Status.AT_BOUND: "A parameter is at a bound. Widen the bound if it was a guess.",
             Status.RANK_LOSS: "The data are too few or too alike to determine everything that predictions "
-            "depend on: measure more configurations that move every joint, or free fewer parameters.",
-            Status.NOT_CONVERGED: "The steps did not settle: check units, joint order and targets.",
+            "depend on. Measure more configurations that move every joint, or free fewer parameters.",
+            Status.NOT_CONVERGED: "The solver's steps did not become small. Check units, joint order and targets.",
         }[self]
 
 
@@ -86,14 +86,16 @@ class Fit:
         Of the free parameters [SI], ``(parameters, parameters)``.
     redundancies
         Parameters held because the data cannot tell them apart, with the combination.
-    at_bound, unseen
-        Names of parameters at a bound, and of those that the data leave undetermined though predictions need them.
-    trusted
-        What nobody measured and every prediction depends on: ``base`` where nothing says how the robot stands, ``size``
-        where no length was measured either.
-    blind
-        What readings without an anchor do not see: combinations of the robot's parameters in words, such as
-        ``d_3 - d_2``, of which the first keeps its nominal value.
+    at_bound
+        Names of parameters at a bound.
+    unobservable
+        Names of parameters that the data do not determine although predictions depend on them.
+    gauge_freedoms
+        Motions of everything that no reading observes: ``base`` where no reading locates the robot, ``size`` where no
+        length was measured either.
+    unobservable_combinations
+        Combinations of the robot's own parameters that readings without an anchor do not observe, in words such as
+        ``d_3 - d_2``; the first parameter of each keeps its nominal value.
     sigma
         Standard deviation of a reading [m or rad] by observation, declared (root mean square) or estimated.
     declared
@@ -116,9 +118,9 @@ class Fit:
     covariance: Array
     redundancies: tuple[Redundancy, ...]
     at_bound: tuple[str, ...]
-    unseen: tuple[str, ...]
-    trusted: tuple[str, ...]
-    blind: tuple[str, ...]
+    unobservable: tuple[str, ...]
+    gauge_freedoms: tuple[str, ...]
+    unobservable_combinations: tuple[str, ...]
     sigma: dict[str, float]
     declared: bool
     excess: float
@@ -127,7 +129,7 @@ class Fit:
 
     def parameter_status(self, name: str) -> ParameterStatus:
         """Return how much the value of a parameter is worth."""
-        if name in self.unseen:
+        if name in self.unobservable:
             return "not-determined"
         if any(name == r.dropped for r in self.redundancies):
             return "dropped"
@@ -229,9 +231,9 @@ def _check_held(held: list[str], free: FreeParameters, limits: tuple[Array, Arra
     for name, p, low, high in zip(free.names, free.parameters, *limits, strict=True):
         if name in held and not low <= p.nominal <= high:
             raise InputError(
-                "the bounds exclude the nominal value of a redundant parameter, where --redundancy drop holds it",
+                "the bounds exclude the nominal value of a redundant parameter, at which `redundancy=drop` holds it",
                 where=f"{where}, {name}",
-                cure="Leave this bound out, or use --redundancy prior.",
+                cure="Leave this bound out, or use `redundancy=prior`.",
             )
 
 
@@ -247,7 +249,7 @@ def _solve_with_noise(
 
     Deviations are estimated where they are not declared. Declared ones are widened by what the residuals say where
     there is no anchor: believed to the letter, readings of a closed loop that the model cannot follow would overrule
-    every prior, for the sake of directions that they hardly see.
+    every prior, for the sake of directions that they hardly observe.
     """
     solution = solve(problem, loss, limits, small)
     undeclared = {problem.kind(b) for b in problem.blocks if not b.declared}
@@ -355,8 +357,8 @@ def _fit(
     robot = start.with_parameters(identified)
     held = tuple(robot.parameters[r.dropped] for r in dropped)
     looked_at = FreeParameters((*(robot.parameters[n] for n in free.names), *held))
-    unseen = unobservable_parameters(robot, problem.data, looked_at)
-    trusted = gauge_freedoms(problem.data)
+    unobservable = unobservable_parameters(robot, problem.data, looked_at)
+    gauge = gauge_freedoms(problem.data)
     used = solution.weight / np.median(solution.weight) if loss == "l1" else solution.weight
     weight = np.full(len(problem.data.target), np.nan)
     first = 0
@@ -367,7 +369,7 @@ def _fit(
         first += len(block.readings)
     if not solution.converged:
         status = Status.NOT_CONVERGED
-    elif unseen:
+    elif unobservable:
         status = Status.RANK_LOSS
     elif at_bound.any():
         status = Status.AT_BOUND
@@ -386,9 +388,9 @@ def _fit(
         covariance=covariance,
         redundancies=dropped,
         at_bound=tuple(n for n, bound in zip(free.names, at_bound, strict=True) if bound),
-        unseen=unseen,
-        trusted=trusted,
-        blind=_blind(problem, x) if trusted else (),
+        unobservable=unobservable,
+        gauge_freedoms=gauge,
+        unobservable_combinations=_unobservable_combinations(problem, x) if gauge else (),
         sigma=sigma,
         declared=declared == set(noise),
         excess=excess,
@@ -397,8 +399,8 @@ def _fit(
     )
 
 
-def _blind(problem: Problem, vector: Array) -> tuple[str, ...]:
-    """Return the combinations of the robot's own parameters that the readings do not see."""
+def _unobservable_combinations(problem: Problem, vector: Array) -> tuple[str, ...]:
+    """Return the combinations of the robot's own parameters that the readings do not observe."""
     beside = {p.name for p in problem.free.parameters if p.group in ("target", "fixture")}
     own = [
         {n: c for n, c in redundancy.members.items() if n not in beside}

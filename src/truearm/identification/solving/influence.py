@@ -91,7 +91,7 @@ def influence(
     robot
         Perturbed about its current parameter values, with its joint effects; the loads are held.
     q
-        Joint readings ``(n, joints)``, or postures, n at least 1.
+        Joint positions ``(n, joints)``, or postures, n at least 1.
     names
         Parameters of the robot.
     target

@@ -297,5 +297,5 @@ def check_solvable(problem: Problem) -> None:
             where=problem.data.source,
             came=f"{problem.rows} equations for {len(problem.free.parameters)} unknown parameters",
             allowed=f"at least {-(-len(problem.free.parameters) // 3)} readings of three coordinates",
-            cure="Measure more configurations, free fewer parameters, or use --redundancy prior.",
+            cure="Measure more configurations, free fewer parameters, or use `redundancy=prior`.",
         )

@@ -29,15 +29,15 @@ _APART: Final = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)  # share of a column 
 _MEMBER: Final = 1e-9  # priors per prior below which a parameter takes no part in a combination
 _SHOWN: Final = 0.02
 _KNOWS_NOTHING: Final = 0.3  # readings that tell a parameter no better than to three priors do not tell it
-_UNSEEN: Final = 1e-8  # share of the best seen direction
-_FELT: Final = 1e-6  # share of the largest effect of a parameter
-_FELT_TRUSTED: Final = 1e-3  # the same but for a size of all, which readings with noise all but do not see
+_UNOBSERVED: Final = 1e-8  # share of the best observed direction
+_MATTERS: Final = 1e-6  # share of the largest effect of a parameter
+_MATTERS_UP_TO_GAUGE: Final = 1e-3  # the same up to gauge freedoms: noise hides the size of everything
 _INVOLVED: Final = 0.1  # share of a parameter in the lost directions
 
 
 @dataclass(frozen=True)
 class Redundancy:
-    """A direction in which the parameters can move without any reading noticing.
+    """A direction in which the parameters can move without changing any reading.
 
     Attributes
     ----------
@@ -161,14 +161,14 @@ def in_words(members: dict[str, float], free: FreeParameters) -> str:
 
 
 def unobservable_parameters(robot: Robot, data: Dataset, free: FreeParameters, seed: int = 0) -> tuple[str, ...]:
-    """Return parameters in directions that the data do not see although poses elsewhere depend on them.
+    """Return parameters in directions that the data do not observe although poses elsewhere depend on them.
 
-    The directions unseen by the readings are tried on configurations drawn from the robot's limits. A direction
-    that changes nothing there either is a matter of convention (d_2 against d_3) and harmless; one that does is
-    a loss of rank: the data are too alike.
+    The unobserved directions are tried on configurations drawn from the robot's limits. A direction that changes
+    nothing there either is a matter of convention (d_2 against d_3) and harmless; one that does is a loss of rank: the
+    data are too alike.
 
-    Where nothing says how the robot stands, the world is its base, and predictions count but for a rigid motion of all;
-    where no length was measured either, but for one scale of all: see :func:`gauge_freedoms`.
+    Predictions are compared up to the gauge freedoms: a rigid motion of everything where no reading locates the robot,
+    and a change of its size where no length was measured either. See :func:`gauge_freedoms`.
 
     Parameters
     ----------
@@ -179,34 +179,34 @@ def unobservable_parameters(robot: Robot, data: Dataset, free: FreeParameters, s
     plain = Problem(robot, _unit_noise(data), free, noise, priors=False)
     A = plain.linearised(free.start)[1] * free.prior
     _, s, Vt = np.linalg.svd(np.linalg.qr(A, mode="r"), full_matrices=True)
-    unseen = Vt[int((s > _UNSEEN * s[0]).sum()) :]
-    if len(unseen) == 0:
+    unobserved = Vt[int((s > _UNOBSERVED * s[0]).sum()) :]
+    if len(unobserved) == 0:
         return ()
-    trusted = gauge_freedoms(data)
+    gauge = gauge_freedoms(data)
     q = robot.loaded(robot.random_configurations(40, np.random.default_rng(seed)))
-    felt = np.zeros((0, len(free.names)))
+    effects = np.zeros((0, len(free.names)))
     for target in robot.targets:
         kinematics = robot.forward_kinematics(q, target.name)
         parts = [robot.position_jacobian(kinematics, q, free.names)]
         if target.quaternion is not None:
             parts.append(robot.orientation_jacobian(kinematics, q, free.names))
         moved = [part.reshape(len(free.names), -1).T * free.prior for part in parts]
-        if trusted:
-            moved = gauge_motion_removed(trusted, robot, kinematics, moved)
-        felt = np.concatenate([felt, *moved])
-    _, strength, turned = np.linalg.svd(felt @ unseen.T, full_matrices=False)
-    largest = np.linalg.norm(felt, axis=0)
-    least = _FELT * largest.max()
-    if trusted:
+        if gauge:
+            moved = gauge_motion_removed(gauge, robot, kinematics, moved)
+        effects = np.concatenate([effects, *moved])
+    _, strength, turned = np.linalg.svd(effects @ unobserved.T, full_matrices=False)
+    largest = np.linalg.norm(effects, axis=0)
+    least = _MATTERS * largest.max()
+    if gauge:
         own = [p.group not in ("base", "target", "fixture") for p in free.parameters]
-        least = _FELT_TRUSTED * max(largest[own], default=0.0)
-    lost = turned[: len(strength)][strength > least] @ unseen
+        least = _MATTERS_UP_TO_GAUGE * max(largest[own], default=0.0)
+    lost = turned[: len(strength)][strength > least] @ unobserved
     involved = np.linalg.norm(lost, axis=0) > _INVOLVED
     return tuple(name for name, is_in in zip(free.names, involved.tolist(), strict=True) if is_in)
 
 
 def gauge_freedoms(data: Dataset) -> tuple[str, ...]:
-    """Return what nobody measured and every prediction depends on: where the ``base`` is, and the ``size`` of all."""
+    """Return the motions of everything that no reading observes: of the ``base``, and a change of ``size``."""
     if data.anchored:
         return ()
     if data.distance is not None or (data.setup is not None and data.setup.distance is not None):
@@ -220,16 +220,16 @@ def gauge_freedoms(data: Dataset) -> tuple[str, ...]:
 
 
 def gauge_motion_removed(
-    trusted: Sequence[str], robot: Robot, kinematics: ForwardKinematics, moved: Sequence[Array]
+    gauge: Sequence[str], robot: Robot, kinematics: ForwardKinematics, moved: Sequence[Array]
 ) -> list[Array]:
-    """Take out of moves of a target what a motion of the whole robot does, and a change of its size.
+    """Remove from moves of a target what a motion of the whole robot does, and a change of its size.
 
     Parameters
     ----------
-    trusted
+    gauge
         From :func:`gauge_freedoms`.
-    sweep
-        To the target, at n configurations.
+    robot, kinematics
+        The robot, and its forward kinematics to the target at n configurations.
     moved
         How it moves [m], and turns if that is asked too, by each parameter, ``(3 n, parameters)`` each.
     """
@@ -239,7 +239,7 @@ def gauge_motion_removed(
         part.reshape(6, -1).T
         for part in (kinematics.position_jacobian(places), kinematics.orientation_jacobian(places))[: len(moved)]
     ]
-    if "size" in trusted:
+    if "size" in gauge:
         grown = (kinematics.position - np.array(robot.base.translation)[:, None]).reshape(-1, 1)
         columns = [np.column_stack([c, g]) for c, g in zip(columns, (grown, np.zeros_like(grown)), strict=False)]
     together = np.concatenate(columns)

@@ -36,11 +36,12 @@ _STEP: Final = 0.09
 _TRIED: Final = 6
 #: Deviation that readings are weighed with while targets are looked for [m or rad].
 _ROUGH: Final = 1e-3
-#: How many readings that takes.
-_ENOUGH: Final = 120
+#: How many readings are used for that.
+_READINGS_TRIED: Final = 120
 #: How many of one fixture, at least.
 _FEW: Final = 12
-_TELLS: Final = 1e-5
+#: Singular values below this share of the largest belong to unknowns that are not determined.
+_DETERMINES: Final = 1e-5
 
 
 def start_from_readings(robot: Robot, data: Dataset) -> Robot:
@@ -219,7 +220,7 @@ def _also(robot: Robot, found: Mapping[str, Transform | Array]) -> Robot:
 
 
 def _with_target(robot: Robot, data: Dataset, target: int, kinds: Mapping[str, FixtureKind]) -> Robot:
-    """Return the robot with a target whose place only distances and heights tell."""
+    """Return the robot with a target whose place follows from distances and heights alone."""
     mine = data.of_readings(data.has_reading & (data.target == target) & (data.against >= 0))
     mine = _some_of_each_fixture(mine)
     touched = np.unique(mine.against)
@@ -266,13 +267,13 @@ def _with_target(robot: Robot, data: Dataset, target: int, kinds: Mapping[str, F
 
 def _some_of_each_fixture(data: Dataset) -> Dataset:
     """Return readings that are enough to look for a target, as many of each fixture as of the others."""
-    if len(data.target) <= _ENOUGH:
+    if len(data.target) <= _READINGS_TRIED:
         return data
     fixtures = np.unique(data.against)
     some = np.zeros(len(data.target), dtype=bool)
     for fixture in fixtures.tolist():
         mine = np.flatnonzero(data.against == fixture)
-        count = min(len(mine), max(_FEW, _ENOUGH // len(fixtures)))
+        count = min(len(mine), max(_FEW, _READINGS_TRIED // len(fixtures)))
         some[mine[np.linspace(0, len(mine) - 1, count).astype(np.intp)]] = True
     return data.of_readings(some)
 
@@ -288,7 +289,7 @@ def _refuse_few(data: Dataset, kinds: Mapping[str, FixtureKind]) -> None:
         if name not in known and count < (1 if held else least[kinds[name]]):
             near = nearest_names(name, [other for other in data.fixtures if other != name], 1)
             raise InputError(
-                "a fixture was measured too few times to know where it stands",
+                "a fixture was measured too few times to locate it",
                 where=f"{data.source}, fixture {name}",
                 came=f"{count} reading{'' if count == 1 else 's'} among {data.configurations} configurations",
                 allowed=f"{least[kinds[name]]} or more",
@@ -373,16 +374,16 @@ def _names() -> tuple[str, ...]:
 
 
 def _refuse_alike(robot: Robot, data: Dataset) -> None:
-    """Refuse readings that do not even tell where base, targets and fixtures are."""
+    """Refuse readings that do not even determine where base, targets and fixtures are."""
     free = _start_parameters(robot, data, ("base", "target", "fixture"))
     noise = dict.fromkeys(_names(), _ROUGH)
     J = Problem(robot, data, free, noise, priors=False).linearised(free.start)[1]
     s = np.linalg.svd(np.linalg.qr(J, mode="r"), compute_uv=False)
-    told = int((s > _TELLS * s[0]).sum())
-    if told < len(free.names):
+    determined = int((s > _DETERMINES * s[0]).sum())
+    if determined < len(free.names):
         raise InputError(
-            "the readings do not tell where targets and fixtures are: the postures are too few or too much alike",
+            "the readings do not determine where targets and fixtures are: the postures are too few or too much alike",
             where=data.source,
-            came=f"{data.configurations} postures that determine {told} of {len(free.names)} unknowns",
+            came=f"{data.configurations} postures that determine {determined} of {len(free.names)} unknowns",
             cure="Measure more postures, with the tool turned to different sides.",
         )

@@ -72,15 +72,16 @@ def read_page(path: Path, dpi: float | tuple[float, float] | None = None) -> Pag
         raise InputError(
             "the file does not say its resolution",
             where=str(path),
-            cure="Give the dots per inch of the scan (dpi), or scan again and keep the file as the scanner wrote it.",
+            cure="Give the dots per inch of the scan, `dpi`, or scan again and keep the file as the scanner wrote it.",
         )
     if not all(math.isfinite(value) and _RESOLUTIONS[0] <= value <= _RESOLUTIONS[1] for value in given):
         raise InputError(
             "this is no resolution of a scan",
-            where=str(path) if dpi is None else "dpi",
+            parameter=None if dpi is None else "dpi",
+            where=str(path) if dpi is None else None,
             came=" x ".join(f"{value:g} dpi" for value in given),
             allowed=f"{_RESOLUTIONS[0]:g} to {_RESOLUTIONS[1]:g} dots per inch",
-            cure="Give the dots per inch of the scan (dpi)." if dpi is None else "Scan at 300 dpi.",
+            cure="Give the dots per inch of the scan, `dpi`." if dpi is None else "Scan at 300 dpi.",
         )
     inch = to_si(1.0, "in")
     page = Page(source=str(path), brightness=_brightness(image, path), pitch=(inch / given[0], inch / given[1]))

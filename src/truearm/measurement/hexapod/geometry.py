@@ -45,7 +45,7 @@ class Device:
     reach: float = 1e-3
     sigma: float = 1e-6 / 1.96
 
-    def check(self, nominal: float, length: float, between: str, where: str = "ballbar") -> None:
+    def check(self, nominal: float, length: float, between: str, where: str | None = "ballbar") -> None:
         """Refuse a length that the ballbar cannot have read.
 
         Parameters
@@ -55,7 +55,7 @@ class Device:
         between
             The two cups, as ``B1-T2``.
         where
-            For the message.
+            For the message; None where a job's parameter says enough.
         """
         if not abs(length - nominal) <= self.reach * (1 + 1e-9):
             raise InputError(
@@ -144,7 +144,8 @@ def triangle(sides: Sequence[float] | Array, fixture: str) -> Array:
     """
     d12, d23, d31 = (np.asarray(side, float) for side in sides)
     lengths = np.array(np.broadcast_arrays(d12, d23, d31)).reshape(3, -1)
-    x = (lengths[0] ** 2 + lengths[2] ** 2 - lengths[1] ** 2) / (2 * lengths[0])
+    with np.errstate(divide="ignore", invalid="ignore"):  # two cups in one place
+        x = (lengths[0] ** 2 + lengths[2] ** 2 - lengths[1] ** 2) / (2 * lengths[0])
     height = lengths[2] ** 2 - x**2
     flat = np.flatnonzero(~(height > (_THINNEST * lengths.max(axis=0)) ** 2))
     if len(flat):

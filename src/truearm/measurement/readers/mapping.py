@@ -12,6 +12,7 @@ from pydantic import field_validator as validator_of
 from truearm.errors import InputError
 from truearm.files import is_one_line
 from truearm.measurement.readers.cells import Layout
+from truearm.notices import counted
 
 _DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "whitespace": None}
 
@@ -162,7 +163,7 @@ class JointsEntry(_Entry):
         if (self.unit is None) == (self.units is None):
             raise ValueError("give either unit: for all joints, or units: with one for each joint")
         if self.units is not None and len(self.units) != len(self.columns):
-            raise ValueError(f"there are {len(self.columns)} columns and {len(self.units)} units")
+            raise ValueError(f"there are {counted(len(self.columns), 'column')} and {counted(len(self.units), 'unit')}")
         if self.file is None and (self.key is not None or self.layout is not None):
             raise ValueError("key and layout belong to a second file; name it with file:")
         return self

@@ -13,6 +13,7 @@ from truearm.files import is_one_line, read_text
 from truearm.measurement.dataset import Dataset, IntArray
 from truearm.modeling.chain import Array
 from truearm.modeling.postures import approach_of
+from truearm.notices import counted
 from truearm.units import ANGLE_UNITS, LENGTH_UNITS, checked_unit, sized_si
 
 
@@ -45,24 +46,24 @@ def read_matrices(
     Mapping
         How many readings are missing, by name.
     """
-    checked_unit(angle_unit, ANGLE_UNITS, "--angle-unit")
-    checked_unit(length_unit, LENGTH_UNITS, "--length-unit")
+    checked_unit(angle_unit, ANGLE_UNITS, parameter="angle_unit")
+    checked_unit(length_unit, LENGTH_UNITS, parameter="length_unit")
     if not targets:
-        raise InputError("no target is given", where="--target", cure="Give at least one --target NAME=FILE.")
-    for name in (*targets, *references):
-        if not is_one_line(name) or name != name.strip():
-            raise InputError(
-                "a point needs a name",
-                where="--target, --reference",
-                came=name,
-                allowed="NAME=FILE",
-                cure="Write the name before the = sign, without blanks around it.",
-            )
+        raise InputError("no target is given", parameter="targets", cure="Give at least one.")
+    for parameter, names in (("targets", targets), ("references", references)):
+        for name in names:
+            if not is_one_line(name) or name != name.strip():
+                raise InputError(
+                    "a point needs a name",
+                    parameter=parameter,
+                    came=name,
+                    allowed="one line without blanks around it",
+                )
     for name in references:
         if name in targets:
             raise InputError(
                 f"{name!r} is given as a target and as a reference",
-                where="--reference",
+                parameter="references",
                 came=name,
                 cure="Give the point on the robot and the one beside it different names.",
             )
@@ -74,8 +75,8 @@ def read_matrices(
             raise InputError(
                 f"the file has not as many rows as {joints}",
                 where=str(path),
-                came=f"{len(positions[name])} rows",
-                allowed=f"{len(values)} rows",
+                came=counted(len(positions[name]), "row"),
+                allowed=counted(len(values), "row"),
                 cure="Row n is configuration n in every file: write zeros or NaN where a reading is missing.",
             )
 
@@ -115,8 +116,8 @@ def _matrix(path: Path, width: int | None, unit: str, *, missing: bool) -> Array
             raise InputError(
                 "a position has three numbers" if width else f"the row is not as long as line {first}",
                 where=where,
-                came=f"{len(row)} numbers",
-                allowed=f"{wanted} numbers",
+                came=counted(len(row), "number"),
+                allowed=counted(wanted, "number"),
                 cure="Write one configuration a row.",
             )
         if missing and (not any(row) or any(math.isnan(v) for v in row)):

@@ -24,6 +24,7 @@ from truearm.measurement.readers.mapping import (
 )
 from truearm.measurement.readers.rows import Configurations, Readings, dataset_of, found_configurations
 from truearm.modeling.chain import Array
+from truearm.notices import counted
 from truearm.units import sized_si
 
 
@@ -174,8 +175,8 @@ def _configurations(
             raise InputError(
                 f"the file has not as many rows as {cells.source} has configurations",
                 where=table.source,
-                came=f"{len(table.lines)} rows",
-                allowed=f"{len(row_labels)} rows",
+                came=counted(len(table.lines), "row"),
+                allowed=counted(len(row_labels), "row"),
                 cure="Without a key, row n is the nth configuration: name the column of labels.",
             )
     configurations = found_configurations(table, row_labels, places, entry.unit_of_each)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final
 
-from truearm.errors import InputError, nearest_names
+from truearm.errors import InputError, did_you_mean
 from truearm.modeling.conversion import converted
 from truearm.modeling.formats.dh_csv import complete_dh_csv
 from truearm.modeling.formats.dh_table import DHRow, DHTable, TableConvention
@@ -57,13 +57,12 @@ def exported(robot: Robot, format_: str) -> Export:
         prismatic joint without limits in a URDF.
     """
     if format_ not in FORMATS:
-        near = nearest_names(format_, FORMATS)
         raise InputError(
             "there is no such format",
             parameter="format",
             came=format_,
             allowed=", ".join(FORMATS),
-            cure=f"Did you mean {' or '.join(near)}?" if near else None,
+            cure=did_you_mean(format_, FORMATS),
         )
     return FORMATS[format_](robot)
 

@@ -31,7 +31,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.errors import InputError, nearest_names
+from truearm.errors import InputError, did_you_mean
 from truearm.modeling.chain import Array, Chain, ForwardKinematics
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import cross, dot
@@ -49,13 +49,12 @@ _CROSSING: Final = 1e-5
 def branch_number(name: str) -> int:
     """Return the number of a branch, or refuse the name."""
     if name not in BRANCHES:
-        near = nearest_names(name, BRANCHES)
         raise InputError(
             "there is no such branch",
             parameter="branch",
             came=name,
             allowed=f"{', '.join(BRANCHES)}, or all",
-            cure=f"Did you mean {' or '.join(near)}?" if near else None,
+            cure=did_you_mean(name, BRANCHES),
         )
     return BRANCHES.index(name)
 

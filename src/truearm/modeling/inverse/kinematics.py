@@ -101,7 +101,6 @@ def inverse(
         raise InputError(
             "the branches have no names here",
             parameter="branch",
-            where=robot.name,
             came=branch,
             allowed="no branch: the answer nearest to the seed is taken",
             cure="Named branches need six turning joints with a closed form, and the whole orientation.",

@@ -18,7 +18,7 @@ import numpy as np
 
 from truearm.errors import InputError
 from truearm.identification.inclinometers.fit import SEAT, TILTING, tilting_parameters
-from truearm.identification.inclinometers.inclination import ENOUGH, change_derivatives, decided, readable
+from truearm.identification.inclinometers.inclination import DECIDING_MOMENTS, change_derivatives, decided, readable
 from truearm.measurement.inclinometer import Pairs
 from truearm.modeling.chain import Array
 from truearm.modeling.postures import Postures
@@ -127,7 +127,7 @@ def _chosen(candidates: Pairs, rows: Array, count: int, known: Array, interest: 
             "hardly any posture decides to which side the joints lean",
             where="postures to compare",
             came=f"{len(telling)} of {len(rows)} pairs that can be used",
-            allowed=f"{ENOUGH}, in {count} pairs",
+            allowed=f"{DECIDING_MOMENTS}, in {count} pairs",
             cure="Give a larger force, or a payload beside the last axis.",
         )
     chosen = telling[most_telling(rows[telling], count, known, OfInterest(interest))]

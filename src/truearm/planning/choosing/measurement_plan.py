@@ -5,12 +5,12 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.errors import InputError
+from truearm.errors import InputError, did_you_mean
 from truearm.identification.solving.models import Model
 from truearm.identification.solving.redundancy import gauge_freedoms
 from truearm.identification.start_values.frames import initial_frames
@@ -91,30 +91,6 @@ class MeasurementPlan:
     prediction: Prediction
     reads: tuple[str, ...] = ()
     fixtures: Mapping[str, Array] = field(default_factory=dict)
-
-    def summary(self) -> dict[str, Any]:
-        """Return the figures as ``--json`` prints them: errors in mm."""
-        told = self.prediction
-        return {
-            "poses": len(self.joints),
-            "objective": self.objective,
-            "indices": dict(self.indices),
-            "candidates": self.candidates,
-            "usable": self.usable,
-            "rejected": dict(self.rejected),
-            "left_out": list(self.left_out),
-            **({"fixtures_mm": {n: (1e3 * p).tolist() for n, p in self.fixtures.items()}} if self.fixtures else {}),
-            "seconds": self.seconds,
-            "prediction": {
-                "floor_mm": told.floor * 1e3,
-                "planned_mm": told.planned * 1e3,
-                "enough": told.enough,
-                "by_number": [
-                    {"poses": int(n), "chosen_mm": c * 1e3, "random_mm": r * 1e3}
-                    for n, c, r in zip(told.numbers, told.chosen.tolist(), told.random.tolist(), strict=True)
-                ],
-            },
-        }
 
 
 def with_targets(robot: Robot, data: Dataset | None = None) -> Robot:
@@ -220,14 +196,18 @@ def plan_measurements(
     """
     if objective not in INDICES:
         raise InputError(
-            "there is no objective of this name", where="--objective", came=objective, allowed=", ".join(INDICES)
+            "there is no objective of this name",
+            parameter="objective",
+            came=objective,
+            allowed=", ".join(INDICES),
+            cure=did_you_mean(objective, INDICES),
         )
     if poses is None and objective != "O1":
         raise InputError(
             "only O1 weighs the number of poses",
-            where="--poses",
-            came=f"auto with --objective {objective}",
-            cure="Name a number of poses, or use --objective O1.",
+            parameter="poses",
+            came=f"auto, and the objective {objective}",
+            cure="Name a number of poses, or use `objective=O1`.",
         )
     seen = model.prepared(robot)
     kept = allowed(seen, candidates, constraints, where, seen_from_the_origin=seen_from_the_origin)
@@ -247,7 +227,7 @@ def plan_measurements(
     if poses is not None and poses * rows.shape[1] < len(among):
         raise InputError(
             "there are fewer equations than parameters",
-            where="--poses",
+            parameter="poses",
             came=poses,
             allowed=f"{-(-len(among) // rows.shape[1])} or more for the model {model.name}, or auto",
         )
@@ -308,15 +288,13 @@ def _before(robot: Robot, joints: Array) -> Array:
 
 def _refuse_too_few(needed: int, usable: int, candidates: int, rejected: Mapping[str, int]) -> None:
     if needed < 1:
-        raise InputError("at least one pose is needed", where="--poses", came=needed, allowed="1 or more, or auto")
+        raise InputError("at least one pose is needed", parameter="poses", came=needed, allowed="1 or more, or auto")
     if usable < needed:
         cost = ", ".join(f"{name} {count}" for name, count in rejected.items() if count)
         raise InputError(
             "too few configurations are left to choose from",
-            where="candidates",
+            parameter="candidates",
             came=f"{usable} of {candidates} usable" + (f"; rejected by {cost}" if cost else ""),
             allowed=f"{needed} or more",
-            cure="Widen the constraint that costs most, or give more --candidates."
-            if cost
-            else "Give more candidates.",
+            cure="Widen the constraint that costs most, or give more candidates." if cost else "Give more candidates.",
         )

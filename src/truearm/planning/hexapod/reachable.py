@@ -94,7 +94,7 @@ def reachable(
     """
     for begin in branches:
         if not any(branch.startswith(begin) for branch in BRANCHES):
-            raise InputError("there is no such branch", where="branches", came=begin, allowed=", ".join(BRANCHES))
+            raise InputError("there is no such branch", parameter="branches", came=begin, allowed=", ".join(BRANCHES))
     turned = fixture.rotation
     position = np.array([turned @ pose.position for pose in wanted]) + np.array(fixture.translation)
     rotation = np.array([turned @ pose.rotation for pose in wanted])
@@ -117,7 +117,7 @@ def reachable(
     if not kept.any():
         raise InputError(
             f"{robot.name} can take none of the {len(wanted)} poses with the fixture at this place",
-            where="fixture",
+            parameter="fixture",
             came=", ".join(f"{count} {reason}" for reason, count in left_out.items()),
             cure="Move the fixture; it is given in the robot's base frame.",
         )

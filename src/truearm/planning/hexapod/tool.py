@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from truearm.errors import InputError
+from truearm.errors import InputError, did_you_mean
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import NO_PAYLOAD, Payload
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY
+from truearm.notices import counted
 
 
 def with_cups(robot: Robot, tool: str | None = None) -> tuple[Robot, Array]:
@@ -39,7 +40,11 @@ def with_cups(robot: Robot, tool: str | None = None) -> tuple[Robot, Array]:
     if tool is not None or not robot.targets:
         if tool is not None and tool not in robot.tools:
             raise InputError(
-                "the robot has no such tool", where=robot.name, came=tool, allowed=", ".join(robot.tools) or "none"
+                "the robot has no such tool",
+                where=robot.name,
+                came=tool,
+                allowed=", ".join(robot.tools) or "none",
+                cure=did_you_mean(tool, robot.tools),
             )
         if robot.tools:
             chosen = robot.tools[tool] if tool is not None else next(iter(robot.tools.values()))
@@ -50,7 +55,7 @@ def with_cups(robot: Robot, tool: str | None = None) -> tuple[Robot, Array]:
         raise InputError(
             "the device needs a tool with three cups",
             where=robot.name,
-            came=f"{len(robot.targets)} targets",
+            came=counted(len(robot.targets), "target"),
             cure="Describe the tool under 'tools' in the robot file, its cups as three targets.",
         )
     values = robot.values

@@ -28,6 +28,7 @@ from truearm.modeling.inverse.turns import beyond_limits
 from truearm.modeling.postures import Postures, approach_of
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import rotation_vector
+from truearm.notices import counted
 from truearm.planning.paths.trajectory import Trajectory
 from truearm.planning.poses.tip import Tip
 from truearm.units import SHOWN_AS, from_si
@@ -127,7 +128,7 @@ class _Follower:
             raise InputError(
                 "the arm has too few joints to keep this orientation along a path",
                 where=robot.name,
-                came=f"{len(robot.joints)} joints, orientation '{orientation}'",
+                came=f"{counted(len(robot.joints), 'joint')}, orientation '{orientation}'",
                 cure="Let the orientation be free, or keep the axis alone.",
             )
 
@@ -255,7 +256,7 @@ class _Follower:
 def _checked(trajectory: Trajectory) -> Trajectory:
     count = len(trajectory.time)
     if count == 0 or not (np.isfinite(trajectory.time).all() and (np.diff(trajectory.time) > 0).all()):
-        raise InputError("times do not rise, or there are none", where="trajectory", came=f"{count} samples")
+        raise InputError("times do not rise, or there are none", where="trajectory", came=counted(count, "sample"))
     for name in ("position", "velocity", "acceleration"):
         values = getattr(trajectory, name)
         if values.shape != (count, 3) or not np.isfinite(values).all():

@@ -54,7 +54,7 @@ class SevenLines:
         return slice(first, first + self.poses_each)
 
     def joints(self, robot: Robot) -> Array:
-        """Return the nominal robot's joint readings ``(7 k, joints)``.
+        """Return the nominal robot's joint positions ``(7 k, joints)``.
 
         Raises
         ------
@@ -62,13 +62,13 @@ class SevenLines:
             If it cannot go to one of the poses, with its label.
         """
         rotation = np.broadcast_to(self.rotation, (len(self.position), 3, 3))
-        return readings(inverse(robot, self.position, rotation, seed=self._seed(robot)), self.labels, "line test")
+        return usable_joints(inverse(robot, self.position, rotation, seed=self._seed(robot)), self.labels, "line test")
 
     def _seed(self, robot: Robot) -> Array:
-        """Return readings at the middle of the box, near which all others shall lie."""
+        """Return joint positions at the middle of the box, near which all others shall lie."""
         middle = self.position.mean(axis=0)
         found = inverse(robot, middle[None], self.rotation[None])
-        return np.asarray(readings(found, ("the middle of the box",), "line test")[0])
+        return np.asarray(usable_joints(found, ("the middle of the box",), "line test")[0])
 
 
 def seven_lines(centre: ArrayLike, size: ArrayLike, poses_each: int = POSES_EACH, rotation: Array = DOWN) -> SevenLines:
@@ -99,8 +99,8 @@ def seven_lines(centre: ArrayLike, size: ArrayLike, poses_each: int = POSES_EACH
     return SevenLines(np.concatenate(lines), rotation, labels)
 
 
-def readings(solutions: JointSolutions, labels: tuple[str, ...], where: str) -> Array:
-    """Return the joint readings of solutions, one a pose, or refuse the first that cannot be gone to."""
+def usable_joints(solutions: JointSolutions, labels: tuple[str, ...], where: str) -> Array:
+    """Return the joint positions of solutions, one a pose, or refuse the first that cannot be gone to."""
     for row, status in enumerate(solutions.status):
         if not status.usable:
             raise InputError(

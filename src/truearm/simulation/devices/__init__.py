@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from truearm.errors import InputError, nearest_names
+from truearm.errors import InputError, did_you_mean
 from truearm.simulation.devices.artefacts import MARKERS, PLANAR_ARTEFACT, SPATIAL_ARTEFACT
 from truearm.simulation.devices.device import Arm, Device, measured_with, stationed_for
 from truearm.simulation.devices.hexapod_poses import HEXAPOD
@@ -50,11 +50,10 @@ def named_device(name: str) -> Device:
     known = {device.name: device for device in DEVICES}
     if name in known:
         return known[name]
-    near = nearest_names(name, known)
     raise InputError(
         "there is no device of this name",
-        where="device",
+        parameter="device",
         came=name,
         allowed=", ".join(known),
-        cure=f"Did you mean {' or '.join(near)}?" if near else None,
+        cure=did_you_mean(name, known),
     )

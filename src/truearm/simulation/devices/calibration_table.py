@@ -18,6 +18,7 @@ from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY, Transform
+from truearm.notices import counted
 from truearm.simulation.twin import Conditions, Twin, directions
 
 #: The ball joint of the document's table turns no further about the roll axis; about the pitch axis it is free [rad].
@@ -122,12 +123,13 @@ class CalibrationTable:
             raise InputError(
                 "one target touches the table: the tip",
                 where=robot.name,
-                came=f"{len(robot.targets)} targets",
+                came=counted(len(robot.targets), "target"),
                 allowed="1",
             )
         n = len(self.points)
         wanted = self.in_world + rng.normal(0.0, 1.0, (n, 3)) * noise
         q = np.tile(np.asarray(start, float), (n, 1))
+        conditions.setdefault("number", np.arange(float(n)))
         if "approach" not in conditions:
             conditions["approach"] = np.zeros(q.shape)
             if any(truth.hysteresis for truth in twin.joints.values()):
@@ -145,7 +147,7 @@ class CalibrationTable:
             position=self.points,
             sigma=np.full(n, noise) if noise > 0 else None,
             approach=conditions["approach"],
-            number=np.arange(float(n)),
+            number=conditions["number"],
             temperature=conditions.get("temperature"),
             wrench=conditions.get("wrench"),
         )

@@ -16,6 +16,7 @@ from truearm.modeling.chain import Array
 from truearm.modeling.parts import Tool
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform, rigid_motion
+from truearm.notices import counted
 from truearm.simulation.truths import DEFAULT_TOOL, stationed
 from truearm.simulation.twin import Twin, directions
 
@@ -26,14 +27,28 @@ _TRIED: Final = 100
 
 
 class Arm(Protocol):
-    """What is measured: a twin, or a robot taken at its word."""
+    """What is measured, configuration by configuration: a twin, or a robot taken at its word."""
 
     @property
     def robot(self) -> Robot:
         """Its targets by name."""
 
     def frames(self, joints: Array) -> Mapping[str, Array]:
-        """Return ``T_world_target`` ``(n, 4, 4)`` of every target at joint readings ``(n, joints)``."""
+        """Return ``T_world_target`` ``(n, 4, 4)`` of every target at joints ``(n, joints)``, in measuring order."""
+
+
+@dataclass(frozen=True)
+class _InOrder:
+    """A twin as a campaign meets it: it comes to the first configuration as cold as it is before any."""
+
+    twin: Twin
+
+    @property
+    def robot(self) -> Robot:
+        return self.twin.robot
+
+    def frames(self, joints: Array) -> Mapping[str, Array]:
+        return self.twin.frames(joints, number=np.arange(float(len(joints))))
 
 
 @dataclass(frozen=True)
@@ -108,7 +123,7 @@ def measured_with(
         raise InputError(
             "a campaign needs configurations, and a deviation is not negative",
             where=device.name,
-            came=f"{count} configurations, deviation {sigma}",
+            came=f"{counted(count, 'configuration')}, deviation {sigma}",
             allowed="1 configuration or more, deviation 0 or more",
         )
     if device.tool is not None:
@@ -117,7 +132,7 @@ def measured_with(
     values = twin.robot.values
     places = {t.name: [values[t.parameter(axis)] for axis in "xyz"] for t in twin.robot.targets}
     standing = nominal.with_frames(_where_it_stands(nominal, twin.robot), places)
-    return device.campaign(standing, twin, count, device.sigma if sigma is None else sigma, rng)
+    return device.campaign(standing, _InOrder(twin), count, device.sigma if sigma is None else sigma, rng)
 
 
 def stationed_for(device: Device, robot: Robot) -> Robot:
@@ -219,10 +234,10 @@ def shown(
             return np.concatenate(found)[:count], np.concatenate(seen)[:count]
     raise InputError(
         f"{what} sees too few configurations of {nominal.name}",
-        where="device",
+        parameter="device",
         came=f"{sum(map(len, found))} among {_DRAWN * _DRAWS} within the limits",
         allowed=f"{count} or more",
-        cure="Take fewer poses, or another device.",
+        cure="Lower `poses`, or take another device.",
     )
 
 

@@ -63,9 +63,11 @@ class HexapodPoses(Device):
                 where=self.name,
                 came=f"{len(kept)} of {len(order)} tried, at {len(origins)} places of the fixture",
                 allowed=f"{count} or more",
-                cure="Take fewer poses.",
+                cure="Lower `poses`.",
             )
-        at, seen, place = at[kept], seen[kept], place_of[order][kept]
+        at, place = at[kept], place_of[order][kept]
+        frames = arm.frames(at)  # once more: what depends on the order depends on that of the poses taken
+        seen = np.stack([frames[name][:, :3, 3] for name in names], axis=1)
         pose = [wanted[k] for k in pose_of[order][kept]]
         cups = (seen - np.array(base.translation)) @ turned - origins[place][:, None]
         feet, bar = triangle([DEVICE.base] * 3, "B"), sigma / _CUP * rng.standard_normal((count, 6))

@@ -1,0 +1,39 @@
+"""Measurements from any table of points."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from truearm.files import write_text
+from truearm.jobs.arguments import file_for, path_argument, refusals_of
+from truearm.measurement.readers.canonical import csv_text
+from truearm.measurement.readers.table import files_read, read_table
+from truearm.results.imported import Imported
+
+
+def import_table(file: str | Path, mapping: str | Path, *, out: str | Path | None = None) -> Imported:
+    """Read any table of points, by a mapping that says which column is what.
+
+    Parameters
+    ----------
+    file
+        A CSV or SpatialAnalyzer ASCII file.
+    mapping
+        Mapping file, schema ``truearm-mapping/1``.
+    out
+        Canonical CSV file to write; None writes nothing.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be used; the message names the line and the column.
+    """
+    table, columns = path_argument(file, "file"), path_argument(mapping, "mapping")
+    with refusals_of("mapping"):
+        read = files_read(table, columns)
+    target = None if out is None else file_for(out, *read)
+    with refusals_of("file"):
+        data = read_table(table, columns)
+    if target is not None:
+        write_text(target, csv_text(data))
+    return Imported(data, target)

@@ -1,0 +1,131 @@
+"""The joints that bring a robot to poses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from truearm.errors import InputError
+from truearm.files import write_text
+from truearm.jobs.arguments import (
+    array_argument,
+    choice_argument,
+    file_for,
+    gravity_argument,
+    path_argument,
+    payload_argument,
+    refusals_of,
+    robot_argument,
+    wrong_kind,
+)
+from truearm.measurement.readers.poses import read_poses
+from truearm.modeling.chain import Array
+from truearm.modeling.formats.joint_table import joints_csv
+from truearm.modeling.frames import Frame
+from truearm.modeling.inverse import inverse as inverse_kinematics
+from truearm.modeling.inverse.pose_solver import Orientation
+from truearm.modeling.parts import Payload
+from truearm.modeling.robot import Robot
+from truearm.modeling.transform import rotation_from_quaternion
+from truearm.results.joint_table import JointTable
+
+
+def inverse(
+    robot: Robot | str | Path,
+    poses: Array | str | Path,
+    rotations: Array | None = None,
+    *,
+    out: str | Path | None = None,
+    branch: str | None = None,
+    seed: Array | Sequence[float] | None = None,
+    target: str | None = None,
+    frame: Frame = "base",
+    orientation: Orientation = "full",
+    payload: Payload | str | None = None,
+    gravity: Sequence[float] | None = None,
+) -> JointTable:
+    """Find the joints that bring a robot to poses, with its calibration and joint effects.
+
+    The arm is at rest; what depends on the way it came, on temperature or on an external force is left out.
+
+    Parameters
+    ----------
+    robot
+        A robot, or what :func:`truearm.load_robot` takes.
+    poses
+        Positions [m], ``(n, 3)``, or a CSV file with the columns pose, x [mm], y [mm], z [mm], and qw, qx, qy, qz.
+    rotations
+        Rotation matrices, ``(n, 3, 3)``; None with a file, which has its own, or with ``orientation="free"``.
+    out
+        CSV file to write; None writes nothing.
+    branch
+        A branch by name, as ``front-up-noflip``; ``all``; or None for the one nearest to the seed within the limits.
+    seed
+        Joint positions ``(joints,)`` or ``(n, joints)`` [rad; m for prismatic joints] near which the answer shall lie;
+        zero if None.
+    target
+        Name of the target that shall be there; the flange if None.
+    frame
+        What the poses are given in: ``base``, the robot's base, or ``world``, the instrument's frame.
+    orientation
+        ``full``; ``axis`` if only the direction of the z axis counts; ``free`` if only the position does.
+    payload, gravity
+        What the robot carries (an object, or a text such as ``2.7kg,50mm,25mm,100mm``) and free fall in its base frame
+        [m/s^2]; None for what its file says.
+
+    Raises
+    ------
+    InputError
+        For anything that cannot be used, with a message that says what to do.
+    """
+    file = None if out is None else file_for(out, robot, poses)
+    choice_argument(frame, "frame", dict.fromkeys(("base", "world")))
+    choice_argument(orientation, "orientation", dict.fromkeys(("full", "axis", "free")))
+    arm = robot_argument(robot).with_payload(payload_argument(payload), gravity_argument(gravity))
+    if target is not None:
+        choice_argument(target, "target", {known.name: known for known in arm.targets})
+    if branch is not None and not isinstance(branch, str):
+        raise wrong_kind("the name of a branch belongs here", branch, "branch", "front-up-noflip, for example, or all")
+    labels, positions, turned = _poses(poses, rotations)
+    if turned is None and orientation != "free":
+        given = isinstance(poses, str | Path)
+        raise InputError(
+            "the poses have no orientation",
+            parameter="poses" if given else "rotations",
+            where=str(poses) if given else None,
+            allowed="the columns qw, qx, qy, qz" if given else "rotation matrices, (n, 3, 3)",
+            cure="Add them, or say `orientation=free`.",
+        )
+    near = None
+    if seed is not None:
+        many = isinstance(seed, Sequence) or getattr(seed, "ndim", 1) == 1
+        shape = (len(arm.joints),) if many else (len(positions), len(arm.joints))
+        near = array_argument(seed, "seed", shape, f"{len(arm.joints)} numbers, one for each joint of {arm.name}")
+    with refusals_of("robot"):
+        solutions = inverse_kinematics(
+            arm, positions, turned, target=target, frame=frame, branch=branch, seed=near, orientation=orientation
+        )
+    if file is not None:
+        write_text(file, joints_csv(solutions, labels, arm.joints))
+    return JointTable(labels, solutions)
+
+
+def _poses(poses: object, rotations: object) -> tuple[tuple[str, ...], Array, Array | None]:
+    """Return names, positions and rotations of poses from a file or from arrays."""
+    if isinstance(poses, str | Path):
+        with refusals_of("poses"):
+            read = read_poses(path_argument(poses, "poses"))
+        if rotations is not None:
+            raise InputError(
+                "the file says how the poses are turned",
+                parameter="rotations",
+                cure="Leave `rotations` out, or give positions.",
+            )
+        turned = None if read.quaternion is None else rotation_from_quaternion(read.quaternion)
+        return read.labels, read.position, turned
+    positions = array_argument(poses, "poses", (None, 3), "positions in m, (n, 3), or a CSV file")
+    labels = tuple(str(number + 1) for number in range(len(positions)))
+    if rotations is None:
+        return labels, positions, None
+    allowed = f"rotation matrices, ({len(positions)}, 3, 3)"
+    return labels, positions, array_argument(rotations, "rotations", (len(positions), 3, 3), allowed)

@@ -1,0 +1,197 @@
+"""Which configurations to measure for a calibration."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Final, Literal
+
+import numpy as np
+
+from truearm.errors import InputError
+from truearm.identification.solving.models import MODELS
+from truearm.jobs.arguments import (
+    choice_argument,
+    data_argument,
+    deviation_argument,
+    device_argument,
+    file_for,
+    gravity_argument,
+    kind_of,
+    path_argument,
+    payload_argument,
+    python_call,
+    refusals_of,
+    robot_argument,
+    whole_argument,
+)
+from truearm.measurement.checks import check_joints
+from truearm.measurement.dataset import Dataset
+from truearm.modeling.parts import Payload
+from truearm.modeling.robot import Robot
+from truearm.planning.choosing.measurement_plan import (
+    device_candidates,
+    plan_measurements,
+    random_candidates,
+    with_targets,
+)
+from truearm.planning.choosing.observability import INDICES
+from truearm.planning.constraints.constraints import Constraints, read_constraints
+from truearm.results.plan import Plan
+
+_PAGE: Final = ".html"
+
+
+def plan(
+    robot: Robot | str | Path,
+    *,
+    poses: int | Literal["auto"],
+    out: str | Path | None = None,
+    candidates_from: Dataset | str | Path | None = None,
+    objective: str = "O1",
+    model: str = "geometric",
+    candidates: int = 5000,
+    device: str | None = None,
+    constraints: Constraints | str | Path | None = None,
+    noise: float = 1e-4,
+    seed: int = 0,
+    payload: Payload | str | None = None,
+    gravity: Sequence[float] | None = None,
+    command: str | None = None,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Plan:
+    """Choose the configurations that tell most, in measuring order, and say how accurate the result will be.
+
+    Parameters
+    ----------
+    robot
+        Nominal or calibrated, or what :func:`truearm.load_robot` takes. Derivatives are taken at its parameter values.
+    poses
+        How many configurations to choose; ``auto`` lets O1 decide.
+    out
+        CSV file to write, and a page beside it; None writes nothing, see :meth:`Plan.save`.
+    candidates_from
+        Readings, or a canonical CSV file, among whose configurations to choose; None draws them within the limits.
+    objective
+        ``O1`` to ``O5``.
+    model
+        What will be identified, one of :data:`truearm.identification.solving.models.MODELS` by name.
+    candidates
+        How many configurations to draw, where none are given.
+    device
+        Name of the instrument, of ``truearm.devices()``, which finds configurations itself; None for one that reads
+        every target everywhere.
+    constraints
+        What a configuration must keep besides the robot's limits, or a constraints file.
+    noise
+        Standard deviation of a coordinate about a well identified model [m].
+    seed
+        Of the random configurations and of the prediction.
+    payload, gravity
+        What the robot carries (an object, or a text such as ``2.7kg,50mm,25mm,100mm``) and free fall in its base frame
+        [m/s^2].
+    command
+        How to run it again, for the page; None writes the call in Python.
+    progress
+        Called with a few words at each step.
+
+    Raises
+    ------
+    InputError
+        For anything that cannot be used, with a message that says what to do.
+    """
+    told = command or python_call(
+        "plan",
+        robot,
+        poses=poses,
+        candidates_from=candidates_from,
+        objective=objective,
+        model=model,
+        candidates=candidates,
+        device=device,
+        constraints=constraints,
+        noise=noise,
+        seed=seed,
+        payload=payload,
+        gravity=gravity,
+    )
+    table = None if out is None else _files(out, robot, candidates_from, constraints)
+    count = _count(poses)
+    choice_argument(objective, "objective", {name: name for name in INDICES})
+    wanted = choice_argument(model, "model", {m.name: m for m in MODELS})
+    deviation = deviation_argument(noise, "noise")
+    number = whole_argument(candidates, "candidates", 1)
+    rng = np.random.default_rng(whole_argument(seed, "seed"))
+    if device is not None and candidates_from is not None:
+        raise InputError(
+            "a device finds its own configurations to choose from",
+            parameter="device, candidates_from",
+            came=f"{device} and {_named(candidates_from)}",
+            cure="Leave one of them out; `constraints` narrows the choice.",
+        )
+    instrument = None if device is None else device_argument(device)
+    rules = _rules(constraints)
+    progress("reading the robot")
+    carrying = robot_argument(robot).with_payload(payload_argument(payload), gravity_argument(gravity))
+    labels, readings, own = None, None, bool(carrying.targets)
+    if instrument is not None:
+        seen, readings, choice = device_candidates(carrying, instrument, number, rng)
+        own = True
+    elif candidates_from is None:
+        seen = with_targets(carrying)
+        choice = random_candidates(seen, number, rng)
+    else:
+        data = data_argument(candidates_from, "candidates_from")
+        check_joints(carrying, data)
+        seen, choice, labels = with_targets(carrying, data), data.postures, data.labels
+        own = own or bool(data.has_position.any())
+    progress(f"choosing among {len(choice)} configurations")
+    made = plan_measurements(
+        seen,
+        choice,
+        wanted,
+        poses=count,
+        rng=rng,
+        objective=objective,
+        noise=deviation,
+        labels=labels,
+        constraints=rules,
+        where=str(constraints) if isinstance(constraints, str | Path) else "constraints",
+        seen_from_the_origin=own,
+        readings=readings,
+    )
+    planned = Plan(made, told)
+    if table is not None:
+        progress("writing the files")
+        planned.save(table)
+    return planned
+
+
+def _files(out: object, *read: object) -> Path:
+    """Return where the plan shall be written, with room for its page beside it."""
+    table = file_for(out, *read)
+    if table.suffix == _PAGE:
+        raise InputError("the plan is a CSV file", parameter="out", came=table.name, allowed="PLAN.csv")
+    file_for(table.with_suffix(_PAGE), *read)
+    return table
+
+
+def _rules(constraints: object) -> Constraints | None:
+    if constraints is None or isinstance(constraints, Constraints):
+        return constraints
+    with refusals_of("constraints"):
+        return read_constraints(path_argument(constraints, "constraints"))
+
+
+def _count(poses: object) -> int | None:
+    if poses == "auto":
+        return None
+    if isinstance(poses, str):
+        raise InputError(
+            "a number of poses belongs here", parameter="poses", came=poses, allowed="a whole number, or auto"
+        )
+    return whole_argument(poses, "poses", 1)
+
+
+def _named(data: object) -> str:
+    return str(data) if isinstance(data, str | Path) else kind_of(data)

@@ -1,0 +1,107 @@
+"""What an instrument would read of a robot whose truth is known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from truearm.errors import InputError
+from truearm.files import write_text
+from truearm.jobs.arguments import (
+    deviation_argument,
+    device_argument,
+    file_for,
+    gravity_argument,
+    number_argument,
+    path_argument,
+    payload_argument,
+    refusals_of,
+    robot_argument,
+    whole_argument,
+    wrong_kind,
+)
+from truearm.measurement.readers.canonical import csv_text
+from truearm.modeling.parts import Payload
+from truearm.modeling.robot import Robot
+from truearm.results.simulation import Simulation
+from truearm.simulation.devices import measured_with
+from truearm.simulation.truths import truth_twin
+from truearm.simulation.twin import measure
+
+
+def simulate(
+    robot: Robot | str | Path,
+    *,
+    truth: Robot | str | Path,
+    poses: int,
+    out: str | Path | None = None,
+    noise: float | None = None,
+    device: str | None = None,
+    seed: int = 0,
+    payload: Payload | str | None = None,
+    gravity: Sequence[float] | None = None,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Simulation:
+    """Measure a digital twin whose truth is known, with a simulated instrument.
+
+    Configurations are measured in their order: what depends on the way the arm came, or on how long it has been moving,
+    follows from it.
+
+    Parameters
+    ----------
+    robot
+        The nominal robot, or what :func:`truearm.load_robot` takes.
+    truth
+        ``nominal``; ``random``, geometry and joint zeros drawn from their priors; the name of a truth in the robot's
+        file; or another robot or its file, with its own base and targets if it has targets.
+    poses
+        How many configurations, drawn evenly within the limits.
+    out
+        Canonical CSV file to write; None writes nothing.
+    noise
+        Standard deviation of a reading [m], 0 for none; None for what the device is good for.
+    device
+        Name of the instrument, of ``truearm.devices()``; None for one that sees every target everywhere.
+    seed
+        Of configurations, noise and a random truth.
+    payload, gravity
+        What the robot truly carries (an object, or a text such as ``2.7kg,50mm,25mm,100mm``) and free fall in its base
+        frame [m/s^2]; None for what its file says.
+    progress
+        Called with a few words at each step.
+
+    Raises
+    ------
+    InputError
+        For anything that cannot be used, with a message that says what to do.
+    """
+    if noise is None and device is None:
+        raise InputError(
+            "nobody knows how good the instrument is", parameter="noise", cure="Give `noise`, or a `device`."
+        )
+    instrument = None if device is None else device_argument(device)
+    sigma = 0.0 if instrument is None else instrument.sigma
+    if noise is not None:
+        sigma = deviation_argument(noise, "noise") if number_argument(noise, "noise", 0.0) else 0.0
+    count = whole_argument(poses, "poses", 1)
+    if not isinstance(truth, Robot):
+        if not isinstance(truth, str | Path):
+            raise wrong_kind("a truth belongs here", truth, "truth", "nominal, random, a truth's name, or a robot")
+        path_argument(truth, "truth")
+    file = None if out is None else file_for(out, robot, truth)
+    rng = np.random.default_rng(whole_argument(seed, "seed"))
+    nominal = robot_argument(robot)
+    with refusals_of("truth"):
+        twin = truth_twin(nominal, truth, rng)
+    twin = replace(twin, robot=twin.robot.with_payload(payload_argument(payload), gravity_argument(gravity)))
+    progress(f"measuring {count} configurations")
+    if instrument is None:
+        data = measure(twin, nominal.random_configurations(count, rng), sigma, rng)
+    else:
+        data = measured_with(instrument, nominal, twin, count, rng, sigma)
+    if file is not None:
+        write_text(file, csv_text(data))
+    return Simulation(nominal.name, truth.name if isinstance(truth, Robot) else str(truth), data, file)

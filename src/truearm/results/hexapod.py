@@ -1,0 +1,259 @@
+"""What is found with the hexapod device: its poses, how well it measures, cups, plans, and the base fixture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from truearm.files import write_text
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.hexapod.geometry import Design, side_names
+from truearm.measurement.hexapod.poses import HexapodPose
+from truearm.measurement.hexapod.sheet import sheet_csv
+from truearm.measurement.hexapod.uncertainty import CupUncertainty
+from truearm.measurement.hexapod.world_frame import WorldFrame
+from truearm.measurement.readers.canonical import csv_text
+from truearm.modeling.chain import Array
+from truearm.modeling.robot import Robot
+from truearm.planning.hexapod.reachable import Reachable
+from truearm.planning.hexapod.steps import steps_text
+from truearm.results.record import Record
+
+_CUPS: Final = ("t1", "t2", "t3")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class HexapodPoses(Record):
+    """Designs, assemblies and poses of the device.
+
+    Attributes
+    ----------
+    designs, assemblies
+        How many there are.
+    poses
+        Those that can be measured, by their number.
+    distinct
+        Those of them that are left without near-equal ones.
+    near_equal
+        Numbers of poses that teach much the same, in pairs.
+    """
+
+    designs: int
+    assemblies: int
+    poses: tuple[HexapodPose, ...]
+    distinct: tuple[HexapodPose, ...]
+    near_equal: tuple[tuple[int, int], ...]
+
+    def summary(self) -> dict[str, Any]:
+        """Return it as JSON holds it."""
+        return {
+            "designs": self.designs,
+            "assemblies": self.assemblies,
+            "poses": len(self.poses),
+            "distinct": len(self.distinct),
+            "near_equal": [list(pair) for pair in self.near_equal],
+        }
+
+    def lines(self) -> list[str]:
+        """Return what the command prints."""
+        return [
+            f"{self.designs} designs, {self.assemblies} assemblies above the base",
+            f"{len(self.poses)} poses with the flange beyond the tool's plane, {len(self.distinct)} distinct",
+            f"Nearer than 30 deg and 50 mm: {', '.join(f'{a}-{b}' for a, b in self.near_equal)}",
+        ]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class HexapodUncertainty(Record):
+    """How well the tool's cups are known, in standard deviations of one length.
+
+    Attributes
+    ----------
+    solutions
+        Propagated, for each of the four ways to assemble a design.
+    drawn
+        The same by Monte Carlo: T1, T2, T3 of each solution.
+    """
+
+    solutions: tuple[CupUncertainty, ...]
+    drawn: tuple[tuple[float, float, float], ...]
+
+    def summary(self) -> dict[str, Any]:
+        """Return it as JSON holds it."""
+        return {
+            "solutions": [
+                {
+                    **dict(zip(_CUPS, found.norms, strict=True)),
+                    "t3_as_printed": float(np.linalg.norm(found.third_as_printed)),
+                }
+                for found in self.solutions
+            ],
+            "monte_carlo": [dict(zip(_CUPS, drawn, strict=True)) for drawn in self.drawn],
+        }
+
+    def lines(self) -> list[str]:
+        """Return what the command prints."""
+        said = self.summary()
+        text = ["solution     t1     t2     t3   t3 as printed   Monte Carlo: t1     t2     t3   [sigma]"]
+        for number, (row, again) in enumerate(zip(said["solutions"], said["monte_carlo"], strict=True), 1):
+            figures = "  ".join(f"{row[name]:5.3f}" for name in _CUPS)
+            checks = "  ".join(f"{again[name]:5.3f}" for name in _CUPS)
+            text.append(f"{number:8}  {figures}  {row['t3_as_printed']:14.3f}  {checks:>32}")
+        return text
+
+
+@dataclass(frozen=True, eq=False)
+class SolvedPose:
+    """The tool's cups at one pose.
+
+    Attributes
+    ----------
+    configuration
+        Its label; empty without a sheet.
+    design, solution
+        Which legs were measured, and how they are assembled.
+    cups
+        T1, T2, T3 in the frame of the base fixture [m], ``(3, 3)``.
+    """
+
+    configuration: str
+    design: Design
+    solution: int
+    cups: Array
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class HexapodSolution(Record):
+    """The tool's cups, from lengths.
+
+    Attributes
+    ----------
+    poses
+        One for each configuration with six measured legs.
+    left_out
+        Labels of the configurations of which a leg is missing.
+    data
+        The cups as measurements of the robot; None without joint positions.
+    """
+
+    poses: tuple[SolvedPose, ...]
+    left_out: tuple[str, ...]
+    data: Dataset | None
+
+    def summary(self) -> dict[str, Any]:
+        """Return it as JSON holds it, in mm."""
+        entries = [
+            {
+                "configuration": pose.configuration,
+                "design": pose.design.name,
+                "solution": pose.solution,
+                "legs": list(pose.design.leg_names),
+                "cups_mm": (pose.cups * 1e3).tolist(),
+            }
+            for pose in self.poses
+        ]
+        return {"poses": entries, "left_out": list(self.left_out)}
+
+    def lines(self) -> list[str]:
+        """Return what the command prints."""
+        text = []
+        for pose in self.poses:
+            text.append(f"{pose.configuration or 'pose'}: design {pose.design.name}, solution {pose.solution}")
+            for cup, (x, y, z) in enumerate((pose.cups * 1e3).tolist(), 1):
+                text.append(f"  T{cup}  x {x:.4f}  y {y:.4f}  z {z:.4f} mm")
+        if self.left_out:
+            text.append(f"Left out, not all legs measured: {', '.join(self.left_out)}")
+        return text
+
+    def save(self, path: str | Path) -> None:
+        """Write the cups as a canonical CSV file, for ``truearm.calibrate``."""
+        if self.data is None:
+            raise ValueError("there are no joint positions, so this is no data")
+        write_text(Path(path), csv_text(self.data))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class HexapodPlan(Record):
+    """Which configurations of a robot can be measured with the base fixture at one place.
+
+    Attributes
+    ----------
+    robot
+        With the cups as its targets.
+    reachable
+        The configurations in their order, and what was left out.
+    """
+
+    robot: Robot
+    reachable: Reachable
+
+    def summary(self) -> dict[str, Any]:
+        """Return it as JSON holds it, in mm."""
+        found = self.reachable
+        return {
+            "poses": found.poses,
+            "poses_reached": found.poses_reached,
+            "configurations": len(found.rows),
+            "left_out": dict(found.left_out),
+            "smallest_room_mm": float(found.clearance.min()) * 1e3,
+        }
+
+    def lines(self) -> list[str]:
+        """Return what the command prints."""
+        said = self.summary()
+        left_out = ", ".join(f"{n} {why}" for why, n in said["left_out"].items())
+        return [
+            f"{said['poses_reached']} of {said['poses']} poses, {said['configurations']} configurations",
+            f"Left out: {left_out or 'nothing'}",
+            f"Smallest room between arm and bars: {said['smallest_room_mm']:.0f} mm",
+        ]
+
+    def sheet_text(self) -> str:
+        """Return the sheet to fill in, as CSV."""
+        return sheet_csv(self.reachable.rows, self.robot.joints)
+
+    def steps_text(self) -> str:
+        """Return the plan step by step, to print."""
+        return steps_text(self.reachable, self.robot)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class HexapodFrame(Record):
+    """Where the base fixture stands in the robot's base frame.
+
+    Attributes
+    ----------
+    found
+        The frame, what it would be without the measured distances, and what is left at the cups.
+    """
+
+    found: WorldFrame
+
+    def summary(self) -> dict[str, Any]:
+        """Return it as JSON holds it, in mm."""
+        found = self.found
+        return {
+            "position_mm": [value * 1e3 for value in found.frame.translation],
+            "quaternion": list(found.frame.quaternion),
+            "plain": {
+                "position_mm": [value * 1e3 for value in found.plain.translation],
+                "quaternion": list(found.plain.quaternion),
+            },
+            "distances_by_robot_mm": (found.seen * 1e3).tolist(),
+            "residuals_mm": (np.linalg.norm(found.residual, axis=1) * 1e3).tolist(),
+        }
+
+    def lines(self) -> list[str]:
+        """Return what the command prints."""
+        said = self.summary()
+        x, y, z = said["position_mm"]
+        seen = ", ".join(f"{n} {s:.3f}" for n, s in zip(side_names("B"), said["distances_by_robot_mm"], strict=True))
+        return [
+            f"Base fixture in the robot's base frame: x {x:.4f}  y {y:.4f}  z {z:.4f} mm",
+            "  quaternion {:.8f} {:.8f} {:.8f} {:.8f}".format(*said["quaternion"]),
+            f"Distances by the robot: {seen} mm",
+            "Left at the cups: {:.4f}, {:.4f}, {:.4f} mm".format(*said["residuals_mm"]),
+        ]

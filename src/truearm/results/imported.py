@@ -1,0 +1,89 @@
+"""Measurements that came from files of other programs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from truearm.measurement.dataset import Dataset
+from truearm.notices import counted
+from truearm.results.record import Record
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Imported(Record):
+    """Measurements that came from files of other programs.
+
+    Attributes
+    ----------
+    data
+        The measurements.
+    out
+        The canonical CSV file that holds them; None if none was written.
+    missing
+        How many readings are missing of each point, where the file has places for them.
+    """
+
+    data: Dataset
+    out: Path | None = None
+    missing: Mapping[str, int] = field(default_factory=dict)
+
+    def summary(self) -> dict[str, Any]:
+        """Return it as JSON holds it."""
+        return {
+            "configurations": self.data.configurations,
+            "targets": list(self.data.targets),
+            "missing": dict(self.missing),
+        }
+
+    def lines(self) -> list[str]:
+        """Return what was read."""
+        where = "" if self.out is None else f": {self.out}"
+        many = counted(self.data.configurations, "configuration")
+        text = [f"{many}, targets {', '.join(self.data.targets)}{where}"]
+        return text + [f"  {name}: {count} missing {_nouns('reading', count)}" for name, count in self.missing.items()]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ImportedCircles(Record):
+    """Circles that a robot drew, as distances and heights.
+
+    Attributes
+    ----------
+    data
+        The measurements.
+    pages
+        Names of the pages.
+    out
+        The canonical CSV file that holds them; None if none was written.
+    """
+
+    data: Dataset
+    pages: tuple[str, ...]
+    out: Path | None = None
+
+    @property
+    def gaps(self) -> int:
+        """How many distances are missing, where the line has gaps."""
+        return int(np.sum(~self.data.has_reading))
+
+    def summary(self) -> dict[str, Any]:
+        """Return it as JSON holds it."""
+        return {"configurations": self.data.configurations, "pages": list(self.pages), "missing": self.gaps}
+
+    def lines(self) -> list[str]:
+        """Return what was read."""
+        where = "" if self.out is None else f": {self.out}"
+        many = counted(self.data.configurations, "configuration")
+        text = [f"{many} on {counted(len(self.pages), 'page')}{where}"]
+        if self.gaps:
+            text.append(f"  {self.gaps} missing {_nouns('distance', self.gaps)}, where the line has gaps")
+        return text
+
+
+def _nouns(noun: str, count: int) -> str:
+    return noun if count == 1 else f"{noun}s"

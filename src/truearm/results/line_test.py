@@ -1,0 +1,92 @@
+"""A line test: the poses, the joint positions that reach them, and the errors found there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from truearm.files import write_text
+from truearm.modeling.chain import Array
+from truearm.modeling.robot import Robot
+from truearm.planning.poses.seven_lines import DIRECTIONS, SevenLines
+from truearm.results.record import Record
+from truearm.units import from_si
+from truearm.validation.line_test import LineErrors, reduction
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LineTest(Record):
+    """A line test of a robot.
+
+    Attributes
+    ----------
+    robot
+        The nominal robot.
+    poses
+        The poses, line after line.
+    joints
+        Joint positions to command, ``(7 k, joints)`` [rad or m].
+    compensated
+        Whether `joints` are compensated for joint errors.
+    before
+        Errors without compensation; None where nothing was measured and no truth was named.
+    after
+        Errors with compensation; None where it was not tried.
+    """
+
+    robot: Robot
+    poses: SevenLines
+    joints: Array
+    compensated: bool
+    before: LineErrors | None
+    after: LineErrors | None
+
+    def summary(self) -> dict[str, Any]:
+        """Return it as JSON holds it, in mm."""
+        return {"poses": len(self.poses.labels), "lines": self._errors()}
+
+    def lines(self) -> list[str]:
+        """Return what the command prints: one line of text for each line of poses."""
+        text = []
+        for row in self._errors():
+            before = row["before_mm"]
+            words = f"{row['direction']:<4} mean {before['mean']:.3f}  max {before['max']:.3f} mm"
+            if "after_mm" in row:
+                after = row["after_mm"]
+                words += (
+                    f"   compensated mean {after['mean']:.3f}  max {after['max']:.3f} mm"
+                    f"   max reduced by {row['reduction_percent']:.1f} %"
+                )
+            text.append(words)
+        return text or [f"The robot can go to all {len(self.poses.labels)} poses."]
+
+    def csv_text(self) -> str:
+        """Return the plan as CSV: one configuration a pose, joint positions in deg, those of sliding joints in mm."""
+        units = ["deg" if joint.kind == "revolute" else "mm" for joint in self.robot.joints]
+        heading = ["configuration", *(f"joint_{i} [{unit}]" for i, unit in enumerate(units, 1))]
+        rows = [
+            [label, *(repr(from_si(value, unit)) for value, unit in zip(row, units, strict=True))]
+            for label, row in zip(self.poses.labels, self.joints.tolist(), strict=True)
+        ]
+        return "\n".join(",".join(row) for row in [heading, *rows]) + "\n"
+
+    def save(self, path: str | Path) -> None:
+        """Write the plan as a CSV file."""
+        write_text(Path(path), self.csv_text())
+
+    def _errors(self) -> list[dict[str, Any]]:
+        if self.before is None:
+            return []
+        rows = []
+        for direction in DIRECTIONS:
+            row: dict[str, Any] = {"direction": direction, "before_mm": _shown(self.before, direction)}
+            if self.after is not None:
+                row["after_mm"] = _shown(self.after, direction)
+                row["reduction_percent"] = reduction(self.before, self.after, direction)
+            rows.append(row)
+        return rows
+
+
+def _shown(errors: LineErrors, direction: str) -> dict[str, float]:
+    return {"mean": errors.mean(direction) * 1e3, "max": errors.largest(direction) * 1e3}

@@ -1,0 +1,102 @@
+"""Which configurations to measure, and what comes of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from truearm.files import write_files
+from truearm.modeling.chain import Array
+from truearm.planning.choosing.measurement_plan import MeasurementPlan
+from truearm.planning.choosing.plan_table import plan_csv
+from truearm.results.record import Record
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Plan(Record):
+    """Configurations to measure for a calibration, in measuring order.
+
+    Attributes
+    ----------
+    made
+        What was chosen, among what, and how accurate the calibration will be.
+    command
+        How to run it again.
+    """
+
+    made: MeasurementPlan
+    command: str
+
+    @property
+    def joints(self) -> Array:
+        """Where to measure [rad; m for prismatic joints], ``(n, joints)``."""
+        return self.made.joints
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Name of each configuration."""
+        return self.made.labels
+
+    @property
+    def answer(self) -> tuple[str, ...]:
+        """How accurate the calibration will be and how many poses it needs, in words."""
+        from truearm.reporting.numbers import significant
+
+        told = self.made.prediction
+        planned, floor = (significant(value * 1e3, 3) for value in (told.planned, told.floor))
+        first = (
+            f"Measured at these {len(self.joints)} configurations, the {self.made.model.name} model will miss readings "
+            f"elsewhere by {planned} mm on average. No number of poses brings that below {floor} mm, the noise."
+        )
+        if told.enough is None:
+            return first, "More poses than were looked at are needed to come within 10 % of that."
+        return first, f"{told.enough} well-chosen poses are enough to come within 10 % of that."
+
+    def summary(self) -> dict[str, Any]:
+        """Return the figures as JSON holds them: errors in mm."""
+        made, told = self.made, self.made.prediction
+        return {
+            "poses": len(made.joints),
+            "objective": made.objective,
+            "indices": dict(made.indices),
+            "candidates": made.candidates,
+            "usable": made.usable,
+            "rejected": dict(made.rejected),
+            "left_out": list(made.left_out),
+            **({"fixtures_mm": {n: (1e3 * p).tolist() for n, p in made.fixtures.items()}} if made.fixtures else {}),
+            "seconds": made.seconds,
+            "prediction": {
+                "floor_mm": told.floor * 1e3,
+                "planned_mm": told.planned * 1e3,
+                "enough": told.enough,
+                "by_number": [
+                    {"poses": int(n), "chosen_mm": c * 1e3, "random_mm": r * 1e3}
+                    for n, c, r in zip(told.numbers, told.chosen.tolist(), told.random.tolist(), strict=True)
+                ],
+            },
+        }
+
+    def lines(self) -> list[str]:
+        """Return what was chosen, what constraints cost, and how accurate the calibration will be."""
+        made = self.made
+        text = [f"{len(made.joints)} of {made.usable} usable configurations, chosen by {made.objective}."]
+        text += [f"  {name}: broken by {lost} of {made.candidates}" for name, lost in made.rejected.items() if lost]
+        text.append("  " + "  ".join(f"{name} {value:.4g}" for name, value in made.indices.items()))
+        for name, place in made.fixtures.items():
+            text.append(f"  {name} at ({', '.join(f'{v * 1e3:.1f}' for v in place)}) mm in the base frame")
+        return [*text, *self.answer]
+
+    def save(self, file: str | Path) -> tuple[Path, Path]:
+        """Write the plan as CSV, and a page with the same name that ends in ``.html``.
+
+        Returns
+        -------
+        The files written.
+        """
+        from truearm.reporting.plan_report import plan_html
+
+        table = Path(file)
+        page = table.with_suffix(".html")
+        write_files(table.parent, {table.name: plan_csv(self.made), page.name: plan_html(self)})
+        return table, page

@@ -1,0 +1,53 @@
+"""What an instrument reads of a simulated robot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from truearm.measurement.dataset import Dataset
+from truearm.notices import counted
+from truearm.results.record import Record
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Simulation(Record):
+    """What an instrument reads of a simulated robot.
+
+    Attributes
+    ----------
+    robot
+        Name of the nominal robot.
+    truth
+        What the simulated robot truly is: the name of a truth, or the robot file.
+    data
+        The readings.
+    out
+        The file that holds them; None if none was written.
+    """
+
+    robot: str
+    truth: str
+    data: Dataset
+    out: Path | None = None
+
+    def summary(self) -> dict[str, Any]:
+        """Return it as JSON holds it."""
+        return {
+            "robot": self.robot,
+            "truth": self.truth,
+            "configurations": self.data.configurations,
+            "readings": len(self.data.target),
+            "targets": list(self.data.targets),
+            "fixtures": list(self.data.fixtures),
+        }
+
+    def lines(self) -> list[str]:
+        """Return what was read."""
+        data = self.data
+        what = f"{counted(len(data.target), 'reading')} of {counted(len(data.targets), 'target')}"
+        against = f" against {', '.join(data.fixtures)}" if data.fixtures else ""
+        where = "" if self.out is None else f": {self.out}"
+        many = counted(data.configurations, "configuration")
+        return [f"{many} of {self.robot} ({self.truth}), {what}{against}{where}"]

@@ -1,0 +1,65 @@
+"""The IRB 120 as chapter 2 drives it, and a twin of it whose gears run out."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Final
+
+import numpy as np
+
+from truearm.library import load_robot
+from truearm.modeling.chain import Array
+from truearm.modeling.robot import Robot
+from truearm.simulation.twin import Twin
+from truearm.simulation.twin_joint import PERFECT
+from truearm.studies import regions
+
+#: Sine a turn of each joint, amplitude and phase [deg]: the smallest that with the compliances of Table 2.7 leaves the
+#: angular errors of Table 2.3 (study irb120-axes).
+_RUN_OUT: Final = {1: (0.004, 150), 2: (0.032, 0), 3: (0.028, 195), 4: (0.044, 315), 5: (0.049, 270), 6: (0.061, 210)}
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """Where a twin truly is at configurations that no calibration has seen.
+
+    Attributes
+    ----------
+    joints
+        ``(n, joints)``.
+    flange
+        ``T_world_flange``, ``(n, 4, 4)``.
+    """
+
+    joints: Array
+    flange: Array
+
+    @classmethod
+    def of(cls, twin: Twin, joints: Array) -> Truth:
+        """Ask the twin."""
+        bare = replace(twin, robot=twin.robot.with_frames(twin.robot.base, {"flange": (0.0, 0.0, 0.0)}))
+        return cls(joints, np.asarray(bare.frames(joints)["flange"]))
+
+    def places(self, point: tuple[float, ...]) -> Array:
+        """Return where a point of the flange frame is in the world [m], ``(n, 3)``."""
+        return np.asarray(self.flange[:, :3, 3] + self.flange[:, :3, :3] @ np.array(point))
+
+
+@cache
+def driven() -> Robot:
+    """Return the nominal IRB 120 with the limits within which the document drives it."""
+    robot = load_robot("irb120")
+    low, high = (limits.tolist() for limits in regions.IRB120.limits)
+    joints = zip(robot.joints, low, high, strict=True)
+    return replace(robot, joints=tuple(replace(joint, limits=(a, b)) for joint, a, b in joints))
+
+
+def running_out(twin: Twin) -> Twin:
+    """Return the twin with gears that run out as Table 2.3 needs it."""
+    joints = {
+        number: replace(twin.joints.get(number, PERFECT), gear=((1, math.radians(amplitude), math.radians(phase)),))
+        for number, (amplitude, phase) in _RUN_OUT.items()
+    }
+    return replace(twin, joints=joints)

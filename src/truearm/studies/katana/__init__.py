@@ -1,0 +1,1 @@
+"""The Katana 450 of Patel's thesis, which several studies share."""

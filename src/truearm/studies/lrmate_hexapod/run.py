@@ -1,0 +1,244 @@
+"""The study lrmate-hexapod: campaigns with the hexapod device on twins of the LR Mate, and what models are worth."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.identification.hexapod.campaign import Campaign, two_steps
+from truearm.identification.solving.fit import identify
+from truearm.identification.solving.models import MODELS
+from truearm.measurement.hexapod.poses import HexapodPose, poses
+from truearm.measurement.hexapod.sheet import PlannedRow
+from truearm.measurement.hexapod.world_frame import world_frame
+from truearm.modeling.chain import Array
+from truearm.modeling.postures import Postures
+from truearm.modeling.robot import Robot
+from truearm.modeling.transform import Transform, rotation_vector
+from truearm.planning.choosing.measurement_plan import plan_measurements
+from truearm.planning.hexapod.reachable import Reachable, reachable
+from truearm.simulation.hexapod.simulated import ballbar
+from truearm.simulation.twin import Twin, measure
+from truearm.studies import Progress
+from truearm.studies.lrmate_hexapod.identification import Cups, identified_as_printed, rebased
+from truearm.studies.lrmate_hexapod.judgement import (
+    HeldOut,
+    Judgement,
+    allowed_configurations,
+    held_out,
+    judged,
+    mean_position_error,
+)
+from truearm.studies.lrmate_hexapod.robot import (
+    BACK_DOWN,
+    FIXTURE,
+    FRONT_UP,
+    drawn_twin,
+    invented_twin,
+    nominal_robot,
+    touches,
+)
+from truearm.studies.seeds import Seed, over_seeds
+
+_ELASTIC: Final = next(model for model in MODELS if model.name == "elastic")
+_TRACKER: Final = 50
+_CANDIDATES: Final = 1000
+#: Of a coordinate that the tracker reads, invented [m].
+_NOISE: Final = 0.02e-3
+#: Beyond this the cup is away from the reference point [m].
+_AWAY: Final = 0.4
+
+#: As the document has them, base by three cups; with base and cups found together with the robot; and by a tracker.
+Model = Literal["nominal", "preliminary", "final", "preliminary found", "final found", "tracker"]
+#: The models that look for the fixture's frame by its cups.
+FrameModel = Literal["nominal", "final found"]
+
+
+@dataclass(frozen=True, eq=False)
+class Station:
+    """What is the same for every robot: the nominal one, the plan, where it touches, what the tracker looks at."""
+
+    robot: Robot
+    wanted: tuple[HexapodPose, ...]
+    plan: Reachable
+    touches: Array
+    tracked: Array
+
+
+@dataclass(frozen=True)
+class FrameError:
+    """How far the fixture's frame by a model is from the true one [m], and by how much it is turned [rad]."""
+
+    shift: float
+    turn: float
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """One campaign: its steps, every model judged, and how the world frame came out.
+
+    Attributes
+    ----------
+    campaign
+        With the device.
+    front
+        Which of the measured rows are front/up.
+    judgements
+        Of every model.
+    away
+        Distance of each held-out configuration from the reference point [m], ``(n,)``.
+    front_up
+        Which of them are front/up, ``(n,)``.
+    uncorrected
+        Mean error of the final model without the correction of the frame by distances [m].
+    repeated
+        Mean error of the final model after ten more rounds of touching and identifying [m].
+    frames
+        Error of the fixture's frame by models.
+    """
+
+    campaign: Campaign
+    front: tuple[bool, ...]
+    judgements: Mapping[Model, Judgement]
+    away: Array
+    front_up: NDArray[np.bool_]
+    uncorrected: float
+    repeated: float
+    frames: Mapping[FrameModel, FrameError]
+
+    def mean_away(self, model: Model) -> float:
+        """Return the mean position error beyond 400 mm from the reference point [m]."""
+        return float(self.judgements[model].position[self.away > _AWAY].mean())
+
+    @property
+    def gain(self) -> float:
+        """By how much the correction of the frame reduces the mean error of the final model [%]."""
+        return 100.0 * (1.0 - self.judgements["final"].mean / self.uncorrected)
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """The whole study.
+
+    Attributes
+    ----------
+    station
+        What is the same for every robot.
+    outcomes
+        Of the robot file's truth, one a seed.
+    others
+        Of other robots, one a seed.
+    """
+
+    station: Station
+    outcomes: tuple[Outcome, ...]
+    others: tuple[Outcome, ...]
+
+
+def run(seeds: int, progress: Progress, configurations: int, others: int) -> Run:
+    """Plan, measure and calibrate the robot file's truth and other robots, once a seed.
+
+    Parameters
+    ----------
+    seeds
+        How many: of the ballbar's and the tracker's noise and of the choice between flip and noflip; and as many other
+        robots.
+    progress
+        Called with a few words at each step.
+    configurations
+        To judge the robot of the robot file by.
+    others
+        To judge each of the other robots by.
+    """
+    progress("planning")
+    station = _station()
+    progress(f"moving the twin to {configurations} configurations")
+    joints = allowed_configurations(station.robot, configurations, np.random.default_rng(0))
+    twin = invented_twin(station.robot)
+    truth = held_out(station.robot, twin, joints)
+
+    def other(seed: Seed) -> Outcome:
+        drawn = drawn_twin(station.robot, seed.number)
+        return _campaign(station, drawn, held_out(station.robot, drawn, joints[:others]), seed)
+
+    return Run(
+        station=station,
+        outcomes=over_seeds(seeds, progress, lambda seed: _campaign(station, twin, truth, seed)),
+        others=over_seeds(seeds, progress, other, what="other robot"),
+    )
+
+
+def _station() -> Station:
+    """Return what is the same for every robot."""
+    robot, cups = nominal_robot()
+    wanted = poses(cups)
+    candidates = Postures(allowed_configurations(robot, _CANDIDATES, np.random.default_rng(1)))
+    tracked = plan_measurements(robot, candidates, _ELASTIC, poses=_TRACKER, rng=np.random.default_rng(1))
+    plan = reachable(robot, FIXTURE, wanted, branches=(FRONT_UP, BACK_DOWN))
+    return Station(robot, wanted, plan, touches(robot), tracked.joints)
+
+
+def _campaign(station: Station, twin: Twin, truth: HeldOut, seed: Seed) -> Outcome:
+    """Measure and calibrate a twin with the device and with a tracker, and judge all models by `truth`."""
+    rng = seed.generator()
+    robot = station.robot
+    rows = _one_of_flip_and_noflip(station.plan, rng)
+    campaign = two_steps(robot, twin, station.touches, station.wanted, rows, _ELASTIC, ballbar(rng))
+    sides = np.linalg.norm(campaign.base_cups - np.roll(campaign.base_cups, -1, axis=0), axis=1)
+    frame = world_frame(campaign.base_cups, sides).frame
+    truth = truth.seen_from(frame)
+    first = campaign.data.of_configurations(range(len(campaign.first)))
+
+    def as_printed(cups: Cups) -> tuple[Robot, Robot]:
+        preliminary = identified_as_printed(robot, robot, first, cups)
+        return preliminary, identified_as_printed(robot, preliminary, campaign.data, cups)
+
+    cups = Cups(campaign.touches, campaign.sides)
+    preliminary, final = as_printed(cups)
+    again = final
+    for _ in range(10):
+        again = identified_as_printed(robot, again, campaign.data, cups)
+    placed = rebased(robot, frame)
+    models: dict[Model, Robot] = {
+        "nominal": placed,
+        "preliminary": preliminary,
+        "final": final,
+        "preliminary found": campaign.preliminary.robot,
+        "final found": campaign.final.robot,
+        "tracker": _tracked(station, twin, frame, rng),
+    }
+    # In the base of the true frame, so that what is found there would be no motion at all.
+    frame_models: tuple[FrameModel, ...] = ("nominal", "final found")
+    found = {name: cups.frame_by(models[name]).frame for name in frame_models}
+    return Outcome(
+        campaign=campaign,
+        front=tuple(row.branch.startswith(FRONT_UP) for row in rows),
+        judgements={name: judged(model, truth) for name, model in models.items()},
+        away=truth.away,
+        front_up=truth.front_up,
+        uncorrected=mean_position_error(as_printed(replace(cups, corrected=False))[1], truth),
+        repeated=mean_position_error(again, truth),
+        frames={
+            name: FrameError(float(np.linalg.norm(of.translation)), float(np.linalg.norm(rotation_vector(of.rotation))))
+            for name, of in found.items()
+        },
+    )
+
+
+def _one_of_flip_and_noflip(plan: Reachable, rng: np.random.Generator) -> list[PlannedRow]:
+    """Return the rows of a plan with one of flip and noflip, by chance, as in section 4.4."""
+    same: dict[tuple[int, str], list[int]] = {}
+    for number, row in enumerate(plan.rows):
+        same.setdefault((row.pose, row.branch.rpartition("-")[0]), []).append(number)
+    return [plan.rows[number] for number in sorted(int(rng.choice(numbers)) for numbers in same.values())]
+
+
+def _tracked(station: Station, twin: Twin, frame: Transform, rng: np.random.Generator) -> Robot:
+    data = measure(twin, station.tracked, _NOISE, rng)
+    seen = (data.target == data.configuration % len(data.targets))[:, None]
+    from_fixture = (data.position - np.array(frame.translation)) @ frame.rotation
+    return identify(station.robot, replace(data, position=np.where(seen, from_fixture, np.nan)), _ELASTIC).robot

@@ -1,0 +1,150 @@
+"""The jobs of the hexapod device from Python: records, files, and refusals that name the parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import truearm
+from truearm import InputError
+from truearm.measurement.hexapod.geometry import triangle
+from truearm.measurement.hexapod.poses import poses
+from truearm.measurement.hexapod.sheet import read_sheet
+from truearm.modeling.inverse import inverse
+from truearm.modeling.transform import Transform
+from truearm.planning.hexapod.tool import with_cups
+
+LEGS = (0.3,) * 6
+FIXTURE = (0.22, 0.0, 0.1, np.radians(-30.0))
+
+
+def test_poses_are_counted_and_held() -> None:
+    found = truearm.hexapod_enumerate()
+    assert (found.designs, found.assemblies, len(found.poses), len(found.distinct)) == (36, 144, 72, 54)
+    assert (10, 37) in found.near_equal
+    assert "72 poses" in repr(found)
+
+
+def test_uncertainty_is_repeated_with_its_seed() -> None:
+    first, again, other = (truearm.hexapod_uncertainty(trials=500, seed=seed) for seed in (1, 1, 2))
+    assert first.drawn == again.drawn
+    assert first.drawn != other.drawn
+    assert first.solutions[0].norms[2] == pytest.approx(3.359, abs=5e-4)
+
+
+def test_one_pose_is_solved_from_any_sequence_of_lengths() -> None:
+    found = truearm.hexapod_solve(pose=7, legs=np.array(LEGS), base=[0.3] * 3)  # type: ignore[arg-type]
+    assert found.poses[0].cups == pytest.approx(poses()[6].cups, abs=1e-12)
+    assert found.data is None
+    with pytest.raises(ValueError, match="no joint positions"):
+        found.save("data.csv")
+
+
+def test_a_fixture_is_a_transform_or_numbers(tmp_path: Path) -> None:
+    half = FIXTURE[3] / 2
+    quaternion = (float(np.cos(half)), 0.0, 0.0, float(np.sin(half)))
+    plans = [
+        truearm.hexapod_plan("irb120", fixture, distinct=True, branches=["front-up"])
+        for fixture in (FIXTURE, (*FIXTURE[:3], *quaternion), Transform((0.22, 0.0, 0.1), quaternion))
+    ]
+    assert plans[0].summary() == plans[1].summary() == plans[2].summary()
+    assert all(row.branch.startswith("front-up") for row in plans[0].reachable.rows)
+
+
+def test_a_plan_and_its_sheet_are_written_and_solved(tmp_path: Path) -> None:
+    sheet, steps, data = (tmp_path / name for name in ("sheet.csv", "steps.txt", "data.csv"))
+    plan = truearm.hexapod_plan("irb120", FIXTURE, distinct=True, out=sheet, steps=steps)
+    assert steps.read_text().count("Configuration ") == len(plan.reachable.rows)
+    header, *rows = (line.split(",") for line in sheet.read_text().splitlines())
+    for row in rows:
+        design = next(p.design for p in poses() if str(p.number) == row[header.index("pose")])
+        for name in (*design.leg_names, "B1-B2", "B2-B3", "B3-B1"):
+            row[header.index(f"{name} [mm]")] = "300"
+        for name in ("T1-T2", "T2-T3", "T3-T1"):
+            row[header.index(f"{name} [mm]")] = "150"
+    sheet.write_text("\n".join(",".join(row) for row in [header, *rows]) + "\n")
+    solved = truearm.hexapod_solve(sheet, out=data)
+    assert len(solved.poses) == len(rows)
+    assert solved.left_out == ()
+    assert truearm.load_data(data).position == pytest.approx(read_sheet(sheet).dataset().position, abs=1e-12)
+    assert truearm.hexapod_solve(read_sheet(sheet)).summary() == solved.summary()
+    assert len(repr(solved)) <= 2000
+
+
+def test_the_base_fixture_is_found_from_arrays() -> None:
+    robot, _ = with_cups(truearm.load_robot("irb120"))
+    cups = triangle([0.3003, 0.3, 0.2996], "B") + np.array([0.25, -0.1, 0.1])
+    joints = inverse(robot, cups, np.broadcast_to(np.diag([1.0, -1.0, -1.0]), (3, 3, 3)), target="1").joints
+    frame = truearm.hexapod_world_frame(robot, joints, (0.3003, 0.3, 0.2996), target="1").found.frame
+    assert frame.translation == pytest.approx([0.25, -0.1, 0.1], abs=1e-9)
+    assert frame.quaternion == pytest.approx([1, 0, 0, 0], abs=1e-9)
+
+
+SIDES, JOINTS = (0.3, 0.3, 0.3), np.zeros((3, 6))
+
+
+@pytest.mark.parametrize(
+    ("call", "parameter", "words"),
+    [
+        (lambda: truearm.hexapod_uncertainty(trials=1), "trials", "allowed: 2 or more"),
+        (lambda: truearm.hexapod_uncertainty(seed=-1), "seed", "allowed: 0 or more"),
+        (lambda: truearm.hexapod_solve(), "sheet, pose, legs", "a sheet, or a pose and its six legs"),
+        (lambda: truearm.hexapod_solve("a.csv", pose=7, legs=LEGS), "sheet, pose, legs", "a sheet, or a pose"),
+        (lambda: truearm.hexapod_solve("missing.csv"), "sheet", "there is no such file"),
+        (lambda: truearm.hexapod_solve(3), "sheet", "a path belongs here"),  # type: ignore[arg-type]
+        (lambda: truearm.hexapod_solve(pose=73, legs=LEGS), "pose", "allowed: 1 to 72"),
+        (lambda: truearm.hexapod_solve(pose=7, legs=LEGS[:5]), "legs", "6 numbers belong here"),
+        (lambda: truearm.hexapod_solve(pose=7, legs=(*LEGS[:5], np.nan)), "legs", "the number cannot be used"),
+        (lambda: truearm.hexapod_solve(pose=7, legs=(*LEGS[:5], 0.302)), "legs", "is beyond the range"),
+        (lambda: truearm.hexapod_solve(pose=7, legs=LEGS, base=(0.31, 0.3, 0.3)), "base", "the length B1-B2"),
+        (lambda: truearm.hexapod_solve(pose=7, legs=LEGS, tool=(0.15, 0.2, 0.15)), "tool", "the length T2-T3"),
+        (
+            lambda: truearm.hexapod_solve(pose=7, legs=LEGS, base=(0.3, 0.3, 0.6), reach=0.4),
+            "base",
+            "B1, B2, B3 lie on one line",
+        ),
+        (
+            lambda: truearm.hexapod_solve(pose=7, legs=(0.1, 0.1, 0.1, 0.3, 0.3, 0.3), reach=0.4),
+            "legs",
+            "do not meet",
+        ),
+        (lambda: truearm.hexapod_solve(pose=7, legs=LEGS, reach=-1.0), "reach", "the length is out of range"),
+        (lambda: truearm.hexapod_solve(pose=7, legs=LEGS, out="a.csv"), "out", "is no data file"),
+        (lambda: truearm.hexapod_plan("irb120", (1.0, 2.0)), "fixture", "4 or 7 numbers"),
+        (lambda: truearm.hexapod_plan("irb120", "here"), "fixture", "an array of numbers"),  # type: ignore[arg-type]
+        (lambda: truearm.hexapod_plan("irb120", (0, 0, np.nan, 0)), "fixture", "NaN and infinity"),
+        (lambda: truearm.hexapod_plan("irb120", (0, 0, 0, 1, 1, 0, 0)), "fixture", "has not length 1"),
+        (lambda: truearm.hexapod_plan("irb120", (9.0, 0, 0, 0)), "fixture", "can take none of the 72 poses"),
+        (lambda: truearm.hexapod_plan("irb120", FIXTURE, branches="front-up"), "branches", "a sequence of names"),
+        (lambda: truearm.hexapod_plan("irb120", FIXTURE, branches=["front-upp"]), "branches", "no such branch"),
+        (lambda: truearm.hexapod_plan("irb120", FIXTURE, tool="hammer"), "tool", "no such tool"),
+        (lambda: truearm.hexapod_plan("irb120", FIXTURE, tool=["a"]), "tool", "a name belongs here"),  # type: ignore[arg-type]
+        (lambda: truearm.hexapod_plan("irb120", FIXTURE, distinct=1), "distinct", "yes or no"),  # type: ignore[arg-type]
+        (lambda: truearm.hexapod_plan("irb120", FIXTURE, arm_radius=-0.1), "arm_radius", "out of range"),
+        (lambda: truearm.hexapod_plan("irb120", FIXTURE, out="a", steps="a"), "steps", "cannot be one file"),
+        (lambda: truearm.hexapod_world_frame("irb120", JOINTS[:2], SIDES), "touches", "got 'shape (2, 6)'"),
+        (lambda: truearm.hexapod_world_frame("irb120", "missing.csv", SIDES), "touches", "there is no such file"),
+        (lambda: truearm.hexapod_world_frame("irb120", JOINTS, SIDES[:2]), "base", "3 numbers belong here"),
+        (lambda: truearm.hexapod_world_frame("irb120", JOINTS, (0.3, 0.302, 0.3)), "base", "the length B2-B3"),
+        (lambda: truearm.hexapod_world_frame("irb120", JOINTS, SIDES, target="4"), "target", "no target of this name"),
+        (lambda: truearm.hexapod_world_frame("irb120", JOINTS, SIDES), "touches", "lie on one line"),
+    ],
+)
+def test_refusals_name_the_parameter(call: Callable[[], Any], parameter: str, words: str) -> None:
+    with pytest.raises(InputError) as refused:
+        call()
+    assert refused.value.parameter == parameter
+    assert words in str(refused.value)
+
+
+def test_the_robot_file_is_not_overwritten(tmp_path: Path) -> None:
+    robot = tmp_path / "robot.yaml"
+    robot.write_text("truearm: truearm-robot/1\n")
+    for name in ("out", "steps"):
+        with pytest.raises(InputError, match="this file is read") as refused:
+            truearm.hexapod_plan(robot, FIXTURE, **{name: robot})  # type: ignore[arg-type]
+        assert refused.value.parameter == name

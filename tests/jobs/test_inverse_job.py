@@ -1,0 +1,71 @@
+"""The job that finds joints for poses, from a file and from arrays."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import truearm
+from truearm.errors import InputError
+from truearm.modeling.transform import quaternion_from_rotation
+
+Q = np.radians([[10.0, 20.0, -30.0, 40.0, 50.0, 60.0], [-70.0, 30.0, 0.0, -20.0, 40.0, 0.0]])
+
+
+def poses() -> tuple[np.ndarray, np.ndarray]:
+    """Two poses of the IRB 120."""
+    at = truearm.load_robot("irb120").forward_kinematics(Q)
+    return at.position.T, at.matrix()
+
+
+def test_arrays_and_a_file_give_the_same_joints(tmp_path: Path) -> None:
+    p, R = poses()
+    rows = np.hstack([p * 1e3, quaternion_from_rotation(R)]).tolist()
+    file = tmp_path / "poses.csv"
+    lines = [f"{n},{','.join(map(repr, row))}" for n, row in enumerate(rows, 1)]
+    file.write_text("\n".join(["pose,x [mm],y [mm],z [mm],qw,qx,qy,qz", *lines]) + "\n")
+    found = truearm.inverse("irb120", p, R, seed=Q)
+    assert found.joints == pytest.approx(Q, abs=1e-9)
+    assert found.complete
+    assert found.lines() == ["2 of 2 poses reached. Rows: 2 reached"]
+    read = truearm.inverse("irb120", file, seed=Q[0], branch="front-up-noflip", out=tmp_path / "joints.csv")
+    assert read.joints == pytest.approx(Q, abs=1e-9)
+    assert (tmp_path / "joints.csv").read_text().count("\n") == 3
+
+
+def test_many_poses_out_of_reach_are_told_in_short() -> None:
+    found = truearm.inverse("irb120", np.full((12, 3), 5.0), orientation="free")
+    assert not found.complete
+    assert len(found.attention) == 12
+    assert len(found.lines()) == 12
+    assert found.lines()[-1] == "  and 2 more; the JSON summary lists all"
+    assert found.summary()["poses_reached"] == 0
+
+
+def test_orientations_come_from_one_place(tmp_path: Path) -> None:
+    p, R = poses()
+    with pytest.raises(InputError, match=r"the poses have no orientation.*`orientation=free`") as refusal:
+        truearm.inverse("irb120", p)
+    assert refusal.value.parameter == "rotations"
+    with pytest.raises(InputError, match="rotations, row 1: the matrix mirrors") as refusal:
+        truearm.inverse("irb120", p, R * [[[1.0]], [[-1.0]]])
+    assert refusal.value.parameter == "rotations"
+    file = tmp_path / "poses.csv"
+    file.write_text("pose,x [mm],y [mm],z [mm]\nA,300,100,500\n")
+    with pytest.raises(InputError, match=r"poses.csv: the poses have no orientation; allowed: the columns") as refusal:
+        truearm.inverse("irb120", file)
+    assert refusal.value.parameter == "poses"
+    with pytest.raises(InputError, match="the file says how the poses are turned") as refusal:
+        truearm.inverse("irb120", file, R)
+    assert refusal.value.parameter == "rotations"
+    with pytest.raises(InputError, match="would be overwritten") as refusal:
+        truearm.inverse("irb120", file, orientation="free", out=file)
+    assert refusal.value.parameter == "out"
+
+
+def test_a_branch_of_an_arm_without_named_ones() -> None:
+    with pytest.raises(InputError, match="the branches have no names here") as refusal:
+        truearm.inverse("irb120", poses()[0], branch="all", orientation="free")
+    assert refusal.value.parameter == "branch"

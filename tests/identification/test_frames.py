@@ -69,6 +69,7 @@ def test_orientation_readings_place_an_arm_of_two_joints() -> None:
         position=position,
         quaternion=quaternion_from_rotation(R),
         sigma=None,
+        approach=None,
         joint_kinds=("revolute",) * 2,
     )
     errors = errors_of(initial_frames(robot, data), data)

@@ -145,7 +145,7 @@ def test_refusals_name_the_parameter(call: Callable[[], Any], parameter: str, wo
 
 
 def test_data_of_other_joints_are_refused(data: Dataset) -> None:
-    other = replace(data, joints=data.joints[:, :5], joint_kinds=data.joint_kinds[:5])
+    other = replace(data, joints=data.joints[:, :5], joint_kinds=data.joint_kinds[:5], approach=None)
     for job in (partial(axes, other, frame="robot"), partial(lines, CENTRE, data=other)):
         with pytest.raises(InputError, match="joints") as refused:
             job()

@@ -222,13 +222,13 @@ def _rotations(given: ArrayLike, count: int) -> Array:
     if len(wrong):
         row = int(wrong[0])
         left = off[row] <= ROTATION_TOLERANCE
-        found = f"determinant {np.linalg.det(R[row]):.6g}" if left else f"R'R off from 1 by {off[row]:.3g}"
         raise InputError(
-            "a matrix mirrors, it does not turn"
+            "the matrix mirrors, it does not turn"
             if left
-            else "a matrix is no rotation: its columns are not orthonormal",
+            else "the matrix is no rotation: its columns are not orthonormal",
             parameter="rotations",
-            came=f"{found} in row {row}",
+            where=f"rotations, row {row}",
+            came=f"determinant {np.linalg.det(R[row]):.6g}" if left else f"R'R off from 1 by {off[row]:.3g}",
             allowed="determinant 1" if left else f"within {ROTATION_TOLERANCE:g}",
             cure="Check rows against columns, and that all digits were passed on.",
         )

@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from truearm.jobs.revert import revert
     from truearm.jobs.robots import robots
     from truearm.jobs.simulate import simulate
+    from truearm.jobs.study import study
     from truearm.jobs.tolerance import tolerance
     from truearm.jobs.validate import validate
     from truearm.measurement.dataset import Dataset
@@ -90,6 +91,7 @@ __all__ = [
     "revert",
     "robots",
     "simulate",
+    "study",
     "tolerance",
     "validate",
 ]

@@ -46,7 +46,7 @@ def test_json_is_what_the_file_holds(truearm: Truearm, quick: None, tmp_path: Pa
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("irb120-sim",), "NAME: there is no such study"),
+        (("irb120-sim",), "NAME: there is no study of this name"),
         (("irb120-faro",), "--data: this study needs measured data"),
         (("irb120-faro", "--data", "nowhere"), "a file of the measured data is missing"),
         (("irb120-axes", "--data", "nowhere"), "--data: this study simulates its data; got 'nowhere'. Leave --data"),

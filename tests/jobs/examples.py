@@ -204,6 +204,7 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
     "revert": lambda folder: {"programs": [_corrected(folder)], "out": folder / "reverted"},
     "convert": lambda folder: {"robot": "irb120", "convention": "hayati", "out": _new(folder, "hayati.yaml")},
     "export": lambda folder: {"robot": "irb120", "format": "hayati", "out": _new(folder, "hayati.csv")},
+    "study": lambda folder: {"name": "li-table", "seeds": 1, "out": folder / "study"},
     "new_robot": lambda folder: {"file": _new(folder, "robot.yaml")},
     "example": lambda folder: {"folder": Path(tempfile.mkdtemp(dir=folder))},
     "demo": lambda folder: {"out": folder / "demo"},

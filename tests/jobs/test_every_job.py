@@ -172,7 +172,7 @@ def test_what_cannot_be_used_is_refused_naming_the_parameter(job: str, name: str
 
 
 def test_no_text_outside_the_command_names_an_option() -> None:
-    option = re.compile(r"(?<![\w-])--[a-z][a-z-]+")
+    option = re.compile(r"(?<![\w-])(?<!var\()--[a-z][a-z-]+")
     found = [
         f"{path.relative_to(ROOT)}:{number}: {line.strip()}"
         for path in sorted((ROOT / "src" / "truearm").rglob("*"))

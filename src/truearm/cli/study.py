@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from truearm.cli.options import command_line
-from truearm.cli.output import Json, print_json, progress
+from truearm.cli.output import Json, print_json, print_record, progress
 from truearm.studies import STUDIES
 
 HELP = "\n\n".join(
@@ -31,28 +31,13 @@ def study(
     json: Json = False,
 ) -> None:
     """Make a published experiment again."""
-    from dataclasses import replace
-
-    from truearm.files import writable_folder
-    from truearm.studies import run_study
+    from truearm.jobs.study import study as run
     from truearm.studies.study import STUDY_FILES
 
-    writable_folder(out)
     with progress() as say:
-        finished = replace(run_study(name, seeds, data, say), command=command_line())
-        say("writing the report")
-        finished.save(out)
+        finished = run(name, seeds=seeds, data=data, out=out, command=command_line(), progress=say)
     if json:
         print_json(finished.summary())
-        return
-    typer.echo(finished.title)
-    for table in finished.tables:
-        if table.compares:
-            typer.echo(f"{table.title}:")
-        for row in table.rows:
-            if row.published is not None:
-                allowed = "" if row.tolerance is None else f", may differ by {row.tolerance:.2g}"
-                typer.echo(
-                    f"  {row.verdict:8}{row.what}: {row.median:.3g}, published {row.published:g} {row.unit}{allowed}"
-                )
-    typer.echo(f"Written to {out}: {', '.join(STUDY_FILES)}")
+    else:
+        print_record(finished)
+        typer.echo(f"Written to {out}: {', '.join(STUDY_FILES)}")

@@ -37,6 +37,7 @@ JOBS: Final = (
     "revert",
     "convert",
     "export",
+    "study",
     "new_robot",
     "example",
     "demo",

@@ -12,6 +12,7 @@ from typing import Any, Literal
 from truearm.files import write_files
 from truearm.reporting.drawing import Figure
 from truearm.reporting.page import page
+from truearm.results.record import Record
 
 #: What a study writes into its folder.
 STUDY_FILES = ("report.html", "study.json")
@@ -126,8 +127,8 @@ class Picture:
     figure: Figure
 
 
-@dataclass(frozen=True)
-class Study:
+@dataclass(frozen=True, repr=False)
+class Study(Record):
     """A finished study.
 
     Attributes
@@ -185,6 +186,19 @@ class Study:
             "pictures": {picture.name: picture.figure for picture in self.pictures},
             "notes": list(self.notes),
         }
+
+    def lines(self) -> list[str]:
+        """Return the title, and every figure that has a published one beside it."""
+        text = [self.title]
+        for table in self.tables:
+            if table.compares:
+                text.append(f"{table.title}:")
+            for row in table.rows:
+                if row.published is not None:
+                    allowed = "" if row.tolerance is None else f", may differ by {row.tolerance:.2g}"
+                    ours = f"{row.what}: {row.median:.3g}, published {row.published:g} {row.unit}{allowed}"
+                    text.append(f"  {row.verdict:8}{ours}")
+        return text
 
     def html(self) -> str:
         """Return the report as one HTML page."""

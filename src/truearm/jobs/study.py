@@ -1,0 +1,56 @@
+"""A published experiment made again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from truearm.jobs.arguments import choice_argument, folder_for, path_argument, python_call, refusals_of, whole_argument
+from truearm.studies import STUDIES, run_study
+from truearm.studies.study import Study
+
+
+def study(
+    name: str,
+    *,
+    seeds: int = 10,
+    data: str | Path | None = None,
+    out: str | Path | None = None,
+    command: str | None = None,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Study:
+    """Make a published experiment again and set our figures beside the printed ones.
+
+    Parameters
+    ----------
+    name
+        One of :data:`truearm.studies.STUDIES` by name.
+    seeds
+        How often to do it anew, with seeds 0, 1, 2 and so on.
+    data
+        Folder of measured data, for a study that needs them.
+    out
+        Folder for report.html and study.json; None writes nothing.
+    command
+        How to run it again, for the report; None writes the call in Python.
+    progress
+        Called with a few words at each step.
+
+    Raises
+    ------
+    InputError
+        If there is no such study, or its data are missing, or it needs none.
+    """
+    choice_argument(name, "name", {entry.name: entry for entry in STUDIES}, "study")
+    seeds = whole_argument(seeds, "seeds", 1)
+    source = None if data is None else path_argument(data, "data")
+    folder = None if out is None else folder_for((), out)
+    invocation = command or python_call("study", name, seeds=seeds, data=data)
+    with refusals_of("data"):
+        finished = replace(run_study(name, seeds, source, progress), command=invocation)
+    if folder is not None:
+        progress("writing the report")
+        with refusals_of("out"):
+            finished.save(folder)
+    return finished

@@ -256,7 +256,7 @@ def test_hysteresis_of_a_simulated_robot_shows(robot: str) -> None:
     twin, data = campaign(robot, 80, 0.05e-3, 4)
     lag = np.sign(np.diff(data.joints, axis=0, prepend=data.joints[:1])) * np.radians(0.01)
     true = twin.robot
-    position = np.stack([true.poses(data.joints + lag, t)[0] for t in data.targets], axis=1).reshape(-1, 3)
+    position = np.stack([true.world_poses(data.joints + lag, t)[0] for t in data.targets], axis=1).reshape(-1, 3)
     late = replace(data, position=position + rng.normal(0.0, 0.05e-3, position.shape))
     assert "joints-not-settled" in {n.code for n in calibrate(robot, late).warnings}
     assert "joints-not-settled" not in {n.code for n in calibrate(robot, data).warnings}

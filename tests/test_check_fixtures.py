@@ -136,7 +136,7 @@ def test_the_stated_accuracy_of_positions_is_true(device: str) -> None:
         stated.append(float(notice.message.split("accurate to about ")[1].split(" mm")[0]))
         q = ROBOT.random_configurations(150, np.random.default_rng(seed))
         at = twin.frames(q)[data.targets[0]][:, :3, 3]
-        got = fit.robot.poses(q, data.targets[0])[0]
+        got = fit.robot.world_poses(q, data.targets[0])[0]
         a, b = got - got.mean(axis=0), at - at.mean(axis=0)
         U, s, Vt = np.linalg.svd(a.T @ b)
         turn = np.diag([1.0, 1.0, np.linalg.det(U @ Vt)])

@@ -47,7 +47,7 @@ for kind in ("simulated", "measured"):
         problem = Problem(start, data, geometric.free(start), {})
         alone.append(median_seconds(lambda problem=problem: solve(problem), 15))
         robot = identify(nominal, data, geometric).robot
-        found = np.stack([robot.poses(given["held_out"], t.name)[0] for t in robot.targets], 1)
+        found = np.stack([robot.world_poses(given["held_out"], t.name)[0] for t in robot.targets], 1)
         errors.append(float(np.linalg.norm(found - given["held_out_position"], axis=2).mean()))
         figures["parameters"] = len(problem.free.names)
     if whole:

@@ -37,9 +37,9 @@ np.savez(
     names=list(real.parameters),
     values=list(real.values.values()),
     modified_dh=dh,
-    position=real.poses(q)[0],
+    position=real.world_poses(q)[0],
     jacobian=real.joint_jacobian(q),
-    nominal_position=nominal.poses(q)[0],
+    nominal_position=nominal.world_poses(q)[0],
 )
 # Inverse kinematics: poses that the robot reaches on one branch, and seeds up to 0.1 rad away.
 rule = branch_rule(nominal)
@@ -47,13 +47,13 @@ assert rule is not None
 q = nominal.random_configurations(16 * POSES, rng)
 q = q[rule.numbers(real.forward_kinematics(q)) == BRANCHES.index("front-up-noflip")][:POSES]
 assert len(q) == POSES
-position, rotation = real.poses(q)
+position, rotation = real.world_poses(q)
 np.savez(folder / "inverse.npz", position=position, rotation=rotation, seed=q + rng.uniform(-0.1, 0.1, q.shape))
 # Fits: what a tracker reads of three targets, and where the targets truly are at configurations held out.
 for campaign in range(CAMPAIGNS):
     twin = truth_twin(nominal, "random", rng).robot
     train, held_out = (nominal.random_configurations(n, rng) for n in (TRAIN, HELD_OUT))
-    seen, true = (np.stack([twin.poses(part, t.name)[0] for t in twin.targets], 1) for part in (train, held_out))
+    seen, true = (np.stack([twin.world_poses(part, t.name)[0] for t in twin.targets], 1) for part in (train, held_out))
     seen = seen + NOISE * rng.standard_normal(seen.shape)
     np.savez(folder / f"simulated-{campaign}.npz", q=train, position=seen, held_out=held_out, held_out_position=true)
 if len(sys.argv) > 2:

@@ -65,7 +65,7 @@ def test_measured_lines_are_judged(truearm: Truearm, kr5: Path, tmp_path: Path) 
     rng = np.random.default_rng(1)
     true = truth_twin(load_robot("kr5"), "axis-tests", rng).robot.with_frames(IDENTITY, {"smr": (0.1, 0.05, 0.03)})
     joints = np.radians([[float(cell) for cell in row[1:]] for row in rows])
-    position = true.poses(joints, "smr")[0] * 1e3
+    position = true.world_poses(joints, "smr")[0] * 1e3
     text = "configuration," + ",".join(f"joint_{i} [deg]" for i in range(1, 7)) + ",target,x [mm],y [mm],z [mm]\n"
     for row, place in zip(rows, position.tolist(), strict=True):
         text += ",".join([*row, "smr", *map(repr, place)]) + "\n"

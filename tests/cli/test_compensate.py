@@ -162,7 +162,7 @@ def test_moves_are_split(truearm: Truearm, cell: Path) -> None:
 def test_a_move_on_which_the_posture_changes_is_not_split(truearm: Truearm, cell: Path) -> None:
     """No straight move leads from one posture of the wrist to the other, and no number of segments would do."""
     joints = np.radians([[10.0, 20, 10, 30, 50, 20], [15.0, 22, 8, -148, -52, 202]])
-    position, rotation = load_robot("irb120").poses(joints)
+    position, rotation = load_robot("irb120").world_poses(joints)
     configurations = ((0, 0), (-2, 2))
     moves = [
         f"    MoveL [[{','.join(f'{1e3 * v:.3f}' for v in p)}],[{','.join(f'{v:.7f}' for v in q)}],[0,{c4},{c6},0],"

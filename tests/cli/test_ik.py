@@ -22,7 +22,7 @@ Q = np.radians([[10.0, 20.0, -30.0, 40.0, 50.0, 60.0], [-70.0, 30.0, 0.0, -20.0,
 @pytest.fixture
 def poses(tmp_path: Path) -> Path:
     """Two poses of the IRB 120 in its base frame."""
-    p, R = load_robot("irb120").poses(Q)
+    p, R = load_robot("irb120").world_poses(Q)
     return _written(tmp_path / "poses.csv", p, quaternion_from_rotation(R))
 
 
@@ -87,7 +87,7 @@ def test_seed_target_frame_and_free_orientation(truearm: Truearm, poses: Path, t
 
 
 def test_what_is_not_reached_is_explained_and_ends_with_3(truearm: Truearm, tmp_path: Path) -> None:
-    p, R = load_robot("irb120").poses(np.vstack([Q[:1], np.zeros((1, 6)), Q[:1]]))
+    p, R = load_robot("irb120").world_poses(np.vstack([Q[:1], np.zeros((1, 6)), Q[:1]]))
     p[2] *= 5
     poses, out = _written(tmp_path / "poses.csv", p, quaternion_from_rotation(R)), tmp_path / "j.csv"
     run = truearm("ik", "irb120", poses, "--out", out)
@@ -123,7 +123,7 @@ def test_refusals(truearm: Truearm, poses: Path, tmp_path: Path, words: str, opt
 
 
 def test_an_arm_of_five_joints(truearm: Truearm, tmp_path: Path) -> None:
-    p, R = load_robot("katana450").poses(np.radians([[10, 40, -30, 20, 50.0]]))
+    p, R = load_robot("katana450").world_poses(np.radians([[10, 40, -30, 20, 50.0]]))
     poses, out = _written(tmp_path / "poses.csv", p, quaternion_from_rotation(R)), tmp_path / "j.csv"
     assert truearm("ik", "katana450", poses, "--axis-only", "--out", out).code == 0
     run = truearm("ik", "katana450", poses, "--branch", "all", "--out", out)

@@ -164,13 +164,13 @@ def test_inverse_kinematics_lift_what_is_heavier(truearm: Truearm, elastic: Path
     def height(q: np.ndarray[Any, np.dtype[np.float64]]) -> float:
         """Where the flange would be if nothing gave way [m]."""
         stiff = robot.with_values({name: 0.0 for name in robot.parameters if name.startswith("compliance")})
-        return float((base.rotation.T @ (stiff.poses(q)[0][0] - np.array(base.translation)))[2])
+        return float((base.rotation.T @ (stiff.world_poses(q)[0][0] - np.array(base.translation)))[2])
 
     none, own, heavy = joints("--payload", "0kg,0mm,0mm,0mm"), joints(), joints("--payload", "5.4kg,50mm,25mm,100mm")
     assert np.array_equal(own, joints("--payload", PAYLOAD))
     assert 0.3 < height(none) < height(own) < height(heavy)
     assert height(joints("--gravity", "0,0,9.80665")) < 0.3
-    reached = robot.poses(own)[0][0]
+    reached = robot.world_poses(own)[0][0]
     assert base.rotation.T @ (reached - np.array(base.translation)) == pytest.approx([0.4, 0.1, 0.3], abs=1e-9)
 
 

@@ -47,7 +47,7 @@ def test_the_calibrated_robot_goes_where_the_nominal_one_was_meant(name: str) ->
     # The controller, on its way from what is written to joints, and the real robot at these.
     written = matrices(nominal, found.joints)
     np.testing.assert_allclose(found.flange, written, atol=1e-12)
-    position, rotation = robot.poses(found.joints)
+    position, rotation = robot.world_poses(found.joints)
     base = robot.base
     np.testing.assert_allclose(
         position[usable], (wanted[:, :3, 3] @ base.rotation.T + np.array(base.translation))[usable], atol=1e-9

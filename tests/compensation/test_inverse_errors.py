@@ -33,7 +33,7 @@ def test_it_is_equation_11(seed: int) -> None:
         if i:
             T = T @ np.linalg.inv(error(*TABLE_3[i - 1])) @ about("z", q[i - 1])
         T = T @ slid(*(np.array(translation) / 1e3)) @ about(axis, np.radians(angle))
-    position, rotation = inverted(with_table_3()).poses(q[None])
+    position, rotation = inverted(with_table_3()).world_poses(q[None])
     assert_allclose(position[0], T[:3, 3], rtol=0, atol=1e-13)
     assert_allclose(rotation[0], T[:3, :3], rtol=0, atol=1e-13)
 
@@ -43,13 +43,13 @@ def test_a_joint_zero_is_an_error_too() -> None:
     off = robot.with_values({"theta_offset_2": 0.01})
     q = np.array([[0.1, -1.0, 1.2, 0.3, 0.5, -0.2]])
     back = q - np.array([0, 0.01, 0, 0, 0, 0])
-    assert_allclose(inverted(replace(off, known={"theta_offset_2": off.parameters["theta_offset_2"]})).poses(q)[0],
-                    design(robot).poses(back)[0], rtol=0, atol=1e-12)  # fmt: skip
+    alone = inverted(replace(off, known={"theta_offset_2": off.parameters["theta_offset_2"]}))
+    assert_allclose(alone.world_poses(q)[0], design(robot).world_poses(back)[0], rtol=0, atol=1e-12)
 
 
 def test_the_fake_target_mirrors_the_error(lines: SevenLines) -> None:
     robot, joints = with_table_3(), lines.joints(load_robot("kr5"))
-    miss = robot.poses(joints)[0] - lines.position
+    miss = robot.world_poses(joints)[0] - lines.position
     mirrored = fake_targets(robot, joints).position - lines.position
     assert np.linalg.norm(miss, axis=1).max() > 3e-3
     assert_allclose(mirrored, -miss, rtol=0, atol=2e-5)
@@ -58,11 +58,11 @@ def test_the_fake_target_mirrors_the_error(lines: SevenLines) -> None:
 def test_readings_for_it_bring_the_robot_there(lines: SevenLines) -> None:
     robot, joints = with_table_3(), lines.joints(load_robot("kr5"))
     commanded = usable_joints(fake_targets(robot, joints).solutions, lines.labels, "lines")
-    left = np.linalg.norm(robot.poses(commanded)[0] - lines.position, axis=1)
-    before = np.linalg.norm(robot.poses(joints)[0] - lines.position, axis=1)
+    left = np.linalg.norm(robot.world_poses(commanded)[0] - lines.position, axis=1)
+    before = np.linalg.norm(robot.world_poses(joints)[0] - lines.position, axis=1)
     assert left.max() < 5e-6  # second order
     # Solving the inverse kinematics of the inverted model would double the error.
-    doubled = np.linalg.norm(robot.poses(2 * joints - commanded)[0] - lines.position, axis=1)
+    doubled = np.linalg.norm(robot.world_poses(2 * joints - commanded)[0] - lines.position, axis=1)
     assert_allclose(doubled, 2 * before, rtol=0.02)
 
 
@@ -96,7 +96,7 @@ def test_lines_are_those_of_the_box(lines: SevenLines) -> None:
 def test_readings_reach_the_poses_without_jumps(lines: SevenLines) -> None:
     robot = load_robot("kr5")
     joints = lines.joints(robot)
-    assert_allclose(robot.poses(joints)[0], lines.position, rtol=0, atol=1e-9)
+    assert_allclose(robot.world_poses(joints)[0], lines.position, rtol=0, atol=1e-9)
     for d in DIRECTIONS:
         assert np.abs(np.diff(joints[lines.rows(d)], axis=0)).max() < np.radians(25)
 
@@ -115,7 +115,7 @@ def test_twin_and_data_show_the_same_errors(lines: SevenLines) -> None:
     placed = with_table_3().with_frames(Transform((2.0, 1.0, -0.5), (0.8, 0.0, 0.0, 0.6)), {"smr": (0.0, 0.0, 0.0)})
     rng = np.random.default_rng(0)
     shown = on_twin(lines, Twin(placed), joints, 0.0, 1, rng)
-    expected = np.linalg.norm(with_table_3().poses(joints)[0] - lines.position, axis=1)
+    expected = np.linalg.norm(with_table_3().world_poses(joints)[0] - lines.position, axis=1)
     assert_allclose(shown.error, expected, rtol=0, atol=1e-12)
     data = replace(measure(Twin(placed), joints, 0.0, rng), labels=lines.labels)
     stands = load_robot("kr5").with_frames(placed.base, {"smr": (0.0, 0.0, 0.0)})

@@ -59,7 +59,7 @@ def test_joint_targets_alone_keep_to_the_base_that_was_measured() -> None:
     np.testing.assert_allclose(done.frames.base, Transform((0.0, 0.0, 0.001)).matrix, atol=1e-12)
     correction = done.corrections[0]
     # Where the nominal robot was meant to be, seen from a base that is 1 mm higher, is where the real one goes.
-    position, _ = IRB120.poses(correction.joints)
+    position, _ = IRB120.world_poses(correction.joints)
     np.testing.assert_allclose(position, correction.tips[:, :3, 3] + [0, 0, 0.001], atol=1e-9)
 
 
@@ -73,7 +73,7 @@ def test_programs_given_together_share_the_first_frame_that_was_measured() -> No
         IRB120, [poses, rapid(JOINTS.format(10))], Cell(FLANGE.tools, frames)
     ).corrections
     assert first.corrected.all()
-    position, _ = IRB120.poses(second.joints)
+    position, _ = IRB120.world_poses(second.joints)
     np.testing.assert_allclose(position, second.tips[:, :3, 3] + shift.translation, atol=1e-9)
 
 

@@ -60,7 +60,7 @@ def real_tips(position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
     seed = inverse(nominal, position[:1], rotation[:1], branch="front-up-noflip", seed=np.zeros(6)).joints[0]
     found = inverse(nominal, position, rotation, branch="front-up-noflip", seed=seed)
     assert found.complete
-    return IRB120.poses(found.joints)[0]
+    return IRB120.world_poses(found.joints)[0]
 
 
 def interpolated(poses: np.ndarray, shares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

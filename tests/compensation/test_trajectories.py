@@ -137,14 +137,14 @@ def stretched() -> object:
     robot = load_robot("li3")
     q = np.zeros((1, 3))
     motion = JointMotion(np.zeros(1), q, q, q, np.ones(1), tuple(j.name for j in robot.joints))
-    return corrected(robot, motion, robot.poses(q)[0] + 1e-3)
+    return corrected(robot, motion, robot.world_poses(q)[0] + 1e-3)
 
 
 def at_a_limit() -> object:
     robot = nominal()
     motion = at([169.5, 40, 50, 30, 20])
     away = robot.with_values({"theta_offset_1": -1e-3})
-    return corrected(away, motion, robot.poses(motion.joints, "tip")[0], "tip")
+    return corrected(away, motion, robot.world_poses(motion.joints, "tip")[0], "tip")
 
 
 @pytest.mark.parametrize(
@@ -171,4 +171,4 @@ def test_a_line_of_another_arm_is_corrected() -> None:
     correction = corrected(real, motion, path.position)
     assert correction.before.min() > 1e-4
     assert correction.after.max() < 1e-9
-    assert np.abs(real.poses(correction.joints)[0] - path.position).max() < 1e-9
+    assert np.abs(real.world_poses(correction.joints)[0] - path.position).max() < 1e-9

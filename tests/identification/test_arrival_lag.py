@@ -24,7 +24,9 @@ def late(true: Robot, data: Dataset, lag: float | Array) -> Dataset:
     """The readings of a robot whose joints stop short by a lag [rad or m], on the side from which they came."""
     rng = np.random.default_rng(4)
     moved = np.sign(np.diff(data.joints, axis=0, prepend=data.joints[:1]))
-    position = np.stack([true.poses(data.joints + moved * lag, t)[0] for t in data.targets], axis=1).reshape(-1, 3)
+    position = np.stack([true.world_poses(data.joints + moved * lag, t)[0] for t in data.targets], axis=1).reshape(
+        -1, 3
+    )
     return replace(data, position=position + rng.normal(0.0, 0.05e-3, position.shape))
 
 

@@ -62,7 +62,9 @@ def test_without_noise_the_robot_is_found(robot: str) -> None:
     found = analyse(load_robot(robot), data)
     assert left_over(found, twin) < 1e-8
     q = found.nominal.random_configurations(20, np.random.default_rng(3))
-    assert_allclose(found.robot_with_errors.poses(q, "3")[0], found.robot.poses(q, "3")[0], rtol=0, atol=1e-8)
+    assert_allclose(
+        found.robot_with_errors.world_poses(q, "3")[0], found.robot.world_poses(q, "3")[0], rtol=0, atol=1e-8
+    )
 
 
 def test_axes_are_where_the_twin_has_them() -> None:

@@ -102,7 +102,7 @@ def test_the_guide_shows_what_a_tilt_does_to_the_numbers(name: str, monkeypatch:
     for tilt in TILTS:
         real = robot.with_values({"beta_3": math.radians(tilt)})
         tilted = converted(real, name)
-        for one, other in zip(tilted.poses(q), real.poses(q), strict=True):
+        for one, other in zip(tilted.world_poses(q), real.world_poses(q), strict=True):
             np.testing.assert_allclose(one, other, rtol=0, atol=1e-9)
         twin, data = campaign_of(real, "nominal", 50, 0)
         fit = identify(nominal, data, GEOMETRIC)

@@ -76,7 +76,7 @@ def test_intervals_contain_the_truth_as_often_as_they_say() -> None:
     inside: list[bool] = []
     for _ in range(150):
         twin = truth_twin(robot, "random", rng).robot
-        position = np.stack([twin.poses(q, t.name)[0] for t in twin.targets], axis=1).reshape(-1, 3)
+        position = np.stack([twin.world_poses(q, t.name)[0] for t in twin.targets], axis=1).reshape(-1, 3)
         data = replace(like, position=position + sigma * rng.standard_normal(position.shape))
         fit = identify(robot, data, GEOMETRIC)
         for p in fit.robot.parameters.values():
@@ -175,7 +175,7 @@ def test_bounds_hold_and_are_reported() -> None:
 def _same(a: Fit, b: Fit, q: Array, tolerance: float) -> None:
     for target in a.robot.targets:
         np.testing.assert_allclose(
-            a.robot.poses(q, target.name)[0], b.robot.poses(q, target.name)[0], atol=tolerance, rtol=0
+            a.robot.world_poses(q, target.name)[0], b.robot.world_poses(q, target.name)[0], atol=tolerance, rtol=0
         )
 
 
@@ -278,7 +278,7 @@ def test_declared_positions_are_checked_beside_undeclared_orientations() -> None
     rng = np.random.default_rng(3)
     twin, data = campaign("irb120", 60, 0.0, 3)
     robot = twin.robot.with_frames(twin.robot.base, {"t": Transform((0.1, 0.0, 0.1), (0.6, 0.8, 0.0, 0.0))})
-    position, R = robot.poses(data.joints, "t")
+    position, R = robot.world_poses(data.joints, "t")
     poses = replace(
         data, targets=("t",), configuration=np.arange(60), target=np.zeros(60, dtype=np.intp),
         position=position + rng.normal(0.0, 1e-4, (60, 3)), quaternion=quaternion_from_rotation(R),

@@ -36,7 +36,7 @@ def test_it_needs_no_hand_given_frame_wherever_the_robot_stands(seed: int) -> No
     base = Transform((5 * rng.normal(), 5 * rng.normal(), rng.normal()), (w, x, y, z))
     twin, data = campaign("irb120", 12, 0.0, seed, truth="nominal")
     moved = twin.robot.with_frames(base, {"1": (0.1, -0.05, 0.12), "2": (0.0, 0.1, 0.2)})
-    positions = np.concatenate([moved.poses(data.joints, t)[0] for t in ("1", "2")])
+    positions = np.concatenate([moved.world_poses(data.joints, t)[0] for t in ("1", "2")])
     n = data.configurations
     data = replace(
         data,
@@ -58,7 +58,7 @@ def test_orientation_readings_place_an_arm_of_two_joints() -> None:
     )
     rng = np.random.default_rng(0)
     q = robot.random_configurations(8, rng)
-    position, R = truth.poses(q, "t")
+    position, R = truth.world_poses(q, "t")
     _, like = campaign("irb120", 8, 0.0, 0)
     data = replace(
         like,
@@ -69,6 +69,7 @@ def test_orientation_readings_place_an_arm_of_two_joints() -> None:
         position=position,
         quaternion=quaternion_from_rotation(R),
         sigma=None,
+        approach=None,
         joint_kinds=("revolute",) * 2,
     )
     errors = errors_of(initial_frames(robot, data), data)

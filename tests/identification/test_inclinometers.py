@@ -120,7 +120,7 @@ def test_believed_constants_are_priors() -> None:
 def mean_error(robot: Robot, twin: Twin, seed: int) -> float:
     q = KATANA.random_configurations(200, np.random.default_rng(seed))
     truth = [posture.targets["tip"][:3, 3] for posture in twin.postures(q)]
-    return float(np.linalg.norm(robot.poses(q, "tip")[0] - truth, axis=1).mean())
+    return float(np.linalg.norm(robot.world_poses(q, "tip")[0] - truth, axis=1).mean())
 
 
 def test_two_stages_and_all_at_once_leave_little_of_what_geometry_alone_leaves() -> None:

@@ -63,7 +63,7 @@ def test_in_a_cube_before_the_arm_the_averages_are_those_of_the_document() -> No
     """
     robot = katana()
     q = robot.random_configurations(60_000, np.random.default_rng(0))
-    kept = (np.abs(robot.poses(q, "tip")[0] - [0.0, 0.45, 0.0]) < 0.15).all(axis=1)
+    kept = (np.abs(robot.world_poses(q, "tip")[0] - [0.0, 0.45, 0.0]) < 0.15).all(axis=1)
     found = influence(robot, q[kept], NAMES, "tip", PERTURBATIONS)
     mean = dict(zip(found.names, 1e3 * found.mean, strict=True))
     assert kept.sum() > 118

@@ -67,5 +67,5 @@ def test_lengths_caught_by_mistake_are_found(device: str, loss: Loss) -> None:
     plain = identify(nominal, replace(data, distance=lengths), GEOMETRIC)
     q = nominal.random_configurations(50, rng)
 
-    by_clean, by_robust, by_plain = (fit.robot.poses(q)[0] for fit in (clean, robust, plain))
+    by_clean, by_robust, by_plain = (fit.robot.world_poses(q)[0] for fit in (clean, robust, plain))
     assert np.abs(by_robust - by_clean).mean() < 0.3 * np.abs(by_plain - by_clean).mean()

@@ -65,7 +65,7 @@ def test_trials_together_are_calibrations_of_their_datasets() -> None:
         found = robot.with_values(dict(zip(names, together.estimate[trial], strict=True)))
         for target in robot.targets:
             np.testing.assert_allclose(
-                found.poses(q, target.name)[0], fit.robot.poses(q, target.name)[0], rtol=0, atol=1e-9
+                found.world_poses(q, target.name)[0], fit.robot.world_poses(q, target.name)[0], rtol=0, atol=1e-9
             )
         for i, name in enumerate(names):
             alone = fit.robot.parameters[name]

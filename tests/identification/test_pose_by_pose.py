@@ -209,7 +209,7 @@ def test_what_is_not_named_is_held_at_what_is_known(method: Method) -> None:
     """Tilting is compensated by starting from a robot that has it."""
     known = tilting(katana())
     q = known.random_configurations(10, np.random.default_rng(1))
-    data = replace(readings(katana(), 10, 0.0, 1), joints=q, position=known.poses(q, "tip")[0])
+    data = replace(readings(katana(), 10, 0.0, 1), joints=q, position=known.world_poses(q, "tip")[0])
     compensated = method(known, data, combination="scaled-mean")
     assert (compensated.iterations == 0).all()
     np.testing.assert_array_equal(values(compensated.robot), values(katana()))
@@ -222,8 +222,8 @@ def test_geometry_is_found_beneath_known_tilting(method: Method) -> None:
     true = tilting(drawn(1.0, 3))
     rng = np.random.default_rng(3)
     q, unseen = true.random_configurations(60, rng), true.random_configurations(60, rng)
-    data = replace(readings(katana(), 60, 0.0, 1), joints=q, position=true.poses(q, "tip")[0])
-    judged = replace(data, joints=unseen, position=true.poses(unseen, "tip")[0])
+    data = replace(readings(katana(), 60, 0.0, 1), joints=q, position=true.world_poses(q, "tip")[0])
+    judged = replace(data, joints=unseen, position=true.world_poses(unseen, "tip")[0])
     starts = katana(), tilting(katana())
     without, compensated = (mean_error(method(r, data, combination="scaled-mean").robot, judged) for r in starts)
     assert compensated < without

@@ -76,7 +76,7 @@ def test_data_that_move_too_few_joints_lose_rank_and_say_so() -> None:
     twin, data = campaign("irb120", 30, 0.0, 2)
     joints = data.joints.copy()
     joints[:, 1:] = joints[0, 1:]
-    positions = np.stack([twin.robot.poses(joints, t)[0] for t in data.targets], axis=1).reshape(-1, 3)
+    positions = np.stack([twin.robot.world_poses(joints, t)[0] for t in data.targets], axis=1).reshape(-1, 3)
     still = replace(data, joints=joints, position=positions)
     fit = identify(load_robot("irb120"), still, GEOMETRIC)
     assert fit.status is Status.RANK_LOSS
@@ -99,7 +99,7 @@ def test_a_joint_that_never_moved_is_a_loss_of_rank(still: list[int]) -> None:
     twin, data = campaign("irb120", 40, 0.05e-3, 2)
     joints = data.joints.copy()
     joints[:, still] = 0.3
-    positions = np.stack([twin.robot.poses(joints, t)[0] for t in data.targets], axis=1).reshape(-1, 3)
+    positions = np.stack([twin.robot.world_poses(joints, t)[0] for t in data.targets], axis=1).reshape(-1, 3)
     for redundancy in get_args(Redundant):
         fit = identify(load_robot("irb120"), replace(data, joints=joints, position=positions), GEOMETRIC,
                        redundancy=redundancy)  # fmt: skip

@@ -25,7 +25,7 @@ GEOMETRIC = next(model for model in MODELS if model.name == "geometric")
 def to_either_side(count: int, rng: np.random.Generator) -> Array:
     """Joint readings with the flange clearly to the left for the first half, to the right for the second."""
     joints = load_robot("irb120").random_configurations(20 * count, rng)
-    y = load_robot("irb120").poses(joints)[0][:, 1]
+    y = load_robot("irb120").world_poses(joints)[0][:, 1]
     left, right = joints[y > 0.05], joints[y < -0.05]
     return np.concatenate([left[: count // 2], right[: count // 2]])
 
@@ -56,7 +56,7 @@ def test_each_zone_tells_its_own_robot(cut: tuple[Zones, tuple[Twin, Twin]]) -> 
     found = zones.positions(unseen, "1")
     true = np.concatenate([t.frames(q)["1"][:, :3, 3] for t, q in zip(twins, np.split(unseen, 2), strict=True)])
     assert np.linalg.norm(found - true, axis=1).max() < 3e-5
-    of_whole = zones.whole.robot.poses(unseen, "1")[0]
+    of_whole = zones.whole.robot.world_poses(unseen, "1")[0]
     assert np.linalg.norm(of_whole - true, axis=1).max() > 1e-3
 
 
@@ -86,7 +86,7 @@ def test_where_too_little_was_measured_the_whole_stands_in() -> None:
     assert few.zones == ()
     joints = data.joints[:5]
     assert few.of(joints).tolist() == [-1] * 5
-    assert few.positions(joints, "2").tolist() == few.whole.robot.poses(joints, "2")[0].tolist()
+    assert few.positions(joints, "2").tolist() == few.whole.robot.world_poses(joints, "2")[0].tolist()
 
 
 def test_zones_make_up_for_a_missing_effect() -> None:
@@ -101,8 +101,8 @@ def test_zones_make_up_for_a_missing_effect() -> None:
     def mean(places: Array) -> float:
         return float(np.linalg.norm(places - true, axis=1).mean())
 
-    whole = mean(identify(nominal, data, GEOMETRIC).robot.poses(unseen, "3")[0])
-    assert mean(zones.whole.robot.poses(unseen, "3")[0]) == pytest.approx(whole, rel=1e-9)
+    whole = mean(identify(nominal, data, GEOMETRIC).robot.world_poses(unseen, "3")[0])
+    assert mean(zones.whole.robot.world_poses(unseen, "3")[0]) == pytest.approx(whole, rel=1e-9)
     assert mean(zones.positions(unseen, "3")) < 0.9 * whole
 
 

@@ -95,7 +95,7 @@ def test_measured_lines_are_judged_by_the_frames_of_the_joint_errors(found: Axis
         targets=("smr",),
         configuration=np.arange(77),
         target=np.zeros(77, dtype=np.intp),
-        position=stands.poses(plan.joints, "smr")[0],
+        position=stands.world_poses(plan.joints, "smr")[0],
     )
     judged = truearm.lines("kr5", CENTRE, joint_errors=found.robot_with_errors, data=data)
     assert judged.before is not None
@@ -145,7 +145,7 @@ def test_refusals_name_the_parameter(call: Callable[[], Any], parameter: str, wo
 
 
 def test_data_of_other_joints_are_refused(data: Dataset) -> None:
-    other = replace(data, joints=data.joints[:, :5], joint_kinds=data.joint_kinds[:5])
+    other = replace(data, joints=data.joints[:, :5], joint_kinds=data.joint_kinds[:5], approach=None)
     for job in (partial(axes, other, frame="robot"), partial(lines, CENTRE, data=other)):
         with pytest.raises(InputError, match="joints") as refused:
             job()

@@ -100,7 +100,7 @@ def test_library_robot_agrees_with_pinocchio(robot_id: str, seed: int) -> None:
     for target in (None, "tip"):
         behind = robot.target("tip").chain.elements if target else ()
         chain = Chain((*robot.trunk.elements, *behind))
-        position, rotation = robot.poses(q, target)
+        position, rotation = robot.world_poses(q, target)
         compare_with_pinocchio(chain, dict(robot.values), q.T, position, rotation, robot.joint_jacobian(q, target))
 
 
@@ -184,7 +184,7 @@ def test_effect_does_nothing_at_its_nominal_values(effect: type[Effect]) -> None
     q = plain.random_configurations(CONFIGURATIONS, rng)
     robot = plain.with_effects([effect.name])
     assert set(robot.parameters) > set(plain.parameters)
-    for actual, expected in zip(robot.poses(q), plain.poses(q), strict=True):
+    for actual, expected in zip(robot.world_poses(q), plain.world_poses(q), strict=True):
         assert_allclose(actual, expected, rtol=0, atol=1e-15)
 
 
@@ -274,8 +274,8 @@ def test_moving_the_base_moves_every_pose_with_it() -> None:
     q = robot.random_configurations(CONFIGURATIONS, rng)
     frame = random_frame(rng)
     moved = robot.with_frames(frame, {})
-    position, rotation = robot.poses(q)
-    moved_position, moved_rotation = moved.poses(q)
+    position, rotation = robot.world_poses(q)
+    moved_position, moved_rotation = moved.world_poses(q)
     assert_allclose(moved_position, position @ frame.rotation.T + frame.translation, rtol=0, atol=1e-14)
     assert_allclose(moved_rotation, frame.rotation @ rotation, rtol=0, atol=1e-14)
     assert_allclose(moved.base.rotation, frame.rotation, rtol=0, atol=1e-14)

@@ -48,7 +48,7 @@ def controller_poses(robot: Robot, readings: Array) -> Array:
     its, world = robot.controller, robot.base
     base = matrix(world.rotation, world.translation) @ matrix(its.base.rotation, its.base.translation)
     flange = matrix(its.flange.rotation, its.flange.translation)
-    places, rotations = robot.poses(its.joints(readings))
+    places, rotations = robot.world_poses(its.joints(readings))
     return np.array(
         [np.linalg.inv(base) @ matrix(R, p) @ flange for p, R in zip(places, rotations, strict=True)], float
     )

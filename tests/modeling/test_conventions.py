@@ -47,7 +47,7 @@ def random_rows(columns: tuple[str, ...], count: int, rng: np.random.Generator) 
 
 def check_against(robot: Robot, links: list[Array]) -> None:
     """Compare the flange at readings of zero with a product of matrices."""
-    position, rotation = robot.poses(np.zeros((1, len(robot.joints))))
+    position, rotation = robot.world_poses(np.zeros((1, len(robot.joints))))
     expected = np.linalg.multi_dot(links)
     assert_allclose(position[0], expected[:3, 3], rtol=0, atol=1e-14)
     assert_allclose(rotation[0], expected[:3, :3], rtol=0, atol=1e-14)
@@ -127,7 +127,7 @@ def test_product_of_exponentials_is_a_product_of_matrix_exponentials(seed: int) 
         twist[:3, :3] = [[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]]
         twist[:3, 3] = v
         expected = expected @ expm(reading * twist)
-    position, rotation = robot_of("product-of-exponentials", rows, kinds).poses(q[None])
+    position, rotation = robot_of("product-of-exponentials", rows, kinds).world_poses(q[None])
     assert_allclose(position[0], expected[:3, 3], rtol=0, atol=1e-13)
     assert_allclose(rotation[0], expected[:3, :3], rtol=0, atol=1e-13)
 
@@ -144,8 +144,8 @@ def test_zero_reference_holds_its_axes_by_any_of_their_points() -> None:
             for u, p in zip(axes, points, strict=True)
         ]
         robot = robot_of("zero-reference", rows, BOTH)
-        found.append(robot.poses(q))
-        assert_allclose(robot.poses(np.zeros((1, 2)))[0], 0.0, rtol=0, atol=1e-15)
+        found.append(robot.world_poses(q))
+        assert_allclose(robot.world_poses(np.zeros((1, 2)))[0], 0.0, rtol=0, atol=1e-15)
     for one, other in zip(*found, strict=True):
         assert_allclose(one, other, rtol=0, atol=1e-14)
 
@@ -164,7 +164,7 @@ def test_small_rotations_and_published_direction_are_inverse(b: Direction) -> No
         assert math.hypot(*published) == pytest.approx(1.0, abs=1e-15)
         assert_allclose(small_rotations(b, published), (rx, ry), rtol=0, atol=1e-15)
         robot = robot_of("cpc", [dict(zip(("b_x", "b_y", "b_z"), b, strict=True))], ("revolute",))
-        _, rotation = robot.with_values({"rx_1": rx, "ry_1": ry}).poses(np.zeros((1, 1)))
+        _, rotation = robot.with_values({"rx_1": rx, "ry_1": ry}).world_poses(np.zeros((1, 1)))
         assert_allclose(rotation[0][:, 2], published, rtol=0, atol=1e-15)
 
 
@@ -181,7 +181,7 @@ def test_robot_of_any_convention_round_trips(table: Convention, tmp_path: Path) 
     again = read_robot(path)
     assert robot_text(again) == path.read_text(encoding="utf-8")
     q = robot.random_configurations(5, rng)
-    for actual, expected in zip(again.poses(q, "tip"), robot.poses(q, "tip"), strict=True):
+    for actual, expected in zip(again.world_poses(q, "tip"), robot.world_poses(q, "tip"), strict=True):
         assert_allclose(actual, expected, rtol=0, atol=1e-14)
 
 

@@ -32,7 +32,7 @@ def drawn(robot: Robot, rng: np.random.Generator) -> Robot:
 def check_same(made: Robot, robot: Robot, rng: np.random.Generator) -> None:
     q = robot.random_configurations(10, rng)
     for target in (None, *(t.name for t in robot.targets)):
-        for actual, expected in zip(made.poses(q, target), robot.poses(q, target), strict=True):
+        for actual, expected in zip(made.world_poses(q, target), robot.world_poses(q, target), strict=True):
             assert_allclose(actual, expected, rtol=0, atol=1e-12)
 
 

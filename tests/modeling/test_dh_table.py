@@ -33,7 +33,7 @@ def rebuilt(table: DHTable) -> Robot:
 def check_same_poses(robot: Robot, table: DHTable, rng: np.random.Generator, atol: float = 1e-9) -> None:
     scale = [math.pi if joint.kind == "revolute" else 0.5 for joint in robot.joints]
     q = rng.uniform(-1, 1, (20, len(scale))) * scale
-    for actual, expected in zip(rebuilt(table).poses(q), robot.poses(q), strict=True):
+    for actual, expected in zip(rebuilt(table).world_poses(q), robot.world_poses(q), strict=True):
         assert_allclose(actual, expected, rtol=0, atol=atol)
 
 

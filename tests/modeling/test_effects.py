@@ -70,10 +70,10 @@ def test_effects_are_those_of_the_twin(effects: tuple[str, ...]) -> None:
         at.joints, approach=at.approach, number=at.number, temperature=at.temperature, wrench=at.wrench
     )
     true = np.array([posture.targets["tip"] for posture in postures])
-    position, rotation = robot.poses(at, "tip")
+    position, rotation = robot.world_poses(at, "tip")
     assert_allclose(position, true[:, :3, 3], rtol=0, atol=1e-11)
     assert_allclose(rotation, true[:, :3, :3], rtol=0, atol=1e-11)
-    plain, _ = replace(robot, effect_names=()).poses(at, "tip")
+    plain, _ = replace(robot, effect_names=()).world_poses(at, "tip")
     assert np.abs(position - plain).max() > 1e-6
 
 
@@ -106,7 +106,7 @@ def test_effects_that_are_off_change_nothing_at_all(effects: tuple[str, ...]) ->
     plain = replace(load_robot("irb120"), payload=Payload(2.0, (0.05, 0.03, 0.1)))
     robot = plain.with_effects(effects)
     at = circumstances(robot, 20, 5)
-    for actual, expected in zip(robot.poses(at), plain.poses(at), strict=True):
+    for actual, expected in zip(robot.world_poses(at), plain.world_poses(at), strict=True):
         assert_array_equal(actual, expected)
 
 
@@ -127,11 +127,13 @@ def test_nothing_is_nan_where_a_moment_is_zero(effect: type[Effect], massless: b
 def test_a_horizontal_arm_sags() -> None:
     arm = replace(load_robot("irb120"), payload=Payload(3.0)).with_effects(["compliance"])
     stretched = np.radians([[0, 90, -90, 0, 0, 0.0]])
-    rigid = arm.poses(stretched)[0][0]
+    rigid = arm.world_poses(stretched)[0][0]
     for joint in (2, 3, 5):
-        bent = arm.with_values({f"compliance_{joint}": 1e-4}).poses(stretched)[0][0]
+        bent = arm.with_values({f"compliance_{joint}": 1e-4}).world_poses(stretched)[0][0]
         assert bent[2] < rigid[2] - 1e-5
-    hanging = arm.with_payload(gravity=(0.0, 0.0, 9.81)).with_values({"compliance_2": 1e-4}).poses(stretched)[0][0]
+    hanging = (
+        arm.with_payload(gravity=(0.0, 0.0, 9.81)).with_values({"compliance_2": 1e-4}).world_poses(stretched)[0][0]
+    )
     assert hanging[2] > rigid[2] + 1e-5
 
 
@@ -151,15 +153,15 @@ def test_an_arm_that_warms_up_is_one_that_was_colder() -> None:
     colder = 20.0 - np.exp(-at.number * robot.values["warm_up_rate"])
     twin = Twin(robot, growth).postures(at.joints, wrench=at.wrench, temperature=colder)
     true = np.array([posture.targets["tip"][:3, 3] for posture in twin])
-    assert_allclose(robot.poses(at, "tip")[0], true, rtol=0, atol=1e-12)
-    assert np.abs(robot.poses(at.joints, "tip")[0] - true).max() > 1e-6
+    assert_allclose(robot.world_poses(at, "tip")[0], true, rtol=0, atol=1e-12)
+    assert np.abs(robot.world_poses(at.joints, "tip")[0] - true).max() > 1e-6
 
 
 @pytest.mark.parametrize("effect", ["approach", "thermal-growth", "warm-up"])
 def test_what_is_not_known_does_nothing(effect: str) -> None:
     robot = loaded_arm((effect,), 7)
     q = robot.random_configurations(5, np.random.default_rng(8))
-    for actual, expected in zip(robot.poses(q), replace(robot, effect_names=()).poses(q), strict=True):
+    for actual, expected in zip(robot.world_poses(q), replace(robot, effect_names=()).world_poses(q), strict=True):
         assert_array_equal(actual, expected)
 
 
@@ -186,7 +188,7 @@ def test_it_depends_on_what_it_says(effect: type[Effect]) -> None:
 
     def matters(**changed: np.ndarray) -> bool:
         """Whether the effect moves the arm otherwise in other circumstances."""
-        return bool(np.abs(robot.poses(replace(at, **changed))[0] - robot.poses(at)[0]).max() > 1e-9)
+        return bool(np.abs(robot.world_poses(replace(at, **changed))[0] - robot.world_poses(at)[0]).max() > 1e-9)
 
     assert matters(wrench=2.0 * at.wrench) == effect.loaded
     assert matters(approach=-at.approach, number=at.number[::-1]) == effect.ordered
@@ -233,8 +235,8 @@ def test_the_python_file_computes_it_or_says_that_it_does_not(effect: type[Effec
     counterpart = robot if effect.exportable else robot.rigid
     away = {name: p for name, p in counterpart.known.items() if p.group != "base"}
     in_base = replace(counterpart, known=away, base_quaternion=(1.0, 0.0, 0.0, 0.0))
-    assert_allclose(position, in_base.poses(q)[0], rtol=0, atol=1e-9)
-    assert effect.exportable == bool(np.abs(position - in_base.rigid.poses(q)[0]).max() > 1e-9)
+    assert_allclose(position, in_base.world_poses(q)[0], rtol=0, atol=1e-9)
+    assert effect.exportable == bool(np.abs(position - in_base.rigid.world_poses(q)[0]).max() > 1e-9)
 
 
 #: Modules outside of truearm.modeling.effects that name several effects, and why.

@@ -63,7 +63,7 @@ def calibrated(robot: Robot, effects: tuple[str, ...] = (), seed: int = 1) -> Ro
 
 
 def in_base(robot: Robot, q: Array) -> tuple[Array, Array]:
-    position, rotation = robot.poses(q)
+    position, rotation = robot.world_poses(q)
     base = robot.base
     return (position - base.translation) @ base.rotation, base.rotation.T @ rotation
 
@@ -95,7 +95,7 @@ def check_table(robot: Robot, format_: str, folder: Path) -> None:
     made = Robot("read", "", "", table.convention_name, table.joints(), table.flange).with_frames(table.base, {})
     q = configurations(robot)
     assert [joint.kind for joint in made.joints] == [joint.kind for joint in robot.joints]
-    for actual, expected in zip(made.poses(q), in_base(robot.rigid, q), strict=True):
+    for actual, expected in zip(made.world_poses(q), in_base(robot.rigid, q), strict=True):
         assert_allclose(actual, expected, rtol=0, atol=1e-9)
 
 
@@ -241,7 +241,7 @@ def test_json_is_enough_to_compute_poses(convention: Convention) -> None:
         flange = frame_of([*model["base"]["elements"], *links, *model["flange"]["elements"]], readings)
         tip = flange @ frame_of(target["elements"], readings)
         for found, name in ((flange, None), (tip, target["name"])):
-            position, rotation = robot.rigid.poses(readings[None], name)
+            position, rotation = robot.rigid.world_poses(readings[None], name)
             assert_allclose(found[:3, 3], position[0], rtol=0, atol=1e-12)
             assert_allclose(found[:3, :3], rotation[0], rtol=0, atol=1e-12)
 

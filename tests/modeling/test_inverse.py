@@ -60,7 +60,7 @@ def sliding() -> Robot:
 
 
 def pose_errors(robot: Robot, joints: Array, p: Array, R: Array) -> tuple[float, float]:
-    got_p, got_R = robot.poses(joints)
+    got_p, got_R = robot.world_poses(joints)
     turned = rotation_vector(np.swapaxes(R, 1, 2) @ got_R)
     return float(np.abs(got_p - p).max()), float(np.abs(turned).max())
 
@@ -72,7 +72,7 @@ def test_forward_of_inverse_is_the_pose_on_the_branch_asked_for(name: str, gain:
     rule = branch_rule(robot)
     assert rule is not None
     q = robot.random_configurations(250, np.random.default_rng(6))
-    p, R = robot.poses(q)
+    p, R = robot.world_poses(q)
     number = rule.numbers(robot.forward_kinematics(q))
     elsewhere = 0
     for k in np.unique(number):
@@ -94,7 +94,7 @@ def test_the_seed_gives_the_same_joints_back() -> None:
     for name in ("irb1600", "ur10"):
         robot = calibrated(load_robot(name), 1, gain=True)
         q = robot.random_configurations(300, np.random.default_rng(2))
-        p, R = robot.poses(q)
+        p, R = robot.world_poses(q)
         found = inverse(robot, p, R, frame="world", seed=q)
         regular = found.singular_value > 0.05
         assert regular.sum() > 150
@@ -108,7 +108,7 @@ def test_every_nominal_branch_is_found_again_where_it_exists(name: str) -> None:
     robot = calibrated(nominal, 5)
     rule = branch_rule(robot)
     assert rule is not None
-    p, R = nominal.poses(nominal.random_configurations(60, np.random.default_rng(3)))
+    p, R = nominal.world_poses(nominal.random_configurations(60, np.random.default_rng(3)))
     before = inverse(nominal, p, R, frame="world", branch="all")
     after = inverse(robot, p, R, frame="world", branch="all")
     have = {*zip(after.pose.tolist(), after.branch, strict=True)}
@@ -129,7 +129,7 @@ def test_every_nominal_branch_is_found_again_where_it_exists(name: str) -> None:
             {n: v + share * (robot.values[n] - v) for n, v in nominal.values.items()},
         )
         for _ in range(8):
-            got_p, got_R = between.poses(q)
+            got_p, got_R = between.world_poses(q)
             turn = np.einsum("nij,nj->ni", got_R, rotation_vector(np.swapaxes(got_R, 1, 2) @ R[pose]))
             error = np.concatenate([p[pose] - got_p, turn], axis=1)
             J = between.joint_jacobian(q)
@@ -142,7 +142,7 @@ def test_every_nominal_branch_is_found_again_where_it_exists(name: str) -> None:
 
 def test_an_oracle_agrees_that_the_joints_give_the_pose() -> None:
     robot = calibrated(load_robot("kr5"), 4)
-    p, R = robot.poses(robot.random_configurations(5, np.random.default_rng(0)))
+    p, R = robot.world_poses(robot.random_configurations(5, np.random.default_rng(0)))
     oracle = PinocchioChain(robot.trunk, robot.values)
     for row, joints in enumerate((found := inverse(robot, p, R, frame="world")).joints):
         position, rotation, _ = oracle.tip(joints)
@@ -184,7 +184,7 @@ def test_angles_rounded_to_four_digits_as_in_urdf_files_still_have_named_branche
     robot = load_robot("ur5")
     joints = tuple(replace(j, row={c: round(v, 4) for c, v in j.row.items()}) for j in robot.joints)
     robot = replace(robot, joints=joints)
-    p, R = robot.poses(robot.random_configurations(50, np.random.default_rng(0)))
+    p, R = robot.world_poses(robot.random_configurations(50, np.random.default_rng(0)))
     found = inverse(robot, p, R, frame="world", branch="all")
     assert found.complete
     assert len(found.pose) > 300
@@ -193,7 +193,7 @@ def test_angles_rounded_to_four_digits_as_in_urdf_files_still_have_named_branche
 def test_branches_that_have_no_names() -> None:
     for robot in (load_robot("katana450"), seven_axes()):
         assert branch_rule(robot) is None
-        p, R = robot.poses(np.zeros((1, len(robot.joints))))
+        p, R = robot.world_poses(np.zeros((1, len(robot.joints))))
         with pytest.raises(InputError, match="no names here"):
             inverse(robot, p, R, branch="front-up-noflip")
 
@@ -211,12 +211,12 @@ def test_under_load_forward_of_inverse_is_the_pose_on_every_branch(effects: tupl
     robot = calibrated(loaded_arm(effects, 11), 5)
     rule = branch_rule(robot)
     assert rule is not None
-    assert np.abs(robot.poses(np.zeros((1, 6)))[0] - robot.rigid.poses(np.zeros((1, 6)))[0]).max() > 1e-5
+    assert np.abs(robot.world_poses(np.zeros((1, 6)))[0] - robot.rigid.world_poses(np.zeros((1, 6)))[0]).max() > 1e-5
     q = robot.random_configurations(150, np.random.default_rng(12))
-    p, R = robot.poses(q, "tip")
+    p, R = robot.world_poses(q, "tip")
     number = rule.numbers(robot.forward_kinematics(q))
     every = inverse(robot, p, R, frame="world", target="tip", branch="all")
-    position, rotation = robot.poses(every.joints, "tip")
+    position, rotation = robot.world_poses(every.joints, "tip")
     assert np.abs(position - p[every.pose]).max() < 1e-9
     assert np.abs(rotation - R[every.pose]).max() < 1e-9
     assert len(every.pose) > 1000
@@ -234,7 +234,7 @@ def test_under_load_forward_of_inverse_is_the_pose_on_every_branch(effects: tupl
 def test_under_load_the_seed_gives_the_same_joints_back(effects: tuple[str, ...]) -> None:
     robot = calibrated(loaded_arm(effects, 13), 1)
     q = robot.random_configurations(200, np.random.default_rng(2))
-    p, R = robot.poses(q)
+    p, R = robot.world_poses(q)
     found = inverse(robot, p, R, frame="world", seed=q)
     assert found.complete
     regular = found.singular_value > 0.05
@@ -244,7 +244,7 @@ def test_under_load_the_seed_gives_the_same_joints_back(effects: tuple[str, ...]
 
 def test_readings_under_load_bring_the_twin_to_the_pose() -> None:
     robot = loaded_arm(("compliance", "hardening", "fourier", "gain", "bearing-compliance", "clearance"), 3)
-    p, R = robot.rigid.poses(robot.random_configurations(8, np.random.default_rng(4)), "tip")
+    p, R = robot.rigid.world_poses(robot.random_configurations(8, np.random.default_rng(4)), "tip")
     found = inverse(robot, p, R, frame="world", target="tip")
     rows = found.rows(PoseStatus.REACHED, PoseStatus.NEAR_SINGULAR)
     assert len(rows) >= 6
@@ -256,7 +256,7 @@ def test_readings_under_load_bring_the_twin_to_the_pose() -> None:
 
 def test_the_pose_with_another_payload_takes_other_readings() -> None:
     arm = loaded_arm(TILTING, 3)
-    p, R = arm.poses(arm.random_configurations(20, np.random.default_rng(4)))
+    p, R = arm.world_poses(arm.random_configurations(20, np.random.default_rng(4)))
     light, heavy = (
         inverse(arm.with_payload(Payload(mass, (0.0, 0.02, 0.1))), p, R, frame="world") for mass in (0.3, 5.0)
     )
@@ -276,11 +276,11 @@ def test_under_load_other_arms_and_tasks(name: str, orientation: Any) -> None:
     own = {p.name: 0.3 * p.prior for effect in robot.effects for p in effect.parameters}
     robot = robot.with_values(own)
     q = robot.random_configurations(60, np.random.default_rng(1))
-    p, R = robot.poses(q)
+    p, R = robot.world_poses(q)
     seed = q + 0.02 * np.random.default_rng(2).standard_normal(q.shape)
     found = inverse(robot, p, R, frame="world", orientation=orientation, seed=seed)
     assert found.complete
-    got_p, got_R = robot.poses(found.joints)
+    got_p, got_R = robot.world_poses(found.joints)
     assert np.abs(got_p - p).max() < 1e-9
     if orientation == "full":
         assert np.abs(got_R - R).max() < 1e-9
@@ -295,7 +295,7 @@ def test_a_shaft_that_nothing_lays_to_a_side_is_no_obstacle() -> None:
     down = np.diag([1.0, -1.0, -1.0])
     found = inverse(robot, [[0.35, 0.05, 0.35]], down[None])
     assert found.complete
-    position, rotation = robot.poses(found.joints)
+    position, rotation = robot.world_poses(found.joints)
     np.testing.assert_allclose(position, [[0.35, 0.05, 0.35]], rtol=0, atol=1e-9)
     np.testing.assert_allclose(rotation[0], down, rtol=0, atol=1e-9)
 
@@ -312,7 +312,7 @@ def test_base_frame_target_and_world() -> None:
     q = robot.random_configurations(50, np.random.default_rng(0))
     base = robot.base
     for target in (None, "tool", "ball"):
-        p, R = robot.poses(q, target)
+        p, R = robot.world_poses(q, target)
         world = inverse(robot, p, R, target=target, frame="world", seed=q)
         in_base = (p - np.array(base.translation)) @ base.rotation
         local = inverse(robot, in_base, base.rotation.T @ R, target=target, seed=q)
@@ -326,7 +326,7 @@ def test_an_offset_shared_between_base_and_joint_is_no_error_of_the_start() -> N
     robot = load_robot("irb120")
     robot = robot.with_values(robot.truths["tracker-triangular"].values)  # d_1 is 0: it stands in base_z
     q = robot.random_configurations(200, np.random.default_rng(0))
-    p, R = robot.poses(q)
+    p, R = robot.world_poses(q)
     found = inverse(robot, p, R, frame="world", seed=q)
     assert found.complete
     assert (np.abs(found.joints - q).max(axis=1) < 1e-6).sum() >= 198
@@ -339,7 +339,7 @@ def test_an_offset_shared_between_base_and_joint_is_no_error_of_the_start() -> N
 def test_the_turn_nearest_to_the_seed_within_the_limits(gain: bool) -> None:
     robot = calibrated(load_robot("irb120"), 2, gain)
     q = np.radians([[10, 20, -30, 40, 50, 300.0]])
-    p, R = robot.poses(q)
+    p, R = robot.world_poses(q)
     for turn, seed in ((300.0, 310.0), (-60.0, 0.0), (-60.0, -200.0)):
         found = inverse(robot, p, R, frame="world", branch="front-up-noflip", seed=np.radians([0, 0, 0, 0, 0, seed]))
         assert found.complete
@@ -353,7 +353,7 @@ def test_the_turn_nearest_to_the_seed_within_the_limits(gain: bool) -> None:
 def test_beyond_limit_names_the_joints() -> None:
     robot = load_robot("irb120")
     q = np.radians([[10, 20, 80, 40, 50, 0.0]])  # axis 3 ends at 70
-    p, R = robot.poses(q)
+    p, R = robot.world_poses(q)
     found = inverse(robot, p, R, frame="world", branch=_branch(robot, q))
     assert found.status == (PoseStatus.BEYOND_LIMIT,)
     assert found.beyond.tolist() == [[False, False, True, False, False, False]]
@@ -365,7 +365,7 @@ def test_beyond_limit_names_the_joints() -> None:
 def test_near_singular_is_reached_with_a_warning() -> None:
     robot = calibrated(load_robot("irb120"), 2)
     q = np.radians([[10, 20, 30, 40, 0.05, 0.0], [10, 20, 30, 40, 50, 0.0]])
-    p, R = robot.poses(q)
+    p, R = robot.world_poses(q)
     found = inverse(robot, p, R, frame="world")
     assert found.status == (PoseStatus.NEAR_SINGULAR, PoseStatus.REACHED)
     assert found.complete
@@ -375,12 +375,12 @@ def test_near_singular_is_reached_with_a_warning() -> None:
 
 def test_a_pose_out_of_reach_comes_with_the_nearest_joints() -> None:
     robot = calibrated(load_robot("li3"), 2)
-    stretched = robot.poses(np.radians([[20, 40, 0]]))[0]
+    stretched = robot.world_poses(np.radians([[20, 40, 0]]))[0]
     aim = np.vstack([1.5 * stretched, 0.7 * stretched])
     found = inverse(robot, aim, orientation="free")
 
     def miss(q: Array) -> Array:
-        return np.asarray(robot.poses(q[None])[0][0] - aim[0])
+        return np.asarray(robot.world_poses(q[None])[0][0] - aim[0])
 
     low, high = np.array([joint.limits for joint in robot.joints], float).T
     best = min(
@@ -389,13 +389,13 @@ def test_a_pose_out_of_reach_comes_with_the_nearest_joints() -> None:
     )
     assert found.status == (PoseStatus.UNREACHABLE, PoseStatus.REACHED)
     assert found.position_error[0] == pytest.approx(best, rel=1e-6)
-    assert np.linalg.norm(robot.poses(found.joints)[0][0] - aim[0]) == pytest.approx(best, rel=1e-6)
+    assert np.linalg.norm(robot.world_poses(found.joints)[0][0] - aim[0]) == pytest.approx(best, rel=1e-6)
     assert found.advice(0).startswith(f"{best * 1e3:.4g} mm are missing.")
 
 
 def test_out_of_reach_on_all_branches_has_one_row() -> None:
     robot = calibrated(load_robot("irb120"), 2)
-    p, R = robot.poses(np.radians([[10, 20, 30, 40, 50, 0.0]]))
+    p, R = robot.world_poses(np.radians([[10, 20, 30, 40, 50, 0.0]]))
     found = inverse(robot, np.vstack([p, 3 * p]), np.vstack([R, R]), frame="world", branch="all")
     assert Counter(found.pose.tolist())[1] == 1
     assert found.status[-1] is PoseStatus.UNREACHABLE
@@ -408,7 +408,7 @@ def test_out_of_reach_on_all_branches_has_one_row() -> None:
 def test_a_branch_that_does_not_reach_the_pose_is_lost_and_another_one_given() -> None:
     robot = calibrated(load_robot("irb1600"), 2)
     q = np.radians([[10, 80, -70, 40, 50, 0.0]])  # far in front: no reaching over the back
-    p, R = robot.poses(q)
+    p, R = robot.world_poses(q)
     found = inverse(robot, p, R, frame="world", branch="back-up-noflip")
     assert found.status == (PoseStatus.BRANCH_LOST,)
     assert found.branch[0].startswith("front")
@@ -439,7 +439,7 @@ CASES: list[Case] = [
 def test_arms_and_tasks_without_closed_form(nominal: Robot, orientation: Any) -> None:
     robot = calibrated(nominal, 3)
     q = robot.random_configurations(100, np.random.default_rng(1))
-    p, R = robot.poses(q)
+    p, R = robot.world_poses(q)
     seed = q + 0.05 * np.random.default_rng(2).standard_normal(q.shape)
     near = inverse(robot, p, R, frame="world", orientation=orientation, seed=seed)
     assert near.complete
@@ -449,7 +449,7 @@ def test_arms_and_tasks_without_closed_form(nominal: Robot, orientation: Any) ->
     assert np.mean(reached) >= 0.97
     for solutions in (near, found):
         rows = solutions.rows(PoseStatus.REACHED, PoseStatus.NEAR_SINGULAR, PoseStatus.BEYOND_LIMIT)
-        got_p, got_R = robot.poses(solutions.joints[rows])
+        got_p, got_R = robot.world_poses(solutions.joints[rows])
         assert np.abs(got_p - p[rows]).max() < 1e-9
         if orientation == "axis":
             assert np.abs(got_R[:, :, 2] - R[rows][:, :, 2]).max() < 1e-9
@@ -460,7 +460,7 @@ def test_arms_and_tasks_without_closed_form(nominal: Robot, orientation: Any) ->
 
 def test_same_question_same_answer() -> None:
     robot = calibrated(seven_axes(), 3)
-    p, R = robot.poses(robot.random_configurations(20, np.random.default_rng(1)))
+    p, R = robot.world_poses(robot.random_configurations(20, np.random.default_rng(1)))
     one, two = (inverse(robot, p, R, frame="world").joints for _ in range(2))
     assert (one == two).all()
 
@@ -483,16 +483,17 @@ NAN = float("nan")
     [
         ("not orthonormal", P, 1.001 * R, {}),
         ("it does not turn", P, -R, {}),
-        ("wrong shape", P, np.eye(3), {}),
-        ("wrong shape", P[0], R, {}),
+        ("wrong shape", P, np.eye(4), {}),
+        ("wrong shape", P[:, :2], R, {}),
         ("not as many rotations", P, np.vstack([R, R]), {}),
-        ("NaN and infinity are no pose", P * NAN, R, {}),
-        ("NaN and infinity are no pose", P, R * NAN, {}),
+        ("NaN and infinity cannot be used here", P * NAN, R, {}),
+        ("NaN and infinity cannot be used here", P, R * NAN, {}),
         ("the poses have no orientation", P, None, {}),
-        ("wrong length", P, R, {"seed": [0.0] * 5}),
-        ("NaN and infinity are no joint readings", P, R, {"seed": [NAN] * 6}),
+        ("wrong shape", P, R, {"seed": [0.0] * 5}),
+        ("not as many seeds", P, R, {"seed": np.zeros((2, 6))}),
+        ("NaN and infinity cannot be used here", P, R, {"seed": [NAN] * 6}),
         ("no such branch", P, R, {"branch": "front-up-flop"}),
-        ("no such choice", P, R, {"frame": "tool"}),
+        ("no frame of this name", P, R, {"frame": "tool"}),
         ("no such choice", P, R, {"orientation": "half"}),
         ("no target of this name", P, R, {"target": "gripper"}),
         ("no names here", P, R, {"branch": "all", "orientation": "free"}),
@@ -524,7 +525,7 @@ def test_next_to_a_singular_wrist_branches_are_found_that_the_nominal_arm_has_no
     q = nominal.random_configurations(10_000, rng)
     q = q[abs(np.sin(q[:, 4])) < 0.02]
     assert len(q) > 50
-    position, rotation = robot.poses(q)
+    position, rotation = robot.world_poses(q)
     rule = branch_rule(robot)
     assert rule is not None
     number = rule.numbers(robot.forward_kinematics(q))

@@ -53,7 +53,7 @@ def error(ebeta: float, egamma: float, ex: float, ey: float, ez: float) -> Array
 
 def test_flange_of_the_nominal_robot() -> None:
     robot = converted(load_robot("kr5"), "joint-errors")
-    position, _ = robot.poses(np.radians([[0, -90, 90, 0, 0, 0]]))
+    position, _ = robot.world_poses(np.radians([[0, -90, 90, 0, 0, 0]]))
     assert_allclose(position[0], [0.915, 0.0, 1.120], rtol=0, atol=1e-12)
 
 
@@ -65,7 +65,7 @@ def test_it_is_equation_7(seed: int) -> None:
         if i:
             T = T @ error(*TABLE_3[i - 1]) @ about("z", q[i - 1])
         T = T @ slid(*(np.array(translation) / 1e3)) @ about(axis, math.radians(angle))
-    position, rotation = with_table_3().poses(q[None])
+    position, rotation = with_table_3().world_poses(q[None])
     assert_allclose(position[0], T[:3, 3], rtol=0, atol=1e-14)
     assert_allclose(rotation[0], T[:3, :3], rtol=0, atol=1e-14)
 
@@ -75,7 +75,7 @@ def test_the_library_truth_is_the_same_robot() -> None:
     plain = load_robot("kr5")
     truth = plain.with_values(plain.truths["axis-tests"].values)
     q = plain.random_configurations(20, np.random.default_rng(0))
-    for actual, expected in zip(with_table_3().poses(q), truth.poses(q), strict=True):
+    for actual, expected in zip(with_table_3().world_poses(q), truth.world_poses(q), strict=True):
         assert_allclose(actual, expected, rtol=0, atol=1e-12)
 
 

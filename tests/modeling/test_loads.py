@@ -154,7 +154,7 @@ def test_level_arm_sags_forward() -> None:
     assert_allclose(loads[0, :2], weight * np.array([np.sin(q[0]), np.cos(q[0])]), rtol=0, atol=1e-14)
     assert_allclose(loads[0, 2:5], 0.0, rtol=0, atol=1e-14)
     assert loads[0, 5, 0] > 0  # turning forward, about y of the base, lowers the arm
-    held, sagged = (lever().poses(np.array([[turn]]))[0][0, 2] for turn in (0.0, 1e-4 * loads[0, 5, 0]))
+    held, sagged = (lever().world_poses(np.array([[turn]]))[0][0, 2] for turn in (0.0, 1e-4 * loads[0, 5, 0]))
     assert sagged < held
 
 
@@ -187,7 +187,7 @@ def test_horizontal_pull_turns_an_upright_axis() -> None:
     wrench = np.zeros((6, CONFIGURATIONS))
     wrench[1] = 30.0
     loads = joint_loads(robot, q, wrench=wrench)
-    reach = robot.poses(q.T)[0][:, 0]
+    reach = robot.world_poses(q.T)[0][:, 0]
     assert_allclose(loads[0, 5], 30.0 * reach, rtol=0, atol=1e-12)
 
 

@@ -420,9 +420,9 @@ def test_units_of_the_file_count(tmp_path: Path) -> None:
 
 def test_axis_is_made_a_unit_vector(tmp_path: Path) -> None:
     robot = read(tmp_path, URDF_LIKE)
-    _, rotation = robot.with_values({"d_offset_2": 0.05}).poses(np.array([[0.3, 0.0]]))
+    _, rotation = robot.with_values({"d_offset_2": 0.05}).world_poses(np.array([[0.3, 0.0]]))
     assert_allclose(rotation[0] @ rotation[0].T, np.eye(3), rtol=0, atol=1e-15)
-    moved, _ = robot.poses(np.array([[0.0, 0.0], [0.0, 0.1]]))
+    moved, _ = robot.world_poses(np.array([[0.0, 0.0], [0.0, 0.1]]))
     assert math.dist(*moved.tolist()) == pytest.approx(0.1, rel=1e-14)
 
 
@@ -519,7 +519,7 @@ def test_calibrated_robot_round_trips(tmp_path: Path) -> None:
         assert ulps(other.prior, parameter.prior) <= 2
     q = robot.random_configurations(5, np.random.default_rng(1))
     for target in (None, "tip", "1"):
-        for actual, expected in zip(again.poses(q, target), robot.poses(q, target), strict=True):
+        for actual, expected in zip(again.world_poses(q, target), robot.world_poses(q, target), strict=True):
             assert_allclose(actual, expected, rtol=0, atol=1e-14)
 
 
@@ -554,7 +554,7 @@ def test_payload_gravity_and_effects_round_trip(tmp_path: Path) -> None:
             assert ulps(getattr(other, key), getattr(parameter, key)) <= 2, (name, key)
     q = robot.random_configurations(5, np.random.default_rng(1))
     at = Postures(q, approach=np.sign(q), number=np.arange(5.0), temperature=np.linspace(15, 35, 5))
-    for actual, expected in zip(again.poses(at), robot.poses(at), strict=True):
+    for actual, expected in zip(again.world_poses(at), robot.world_poses(at), strict=True):
         assert_allclose(actual, expected, rtol=0, atol=1e-14)
 
 
@@ -587,7 +587,7 @@ def test_urdf_like_robot_round_trips(tmp_path: Path) -> None:
     assert again.joints[1].kind == "prismatic"
     assert again.joints[1].limits == (-0.1, 0.1)
     q = np.array([[0.3, 0.05]])
-    assert_allclose(again.poses(q)[0], robot.poses(q)[0], rtol=0, atol=1e-15)
+    assert_allclose(again.world_poses(q)[0], robot.world_poses(q)[0], rtol=0, atol=1e-15)
 
 
 def test_inertia_round_trips(tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ IDS = ("irb120", "irb1600", "katana450", "kr5", "li3", "lrmate200ic", "puma560",
 
 def position(robot: Robot, degrees: list[float]) -> Array:
     """Flange position [mm]."""
-    positions, _ = robot.poses(np.radians([degrees]))
+    positions, _ = robot.world_poses(np.radians([degrees]))
     return np.array(positions[0] * 1e3)
 
 
@@ -82,7 +82,7 @@ def test_robot_round_trips(robot_id: str, tmp_path: Path) -> None:
     assert robot_text(again) == path.read_text(encoding="utf-8")
     assert again == robot
     q = robot.random_configurations(5, np.random.default_rng(0))
-    for actual, expected in zip(again.poses(q), robot.poses(q), strict=True):
+    for actual, expected in zip(again.world_poses(q), robot.world_poses(q), strict=True):
         assert_allclose(actual, expected, rtol=0, atol=0)
 
 
@@ -155,7 +155,7 @@ def test_known_position(robot_id: str, degrees: list[float], millimetres: list[f
 )
 def test_puma_agrees_with_corke(degrees: list[float], printed: list[list[float]]) -> None:
     # P. Corke, Robotics, Vision and Control, section 7.2: forward kinematics of qz and qn, to four digits.
-    place, rotation = load_robot("puma560").poses(np.radians([degrees]))
+    place, rotation = load_robot("puma560").world_poses(np.radians([degrees]))
     expected = np.array(printed)
     assert_allclose(place[0], expected[:, 3], rtol=0, atol=6e-5)
     assert_allclose(rotation[0], expected[:, :3], rtol=0, atol=1e-12)
@@ -230,6 +230,6 @@ def test_kr5_is_the_product_of_the_paper(with_errors: bool) -> None:
             if with_errors and i < len(KR5_ERRORS):
                 ebeta, egamma, ex, ey, ez = KR5_ERRORS[i]
                 expected = expected @ shift(ex, ey, ez) @ turn("x", egamma) @ turn("y", ebeta)
-        place, rotation = robot.poses(np.radians([degrees]))
+        place, rotation = robot.world_poses(np.radians([degrees]))
         assert_allclose(place[0] * 1e3, expected[:3, 3], rtol=0, atol=1e-9)
         assert_allclose(rotation[0], expected[:3, :3], rtol=0, atol=1e-12)

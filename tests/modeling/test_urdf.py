@@ -189,7 +189,7 @@ def check_poses(robot: Robot, content: bytes | str, link: str, atol: float, seed
     """Check that Pinocchio finds the poses of `robot` in the file; its base stands at the identity."""
     q = robot.random_configurations(10, np.random.default_rng(seed))
     found = Pinocchio(content).poses([joint.name for joint in robot.joints], q, link)
-    for actual, expected in zip(found, robot.poses(q), strict=True):
+    for actual, expected in zip(found, robot.world_poses(q), strict=True):
         assert_allclose(actual, expected, rtol=0, atol=atol)
 
 
@@ -217,7 +217,7 @@ def test_chain_ends_at_the_named_link(tip: str, tmp_path: Path) -> None:
     assert len(robot.joints) == {"forearm_link": 3, "shoulder_link": 1}.get(tip, 4)
     names = [joint.name for joint in robot.joints]
     q = robot.random_configurations(5, np.random.default_rng(1))
-    for actual, expected in zip(robot.poses(q), Pinocchio(UR_LIKE).poses(names, q, tip), strict=True):
+    for actual, expected in zip(robot.world_poses(q), Pinocchio(UR_LIKE).poses(names, q, tip), strict=True):
         assert_allclose(actual, expected, rtol=0, atol=1e-12)
 
 
@@ -438,7 +438,7 @@ def test_calibrated_file_has_the_poses_of_the_robot(
     assert content != FILES[name]
     assert without_origins(content) == without_origins(FILES[name])
     q = robot.random_configurations(10, np.random.default_rng(seed))
-    for actual, expected in zip(read(content, tmp_path).poses(q), robot.poses(q), strict=True):
+    for actual, expected in zip(read(content, tmp_path).world_poses(q), robot.world_poses(q), strict=True):
         assert_allclose(actual, expected, rtol=0, atol=1e-12)
 
 

@@ -74,7 +74,7 @@ def test_box_and_floor_in_the_base_frame(arm: Robot, postures: Postures) -> None
     assert floor.any()
     flange = kept(arm, postures, box={"of": "flange", "y": [0, 9e3]})["box"]
     nominal = load_robot("irb120")
-    assert np.array_equal(flange, nominal.poses(postures)[0][:, 1] >= 0)
+    assert np.array_equal(flange, nominal.world_poses(postures)[0][:, 1] >= 0)
 
 
 def test_targets_look_at_the_instrument(arm: Robot, postures: Postures) -> None:

@@ -130,7 +130,7 @@ def test_a_redundant_arm_stays_as_near_to_its_start_as_it_can() -> None:
     def missing(x: Array) -> Array:
         """The path's point, and a way to the start that is at right angles to all that keep the point."""
         q, multipliers = x[:5], x[5:]
-        (p, _), J = robot.poses(q[None], "tip"), robot.joint_jacobian(q[None], "tip")[0, :3]
+        (p, _), J = robot.world_poses(q[None], "tip"), robot.joint_jacobian(q[None], "tip")[0, :3]
         return np.concatenate([p[0] - path.position[far], q - motion.joints[0] - J.T @ multipliers])
 
     best = least_squares(missing, np.append(nearest, np.zeros(3)), xtol=1e-14, gtol=1e-14)
@@ -259,7 +259,7 @@ NAN = np.full((3, 3), np.nan)
         ("times do not rise", lambda: joint_motion(katana(), changed(time=-changed().time))),
         ("trajectory, velocity: a trajectory has three", lambda: joint_motion(katana(), changed(velocity=NAN))),
         ("NaN or infinity", lambda: joint_motion(katana(), changed(position=np.nan * changed().position))),
-        ("wrong length", lambda: joint_motion(katana(), changed(), seed=[0.0, 1.0])),
+        ("wrong shape", lambda: joint_motion(katana(), changed(), seed=[0.0, 1.0])),
     ],
 )
 def test_refusals(words: str, make: Callable[[], object]) -> None:

@@ -176,7 +176,7 @@ def test_the_predicted_error_comes_true() -> None:
         jitter = noise * (np.sqrt(0.75) * common + np.sqrt(0.25) * rng.normal(size=(45, 3)))
         fit = identify(nominal, replace(data, position=data.position + jitter), MODEL["geometric"])
         q = nominal.random_configurations(40, rng)
-        seen = [fit.robot.poses(q, name)[0] - twin.robot.poses(q, name)[0] for name in data.targets]
+        seen = [fit.robot.world_poses(q, name)[0] - twin.robot.world_poses(q, name)[0] for name in data.targets]
         errors.append(np.linalg.norm(np.stack(seen) + noise * rng.normal(size=(3, 40, 3)), axis=2).mean())
     arm = with_targets(nominal)
     rng = np.random.default_rng(1)

@@ -362,7 +362,7 @@ def test_workspace_is_in_the_base_frame_in_mm() -> None:
     at_origin = replace(report.fit.robot, base_quaternion=(1.0, 0.0, 0.0, 0.0)).with_values(
         {f"base_{axis}": 0.0 for axis in ("x", "y", "z", "rx", "ry", "rz")}
     )
-    predicted = np.array([at_origin.poses(part.joints, name)[0] for name in part.targets])
+    predicted = np.array([at_origin.world_poses(part.joints, name)[0] for name in part.targets])
     expected = predicted[part.target, part.configuration] * 1e3
     assert np.abs(shown - expected).max() < 0.5  # noise and rounding
     assert report.validation is not None

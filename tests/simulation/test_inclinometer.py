@@ -50,7 +50,7 @@ def test_the_plumb_line_in_each_link_comes_back() -> None:
     plumb = -np.sin(inclinations(Twin(robot), q, 0.0, rng))
     assert_allclose(np.linalg.norm(plumb, axis=-1), 1.0, rtol=1e-12)
     down = np.array(robot.gravity) / math.sqrt(86)
-    assert_allclose(plumb[:, 5], robot.poses(q)[1].swapaxes(1, 2) @ down, atol=1e-12)
+    assert_allclose(plumb[:, 5], robot.world_poses(q)[1].swapaxes(1, 2) @ down, atol=1e-12)
 
 
 def test_a_reversal_of_the_load_shows_gap_and_stiffness() -> None:

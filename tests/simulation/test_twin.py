@@ -178,7 +178,7 @@ def test_with_nothing_true_but_the_robot_the_twin_is_the_model() -> None:
         q = twin.robot.random_configurations(3, rng)
         seen = measure(twin, q, 0.0, rng)
         for i, target in enumerate(seen.targets):
-            assert_allclose(seen.position[seen.target == i], twin.robot.poses(q, target)[0], rtol=0, atol=1e-13)
+            assert_allclose(seen.position[seen.target == i], twin.robot.world_poses(q, target)[0], rtol=0, atol=1e-13)
         zeros = replace(twin, joints={i: JointTruth() for i in range(1, len(twin.robot.joints) + 1)})
         assert np.array_equal(measure(zeros, q, 0.0, rng).position, seen.position)
 
@@ -331,7 +331,7 @@ def katana_on_the_circle() -> tuple[Robot, Array]:
         up, across = 0.1 * math.cos(angle) * math.sqrt(0.5), 0.1 * math.sin(angle)
         point, q = centre + np.array([across, -up, up]), np.radians([0.0, 30.0, 60.0, 60.0, 0.0])
         for _ in range(100):
-            missing = point - robot.poses(q[None], "tip")[0][0]
+            missing = point - robot.world_poses(q[None], "tip")[0][0]
             if np.linalg.norm(missing) < 1e-10:
                 break
             step = np.linalg.lstsq(robot.joint_jacobian(q[None], "tip")[0, :3], missing, rcond=None)[0]
@@ -432,8 +432,8 @@ def test_links_grow_while_a_campaign_is_measured() -> None:
     data = measure(twin, twin.robot.random_configurations(30, rng), 0.0, rng)
     for name in data.targets:
         read = data.position[data.target == data.targets.index(name)]
-        assert_allclose(twin.robot.poses(data.postures, name)[0], read, rtol=0, atol=1e-12)
-        warm = np.linalg.norm(twin.robot.poses(data.joints, name)[0] - read, axis=1)
+        assert_allclose(twin.robot.world_poses(data.postures, name)[0], read, rtol=0, atol=1e-12)
+        warm = np.linalg.norm(twin.robot.world_poses(data.joints, name)[0] - read, axis=1)
         assert warm[0] > 1e-4
         assert warm[-1] < 0.5 * warm[:5].mean()
     later = measure(twin, data.joints, 0.0, rng, number=np.arange(100.0, 130.0))
@@ -441,7 +441,7 @@ def test_links_grow_while_a_campaign_is_measured() -> None:
     assert later.number[0] == 100.0
     assert np.abs(later.position - data.position).max() > 1e-4
     shown = twin.frames(data.joints)["1"][:, :3, 3]
-    assert_allclose(twin.robot.poses(data.joints, "1")[0], shown, rtol=0, atol=1e-12)
+    assert_allclose(twin.robot.world_poses(data.joints, "1")[0], shown, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("device", ["tracker", "hexapod", "touch-up"])

@@ -104,4 +104,4 @@ def test_run_out_turns_each_joint_by_its_sine() -> None:
     stiff = replace(twin, joints={number: replace(j, compliance=0.0) for number, j in twin.joints.items()})
     found = Truth.of(stiff, joints).places((0.0, 0.0, 0.1))
     plain = twin.robot.with_frames(twin.robot.base, {"tip": (0.0, 0.0, 0.1)})
-    assert found == pytest.approx(plain.poses(turned, "tip")[0], abs=1e-12)
+    assert found == pytest.approx(plain.world_poses(turned, "tip")[0], abs=1e-12)

@@ -61,7 +61,7 @@ def test_the_tool_link_of_table_3_2_ends_where_the_document_has_it() -> None:
     robot = published("standard")
     q = np.zeros((1, 5))
     fifth = Twin(robot).postures(q)[0].links[-1]
-    assert robot.poses(q, TIP)[0][0] == pytest.approx(fifth[:3, :3] @ end + fifth[:3, 3], abs=1e-12)
+    assert robot.world_poses(q, TIP)[0][0] == pytest.approx(fifth[:3, :3] @ end + fifth[:3, 3], abs=1e-12)
 
 
 def test_a_stiffness_of_table_4_4_is_kilogram_force_metres_a_degree() -> None:
@@ -73,9 +73,9 @@ def test_twin_and_model_tilt_alike() -> None:
     q = katana().random_configurations(20, np.random.default_rng(3))
     model = with_tilting(katana(), TILTING)
     true = true_poses(twin(katana()), q)[0]
-    left = np.linalg.norm(model.poses(q, TIP)[0] - true, axis=1)
+    left = np.linalg.norm(model.world_poses(q, TIP)[0] - true, axis=1)
     assert np.quantile(left, 0.25) < 1e-9  # elsewhere some moment is near zero, where the twin's backlash jumps
-    assert np.median(np.linalg.norm(katana().poses(q, TIP)[0] - true, axis=1)) > 1e-4
+    assert np.median(np.linalg.norm(katana().world_poses(q, TIP)[0] - true, axis=1)) > 1e-4
 
 
 def median(found: Study, table: str, what: str) -> float:

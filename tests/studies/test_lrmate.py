@@ -73,8 +73,8 @@ def test_the_reference_point_is_300_mm_from_the_cups() -> None:
 def test_another_world_changes_no_distance_and_is_undone() -> None:
     robot, _ = nominal_robot()
     q = robot.random_configurations(6, np.random.default_rng(0))
-    position, rotation = robot.poses(q, "2")
-    there, turned = rebased(robot, FIXTURE).poses(q, "2")
+    position, rotation = robot.world_poses(q, "2")
+    there, turned = rebased(robot, FIXTURE).world_poses(q, "2")
     assert there @ FIXTURE.rotation.T + np.array(FIXTURE.translation) == pytest.approx(position, abs=1e-14)
     assert FIXTURE.rotation @ turned == pytest.approx(rotation, abs=1e-14)
 

@@ -52,7 +52,7 @@ def test_a_centre_taught_too_high_makes_lengths_too_short_until_the_centre_is_fi
     rng = np.random.default_rng(2)
     joints = arm.random_configurations(400, rng)
     centre = np.array([0.3, 0.0, 0.2])
-    away = arm.poses(joints, "1")[0] - centre
+    away = arm.world_poses(joints, "1")[0] - centre
     above = joints[away[:, 2] > 0.5 * np.linalg.norm(away, axis=1)]
     high = centre + np.array([0.0, 0.0, 0.2e-3])
     read = lengths(Twin(arm), above, centre)

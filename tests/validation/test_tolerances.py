@@ -42,7 +42,7 @@ def test_no_draw_within_the_tolerances_does_more_than_the_worst() -> None:
     q = robot.random_configurations(30, rng)
     leans, places = np.full(6, 1e-4), np.full(6, 5e-5)
     found = flange_error(robot, leans.tolist(), places.tolist(), q)
-    nominal = robot.poses(q)[0]
+    nominal = robot.world_poses(q)[0]
     seen = []
     for _ in range(300):
         values = dict(robot.values)
@@ -52,7 +52,7 @@ def test_no_draw_within_the_tolerances_does_more_than_the_worst() -> None:
             shift *= 5e-5 / np.linalg.norm(shift)
             for name, step in zip(("ebeta", "egamma", "ex", "ey", "ez"), (ebeta, egamma, *shift), strict=True):
                 values[f"{name}_{i}"] += step
-        seen.append(np.linalg.norm(robot.with_values(values).poses(q)[0] - nominal, axis=1).max())
+        seen.append(np.linalg.norm(robot.with_values(values).world_poses(q)[0] - nominal, axis=1).max())
     assert max(seen) < found.together[0] * 1.001
     assert max(seen) > 0.5 * found.together[1]
 
@@ -65,7 +65,9 @@ def test_the_worst_side_of_one_joint_is_met() -> None:
     for towards in np.linspace(0, 2 * np.pi, 361):
         ebeta, egamma = errors_of_tolerance(1e-5, float(towards), 1.0)
         values = {"ebeta_2": robot.values["ebeta_2"] + ebeta, "egamma_2": robot.values["egamma_2"] + egamma}
-        moved.append(np.linalg.norm(robot.with_values(values).poses(q)[0] - robot.poses(q)[0], axis=1).max())
+        moved.append(
+            np.linalg.norm(robot.with_values(values).world_poses(q)[0] - robot.world_poses(q)[0], axis=1).max()
+        )
     assert found.leaning[1] == pytest.approx(max(moved), rel=1e-4)
     assert found.leaning[[0, 2, 3, 4, 5]].max() == 0.0
 

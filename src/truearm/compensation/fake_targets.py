@@ -198,5 +198,5 @@ def _merged(parts: list[tuple[NDArray[np.intp], JointSolutions]], count: int) ->
 
 def matrices(robot: Robot, joints: Array) -> Array:
     """Return poses ``(n, 4, 4)`` [m] of the flange of a robot whose base is the world."""
-    position, rotation = robot.poses(joints)
+    position, rotation = robot.world_poses(joints)
     return homogeneous(rotation, position)

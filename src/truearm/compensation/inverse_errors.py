@@ -91,7 +91,7 @@ def fake_targets(robot: Robot, joints: Array) -> FakeTargets:
     joints
         Readings at which the nominal robot is at the wanted poses.
     """
-    position, rotation = inverted(robot).poses(joints)
+    position, rotation = inverted(robot).world_poses(joints)
     return FakeTargets(position, rotation, inverse(design(robot), position, rotation, seed=joints))
 
 

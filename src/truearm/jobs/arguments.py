@@ -135,11 +135,7 @@ def files_argument(files: object, parameter: str) -> dict[str, Path]:
 
 def payload_argument(payload: object, parameter: str = "payload") -> Payload | None:
     """Return the payload that was given, or that a text such as ``2.7kg,50mm,25mm,100mm`` names; None for None."""
-    if payload is None or isinstance(payload, Payload):
-        return payload
-    if isinstance(payload, str):
-        return Payload.of_text(payload, parameter)
-    raise wrong_kind("a payload belongs here", payload, parameter, "a Payload, or a text: 2.7kg,50mm,25mm,100mm")
+    return None if payload is None else Payload.of(payload, parameter)
 
 
 def gravity_argument(gravity: object, parameter: str = "gravity") -> tuple[float, float, float] | None:

@@ -70,7 +70,7 @@ def hexapod_world_frame(
         arm, _ = with_cups(loaded, fixture)
     joints = _touches_argument(touches, arm)
     with refusals_of("target"):
-        position, _ = arm.poses(joints, arm.targets[0].name if cup is None else cup)
+        position, _ = arm.world_poses(joints, arm.targets[0].name if cup is None else cup)
     stand = arm.base
     points = (position - np.array(stand.translation)) @ stand.rotation
     with refusals_of("touches"):

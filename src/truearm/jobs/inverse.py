@@ -21,8 +21,8 @@ from truearm.jobs.arguments import (
 from truearm.measurement.readers.poses import read_poses
 from truearm.modeling.chain import Array
 from truearm.modeling.formats.joint_table import joints_csv
+from truearm.modeling.frames import Frame
 from truearm.modeling.inverse import inverse as inverse_kinematics
-from truearm.modeling.inverse.kinematics import PoseFrame
 from truearm.modeling.inverse.pose_solver import Orientation
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
@@ -39,7 +39,7 @@ def inverse(
     branch: str | None = None,
     seed: Array | Sequence[float] | None = None,
     target: str | None = None,
-    frame: PoseFrame = "base",
+    frame: Frame = "base",
     orientation: Orientation = "full",
     payload: Payload | str | None = None,
     gravity: Sequence[float] | None = None,

@@ -121,7 +121,7 @@ def _check_design(nominal: Robot, errors: Robot) -> None:
         plain = design(errors)
     q = nominal.random_configurations(5, np.random.default_rng(0))
     if len(plain.joints) == len(nominal.joints):
-        apart = np.abs(plain.poses(q)[0] - nominal.with_frames(IDENTITY, {}).poses(q)[0]).max()
+        apart = np.abs(plain.world_poses(q)[0] - nominal.with_frames(IDENTITY, {}).world_poses(q)[0]).max()
         if apart < 1e-6:
             return
     raise InputError(

@@ -6,17 +6,33 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from truearm.arrays import axes, number_array
+from truearm.errors import InputError
+from truearm.measurement.dataset_fields import (
+    checked_kinds,
+    checked_labels,
+    checked_order,
+    checked_selection,
+    checked_sigma,
+    distinct_labels,
+    refuse_other_lengths,
+    refuse_unsound,
+)
 from truearm.modeling.chain import Array
-from truearm.modeling.postures import Postures
+from truearm.modeling.postures import Postures, approach_of
+from truearm.shown import as_html, counted, listed, short_text
 
 IntArray = NDArray[np.intp]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Dataset:
     """Configurations and readings; one reading is one target seen at one configuration.
+
+    It checks itself when it is made: a field of the wrong shape, or with numbers that cannot be, is refused by name.
+    :meth:`of` makes one from plain arrays.
 
     Attributes
     ----------
@@ -93,6 +109,124 @@ class Dataset:
     wrench: Array | None = None
     references: Dataset | None = None
 
+    def __post_init__(self) -> None:
+        """Refuse fields that do not fit together."""
+        refuse_unsound(self)
+
+    def __repr__(self) -> str:
+        counts = {
+            "position": self.position,
+            "orientation": self.quaternion,
+            "distance": self.distance,
+            "height": self.height,
+        }
+        found = [
+            counted(int(np.isfinite(values).reshape(len(values), -1).all(axis=1).sum()), what)
+            for what, values in counts.items()
+            if values is not None
+        ]
+        known = {
+            "order of measurement": self.number,
+            "standard deviations": self.sigma,
+            "temperature": self.temperature,
+            "external forces": self.wrench,
+            "reference points": self.references,
+        }
+        return short_text(
+            [
+                f"{self.source}: {counted(self.configurations, 'configuration')} "
+                f"of {counted(len(self.joint_kinds), 'joint')}",
+                f"{counted(len(self.targets), 'target')}: {listed(self.targets)}",
+                f"readings: {', '.join(found)}",
+                f"with: {', '.join(what for what, given in known.items() if given is not None) or 'nothing else'}",
+            ]
+        )
+
+    def _repr_html_(self) -> str:
+        return as_html(repr(self))
+
+    @classmethod
+    def of(
+        cls,
+        joints: ArrayLike,
+        positions: ArrayLike,
+        *,
+        targets: Sequence[str] | None = None,
+        configurations: Sequence[str | int] | None = None,
+        quaternions: ArrayLike | None = None,
+        sigma: ArrayLike | None = None,
+        sigma_rot: ArrayLike | None = None,
+        order: ArrayLike | None = None,
+        temperature: ArrayLike | None = None,
+        joint_kinds: Sequence[str] | None = None,
+        source: str = "arrays",
+    ) -> Dataset:
+        """Make a dataset from arrays, one row a configuration.
+
+        Parameters
+        ----------
+        joints
+            Joint positions [rad; m for prismatic joints], ``(n, joints)``.
+        positions
+            What the instrument read of one target, ``(n, 3)``, or of each of several, ``(n, targets, 3)`` [m]; NaN for
+            a reading that is missing.
+        targets
+            Names of the targets; ``1``, ``2`` and so on if None.
+        configurations
+            Names of the configurations; ``1``, ``2`` and so on if None.
+        quaternions
+            Measured orientations (w, x, y, z), ``(n, 4)`` or ``(n, targets, 4)``, NaN where one is missing.
+        sigma
+            Standard deviation of each coordinate [m]: a number, ``(n,)`` or ``(n, targets)``.
+        sigma_rot
+            Standard deviation about each axis of rotation [rad], likewise.
+        order
+            Place of each configuration in the order of measurement, counted from 0 or 1, ``(n,)``; not known if None.
+        temperature
+            Of the arm [degC], ``(n,)`` or a number.
+        joint_kinds
+            ``revolute`` or ``prismatic`` for each joint; all revolute if None.
+        source
+            What messages call the data.
+
+        Raises
+        ------
+        InputError
+            If shapes do not fit together, joints are not finite, a deviation is not above zero or a quaternion not of
+            length 1, or names are there twice.
+        """
+        q = number_array(joints, "joints", ("n", "joints"))
+        n = len(q)
+        if not n:
+            raise InputError("there is no configuration", parameter="joints", allowed="one row or more")
+        one = axes(positions) == 2
+        p = number_array(positions, "positions", (n, 3) if one else (n, "targets", 3), missing=True).reshape(n, -1, 3)
+        k = p.shape[1]
+        each = (n,) if one else (n, k)
+        whole = np.isfinite(p).all(axis=2, keepdims=True)
+        turned = None
+        if quaternions is not None:
+            turned = number_array(quaternions, "quaternions", (*each, 4), missing=True).reshape(n * k, 4)
+            refuse_other_lengths(turned, "quaternions")
+        names = checked_labels(targets, "targets", k)
+        made = None if order is None else checked_order(order, n)
+        return cls(
+            source=source,
+            labels=checked_labels(configurations, "configurations", n),
+            joints=q,
+            joint_kinds=checked_kinds(joint_kinds, q.shape[1]),
+            targets=names,
+            configuration=np.repeat(np.arange(n), k),
+            target=np.tile(np.arange(k), n),
+            position=np.where(whole, p, np.nan).reshape(n * k, 3),
+            quaternion=turned,
+            sigma=None if sigma is None else checked_sigma(sigma, "sigma", each),
+            sigma_rot=None if sigma_rot is None else checked_sigma(sigma_rot, "sigma_rot", each),
+            approach=None if made is None else approach_of(q, made),
+            number=None if made is None else np.asarray(made - min(int(made.min()), 1), float),
+            temperature=None if temperature is None else _of_each(temperature, "temperature", n),
+        )
+
     @property
     def postures(self) -> Postures:
         """What the arm's shape depended on at each configuration."""
@@ -139,8 +273,15 @@ class Dataset:
         in_frame = bool((self.has_position | self.has_orientation).any())
         return in_frame or (self.setup is not None and bool(self.setup.has_position.any()))
 
-    def of_readings(self, kept: NDArray[np.bool_]) -> Dataset:
-        """Return some of the readings ``(readings,)``, with all configurations."""
+    def of_readings(self, chosen: Sequence[int] | Sequence[bool] | IntArray | NDArray[np.bool_]) -> Dataset:
+        """Return some of the readings, with all configurations.
+
+        Parameters
+        ----------
+        chosen
+            A mask ``(readings,)``, or indices of readings in the order they shall have, repeated ones too.
+        """
+        kept = checked_selection(chosen, len(self.target), "chosen", "readings")
 
         def part(values: Array | None) -> Array | None:
             return None if values is None else values[kept]
@@ -158,25 +299,41 @@ class Dataset:
             sigma_rot=part(self.sigma_rot),
         )
 
-    def of_configurations(self, indices: Sequence[int] | IntArray) -> Dataset:
-        """Return the readings at some configurations, with these in the given order."""
-        indices = np.asarray(indices, dtype=np.intp)
-        place = np.full(self.configurations, -1, dtype=np.intp)
-        place[indices] = np.arange(len(indices))
-        kept = place[self.configuration] >= 0
+    def of_configurations(self, chosen: Sequence[int] | Sequence[bool] | IntArray | NDArray[np.bool_]) -> Dataset:
+        """Return some of the configurations with their readings.
+
+        Parameters
+        ----------
+        chosen
+            A mask ``(configurations,)``, or indices of configurations in the order they shall have. One that is
+            repeated becomes a configuration of its own each time, called ``7``, ``7#2``, ``7#3``: a bootstrap.
+        """
+        return self._at(checked_selection(chosen, self.configurations, "chosen", "configurations"))
+
+    def _at(self, indices: IntArray) -> Dataset:
+        times = np.bincount(indices, minlength=self.configurations)
+        first = np.cumsum(times) - times
+        readings = np.repeat(np.arange(len(self.target)), times[self.configuration])
+        of_each_reading = times[self.configuration]
+        repetition = np.arange(len(readings)) - np.repeat(np.cumsum(of_each_reading) - of_each_reading, of_each_reading)
+        place = np.argsort(indices, kind="stable")[first[self.configuration[readings]] + repetition]
+        some = self.of_readings(readings)
 
         def of_each(values: Array | None) -> Array | None:
             return None if values is None else values[indices]
 
-        some = self.of_readings(kept)
         return replace(
             some,
-            labels=tuple(self.labels[i] for i in indices),
+            labels=distinct_labels([self.labels[i] for i in indices]),
             joints=self.joints[indices],
-            configuration=place[some.configuration],
+            configuration=place,
             approach=of_each(self.approach),
             number=of_each(self.number),
             temperature=of_each(self.temperature),
             wrench=of_each(self.wrench),
-            references=None if self.references is None else self.references.of_configurations(indices),
+            references=None if self.references is None else self.references._at(indices),
         )
+
+
+def _of_each(values: ArrayLike, parameter: str, n: int) -> Array:
+    return np.array(np.broadcast_to(number_array(values, parameter, () if axes(values) == 0 else (n,)), n))

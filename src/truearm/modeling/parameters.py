@@ -12,6 +12,7 @@ from typing import Final, Literal
 
 import numpy as np
 
+from truearm.arrays import finite_number
 from truearm.modeling.chain import Array
 
 #: What parameters of the rigid robot and of what stands beside it describe.
@@ -66,6 +67,16 @@ class Parameter:
     prior: float
     deviation: float | None = None
     informed: float | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what is no number, and a standard deviation below zero."""
+        finite_number(self.nominal, "nominal", where=self.name)
+        finite_number(self.value, "value", where=self.name)
+        finite_number(self.prior, "prior", where=self.name, lowest=0.0)
+        if self.deviation is not None:
+            finite_number(self.deviation, "deviation", where=self.name, lowest=0.0)
+        if self.informed is not None:
+            finite_number(self.informed, "informed", where=self.name)
 
     @classmethod
     def plain(cls, name: str, unit: Unit, group: str, nominal: float, prior: float) -> Parameter:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Final
 
+from truearm.arrays import finite_number, number_array
 from truearm.errors import InputError
 from truearm.modeling.chain import Chain, Element, Motion
 from truearm.modeling.conventions import JointKind
@@ -86,10 +88,29 @@ class Payload:
     mass: float = 0.0
     cog: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
+    def __post_init__(self) -> None:
+        """Refuse a mass below zero, and what is no number."""
+        finite_number(self.mass, "mass", lowest=0.0)
+        number_array(self.cog, "cog", (3,))
+
     @property
     def text(self) -> str:
         """As :meth:`of_text` reads it."""
         return ",".join([f"{self.mass:.15g}kg", *(f"{v * 1e3:.15g}mm" for v in self.cog)])
+
+    @classmethod
+    def of(cls, payload: object, parameter: str = "payload") -> Payload:
+        """Return the payload that was given, or that a text names, see :meth:`of_text`."""
+        if isinstance(payload, Payload):
+            return payload
+        if isinstance(payload, str):
+            return cls.of_text(payload, parameter)
+        raise InputError(
+            "a payload belongs here",
+            parameter=parameter,
+            came=f"an object of type {type(payload).__name__}",
+            allowed="a Payload, or a text: 2.7kg,50mm,25mm,100mm",
+        )
 
     @classmethod
     def of_text(cls, text: str, parameter: str = "payload") -> Payload:
@@ -136,6 +157,20 @@ def _quantity(text: str, units: tuple[str, ...], parameter: str) -> float:
 
 
 NO_PAYLOAD: Final = Payload()
+
+
+def checked_gravity(gravity: object, parameter: str = "gravity") -> tuple[float, float, float]:
+    """Return an acceleration of free fall in the base frame [m/s^2], refusing what cannot be one."""
+    x, y, z = number_array(gravity, parameter, (3,)).tolist()
+    if not 0.1 <= math.hypot(x, y, z) <= 100.0:
+        raise InputError(
+            "this is no acceleration of free fall",
+            parameter=parameter,
+            came=f"{math.hypot(x, y, z):g} m/s^2",
+            allowed="about 9.81 m/s^2 on Earth, 0.1 to 100",
+            cure="Give x, y and z in the robot's base frame: 0,0,-9.81 stands, 0,0,9.81 hangs.",
+        )
+    return x, y, z
 
 
 @dataclass(frozen=True)

@@ -1,292 +1,108 @@
-"""A robot: its chain, its parameters, and the frames before and behind it."""
+"""A robot as it moves: forward and inverse kinematics, Jacobians, and copies with other values."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import TypeVar
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from truearm.errors import InputError, nearest_names
-from truearm.modeling.chain import Array, Chain, Element, ForwardKinematics, across, turn_about
-from truearm.modeling.controller import AS_THE_MODEL, Controller
-from truearm.modeling.conventions import Convention, convention
-from truearm.modeling.effects import EFFECTS, Effect, Layout
+from truearm.arrays import finite_numbers
+from truearm.errors import InputError, did_you_mean
+from truearm.modeling.chain import Array, ForwardKinematics
+from truearm.modeling.effects import checked_effects
 from truearm.modeling.equilibrium import postures_in_equilibrium, readings_in_equilibrium
-from truearm.modeling.fixtures import Fixture, FixtureKind
+from truearm.modeling.fixtures import FixtureKind
+from truearm.modeling.frames import Frame, forward, jacobian
 from truearm.modeling.loads import joint_loads
-from truearm.modeling.parameters import Group, Parameter, Unit, parameter
-from truearm.modeling.parts import GRAVITY, NO_PAYLOAD, SLIDES, TURNS, Joint, LinkMass, Payload, Target, Tool, Truth
+from truearm.modeling.parameters import Parameter
+from truearm.modeling.parts import Payload, checked_gravity
+from truearm.modeling.placing import placed, with_fixtures_beside
 from truearm.modeling.postures import Postures
-from truearm.modeling.transform import IDENTITY, Transform, fixed_rotation
+from truearm.modeling.robot_data import RobotData
+from truearm.modeling.robot_parameters import by_parameters
+from truearm.modeling.transform import Transform
+
+if TYPE_CHECKING:
+    from truearm.modeling.inverse.pose_solver import Orientation
+    from truearm.modeling.inverse.solutions import JointSolutions
 
 Values = Mapping[str, float | Array]
-Part = TypeVar("Part", Target, Fixture)
 
 
-@dataclass(frozen=True)
-class Robot:
+@dataclass(frozen=True, repr=False)
+class Robot(RobotData):
     """A serial robot, nominal or calibrated.
 
-    Joint positions are ``(n, joints)`` in rad (m for prismatic joints); everything is in SI units. The base frame
-    stands in the world at ``base_x``, ``base_y``, ``base_z``, turned by `base_quaternion` and then by the small
-    ``base_rx``, ``base_ry``, ``base_rz`` (Nubiola, equation I.2, with the reference orientation split off so
-    that no installation meets a singular angle). The world is the instrument's frame.
-
-    Attributes
-    ----------
-    name, title, source
-        Short name, full name, and where the numbers come from.
-    convention_name
-        Name of the kinematic convention of the joints' rows.
-    joints
-        From base to flange.
-    flange
-        From the last link's frame to the flange.
-    masses
-        Link masses, where published.
-    payload
-        What hangs on the flange.
-    gravity
-        Acceleration of free fall in the base frame [m/s^2].
-    base_quaternion
-        Reference orientation of the base in the world.
-    targets
-        What the instrument sees.
-    fixtures
-        What stands beside the robot and targets are measured against.
-    effect_names
-        Joint effects that are part of the model.
-    known
-        Parameters that differ from the plain nominal ones.
-    priors
-        The file's own standard deviations of nominal values, by SI unit.
-    controller
-        How the robot's controller counts the joints, and where it has its frames.
-    tools, truths
-        For simulation.
-    history
-        One line for each thing done to the robot.
+    Its data are those of :class:`~truearm.modeling.robot_data.RobotData`. Poses are asked for with
+    :meth:`forward`, joint positions with :meth:`inverse`, derivatives with :meth:`jacobian`.
     """
-
-    name: str
-    title: str
-    source: str
-    convention_name: str
-    joints: tuple[Joint, ...]
-    flange: Transform = IDENTITY
-    masses: tuple[LinkMass, ...] = ()
-    payload: Payload = NO_PAYLOAD
-    gravity: tuple[float, float, float] = GRAVITY
-    base_quaternion: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
-    targets: tuple[Target, ...] = ()
-    fixtures: tuple[Fixture, ...] = ()
-    effect_names: tuple[str, ...] = ()
-    known: Mapping[str, Parameter] = field(default_factory=dict)
-    priors: Mapping[str, float] = field(default_factory=dict)
-    controller: Controller = AS_THE_MODEL
-    tools: Mapping[str, Tool] = field(default_factory=dict)
-    truths: Mapping[str, Truth] = field(default_factory=dict)
-    history: tuple[str, ...] = ()
-
-    @property
-    def convention(self) -> Convention:
-        """The kinematic convention."""
-        return convention(self.convention_name)
-
-    @cached_property
-    def base_elements(self) -> tuple[Element, ...]:
-        """The way from the world to the base frame."""
-        return (
-            *(Element(motion, parameter=f"base_{axis}") for axis, motion in SLIDES),
-            *fixed_rotation(self.base_quaternion),
-            *(Element(motion, parameter=f"base_{axis}") for axis, motion in TURNS),
-        )
-
-    @cached_property
-    def link_elements(self) -> tuple[tuple[Element, ...], ...]:
-        """The way along each link, from base to flange; the link's frame is at its end."""
-        return tuple(
-            self.convention.elements(number, joint.row, joint.kind) for number, joint in enumerate(self.joints, 1)
-        )
-
-    @cached_property
-    def flange_elements(self) -> tuple[Element, ...]:
-        """The way from the last link's frame to the flange."""
-        slides = zip(SLIDES, self.flange.translation, strict=True)
-        return (
-            *(Element(motion, value=value) for (_, motion), value in slides if value),
-            *fixed_rotation(self.flange.quaternion),
-        )
-
-    @cached_property
-    def trunk(self) -> Chain:
-        """The chain from the world to the flange, with what joint effects tilt and stretch."""
-        links = (element for link in self.moved_links for element in link)
-        return Chain((*self.base_elements, *links, *self.flange_elements))
-
-    @cached_property
-    def rigid(self) -> Robot:
-        """The robot without its joint effects: every joint turns by its reading."""
-        return replace(self, effect_names=())
-
-    @cached_property
-    def moved_links(self) -> tuple[tuple[Element, ...], ...]:
-        """The way along each link, as :attr:`link_elements`, with what joint effects tilt and stretch."""
-        tilts = any(effect.tilts for effect in self.effects)
-        stretches = any(effect.stretches for effect in self.effects)
-        slides = iter(range(len(self.layout.lengths)))
-
-        def moved(joint: int, element: Element) -> tuple[Element, ...]:
-            if stretches and _has_length(element):
-                return (replace(element, variable=self.layout.length(next(slides))),)
-            if tilts and element.variable is not None:
-                across_it = zip(across(element), self.layout.tilt(joint), strict=True)
-                return (element, *(turn_about(axis, variable) for axis, variable in across_it))
-            return (element,)
-
-        return tuple(
-            tuple(part for element in link for part in moved(joint, element))
-            for joint, link in enumerate(self.link_elements)
-        )
-
-    @cached_property
-    def layout(self) -> Layout:
-        """The variables of the trunk."""
-        lengths = [(i, e.value) for i, link in enumerate(self.link_elements) for e in link if _has_length(e)]
-        return Layout(
-            tuple(joint.kind for joint in self.joints),
-            tuple(lengths),
-            tuple(joint.transmission_periods for joint in self.joints),
-        )
-
-    @cached_property
-    def effects(self) -> tuple[Effect, ...]:
-        """The joint effects of the model."""
-        return tuple(effect(self.layout) for effect in EFFECTS if effect.name in self.effect_names)
-
-    @cached_property
-    def parameters(self) -> Mapping[str, Parameter]:
-        """All parameters by name: base, joints, effects, targets, fixtures."""
-        zeros = {f"{self.convention.zero(j.kind)}_{i}" for i, j in enumerate(self.joints, 1)}
-        found: dict[str, Parameter] = {}
-
-        def add(name: str, unit: Unit, group: Group, nominal: float) -> None:
-            if name in found:
-                raise InputError(
-                    "two parameters of the robot would have the same name",
-                    where=name,
-                    cure="Rename the target or fixture.",
-                )
-            found[name] = self.known.get(name) or parameter(name, unit, group, nominal, self.priors)
-
-        for element in self.trunk.elements:
-            if element.parameter is not None:
-                name = element.parameter
-                group: Group = "joint zero" if name in zeros else "geometry"
-                add(name, _unit(element), "base" if name.startswith("base_") else group, element.value)
-        for effect in self.effects:
-            for plain in effect.parameters:
-                if plain.name in found:
-                    raise InputError(
-                        "two joint effects of the robot have the same parameter",
-                        where=f"{self.name}, {plain.name}",
-                        came=", ".join(e.name for e in self.effects if plain.name in [p.name for p in e.parameters]),
-                        cure="They are forms of one effect: take one of them.",
-                    )
-                found[plain.name] = self.known.get(plain.name, plain)
-        beside: tuple[tuple[Group, Sequence[Target | Fixture]], ...] = (
-            ("target", self.targets),
-            ("fixture", self.fixtures),
-        )
-        for group_of, parts in beside:
-            for element in (element for part in parts for element in part.chain.elements):
-                if element.parameter is not None:
-                    add(element.parameter, _unit(element), group_of, element.value)
-        return found
-
-    @cached_property
-    def values(self) -> Mapping[str, float]:
-        """Current value of every parameter [SI]."""
-        return {name: p.value for name, p in self.parameters.items()}
-
-    @property
-    def base(self) -> Transform:
-        """Where the base frame stands in the world."""
-        kinematics = Chain(self.base_elements).forward_kinematics(np.zeros((0, 1)), self.values)
-        return Transform.from_matrix(kinematics.matrix()[0], kinematics.position[:, 0])
-
-    def target(self, name: str) -> Target:
-        """Return the target called `name`."""
-        return self._named(name, "target", self.targets)
-
-    def fixture(self, name: str) -> Fixture:
-        """Return the fixture called `name`."""
-        return self._named(name, "fixture", self.fixtures)
-
-    def _named(self, name: str, kind: str, parts: Sequence[Part]) -> Part:
-        for part in parts:
-            if part.name == name:
-                return part
-        known = [part.name for part in parts]
-        near = nearest_names(name, known)
-        raise InputError(
-            f"the robot has no {kind} of this name",
-            where=self.name,
-            came=name,
-            allowed=", ".join(known) or f"none: the robot has no {kind}s",
-            cure=f"Did you mean {' or '.join(near)}?" if near else None,
-        )
 
     # -- changed copies ------------------------------------------------------------------------------------
 
     def with_parameters(self, parameters: Iterable[Parameter]) -> Robot:
         """Return the robot with some parameters replaced."""
         changed = {p.name: p for p in parameters}
-        unknown = sorted(set(changed) - set(self.parameters))
-        if unknown:
-            raise InputError("the robot has no such parameter", where=self.name, came=unknown[0])
+        self._refuse_unknown(changed, "parameters")
         return replace(self, known={**self.known, **changed})
 
     def with_values(self, values: Mapping[str, float]) -> Robot:
-        """Return the robot with some parameter values replaced [SI]."""
-        for name in values:
-            if name not in self.parameters:
-                near = nearest_names(name, self.parameters)
-                cure = f"Did you mean {' or '.join(near)}?" if near else None
-                raise InputError("the robot has no such parameter", where=self.name, came=name, cure=cure)
-        return self.with_parameters(replace(self.parameters[n], value=float(v)) for n, v in values.items())
-
-    def with_payload(self, payload: Payload | None = None, gravity: tuple[float, float, float] | None = None) -> Robot:
-        """Return the robot with another payload, or mounted another way; None leaves what it has.
+        """Return the robot with some parameter values replaced [SI].
 
         Raises
         ------
         InputError
-            If the mass is negative, or the gravity is none.
+            If the robot has no parameter of a name, or a value is not finite.
         """
-        if payload is not None and payload.mass < 0.0:
-            raise InputError("a mass cannot be negative", parameter="payload", came=f"{payload.mass:g} kg")
-        if gravity is not None and not 0.1 <= math.hypot(*gravity) <= 100.0:
-            raise InputError(
-                "this is no acceleration of free fall",
-                parameter="gravity",
-                came=f"{math.hypot(*gravity):g} m/s^2",
-                allowed="about 9.81 m/s^2 on Earth, 0.1 to 100",
-                cure="Give x, y and z in the robot's base frame: 0,0,-9.81 stands, 0,0,9.81 hangs.",
-            )
+        numbers = finite_numbers(values, "values", allowed="a mapping from parameter names to values in SI units")
+        self._refuse_unknown(numbers, "values")
+        return self.with_parameters(replace(self.parameters[n], value=v) for n, v in numbers.items())
+
+    def _refuse_unknown(self, names: Iterable[str], parameter: str) -> None:
+        for name in names:
+            if name not in self.parameters:
+                raise InputError(
+                    "the robot has no such parameter",
+                    parameter=parameter,
+                    where=self.name,
+                    came=name,
+                    cure=did_you_mean(name, self.parameters) if isinstance(name, str) else None,
+                )
+
+    def with_payload(
+        self, payload: Payload | str | None = None, gravity: tuple[float, float, float] | None = None
+    ) -> Robot:
+        """Return the robot with another payload, or mounted another way; None leaves what it has.
+
+        Parameters
+        ----------
+        payload
+            What hangs on the flange; also as a text such as ``2.7kg,50mm,25mm,100mm``.
+        gravity
+            Acceleration of free fall in the base frame [m/s^2].
+
+        Raises
+        ------
+        InputError
+            If the payload is none, or the gravity.
+        """
         return replace(
             self,
-            payload=self.payload if payload is None else payload,
-            gravity=self.gravity if gravity is None else gravity,
+            payload=self.payload if payload is None else Payload.of(payload),
+            gravity=self.gravity if gravity is None else checked_gravity(gravity),
         )
 
     def with_effects(self, names: Sequence[str]) -> Robot:
-        """Return the robot with these joint effects added."""
-        return replace(self, effect_names=tuple(dict.fromkeys((*self.effect_names, *names))))
+        """Return the robot with these joint effects added.
+
+        Raises
+        ------
+        InputError
+            If there is no effect of a name.
+        """
+        return replace(self, effect_names=tuple(dict.fromkeys((*self.effect_names, *checked_effects(names)))))
 
     def with_frames(self, base: Transform, targets: Mapping[str, Transform | Sequence[float]]) -> Robot:
         """Return the robot at another place with other targets, both as nominal values.
@@ -298,16 +114,7 @@ class Robot:
         targets
             For each target its place on the flange: a transform, or a position [m] for a point.
         """
-        kept = {n: p for n, p in self.known.items() if p.group not in ("base", "target")}
-        made, places = [], dict(zip(("base_x", "base_y", "base_z"), base.translation, strict=True))
-        for name, place in targets.items():
-            frame = place if isinstance(place, Transform) else None
-            target = Target(name, frame.quaternion if frame else None)
-            position = frame.translation if frame else place
-            places |= {target.parameter(a): float(v) for a, v in zip("xyz", position, strict=True)}  # type: ignore[arg-type]
-            made.append(target)
-        moved = replace(self, base_quaternion=base.quaternion, targets=tuple(made), known=kept)
-        return moved.with_parameters(moved.parameters[n].restarted(v) for n, v in places.items())
+        return placed(self, base, targets)
 
     def with_fixtures(self, places: Mapping[str, tuple[FixtureKind, Transform]]) -> Robot:
         """Return the robot with other fixtures beside it, as nominal values.
@@ -317,13 +124,7 @@ class Robot:
         places
             What each fixture is and where it stands in the world, see :meth:`Fixture.values_at`.
         """
-        kept = {n: p for n, p in self.known.items() if p.group != "fixture"}
-        made = tuple(Fixture(name, kind, place.quaternion) for name, (kind, place) in places.items())
-        beside = replace(self, fixtures=made, known=kept)
-        values = {
-            n: v for f, (_, place) in zip(made, places.values(), strict=True) for n, v in f.values_at(place).items()
-        }
-        return beside.with_parameters(beside.parameters[n].restarted(v) for n, v in values.items())
+        return with_fixtures_beside(self, places)
 
     # -- kinematics ----------------------------------------------------------------------------------------
 
@@ -337,6 +138,7 @@ class Robot:
         if at.joints.ndim != 2 or at.joints.shape[1] != len(self.joints):
             raise InputError(
                 "wrong number of joint positions",
+                parameter="joints",
                 where=self.name,
                 came=f"an array of shape {at.joints.shape}",
                 allowed=f"(n, {len(self.joints)})",
@@ -430,15 +232,109 @@ class Robot:
         """Run through the chain to a fixture: one configuration; `values` as for :meth:`forward_kinematics`."""
         return self.fixture(name).chain.forward_kinematics(np.zeros((0, 1)), self.values if values is None else values)
 
-    def poses(self, q: Array | Postures, target: str | None = None) -> tuple[Array, Array]:
-        """Return positions ``(n, 3)`` [m] and rotations ``(n, 3, 3)`` of the flange or a target in the world."""
+    def forward(
+        self, joints: ArrayLike | Postures, *, frame: Frame = "base", target: str | None = None
+    ) -> tuple[Array, Array]:
+        """Return where the flange, or a target, is at joint positions: forward kinematics.
+
+        Parameters
+        ----------
+        joints
+            Joint positions ``(n, joints)``, or ``(joints,)`` of one configuration [rad; m for prismatic joints]. The
+            arm is at rest under its own weight and its payload, and what depends on the order of measurement or the
+            temperature is in its middle; postures say more (``data.postures``).
+        frame
+            What the poses are given in: ``base``, the robot's base frame, or ``world``, the instrument's frame.
+        target
+            Name of a target; the flange if None. A target without orientation has the flange's.
+
+        Returns
+        -------
+        positions, rotations
+            ``(n, 3)`` [m] and ``(n, 3, 3)``.
+
+        Raises
+        ------
+        InputError
+            If the joints have the wrong shape or are not finite, or there is no such frame or target.
+        """
+        return forward(self, joints, frame, target)
+
+    def inverse(
+        self,
+        positions: ArrayLike,
+        rotations: ArrayLike | None = None,
+        *,
+        frame: Frame = "base",
+        seed: ArrayLike | None = None,
+        target: str | None = None,
+        orientation: Orientation = "full",
+    ) -> JointSolutions:
+        """Return joint positions that bring the flange, or a target, to poses: inverse kinematics.
+
+        Away from singular postures, ``robot.inverse(*robot.forward(q), seed=q).joints`` is `q`.
+
+        Parameters
+        ----------
+        positions
+            [m], ``(n, 3)``, or ``(3,)`` of one pose.
+        rotations
+            Rotation matrices ``(n, 3, 3)``; None with ``orientation="free"``.
+        frame
+            What the poses are given in: ``base``, the robot's base frame, or ``world``, the instrument's frame.
+        seed
+            Joint positions ``(joints,)`` or ``(n, joints)`` near which the answer shall lie; zero if None.
+        target
+            Name of the target that shall be there; the flange if None.
+        orientation
+            ``full``; ``axis`` if only the direction of the z axis counts; ``free`` if only the position does.
+
+        Returns
+        -------
+        solutions
+            One row a pose: `joints` ``(n, joints)``, NaN where the pose is out of reach, and `status`.
+
+        Raises
+        ------
+        InputError
+            If an array has the wrong shape or is not finite, a matrix is no rotation, or there is no such frame or
+            target.
+        """
+        from truearm.modeling.inverse.kinematics import inverse
+
+        found = inverse(self, positions, rotations, frame=frame, seed=seed, target=target, orientation=orientation)
+        return found.without_unreached()
+
+    def jacobian(self, joints: ArrayLike | Postures, *, frame: Frame = "base", target: str | None = None) -> Array:
+        """Return how the pose of the flange, or a target, follows the joint positions: the geometric Jacobian.
+
+        It is the derivative by the commanded joint positions, as :meth:`forward` takes them: with joint effects in the
+        model their changes are in it (a gain, or a deflection that grows with the load). Without them it is the
+        Jacobian of the rigid arm.
+
+        Parameters
+        ----------
+        joints, target
+            As for :meth:`forward`.
+        frame
+            Whose axes velocities are given in.
+
+        Returns
+        -------
+        jacobian
+            ``(n, 6, joints)``: velocity of the point [m per rad or m], then angular velocity [rad per rad or m].
+        """
+        return jacobian(self, joints, frame, target)
+
+    def world_poses(self, q: Array | Postures, target: str | None = None) -> tuple[Array, Array]:
+        """Return what :meth:`forward` does in the world, of joint positions that are known to be sound."""
         kinematics = self.forward_kinematics(q, target)
         return np.ascontiguousarray(kinematics.position.T), np.ascontiguousarray(kinematics.matrix())
 
     def joint_jacobian(self, q: Array | Postures, target: str | None = None) -> Array:
         """Return the geometric Jacobian ``(n, 6, joints)`` in the world, linear rows first [m, rad per rad or m].
 
-        Rates are those of the true joint variables.
+        Rates are those of the true joint variables: of what the joints turn by, with tilts and lengths held.
         """
         kinematics = self.forward_kinematics(q, target)
         return np.moveaxis(
@@ -448,11 +344,11 @@ class Robot:
     def position_jacobian(
         self, kinematics: ForwardKinematics, q: Array | Postures, names: Sequence[str], values: Values | None = None
     ) -> Array:
-        """Return the velocity of the tip of a sweep by the parameters `names` [m per unit of the parameter].
+        """Return the velocity of the tip by the parameters `names` [m per unit of the parameter].
 
         Parameters
         ----------
-        sweep
+        kinematics
             From :meth:`forward_kinematics` with the same `q` and `values`.
 
         Returns
@@ -460,16 +356,18 @@ class Robot:
         linear
             ``(len(names), 3, ..., n)`` in the world; zero for parameters of other targets.
         """
-        return self._by_parameters(kinematics, kinematics.position_jacobian, q, names, values)
+        values = self.values if values is None else values
+        return by_parameters(self, kinematics, kinematics.position_jacobian, q, names, values)
 
     def orientation_jacobian(
         self, kinematics: ForwardKinematics, q: Array | Postures, names: Sequence[str], values: Values | None = None
     ) -> Array:
-        """Return the angular velocity of the tip of a sweep by the parameters `names` [rad per unit of the parameter].
+        """Return the angular velocity of the tip by the parameters `names` [rad per unit of the parameter].
 
         Parameters and the shape of what is returned are as for :meth:`position_jacobian`.
         """
-        return self._by_parameters(kinematics, kinematics.orientation_jacobian, q, names, values)
+        values = self.values if values is None else values
+        return by_parameters(self, kinematics, kinematics.orientation_jacobian, q, names, values)
 
     def jacobians(
         self, kinematics: ForwardKinematics, q: Array | Postures, names: Sequence[str], values: Values | None = None
@@ -479,44 +377,8 @@ class Robot:
             kinematics, q, names, values
         )
 
-    def _by_parameters(
-        self,
-        kinematics: ForwardKinematics,
-        by_elements: Callable[[Sequence[int | None]], Array],
-        q: Array | Postures,
-        names: Sequence[str],
-        values: Values | None,
-    ) -> Array:
-        places = [kinematics.places.get(name) for name in names]
-        derivative = by_elements(places)
-        if self.effects and None in places:
-            at = self.loaded(q)
-            values = self.values if values is None else values
-            rates = {n: r for effect in self.effects for n, r in effect.derivative(at, values).items() if n in names}
-            needed = sorted({variable for rate in rates.values() for variable in rate})
-            by_variable = dict(zip(needed, by_elements([self.moving[v] for v in needed]), strict=True))
-            for i, name in enumerate(names):
-                for variable, rate in rates.get(name, {}).items():
-                    derivative[i] += rate * by_variable[variable]
-        return derivative
-
-    @cached_property
-    def moving(self) -> list[int]:
-        """Index of the element that each variable of the trunk moves, joints first."""
-        places = {e.variable: i for i, e in enumerate(self.trunk.elements) if e.variable is not None}
-        count = self.layout.variables if len(places) > len(self.joints) else len(self.joints)
-        return [places.get(i, -1) for i in range(count)]
-
     def random_configurations(self, count: int, rng: np.random.Generator) -> Array:
         """Return joint readings ``(count, joints)`` drawn evenly within the limits (or a turn, or 1 m)."""
         default = {"revolute": (-np.pi, np.pi), "prismatic": (-0.5, 0.5)}
         low, high = np.array([j.limits or default[j.kind] for j in self.joints]).T
         return rng.uniform(low, high, (count, len(self.joints)))
-
-
-def _unit(element: Element) -> Unit:
-    return "rad" if element.turns else "m"
-
-
-def _has_length(element: Element) -> bool:
-    return not element.turns and element.variable is None and element.value != 0.0

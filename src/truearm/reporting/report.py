@@ -102,7 +102,7 @@ class Report:
         """Return where the target of each judged reading is, in the robot's base frame [m], ``(readings, 3)``."""
         part, robot = self.judged_part, self.calibration.fit.robot
         seen = robot.loaded(part.postures)
-        tips = np.array([robot.poses(seen, name)[0] for name in part.targets])
+        tips = np.array([robot.world_poses(seen, name)[0] for name in part.targets])
         base = robot.base
         return np.asarray((tips[part.target, part.configuration] - np.array(base.translation)) @ base.rotation)
 

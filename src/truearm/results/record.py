@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from html import escape
-from typing import Any, Final
+from typing import Any
 
 from truearm.notices import Notice
-
-#: What a `repr` may be long at most.
-_LONGEST: Final = 2000
+from truearm.shown import as_html, short_text
 
 
 class Record(ABC):
@@ -25,11 +22,10 @@ class Record(ABC):
         """Return the result in words and figures, line by line, as the command prints it."""
 
     def __repr__(self) -> str:
-        text = "\n".join(self.lines())
-        return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 4].rstrip()}\n..."
+        return short_text(self.lines())
 
     def _repr_html_(self) -> str:
-        return f"<pre>{escape(repr(self))}</pre>"
+        return as_html(repr(self))
 
 
 def notice_lines(notices: Sequence[Notice]) -> list[str]:

@@ -32,7 +32,7 @@ class RobotDescription(Record):
         """Return it as JSON holds it, lengths in mm and angles in deg."""
         robot = self.robot
         base = robot.base
-        position, _ = robot.poses(np.zeros((1, len(robot.joints))))
+        position, _ = robot.world_poses(np.zeros((1, len(robot.joints))))
         joints = []
         for number, joint in enumerate(robot.joints, 1):
             values = {

@@ -95,7 +95,7 @@ def sphere_test(
             allowed=f"{needed} or more",
             cure="Send the tool to more points of the sphere." if inside.all() else "Calibrate the robot first.",
         )
-    points, _ = robot.poses(q[inside], target)
+    points, _ = robot.world_poses(q[inside], target)
     middle = _centre(points, read[inside]) if centre is None else np.asarray(centre, float)
     return SphereTest(read[inside] - np.linalg.norm(points - middle, axis=1), middle)
 

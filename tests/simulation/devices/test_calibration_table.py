@@ -69,7 +69,9 @@ def test_any_arm_touches_though_it_errs_sags_and_plays(name: str) -> None:
     start = np.radians((10.0, 60.0, -90.0, 20.0, 30.0, 0.0)[: len(robot.joints)])
     if name == "irb120":
         start = np.radians((10.0, 20.0, 10.0, 20.0, 30.0, 0.0))
-    table = CalibrationTable(rectangular_grid(3, 2, 0.02), Transform(tuple(robot.poses(start[None], "tip")[0][0])))
+    table = CalibrationTable(
+        rectangular_grid(3, 2, 0.02), Transform(tuple(robot.world_poses(start[None], "tip")[0][0]))
+    )
     data = table.tilted(ROLL, -PITCH).touched_by(twin, start, 0.0, rng)
     assert data.approach is not None
     there = tips(twin, data.joints, data.approach)
@@ -115,8 +117,8 @@ def test_an_arm_identified_on_an_exact_table_predicts_other_points_of_it() -> No
     geometric = next(model for model in MODELS if model.name == "geometric")
     data, unseen = (t.touched_by(twin, ELBOW_UP, 0.0, rng) for t in (table, other))
     before, fitted = (f.robot for f in (place(load_robot("li3"), data), identify(load_robot("li3"), data, geometric)))
-    assert np.abs(before.poses(unseen.joints, "tip")[0] - unseen.position).max() > 1e-5
-    assert np.abs(fitted.poses(unseen.joints, "tip")[0] - unseen.position).max() < 1e-7
+    assert np.abs(before.world_poses(unseen.joints, "tip")[0] - unseen.position).max() > 1e-5
+    assert np.abs(fitted.world_poses(unseen.joints, "tip")[0] - unseen.position).max() < 1e-7
 
 
 def test_a_point_out_of_reach_is_named() -> None:

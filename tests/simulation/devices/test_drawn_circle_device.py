@@ -49,7 +49,7 @@ def test_each_circle_is_one_way_round_a_page_in_one_posture() -> None:
     """Places of the pencil by the nominal robot: six circles of twelve points, two on each of three slopes."""
     robot = katana().with_frames(STANDS, {"pencil": (0.02, 0.01, 0.15)})
     data = drawn(Twin(robot), 72)
-    places = robot.poses(data.joints, "pencil")[0].reshape(6, 12, 3)
+    places = robot.world_poses(data.joints, "pencil")[0].reshape(6, 12, 3)
     opposite = np.linalg.norm(places - np.roll(places, 1, axis=1), axis=2)
     assert opposite == pytest.approx(2 * DRAWN_CIRCLE.radius * np.sin(np.pi / 12), abs=1e-9)
     up = STANDS.rotation[:, 2]

@@ -275,14 +275,16 @@ def test_without_noise_everything_else_follows(name: str, robot: str) -> None:
 
     q = nominal(robot).random_configurations(60, np.random.default_rng(9))
     true = np.concatenate([frames[:, :3, 3] for frames in twin.frames(q).values()])
-    got = np.concatenate([fit.robot.poses(q, target.name)[0] for target in twin.robot.targets])
+    got = np.concatenate([fit.robot.world_poses(q, target.name)[0] for target in twin.robot.targets])
     before = fit.start.with_frames(fit.robot.base, {})
     trusted = gauge_freedoms(data)
     if trusted:
         got = fitted(got, true, size="size" in trusted)
     # a plane tells the most remote postures a hundred times less than those on it
     assert np.abs(got - true).max() < (5e-7 if name == "plane" else 1e-9)
-    flange = np.abs(fitted(before.poses(q)[0], twin.robot.poses(q)[0], size=True) - twin.robot.poses(q)[0]).max()
+    flange = np.abs(
+        fitted(before.world_poses(q)[0], twin.robot.world_poses(q)[0], size=True) - twin.robot.world_poses(q)[0]
+    ).max()
     assert flange > 1e-4  # it was not so before
 
 

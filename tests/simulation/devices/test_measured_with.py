@@ -23,7 +23,7 @@ class Onlooker(Device):
     def campaign(self, nominal: Robot, arm: Arm, count: int, sigma: float, rng: np.random.Generator) -> Dataset:
         joints = nominal.random_configurations(count, rng)
         name = nominal.targets[0].name
-        apart = nominal.poses(joints, name)[0] - arm.frames(joints)[name][:, :3, 3]
+        apart = nominal.world_poses(joints, name)[0] - arm.frames(joints)[name][:, :3, 3]
         assert np.linalg.norm(apart, axis=1).max() < 5e-3
         return measure(truth_twin(nominal, "nominal", rng), joints, sigma, rng)
 

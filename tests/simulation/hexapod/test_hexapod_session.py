@@ -65,7 +65,7 @@ def test_without_noise_the_cups_are_where_they_are(arm: Robot, plan: tuple[list[
     rows, joints = plan
     found = measure_poses(Twin(arm), fixture(), rows, joints, ballbar(np.random.default_rng(0), EXACT))
     assert found == pytest.approx(seen(Twin(arm), joints), abs=1e-12)
-    data = cups_dataset(arm, ["a"] * len(rows), joints, found)
+    data = cups_dataset(arm, [str(row) for row in range(len(rows))], joints, found)
     twice = joined(data, data)
     assert twice.configurations == 2 * len(rows)
     assert twice.position[3 * len(rows) :] == pytest.approx(data.position)
@@ -83,7 +83,7 @@ def test_sessions_that_do_not_fit_are_refused(arm: Robot) -> None:
     with pytest.raises(InputError, match="not of one robot with one tool"):
         joined(data, replace(data, targets=("a", "b", "c")))
     with pytest.raises(InputError, match="sessions with quaternion cannot be joined"):
-        joined(data, replace(data, quaternion=np.zeros((3, 4))))
+        joined(data, replace(data, quaternion=np.full((3, 4), 0.5)))
 
 
 def test_a_bar_that_is_not_initialised_errs_more_and_more(arm: Robot, plan: tuple[list[PlannedRow], Array]) -> None:

@@ -72,7 +72,7 @@ class AxisAnalysis:
         return self._with_targets(self.errors.robot)
 
     def _with_targets(self, robot: Robot) -> Robot:
-        position, rotation = robot.poses(self.data.postures)
+        position, rotation = robot.world_poses(self.data.postures)
         there = self.data.has_position
         places = {}
         for index, name in enumerate(self.data.targets):

@@ -89,7 +89,7 @@ class Zones:
         made = np.empty((len(joints), 3))
         for index in np.unique(zone).tolist():
             fit = self.whole if index < 0 else self.zones[index].fit
-            made[zone == index] = fit.robot.poses(joints[zone == index], target)[0]
+            made[zone == index] = fit.robot.world_poses(joints[zone == index], target)[0]
         return made
 
 
@@ -155,4 +155,4 @@ def identify_zones(
 
 def _flange(robot: Robot, q: Array | Postures) -> Array:
     """Return where the flange is in the base frame [m], ``(n, 3)``."""
-    return robot.with_frames(Transform(), {}).poses(q)[0]
+    return robot.with_frames(Transform(), {}).world_poses(q)[0]

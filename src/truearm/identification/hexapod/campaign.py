@@ -64,7 +64,7 @@ class Campaign:
 
     def frame_by(self, robot: Robot, target: str) -> WorldFrame:
         """Return the fixture's frame in the robot's world by a model, from the touches at the cups (Nubiola, 4.3)."""
-        return world_frame(robot.poses(self.touches, target)[0], self.sides)
+        return world_frame(robot.world_poses(self.touches, target)[0], self.sides)
 
 
 def touching(robot: Robot, target: str, fixture: Transform, side: float, towards: Array) -> Array:
@@ -176,8 +176,8 @@ def two_steps(
 
 def _corrected(robot: Robot, poses: Sequence[HexapodPose], near: Array) -> Array:
     """Return joint positions near `near` at which the calibrated cups are those of the poses."""
-    on_flange = np.array([robot.poses(near[:1], target.name)[0][0] for target in robot.targets])
-    position, rotation = robot.poses(near[:1])
+    on_flange = np.array([robot.world_poses(near[:1], target.name)[0][0] for target in robot.targets])
+    position, rotation = robot.world_poses(near[:1])
     on_flange = (on_flange - position[0]) @ rotation[0]
     R, p = rigid_motion(on_flange, np.array([pose.cups for pose in poses]))
     found = inverse(robot, p, R, frame="world", seed=near)

@@ -112,7 +112,7 @@ def monte_carlo(
 
 def _of_itself(robot: Robot, q: Array, model: Model, sigma: float) -> Problem:
     """Return the calibration of a robot from what an instrument without noise reads of it."""
-    positions = [robot.poses(q, target.name)[0] for target in robot.targets]
+    positions = [robot.world_poses(q, target.name)[0] for target in robot.targets]
     data = Dataset(
         source="simulation",
         labels=tuple(str(i + 1) for i in range(len(q))),

@@ -302,7 +302,7 @@ def _far_off(robot: Robot, data: Dataset) -> list[Suspect]:
     doubted = np.flatnonzero(np.nan_to_num(off) > allowed)
     if len(doubted) == 0:
         return []
-    predicted = np.stack([fit.robot.poses(data.postures, name)[0] for name in data.targets], axis=1)
+    predicted = np.stack([fit.robot.world_poses(data.postures, name)[0] for name in data.targets], axis=1)
     points = constellation(data)
     suspects = []
     for c in dict.fromkeys(data.configuration[doubted].tolist()):

@@ -41,7 +41,7 @@ def initial_frames(robot: Robot, data: Dataset) -> Robot:
         If no target has a position.
     """
     placed = robot.with_frames(Transform(), {})
-    p, R = placed.poses(data.postures)
+    p, R = placed.world_poses(data.postures)
     with_position = data.has_position
     if not with_position.any():
         raise InputError("there is no position reading at all", where=data.source, cure="Fill in x, y and z.")

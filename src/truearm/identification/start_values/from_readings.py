@@ -202,7 +202,7 @@ def _at_points(robot: Robot, data: Dataset, kinds: Mapping[str, FixtureKind]) ->
     read = read[np.isin(data.target[read], targets)]
     if len(read) == 0:
         return robot
-    p, R = robot.poses(data.postures)
+    p, R = robot.world_poses(data.postures)
     rows = np.zeros((len(read), 3, 3 * (len(targets) + len(points))))
     for k, reading in enumerate(read.tolist()):
         t, f = targets.index(int(data.target[reading])), points.index(int(data.against[reading]))
@@ -233,7 +233,7 @@ def _with_target(robot: Robot, data: Dataset, target: int, kinds: Mapping[str, F
         sigma_rot=None,
     )
     name = data.targets[target]
-    p, R = robot.poses(mine.postures)
+    p, R = robot.world_poses(mine.postures)
     p, R = p[mine.configuration], R[mine.configuration]
     steps = np.arange(-_REACH, _REACH + 1e-9, _STEP)
     grid = np.stack(np.meshgrid(steps, steps, steps), axis=-1).reshape(-1, 3)
@@ -302,8 +302,8 @@ def _refuse_few(data: Dataset, kinds: Mapping[str, FixtureKind]) -> None:
 def _fixture_places(robot: Robot, data: Dataset, kinds: Mapping[str, FixtureKind]) -> dict[str, Place]:
     """Return where the fixtures stand, from the places of the targets; known places as they are known."""
     at = robot.loaded(data.postures)
-    tips = {t.name: robot.poses(at, t.name)[0] for t in robot.targets if t.name in data.targets}
-    flange = robot.poses(at)[0]
+    tips = {t.name: robot.world_poses(at, t.name)[0] for t in robot.targets if t.name in data.targets}
+    flange = robot.world_poses(at)[0]
     known = {} if data.setup is None else _known(data.setup)
     places: dict[str, Place] = {}
     for index, name in enumerate(data.fixtures):
@@ -359,7 +359,7 @@ def _misfit(robot: Robot, data: Dataset, setup: Dataset) -> float:
     known = _known(setup)
     off = 0.0
     for target in robot.targets:
-        tips = robot.poses(data.postures, target.name)[0]
+        tips = robot.world_poses(data.postures, target.name)[0]
         mine = data.target == data.targets.index(target.name)
         for index, name in enumerate(data.fixtures):
             if data.distance is not None and name in known:

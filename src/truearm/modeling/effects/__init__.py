@@ -6,8 +6,10 @@ one is a file here and a line in `EFFECTS`; the order there is that of parameter
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
+from truearm.errors import InputError, did_you_mean
 from truearm.modeling.effects.approach import Approach
 from truearm.modeling.effects.backlash import Backlash
 from truearm.modeling.effects.bearing import BearingCompliance
@@ -40,4 +42,26 @@ EFFECTS: Final[tuple[type[Effect], ...]] = (
 #: Groups of parameters that no joint has negative ones of. An identified value may come out so all the same.
 NON_NEGATIVE: Final = frozenset(effect.name for effect in EFFECTS if effect.non_negative)
 
-__all__ = ["EFFECTS", "NON_NEGATIVE", "Effect", "Layout"]
+__all__ = ["EFFECTS", "NON_NEGATIVE", "Effect", "Layout", "checked_effects"]
+
+
+def checked_effects(names: Sequence[str], parameter: str = "effects") -> tuple[str, ...]:
+    """Return names of joint effects, refusing those that there are not."""
+    known = [effect.name for effect in EFFECTS]
+    if isinstance(names, str | bytes) or not isinstance(names, Sequence):
+        raise InputError(
+            "a sequence of names belongs here",
+            parameter=parameter,
+            came=repr(names) if isinstance(names, str | bytes) else f"an object of type {type(names).__name__}",
+            allowed=", ".join(known),
+        )
+    for name in names:
+        if name not in known:
+            raise InputError(
+                "there is no joint effect of this name",
+                parameter=parameter,
+                came=name,
+                allowed=", ".join(known),
+                cure=did_you_mean(name, known) if isinstance(name, str) else None,
+            )
+    return tuple(names)

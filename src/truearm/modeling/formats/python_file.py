@@ -80,7 +80,7 @@ def _constants(robot: Robot) -> dict[str, str]:
     ]
     places, masses = _bodies(robot)
     q = np.round(robot.random_configurations(_STORED, np.random.default_rng(0)), 4)
-    position, rotation = robot.poses(q)
+    position, rotation = robot.world_poses(q)
     return {
         "JOINTS": repr(tuple(names)),
         "SLIDING": repr(tuple(joint.kind == "prismatic" for joint in robot.joints)),

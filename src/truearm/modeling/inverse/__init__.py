@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from truearm.modeling.inverse.kinematics import PoseFrame, inverse
+from truearm.modeling.inverse.kinematics import inverse
 from truearm.modeling.inverse.solutions import JointSolutions, PoseStatus
 
-__all__ = ["JointSolutions", "PoseFrame", "PoseStatus", "inverse"]
+__all__ = ["JointSolutions", "PoseStatus", "inverse"]

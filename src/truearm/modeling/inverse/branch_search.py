@@ -22,6 +22,10 @@ from truearm.modeling.transform import homogeneous
 
 #: A nominal start that misses by more [reach lengths, rad] is no start but for the nearest pose.
 _NEAR: Final = 0.05
+#: A seed may be beside an answer if it misses by less than this [reach lengths, rad] ..
+_BESIDE: Final = 0.5
+#: .. and was not met if the answer found is further away than this [rad].
+_AWAY: Final = 0.1
 #: A nominal start may be this far beyond a limit [rad]: the calibrated arm may reach the pose within it.
 _SLACK: Final = 0.02
 #: Fake targets tried one after the other.
@@ -89,7 +93,21 @@ class BranchSearch:
             else:
                 expected[~missing | self._pool.found().any(axis=1)] = False
             self._look_again(expected, thorough=True)
+        if wanted is None:
+            self._add_nearer()
         return self._pool
+
+    def _add_nearer(self) -> None:
+        """Start from seeds that are not far from their poses either, where what was found is.
+
+        The nominal solution nearest to the seed may be out of reach, or lead the calibrated arm to another branch.
+        """
+        away = self._pool.away()
+        beside = np.flatnonzero((_missed(self._task, self._turned) < _BESIDE) & (away > _AWAY))
+        tried = Candidates(self._task, self._seed, self._rule)
+        tried.add(beside, self._turned[beside])
+        nearer = np.flatnonzero(tried.away() < np.minimum(away, _AWAY))
+        self._pool.add(nearer, self._turned[nearer])
 
     def every_branch(self) -> Candidates:
         """Return candidates on every branch there is."""

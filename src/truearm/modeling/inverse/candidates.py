@@ -97,6 +97,16 @@ class Candidates:
         good = self.reached & (~self.beyond.any(axis=1) if wanted is None else self.number == wanted)
         return self._any(good)
 
+    def away(self) -> Array:
+        """Return how far the nearest joints that give each pose within the limits are from the seed, ``(n,)``.
+
+        The largest difference of a joint counts [rad or m]; infinite where no joints do.
+        """
+        good = self.reached & ~self.beyond.any(axis=1)
+        nearest = np.full(len(self._seed), np.inf)
+        np.minimum.at(nearest, self.pose[good], np.abs(self.joints - self._seed[self.pose]).max(axis=1)[good])
+        return nearest
+
     def found(self) -> NDArray[np.bool_]:
         """Return which branches reach which poses, ``(n, 8)``."""
         found = np.zeros((len(self._seed), len(BRANCHES)), dtype=bool)

@@ -12,23 +12,23 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truearm.errors import InputError
+from truearm.arrays import axes, number_array
+from truearm.errors import InputError, did_you_mean
 from truearm.modeling.chain import Array
+from truearm.modeling.frames import Frame, checked_frame, checked_joints
 from truearm.modeling.inverse.branch_search import BranchSearch
 from truearm.modeling.inverse.branches import BRANCHES, branch_number, branch_rule
 from truearm.modeling.inverse.candidates import REACHED, Candidates
 from truearm.modeling.inverse.closed_form import ClosedForm
-from truearm.modeling.inverse.pose_solver import Orientation, PoseTask, smallest_singular_value
+from truearm.modeling.inverse.pose_solver import ORIENTATIONS, Orientation, PoseTask, smallest_singular_value
 from truearm.modeling.inverse.solutions import JointSolutions, PoseStatus
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import quaternion_from_rotation, rotation_from_quaternion
-
-PoseFrame = Literal["base", "world"]
 
 #: A rotation matrix may be off by this much, as by rounding; it is then made exact.
 ROTATION_TOLERANCE: Final = 1e-6
@@ -42,11 +42,11 @@ _STARTS_A_ROUND: Final = 4
 
 def inverse(
     robot: Robot,
-    position: ArrayLike,
-    rotation: ArrayLike | None = None,
+    positions: ArrayLike,
+    rotations: ArrayLike | None = None,
     *,
     target: str | None = None,
-    frame: PoseFrame = "base",
+    frame: Frame = "base",
     branch: str | None = None,
     seed: ArrayLike | None = None,
     orientation: Orientation = "full",
@@ -59,10 +59,10 @@ def inverse(
     ----------
     robot
         With the parameter values and joint effects that shall hold.
-    position
-        [m], ``(n, 3)``.
-    rotation
-        Rotation matrices, ``(n, 3, 3)``; None with ``orientation="free"``.
+    positions
+        [m], ``(n, 3)``, or ``(3,)`` of one pose.
+    rotations
+        Rotation matrices, ``(n, 3, 3)``, or ``(3, 3)`` of one pose; None with ``orientation="free"``.
     target
         Name of the target that shall be there; the flange if None. A target without orientation has the flange's.
     frame
@@ -83,9 +83,12 @@ def inverse(
     """
     if len(robot.joints) < 3:
         raise InputError(
-            "inverse kinematics needs an arm of three joints or more", where=robot.name, came=len(robot.joints)
+            "inverse kinematics needs an arm of three joints or more",
+            parameter="robot",
+            where=robot.name,
+            came=len(robot.joints),
         )
-    task = _task(robot, position, rotation, target, frame, orientation)
+    task = _task(robot, positions, rotations, target, frame, orientation)
     near, turned = _seed(task.robot, seed, task.position.shape[1])
     rule = branch_rule(robot) if orientation == "full" else None
     form = ClosedForm(robot, target) if rule is not None else None
@@ -165,32 +168,35 @@ def _answer(task: PoseTask, pool: Candidates, rows: NDArray[np.intp], wanted: in
 
 def _task(
     robot: Robot,
-    position: ArrayLike,
-    rotation: ArrayLike | None,
+    positions: ArrayLike,
+    rotations: ArrayLike | None,
     target: str | None,
-    frame: PoseFrame,
+    frame: Frame,
     orientation: Orientation,
 ) -> PoseTask:
-    p = _array("positions", position, 3)
+    p = _array(positions, "positions", 3)
     if target is not None:
         robot.target(target)  # refuses an unknown one
-    for name, came, allowed in (
-        ("frame", frame, ("base", "world")),
-        ("orientation", orientation, ("full", "axis", "free")),
-    ):
-        if came not in allowed:
-            raise InputError("there is no such choice", parameter=name, came=came, allowed=", ".join(allowed))
-    if rotation is None:
+    checked_frame(frame)
+    if orientation not in ORIENTATIONS:
+        raise InputError(
+            "there is no such choice",
+            parameter="orientation",
+            came=orientation,
+            allowed=", ".join(ORIENTATIONS),
+            cure=did_you_mean(orientation, ORIENTATIONS) if isinstance(orientation, str) else None,
+        )
+    if rotations is None:
         if orientation != "free":
             raise InputError(
                 "the poses have no orientation",
                 parameter="rotations",
                 allowed="rotation matrices, (n, 3, 3)",
-                cure="Give them, or ask for the position alone.",
+                cure="Give them, or ask for the position alone: `orientation=free`.",
             )
         R = np.broadcast_to(np.eye(3), (len(p), 3, 3))
     else:
-        R = _rotations(rotation, len(p))
+        R = _rotations(rotations, len(p))
     if frame == "base":
         base = robot.base
         p, R = p @ base.rotation.T + np.array(base.translation), base.rotation @ R
@@ -200,25 +206,13 @@ def _task(
     return PoseTask(known, target, orientation, np.ascontiguousarray(p.T), (x, y, z), reach(robot, target))
 
 
-def _array(name: str, given: ArrayLike, *shape: int) -> Array:
-    values = np.asarray(given, float)
-    if values.shape[1:] != shape:
-        raise InputError(
-            "the array has the wrong shape",
-            parameter=name,
-            came=str(values.shape),
-            allowed=f"(n, {', '.join(map(str, shape))})",
-        )
-    if not np.isfinite(values).all():
-        row = int(np.argwhere(~np.isfinite(values))[0][0])
-        raise InputError(
-            "NaN and infinity are no pose", parameter=name, where=f"{name}, row {row}", cure="Remove the row."
-        )
-    return values
+def _array(given: ArrayLike, parameter: str, *shape: int) -> Array:
+    """Return an array of one row a pose; a single pose may come without its axis."""
+    return number_array([given] if axes(given) == len(shape) else given, parameter, ("n", *shape))
 
 
 def _rotations(given: ArrayLike, count: int) -> Array:
-    R = _array("rotations", given, 3, 3)
+    R = _array(given, "rotations", 3, 3)
     if len(R) != count:
         raise InputError(
             "there are not as many rotations as positions", parameter="rotations", came=len(R), allowed=f"{count}"
@@ -244,17 +238,12 @@ def _rotations(given: ArrayLike, count: int) -> Array:
 def _seed(robot: Robot, seed: ArrayLike | None, count: int) -> tuple[Array, Array]:
     """Return readings, and what they turn the joints by [rad or m], ``(n, joints)`` each."""
     joints = len(robot.joints)
-    values = np.zeros(joints) if seed is None else np.asarray(seed, float)
-    if values.shape not in ((joints,), (count, joints)):
+    values = checked_joints(robot, np.zeros(joints) if seed is None else seed, "seed")
+    if len(values) not in (1, count):
         raise InputError(
-            "the seed has the wrong length",
-            parameter="seed",
-            came=str(values.shape),
-            allowed=f"({joints},), one reading for each joint of {robot.name}, or ({count}, {joints})",
+            "there are not as many seeds as poses", parameter="seed", came=len(values), allowed=f"1 or {count}"
         )
-    if not np.isfinite(values).all():
-        raise InputError("NaN and infinity are no joint readings", parameter="seed")
-    turned = robot.variables(np.atleast_2d(values), robot.values)[:joints].T
+    turned = robot.variables(values, robot.values)[:joints].T
     return np.broadcast_to(values, (count, joints)), np.broadcast_to(turned, (count, joints))
 
 

@@ -26,6 +26,7 @@ from truearm.modeling.transform import cross, dot
 
 #: ``full``; ``axis``, the direction of the tip's z axis alone; ``free``, the position alone.
 Orientation = Literal["full", "axis", "free"]
+ORIENTATIONS: Final = ("full", "axis", "free")
 
 #: Where a pose counts as met and the steps end [reach lengths, rad].
 CONVERGED: Final = 1e-12

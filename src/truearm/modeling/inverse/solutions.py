@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections import Counter
+from dataclasses import dataclass, replace
 from enum import Enum
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truearm.modeling.chain import Array
+from truearm.shown import as_html, counted, short_text
+
+#: Poses explained one by one where a person looks at the solutions.
+_EXPLAINED: Final = 5
 
 
 class PoseStatus(Enum):
@@ -42,9 +48,9 @@ class PoseStatus(Enum):
         }[self]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class JointSolutions:
-    """Joint readings for poses, one row a pose, or one a pose and branch where all branches were asked for.
+    """Joint positions for poses, one row a pose, or one a pose and branch where all branches were asked for.
 
     Attributes
     ----------
@@ -53,7 +59,7 @@ class JointSolutions:
     pose
         Index of each row's pose, ascending, ``(rows,)``. Every pose has at least one row.
     joints
-        Joint readings [rad or m], ``(rows, joints)``.
+        Joint positions [rad or m], ``(rows, joints)``.
     status
         How each search ended.
     branch
@@ -81,6 +87,26 @@ class JointSolutions:
     beyond: NDArray[np.bool_]
     singular_value: Array
     joint_names: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        counts = Counter(status.value for status in self.status)
+        usable = len(set(self.pose[self.usable].tolist()))
+        of_each = ", ".join(f"{count} {status}" for status, count in counts.items())
+        lines = [f"{usable} of {counted(self.poses, 'pose')} can be reached ({of_each or 'none'})"]
+        rows = np.flatnonzero(~self.usable)
+        lines += [f"pose {self.pose[row]}: {self.advice(row)}" for row in rows[:_EXPLAINED]]
+        lines += [f"and {len(rows) - _EXPLAINED} more"] if len(rows) > _EXPLAINED else []
+        return short_text(lines)
+
+    def _repr_html_(self) -> str:
+        return as_html(repr(self))
+
+    def without_unreached(self) -> JointSolutions:
+        """Return the solutions with NaN for the joints of poses that are out of reach."""
+        out = self.rows(PoseStatus.UNREACHABLE)
+        joints = self.joints.copy()
+        joints[out] = np.nan
+        return replace(self, joints=joints)
 
     @property
     def usable(self) -> NDArray[np.bool_]:

@@ -124,7 +124,7 @@ class _AsSaid:
         found = {}
         for target in self.robot.targets:
             frame = np.tile(np.eye(4), (len(joints), 1, 1))
-            frame[:, :3, 3], frame[:, :3, :3] = self.robot.poses(joints, target.name)
+            frame[:, :3, 3], frame[:, :3, :3] = self.robot.world_poses(joints, target.name)
             found[target.name] = frame
         return found
 

@@ -121,6 +121,6 @@ def predict(
         numbers=numbers,
         chosen=np.array(by_choice),
         random=np.array(by_chance),
-        places=robot.poses(q)[0],
+        places=robot.world_poses(q)[0],
         error=_MEAN_LENGTH * noise * np.sqrt(variances(chosen)),
     )

@@ -42,7 +42,7 @@ def smallest_clearance(robot: Robot, q: Array | Postures, near: float) -> Array:
     segments = [(links[i], links[i + 1]) for i in range(len(links) - 1)]
     flange = len(segments)
     for target in robot.targets:
-        segments.append((links[-1], robot.poses(q, target.name)[0]))
+        segments.append((links[-1], robot.world_poses(q, target.name)[0]))
     lengths = [float(np.linalg.norm(b - a, axis=1).max(initial=0.0)) for a, b in segments]
     smallest = np.full(len(links[0]), np.inf)
     for i, j in combinations(range(len(segments)), 2):

@@ -163,9 +163,9 @@ def allowed(
             joint = _joint(robot, number, f"{where}, moments")
             row = 5 if robot.joints[joint].kind == "revolute" else 2
             kept[f"moment_{number}"] = np.asarray(loads[joint, row] * (1.0 if sign == "positive" else -1.0) > 0.0)
-    targets = [robot.poses(postures, target.name)[0] for target in robot.targets]
+    targets = [robot.world_poses(postures, target.name)[0] for target in robot.targets]
     if constraints.box is not None:
-        points = targets if constraints.box.of == "targets" else [robot.poses(postures)[0]]
+        points = targets if constraints.box.of == "targets" else [robot.world_poses(postures)[0]]
         kept["box"] = _in_box(constraints.box, points, length, f"{where}, box")
     if constraints.floor is not None:
         height = sized_si(constraints.floor, length, f"{where}, floor")
@@ -225,12 +225,12 @@ def _visible(
             cure="Add instrument: [x, y, z] in the robot's base frame, or take a calibrated robot.",
         )
     within = sized_si(rule.within, units.angle, f"{where}, within")
-    rotation = robot.poses(postures)[1]
+    rotation = robot.world_poses(postures)[1]
     kept = {}
     for name, direction in rule.targets.items():
         robot.target(name)
         looks = rotation @ (np.array(direction) / np.linalg.norm(direction))
-        sight = instrument - robot.poses(postures, name)[0]
+        sight = instrument - robot.world_poses(postures, name)[0]
         cosine = np.einsum("ni,ni->n", looks, sight) / np.linalg.norm(sight, axis=1)
         kept[f"visibility_{name}"] = np.asarray(cosine >= np.cos(within))
     return kept

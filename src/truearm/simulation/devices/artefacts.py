@@ -42,9 +42,9 @@ class Artefact(Device):
 
     def counted(self, robot: Robot, joints: Array) -> NDArray[np.intp]:
         """Return how many targets of the artefact are seen, ``(n,)``."""
-        place, rotation = robot.poses(joints, robot.targets[0].name)
+        place, rotation = robot.world_poses(joints, robot.targets[0].name)
         to_camera = -place / np.linalg.norm(place, axis=1, keepdims=True)
-        flange = robot.poses(joints)[1] if robot.targets[0].quaternion is None else rotation
+        flange = robot.world_poses(joints)[1] if robot.targets[0].quaternion is None else rotation
         cosine = np.einsum("nij,kj,ni->nk", flange, np.array(self.normals), to_camera)
         return np.asarray((cosine > np.cos(self.within)).sum(axis=1))
 

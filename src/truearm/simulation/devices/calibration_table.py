@@ -183,7 +183,7 @@ def _jogged(twin: Twin, wanted: Array, start: Array, conditions: Conditions) -> 
             if imperfect:
                 tip = np.array([posture.targets[name][:3, 3] for posture in twin.postures(q, **conditions)])
             else:
-                tip = twin.robot.poses(q, name)[0]
+                tip = twin.robot.world_poses(q, name)[0]
             missing = wanted - tip
             apart = np.linalg.norm(missing, axis=1)
             if (apart < _TOUCHES).all():

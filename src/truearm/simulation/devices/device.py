@@ -144,7 +144,7 @@ def stationed_for(device: Device, robot: Robot) -> Robot:
 def _where_it_stands(nominal: Robot, true: Robot) -> Transform:
     q = nominal.random_configurations(_TRIED, np.random.default_rng(0))
     at_origin = nominal.with_frames(Transform(), {})
-    return Transform.from_matrix(*rigid_motion(at_origin.poses(q)[0], true.poses(q)[0]))
+    return Transform.from_matrix(*rigid_motion(at_origin.world_poses(q)[0], true.world_poses(q)[0]))
 
 
 def recorded(

@@ -115,16 +115,16 @@ def postures_at(
         of = np.repeat(open_goals, max(2, min(_STARTS, _TOGETHER // len(open_goals))))
         q = nominal.random_configurations(len(of), rng)
         for _ in range(_STEPS):
-            missing = goals[of] - nominal.poses(q, target)[0]
+            missing = goals[of] - nominal.world_poses(q, target)[0]
             far = np.linalg.norm(missing, axis=1)
             if np.mean(far < 1e-8) > _MOST:
                 break
             q = q + _least(nominal.joint_jacobian(q, target)[:, :3], missing)
-        place, _ = nominal.poses(q, target)
+        place, _ = nominal.world_poses(q, target)
         good = np.linalg.norm(goals[of] - place, axis=1) < 1e-8
         good &= ((q > low + room) & (q < high - room)).all(axis=1)
         if facing is not None:
-            pointing = nominal.poses(q)[1][:, :, 2]
+            pointing = nominal.world_poses(q)[1][:, :, 2]
             good &= np.einsum("ni,ni->n", pointing, facing[of]) > np.cos(within)
         for k in np.flatnonzero(good)[::-1].tolist():
             found[of[k]] = q[k]
@@ -158,7 +158,7 @@ def followed(nominal: Robot, target: str, joints: Array, places: Array) -> tuple
     q, went, whole = joints, [], np.ones(len(joints), dtype=bool)
     for goal in places:
         for _ in range(_STEPS):
-            missing = goal - nominal.poses(q, target)[0]
+            missing = goal - nominal.world_poses(q, target)[0]
             far = np.abs(missing).max(axis=1)
             if float(far.max(where=whole, initial=0.0)) < _THERE:
                 break
@@ -173,7 +173,7 @@ def site(nominal: Robot) -> Array:
     rng = np.random.default_rng(0)
     name = nominal.targets[0].name
     base = nominal.base
-    tips = (nominal.poses(nominal.random_configurations(2000, rng), name)[0] - base.translation) @ base.rotation
+    tips = (nominal.world_poses(nominal.random_configurations(2000, rng), name)[0] - base.translation) @ base.rotation
     far = float(np.quantile(np.hypot(tips[:, 0], tips[:, 1]), 0.9))
     height = float(np.quantile(tips[:, 2], 0.35))
     return np.asarray(base.rotation @ np.array([0.7 * far, 0.0, height]) + base.translation)

@@ -100,7 +100,7 @@ class Strings(Device):
         joints = np.empty((0, len(nominal.joints)))
         while len(joints) < count:
             drawn = nominal.random_configurations(4 * count, rng)
-            above = (nominal.poses(drawn, name)[0] - anchors.mean(axis=0)) @ up
+            above = (nominal.world_poses(drawn, name)[0] - anchors.mean(axis=0)) @ up
             joints = np.concatenate([joints, drawn[above > _UPWARD]])
         joints = joints[:count]
         place = arm.frames(joints)[name][:, :3, 3]

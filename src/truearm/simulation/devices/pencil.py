@@ -118,7 +118,7 @@ class PencilCircle(Device):
             )
             begun, facing = begun[reached], facing[reached]
             q, whole = followed(nominal, name, q, np.moveaxis(places[begun], 0, 1))
-            pencil = np.array([nominal.poses(at)[1][:, :, 2] for at in q])
+            pencil = np.array([nominal.world_poses(at)[1][:, :, 2] for at in q])
             whole &= (np.einsum("kni,ni->kn", pencil, facing) > np.cos(_SLIPS)).all(axis=0)
             for k in np.flatnonzero(whole).tolist():
                 found[begun[k]] = q[::fine, k]

@@ -32,11 +32,11 @@ class Tracker(Device):
 
     def visible(self, robot: Robot, joints: Array) -> NDArray[np.bool_]:
         """Return which targets the tracker sees, none where they are fewer than asked for, ``(n, targets)``."""
-        rotation = robot.poses(joints)[1]
+        rotation = robot.world_poses(joints)[1]
         looks = outward(robot)
         seen = np.empty((len(joints), len(robot.targets)), dtype=bool)
         for k, target in enumerate(robot.targets):
-            place = robot.poses(joints, target.name)[0]
+            place = robot.world_poses(joints, target.name)[0]
             cosine = -np.einsum("nij,j,ni->n", rotation, looks[k], place) / np.linalg.norm(place, axis=1)
             seen[:, k] = cosine > np.cos(self.within)
         enough = seen.sum(axis=1, keepdims=True) >= min(self.at_least, len(robot.targets))
@@ -68,7 +68,7 @@ class MeasurementArm(Device):
         """Return the positions of all targets within reach, at random configurations."""
 
         def visible(robot: Robot, joints: Array) -> NDArray[np.bool_]:
-            far = [np.linalg.norm(robot.poses(joints, target.name)[0], axis=1) for target in robot.targets]
+            far = [np.linalg.norm(robot.world_poses(joints, target.name)[0], axis=1) for target in robot.targets]
             return np.stack(far, axis=1) < self.reach
 
         joints, seen = shown(nominal, count, rng, visible, self.name)

@@ -9,6 +9,7 @@ import numpy as np
 
 from truearm.errors import InputError
 from truearm.measurement.dataset import Dataset
+from truearm.measurement.dataset_fields import distinct_labels
 from truearm.measurement.hexapod.geometry import side_names
 from truearm.measurement.hexapod.kinematics import tool_cups
 from truearm.measurement.hexapod.sheet import PlannedRow
@@ -132,6 +133,8 @@ def cups_dataset(robot: Robot, labels: Sequence[str], joints: Array, cups: Array
 def joined(a: Dataset, b: Dataset) -> Dataset:
     """Return the positions of two sessions as one, in the frame that both have.
 
+    A configuration of the second that is called as one of the first, ``7``, becomes ``7#2``.
+
     Raises
     ------
     InputError
@@ -155,7 +158,7 @@ def joined(a: Dataset, b: Dataset) -> Dataset:
 
     return replace(
         a,
-        labels=a.labels + b.labels,
+        labels=distinct_labels(a.labels + b.labels),
         joints=np.vstack([a.joints, b.joints]),
         configuration=np.concatenate([a.configuration, b.configuration + a.configurations]),
         target=np.concatenate([a.target, b.target]),

@@ -129,7 +129,7 @@ def tool_alone(
     compliance = {f"compliance_{number}": joint.compliance for number, joint in twin.joints.items()}
 
     def errors(robot: Robot) -> dict[int, float]:
-        origin, rotation = robot.poses(truth.joints)
+        origin, rotation = robot.world_poses(truth.joints)
         right = np.einsum("nji,nj->ni", rotation, truth.places(tip) - origin).mean(axis=0)
         found = {
             count: _points(identify(robot, data.of_configurations(range(count)), FRAMES).robot)["tip"]
@@ -153,7 +153,7 @@ def _points(robot: Robot) -> dict[str, tuple[float, ...]]:
 
 
 def _predicted(robot: Robot, data: Dataset, truth: Truth) -> Array:
-    return np.concatenate([robot.poses(truth.joints, name)[0] for name in data.targets])
+    return np.concatenate([robot.world_poses(truth.joints, name)[0] for name in data.targets])
 
 
 def _lengths(errors: Array) -> Array:

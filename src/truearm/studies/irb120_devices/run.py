@@ -326,5 +326,5 @@ def _zones(settings: Settings, rng: np.random.Generator) -> dict[Cut, Spread]:
                 cut = identify_zones(nominal, data, named_model(name), divisions, _OVERLAP)
                 found[Cut(name, count, divisions)] = spread([cut.positions(truth.joints, nest) for nest in nests])
                 whole = cut.whole.robot
-            found[Cut(name, count)] = spread([whole.poses(truth.joints, nest)[0] for nest in nests])
+            found[Cut(name, count)] = spread([whole.world_poses(truth.joints, nest)[0] for nest in nests])
     return found

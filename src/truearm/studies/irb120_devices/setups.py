@@ -176,7 +176,7 @@ def shares(setup: Setup, count: int, rng: np.random.Generator) -> Shares:
         several = 100.0 * float((seen.sum(axis=1) > 1).sum() / seen.any(axis=1).sum())
     elif setup.device is PLANAR_ARTEFACT:
         joints = joints[seen[:, 0]]
-        place, rotation = robot.poses(joints, robot.targets[0].name)
+        place, rotation = robot.world_poses(joints, robot.targets[0].name)
         share = float((np.einsum("ni,ni->n", rotation[:, :, 1], place) < 0.0).mean())
         back = 100.0 * min(share, 1.0 - share)
     return Shares(100.0 * float(seen.any(axis=1).mean()), several, back)
@@ -264,10 +264,10 @@ def _read(setup: Setup, twin: Twin, joints: Array, seen: NDArray[np.bool_], rng:
 
 def _nest(robot: Robot, setup: Setup, joints: Array, nest: str) -> Array:
     if nest in {target.name for target in robot.targets}:
-        return robot.poses(joints, nest)[0]
+        return robot.world_poses(joints, nest)[0]
     # The artefact's own frame is read; where the nests are in it was measured beforehand.
     artefact = robot.targets[0].name
-    place, rotation = robot.poses(joints, artefact)
+    place, rotation = robot.world_poses(joints, artefact)
     tool = setup.device.tool
     origin = np.array(tool.targets[artefact] if tool else (0.0, 0.0, 0.0))
     return np.asarray(place + rotation @ (np.array(setup.nests[nest]) - origin))

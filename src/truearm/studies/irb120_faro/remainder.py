@@ -77,7 +77,7 @@ def left_over(robot: Robot, data: Dataset, model: Model, seed: int) -> Remainder
         fitted = np.setdiff1d(np.arange(n), part)
         found = identify(robot, data.of_configurations(fitted), model).robot
         every = errors_of(found, data).position_errors.reshape(n, count, 3) * 1e3
-        there = np.stack([found.poses(data.postures, name)[0] for name in data.targets], axis=1)
+        there = np.stack([found.world_poses(data.postures, name)[0] for name in data.targets], axis=1)
         jacobian = np.stack([found.joint_jacobian(data.postures, name)[:, :3] for name in data.targets], axis=1)
         residual[part], points[part] = every[part], there[part]
         for cause, columns in _columns(jacobian, there, data.joints).items():

@@ -133,7 +133,7 @@ def _one(rng: np.random.Generator, unseen: int, coarser: int) -> Outcome:
     slipped = {"theta_offset_6": twin.robot.values["theta_offset_6"] + SLIPPED}
     later = replace(twin, robot=twin.robot.with_values(slipped))
     touches = touched(drive, PLACE)
-    frame = world_frame(drive.poses(touches, "1")[0], np.full(3, DEVICE.base)).plain
+    frame = world_frame(drive.world_poses(touches, "1")[0], np.full(3, DEVICE.base)).plain
     wide = ballbar(rng, _WIDE)
     fixtures = set_up(later, touches, wide)
     reached = measure_poses(later, fixtures, rows, plan, wide, approach=approach)
@@ -170,7 +170,7 @@ def _one(rng: np.random.Generator, unseen: int, coarser: int) -> Outcome:
 
 def _predicted(robot: Robot, joints: Array) -> Array:
     """Return where a model says the cups are [m], ``(n, 3, 3)``."""
-    return np.stack([robot.poses(joints, target.name)[0] for target in robot.targets], axis=1)
+    return np.stack([robot.world_poses(joints, target.name)[0] for target in robot.targets], axis=1)
 
 
 def _in(frame: Transform, points: Array) -> Array:
@@ -182,7 +182,7 @@ def _by_arm(
 ) -> PoseErrors:
     """Return the errors of poses that look up, read by a measurement arm from the base cups."""
     q = regions.IRB120.draw(4000, rng)
-    up = q[drive.poses(q)[1][:, 2, 2] > 0.5][:_BY_ARM]
+    up = q[drive.world_poses(q)[1][:, 2, 2] > 0.5][:_BY_ARM]
     approach = rng.choice([-1.0, 1.0], up.shape)
     names = [target.name for target in twin.robot.targets]
     frames = [posture.targets for posture in twin.postures(up, approach=approach)]

@@ -123,7 +123,7 @@ def _readings(
 ) -> tuple[Array, Array, Array]:
     """Return joint positions on the sphere, what the bar reads there [m], and the centre by the model [m]."""
     at_ball, place = ball
-    centre = model.poses(at_ball[None], "1")[0][0]
+    centre = model.world_poses(at_ball[None], "1")[0][0]
     joints = _on_sphere(model, nest, centre, count, rng)
     approach = rng.choice([-1.0, 1.0], joints.shape)
     nests = np.array([posture.targets[nest][:3, 3] for posture in twin.postures(joints, approach=approach)])
@@ -135,7 +135,7 @@ def _on_sphere(model: Robot, nest: str, centre: Array, count: int, rng: np.rando
     rows: list[Array] = []
     while sum(map(len, rows)) < count:
         q = regions.IRB120.draw(4000, rng)
-        position, rotation = model.poses(q, nest)
+        position, rotation = model.world_poses(q, nest)
         away = position - centre
         distance = np.linalg.norm(away, axis=1)
         near = np.flatnonzero((np.abs(distance - _RADIUS) < 0.1) & (away[:, 2] > 0.2 * distance))

@@ -231,7 +231,7 @@ def _four_sides(bench: _Bench, first: SetUp, flat: Sequence[PlannedRow]) -> Data
 def _by_touches(robot: Robot, places: Sequence[Dataset], touches: Sequence[tuple[Array, Array]]) -> Dataset:
     """Return the readings of all places in the frame of the first, by the joint positions at their cups and a model."""
     name = robot.targets[0].name
-    frames = [world_frame(robot.poses(at, name)[0], sides).frame for at, sides in touches]
+    frames = [world_frame(robot.world_poses(at, name)[0], sides).frame for at, sides in touches]
     first = frames[0]
     moved = []
     for data, frame in zip(places, frames, strict=True):

@@ -32,7 +32,7 @@ def tip_poses(robot: Robot, q: Array | Postures) -> tuple[Array, Array]:
 
     A tip that is a point leans by the turn alpha_6 that its y stands for.
     """
-    position, rotation = robot.poses(q, TIP)
+    position, rotation = robot.world_poses(q, TIP)
     if robot.target(TIP).quaternion is None:
         leaning = -math.atan2(robot.values["target_tip_y"], TOOL + robot.values["target_tip_z"])
         c, s = math.cos(leaning), math.sin(leaning)

@@ -162,7 +162,7 @@ def _one(seed: Seed, counts: Counts) -> Outcome:
     printed = {name: _measured(device, nominal, at_end, count, rng) for name, (device, count) in DOCUMENT.items()}
     document = {
         name: OfDocument(
-            from_nominal=_errors(np.linalg.norm(data.position - in_place.poses(data.joints, TIP)[0], axis=1)),
+            from_nominal=_errors(np.linalg.norm(data.position - in_place.world_poses(data.joints, TIP)[0], axis=1)),
             reached={start: _reached(found, data, others, end) for start, found in fitted(data).items()},
         )
         for name, data in printed.items()
@@ -244,7 +244,7 @@ def _views(nominal: Robot, joints: Array) -> dict[View, float]:
 
 def _reached(fit: Fit, data: Dataset, joints: Array, true: Array) -> Reached:
     """Compare a robot with the true places ``(n, 3)`` of its tip in the world."""
-    predicted = fit.robot.poses(joints, TIP)[0]
+    predicted = fit.robot.world_poses(joints, TIP)[0]
     R, p = rigid_motion(predicted, true)
     own = np.linalg.norm(predicted - true, axis=1) if data.anchored else np.full(len(true), np.nan)
     spread, truly = (places - places.mean(axis=0) for places in (predicted @ R.T, true))

@@ -160,7 +160,10 @@ def _one(seed: Seed, cube: Cube, count: int, unseen: int) -> Outcome:
         for combination in COMBINATIONS:
             robot = _pose_by_pose(one, nominal, data, combination)
             combined[one, combination] = float(pose_errors(tip_poses(robot, others), elsewhere)["dP"].mean())
-    standard, other = published("standard").poses(joints, TIP)[0], published("influence").poses(joints, TIP)[0]
+    standard, other = (
+        published("standard").world_poses(joints, TIP)[0],
+        published("influence").world_poses(joints, TIP)[0],
+    )
     return Outcome(
         influence=influence(nominal, joints, NAMES, TIP, PERTURBATIONS),
         chapter_5=influence(nominal, central, NAMES, TIP, PERTURBATIONS),

@@ -167,7 +167,7 @@ def _one(nominal: Robot, twin: Twin, perfect: Dataset, lines: SevenLines, joints
     commanded = usable_joints(fake_targets(fit.robot, joints).solutions, lines.labels, "line test")
     before = on_twin(lines, twin, joints, NOISE, REPEATS, rng)
     after = on_twin(lines, twin, commanded, NOISE, REPEATS, rng)
-    apart = fit.robot.poses(joints)[0] - twin.robot.poses(joints)[0]
+    apart = fit.robot.world_poses(joints)[0] - twin.robot.world_poses(joints)[0]
     return Outcome(fit, before, after, np.asarray(np.linalg.norm(apart, axis=1)))
 
 

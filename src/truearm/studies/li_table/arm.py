@@ -83,7 +83,7 @@ def truth(
             for p in _deviations(nominal).parameters
         }
         robot = nominal.with_values(values)
-        if error[0] <= np.linalg.norm(robot.poses(joints, TIP)[0] - points, axis=1).mean() <= error[1]:
+        if error[0] <= np.linalg.norm(robot.world_poses(joints, TIP)[0] - points, axis=1).mean() <= error[1]:
             return Twin(robot)
 
 

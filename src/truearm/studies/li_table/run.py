@@ -248,7 +248,7 @@ def _following(nominal: Robot, robots: Mapping[Surface, Robot], twin: Twin) -> F
 
 
 def _sums(by: Measure, robot: Robot, data: Dataset) -> dict[tuple[Measure, Measure], float]:
-    errors = 1e3 * (robot.poses(data.joints, TIP)[0] - data.position)
+    errors = 1e3 * (robot.world_poses(data.joints, TIP)[0] - data.position)
     return {
         ("distances", by): float(np.linalg.norm(errors, axis=1).mean()),
         ("components", by): float(np.abs(errors).sum(axis=1).mean()),
@@ -278,4 +278,4 @@ def _without_camera(
 
 def _apart(robot: Robot, joints: Array, true: Array) -> float:
     """Return how far the true tip is on average from where a robot predicts it [mm]."""
-    return 1e3 * float(np.linalg.norm(robot.poses(joints, TIP)[0] - true, axis=1).mean())
+    return 1e3 * float(np.linalg.norm(robot.world_poses(joints, TIP)[0] - true, axis=1).mean())

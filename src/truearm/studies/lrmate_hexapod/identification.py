@@ -45,7 +45,7 @@ class Cups:
 
     def frame_by(self, robot: Robot) -> WorldFrame:
         """Return the fixture's frame in the world of a model."""
-        return world_frame(robot.poses(self.touches, TOUCHING)[0], self.sides)
+        return world_frame(robot.world_poses(self.touches, TOUCHING)[0], self.sides)
 
     def placed(self, robot: Robot) -> Robot:
         """Return the robot with the fixture's frame as its world, where its own model finds the cups."""

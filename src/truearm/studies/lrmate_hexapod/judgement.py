@@ -115,7 +115,7 @@ def judged(model: Robot, truth: HeldOut) -> Judgement:
     """Compare a model with what a twin does, both in the same frame."""
     at = model.loaded(truth.joints)
     predicted = _predicted(model, at, truth)
-    turned = model.poses(at)[1] @ np.swapaxes(truth.rotation, 1, 2)
+    turned = model.world_poses(at)[1] @ np.swapaxes(truth.rotation, 1, 2)
     front = truth.front_up
     return Judgement(
         position=np.linalg.norm(predicted - truth.position, axis=1),
@@ -133,5 +133,5 @@ def mean_position_error(model: Robot, truth: HeldOut) -> float:
 
 def _predicted(model: Robot, at: Postures, truth: HeldOut) -> Array:
     """Return where a model says the cup that is looked at is [m], ``(n, 3)``."""
-    places = np.array([model.poses(at, name)[0] for name in TARGETS])
+    places = np.array([model.world_poses(at, name)[0] for name in TARGETS])
     return np.asarray(places[truth.cup, np.arange(len(truth.cup))])

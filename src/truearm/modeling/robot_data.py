@@ -1,0 +1,242 @@
+"""What a robot is: its parts, the chain that follows from them, and its parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Self, TypeVar
+
+import numpy as np
+
+from truearm.errors import InputError, did_you_mean
+from truearm.modeling.chain import Chain, Element, across, turn_about
+from truearm.modeling.controller import AS_THE_MODEL, Controller
+from truearm.modeling.conventions import Convention, convention
+from truearm.modeling.effects import EFFECTS, Effect, Layout
+from truearm.modeling.fixtures import Fixture
+from truearm.modeling.parameters import Parameter
+from truearm.modeling.parts import (
+    GRAVITY,
+    NO_PAYLOAD,
+    SLIDES,
+    TURNS,
+    Joint,
+    LinkMass,
+    Payload,
+    Target,
+    Tool,
+    Truth,
+)
+from truearm.modeling.robot_parameters import all_parameters
+from truearm.modeling.transform import IDENTITY, Transform, fixed_rotation
+from truearm.shown import as_html, counted, listed, short_text
+
+Part = TypeVar("Part", Target, Fixture)
+
+
+@dataclass(frozen=True, repr=False)
+class RobotData:
+    """A serial robot as data: what it is made of, the chain that follows from it, and its parameters.
+
+    Joint positions are ``(n, joints)`` in rad (m for prismatic joints); everything is in SI units. The base frame
+    stands in the world at ``base_x``, ``base_y``, ``base_z``, turned by `base_quaternion` and then by the small
+    ``base_rx``, ``base_ry``, ``base_rz`` (Nubiola, equation I.2, with the reference orientation split off so
+    that no installation meets a singular angle). The world is the instrument's frame.
+
+    Attributes
+    ----------
+    name, title, source
+        Short name, full name, and where the numbers come from.
+    convention_name
+        Name of the kinematic convention of the joints' rows.
+    joints
+        From base to flange.
+    flange
+        From the last link's frame to the flange.
+    masses
+        Link masses, where published.
+    payload
+        What hangs on the flange.
+    gravity
+        Acceleration of free fall in the base frame [m/s^2].
+    base_quaternion
+        Reference orientation of the base in the world.
+    targets
+        What the instrument sees.
+    fixtures
+        What stands beside the robot and targets are measured against.
+    effect_names
+        Joint effects that are part of the model.
+    known
+        Parameters that differ from the plain nominal ones.
+    priors
+        The file's own standard deviations of nominal values, by SI unit.
+    controller
+        How the robot's controller counts the joints, and where it has its frames.
+    tools, truths
+        For simulation.
+    history
+        One line for each thing done to the robot.
+    """
+
+    name: str
+    title: str
+    source: str
+    convention_name: str
+    joints: tuple[Joint, ...]
+    flange: Transform = IDENTITY
+    masses: tuple[LinkMass, ...] = ()
+    payload: Payload = NO_PAYLOAD
+    gravity: tuple[float, float, float] = GRAVITY
+    base_quaternion: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+    targets: tuple[Target, ...] = ()
+    fixtures: tuple[Fixture, ...] = ()
+    effect_names: tuple[str, ...] = ()
+    known: Mapping[str, Parameter] = field(default_factory=dict)
+    priors: Mapping[str, float] = field(default_factory=dict)
+    controller: Controller = AS_THE_MODEL
+    tools: Mapping[str, Tool] = field(default_factory=dict)
+    truths: Mapping[str, Truth] = field(default_factory=dict)
+    history: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        changed = sum(p.value != p.nominal for p in self.parameters.values())
+        lines = [
+            f"{self.name}: {self.title}",
+            f"{counted(len(self.joints), 'joint')} ({self.convention_name}), "
+            f"{changed} of {counted(len(self.parameters), 'parameter')} not at the nominal value",
+            f"joint effects: {listed(self.effect_names) or 'none'}",
+            f"targets: {listed([target.name for target in self.targets]) or 'none'}",
+        ]
+        lines += [f"fixtures: {listed([fixture.name for fixture in self.fixtures])}"] if self.fixtures else []
+        lines += [f"payload: {self.payload.text}"] if self.payload.mass else []
+        return short_text(lines)
+
+    def _repr_html_(self) -> str:
+        return as_html(repr(self))
+
+    @property
+    def convention(self) -> Convention:
+        """The kinematic convention."""
+        return convention(self.convention_name)
+
+    @cached_property
+    def base_elements(self) -> tuple[Element, ...]:
+        """The way from the world to the base frame."""
+        return (
+            *(Element(motion, parameter=f"base_{axis}") for axis, motion in SLIDES),
+            *fixed_rotation(self.base_quaternion),
+            *(Element(motion, parameter=f"base_{axis}") for axis, motion in TURNS),
+        )
+
+    @cached_property
+    def link_elements(self) -> tuple[tuple[Element, ...], ...]:
+        """The way along each link, from base to flange; the link's frame is at its end."""
+        return tuple(
+            self.convention.elements(number, joint.row, joint.kind) for number, joint in enumerate(self.joints, 1)
+        )
+
+    @cached_property
+    def flange_elements(self) -> tuple[Element, ...]:
+        """The way from the last link's frame to the flange."""
+        slides = zip(SLIDES, self.flange.translation, strict=True)
+        return (
+            *(Element(motion, value=value) for (_, motion), value in slides if value),
+            *fixed_rotation(self.flange.quaternion),
+        )
+
+    @cached_property
+    def trunk(self) -> Chain:
+        """The chain from the world to the flange, with what joint effects tilt and stretch."""
+        links = (element for link in self.moved_links for element in link)
+        return Chain((*self.base_elements, *links, *self.flange_elements))
+
+    @cached_property
+    def rigid(self) -> Self:
+        """The robot without its joint effects: every joint turns by its reading."""
+        return replace(self, effect_names=())
+
+    @cached_property
+    def moved_links(self) -> tuple[tuple[Element, ...], ...]:
+        """The way along each link, as :attr:`link_elements`, with what joint effects tilt and stretch."""
+        tilts = any(effect.tilts for effect in self.effects)
+        stretches = any(effect.stretches for effect in self.effects)
+        slides = iter(range(len(self.layout.lengths)))
+
+        def moved(joint: int, element: Element) -> tuple[Element, ...]:
+            if stretches and _has_length(element):
+                return (replace(element, variable=self.layout.length(next(slides))),)
+            if tilts and element.variable is not None:
+                across_it = zip(across(element), self.layout.tilt(joint), strict=True)
+                return (element, *(turn_about(axis, variable) for axis, variable in across_it))
+            return (element,)
+
+        return tuple(
+            tuple(part for element in link for part in moved(joint, element))
+            for joint, link in enumerate(self.link_elements)
+        )
+
+    @cached_property
+    def layout(self) -> Layout:
+        """The variables of the trunk."""
+        lengths = [(i, e.value) for i, link in enumerate(self.link_elements) for e in link if _has_length(e)]
+        return Layout(
+            tuple(joint.kind for joint in self.joints),
+            tuple(lengths),
+            tuple(joint.transmission_periods for joint in self.joints),
+        )
+
+    @cached_property
+    def effects(self) -> tuple[Effect, ...]:
+        """The joint effects of the model."""
+        return tuple(effect(self.layout) for effect in EFFECTS if effect.name in self.effect_names)
+
+    @cached_property
+    def parameters(self) -> Mapping[str, Parameter]:
+        """All parameters by name: base, joints, effects, targets, fixtures."""
+        return all_parameters(self)
+
+    @cached_property
+    def values(self) -> Mapping[str, float]:
+        """Current value of every parameter [SI]."""
+        return {name: p.value for name, p in self.parameters.items()}
+
+    @property
+    def base(self) -> Transform:
+        """Where the base frame stands in the world."""
+        kinematics = Chain(self.base_elements).forward_kinematics(np.zeros((0, 1)), self.values)
+        return Transform.from_matrix(kinematics.matrix()[0], kinematics.position[:, 0])
+
+    def target(self, name: str) -> Target:
+        """Return the target called `name`."""
+        return self._named(name, "target", self.targets)
+
+    def fixture(self, name: str) -> Fixture:
+        """Return the fixture called `name`."""
+        return self._named(name, "fixture", self.fixtures)
+
+    def _named(self, name: str, kind: str, parts: Sequence[Part]) -> Part:
+        for part in parts:
+            if part.name == name:
+                return part
+        known = [part.name for part in parts]
+        raise InputError(
+            f"the robot has no {kind} of this name",
+            parameter=kind,
+            where=self.name,
+            came=name,
+            allowed=", ".join(known) or f"none: the robot has no {kind}s",
+            cure=did_you_mean(name, known) if isinstance(name, str) else None,
+        )
+
+    @cached_property
+    def moving(self) -> list[int]:
+        """Index of the element that each variable of the trunk moves, joints first."""
+        places = {e.variable: i for i, e in enumerate(self.trunk.elements) if e.variable is not None}
+        count = self.layout.variables if len(places) > len(self.joints) else len(self.joints)
+        return [places.get(i, -1) for i in range(count)]
+
+
+def _has_length(element: Element) -> bool:
+    return not element.turns and element.variable is None and element.value != 0.0

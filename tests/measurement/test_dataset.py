@@ -1,0 +1,326 @@
+"""A dataset checks itself, is made from arrays, and gives parts of itself by index or mask."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from truearm import calibrate, check
+from truearm.errors import InputError
+from truearm.library import load_robot
+from truearm.measurement.dataset import Dataset
+from truearm.modeling.chain import Array
+from truearm.modeling.robot import Robot
+from truearm.modeling.transform import Transform
+
+NAN, INFINITY = float("nan"), float("inf")
+N = 6
+
+
+def joints(count: int = N) -> Array:
+    return np.random.default_rng(1).uniform(-0.5, 0.5, (count, 6))
+
+
+def positions(count: int = N, targets: int = 2) -> Array:
+    return np.random.default_rng(2).uniform(0.2, 0.8, (count, targets, 3))
+
+
+def off_nominal() -> Robot:
+    robot = load_robot("irb120").with_frames(Transform(), {"1": (0.0, 0.05, 0.1)})
+    return robot.with_values({"theta_offset_2": robot.values["theta_offset_2"] + 0.01})
+
+
+def sound() -> Dataset:
+    """Return a dataset in which every field is there and no two numbers are the same."""
+    rng = np.random.default_rng(3)
+    data = Dataset.of(
+        joints(),
+        positions(),
+        targets=["ball", "cup"],
+        sigma=rng.uniform(1e-5, 2e-5, (N, 2)),
+        sigma_rot=1e-4,
+        quaternions=np.broadcast_to([1.0, 0.0, 0.0, 0.0], (N, 2, 4)),
+        order=range(1, N + 1),
+        temperature=rng.uniform(20, 22, N),
+    )
+    beside = replace(data, targets=("p", "q"), quaternion=None, position=data.position + 1.0)
+    return replace(
+        data,
+        distance=np.full(2 * N, NAN),
+        height=rng.uniform(0, 1, 2 * N),
+        fixtures=("plate",),
+        fixture=np.zeros(2 * N, dtype=np.intp),
+        wrench=rng.uniform(0, 1, (N, 6)),
+        references=beside,
+    )
+
+
+def refused(parameter: str, call: Any, *words: Any, **options: Any) -> str:
+    with pytest.raises(InputError) as caught:
+        call(*words, **options)
+    assert caught.value.parameter == parameter
+    return str(caught.value)
+
+
+# -- from arrays ------------------------------------------------------------------------------------------
+
+
+def test_of_one_target() -> None:
+    data = Dataset.of(joints().tolist(), positions()[:, 0].tolist())
+    assert data.configurations == N
+    assert data.labels == ("1", "2", "3", "4", "5", "6")
+    assert data.targets == ("1",)
+    assert data.joint_kinds == ("revolute",) * 6
+    assert_array_equal(data.position, positions()[:, 0])
+    assert_array_equal(data.configuration, np.arange(N))
+    assert data.sigma is None
+    assert data.number is None
+    assert data.source == "arrays"
+
+
+def test_of_several_targets() -> None:
+    p = positions()
+    p[1, 0, 2] = NAN
+    sigma = np.arange(1.0, N + 1)
+    data = Dataset.of(
+        joints(), p, targets=("a", "b"), configurations=[10, 11, 12, 13, 14, 15], sigma=sigma, joint_kinds=None
+    )
+    assert data.labels == ("10", "11", "12", "13", "14", "15")
+    assert data.targets == ("a", "b")
+    assert_array_equal(data.position[[0, 1, 3]], p[[0, 0, 1], [0, 1, 1]])
+    assert np.isnan(data.position[2]).all()
+    assert data.has_reading.sum() == 2 * N - 1
+    assert_array_equal(data.configuration, np.repeat(np.arange(N), 2))
+    assert_array_equal(data.target, np.tile([0, 1], N))
+    assert_array_equal(data.sigma, np.repeat(sigma, 2))
+    assert_array_equal(Dataset.of(joints(), p, sigma=2e-5).sigma, np.full(2 * N, 2e-5))
+
+
+def test_of_an_order_knows_the_last_moves() -> None:
+    q, order = joints(), [2, 1, 3, 4, 5, 6]
+    data = Dataset.of(q, positions(), order=order, temperature=21.0)
+    assert_array_equal(data.number, [1, 0, 2, 3, 4, 5])
+    assert data.approach is not None
+    assert_array_equal(data.approach[1], np.zeros(6))
+    assert_array_equal(data.approach[0], np.sign(q[0] - q[1]))
+    assert_array_equal(data.approach[2], np.sign(q[2] - q[0]))
+    assert_array_equal(data.temperature, np.full(N, 21.0))
+    assert_array_equal(Dataset.of(q, positions(), order=np.array(order) - 1).number, data.number)
+
+
+def test_arrays_can_be_calibrated() -> None:
+    true = off_nominal()
+    q = true.random_configurations(40, np.random.default_rng(0))
+    position, _ = true.forward(q, frame="world", target="1")
+    found = calibrate("irb120", Dataset.of(q, position, sigma=1e-5), train="all")
+    predicted, _ = found.robot.forward(q, frame="world", target="1")
+    assert np.abs(predicted - position).max() < 2e-5
+
+
+@pytest.mark.parametrize(
+    ("parameter", "changed"),
+    [
+        ("joints", {"joints": np.full((N, 6), NAN)}),
+        ("joints", {"joints": np.zeros(6)}),
+        ("joints", {"joints": np.zeros((0, 6))}),
+        ("joints", {"joints": "q"}),
+        ("positions", {"positions": positions()[:4]}),
+        ("positions", {"positions": positions()[:, :, :2]}),
+        ("positions", {"positions": positions()[:, 0, 0]}),
+        ("positions", {"positions": np.full((N, 3), INFINITY)}),
+        ("positions", {"positions": [[0.0] * 3, [0.0] * 2]}),
+        ("positions", {"positions": None}),
+        ("targets", {"targets": ["a"]}),
+        ("targets", {"targets": ["a", "a"]}),
+        ("targets", {"targets": "ab"}),
+        ("targets", {"targets": [None, "a"]}),
+        ("configurations", {"configurations": range(3)}),
+        ("configurations", {"configurations": [1, 2, 3, 4, 5, 5]}),
+        ("configurations", {"configurations": 6}),
+        ("quaternions", {"quaternions": np.ones((N, 2, 4))}),
+        ("quaternions", {"quaternions": np.ones((N, 4))}),
+        ("sigma", {"sigma": 0.0}),
+        ("sigma", {"sigma": -1e-5}),
+        ("sigma", {"sigma": NAN}),
+        ("sigma", {"sigma": np.ones(2)}),
+        ("sigma", {"sigma": "0.02 mm"}),
+        ("sigma_rot", {"sigma_rot": 0.0}),
+        ("order", {"order": [1, 2, 3, 4, 5, 5]}),
+        ("order", {"order": [1, 2, 3, 4, 5, 6.5]}),
+        ("order", {"order": [-1, 2, 3, 4, 5, 6]}),
+        ("order", {"order": "rows"}),
+        ("temperature", {"temperature": [20.0] * 5}),
+        ("temperature", {"temperature": NAN}),
+        ("joint_kinds", {"joint_kinds": ["revolute"] * 5}),
+        ("joint_kinds", {"joint_kinds": ["revolut"] * 6}),
+        ("joint_kinds", {"joint_kinds": "revolute"}),
+    ],
+)
+def test_arrays_that_do_not_fit_are_refused(parameter: str, changed: dict[str, Any]) -> None:
+    refused(parameter, Dataset.of, **{"joints": joints(), "positions": positions()} | changed)
+
+
+# -- checks of its own ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("labels", ("1", "1", "2", "3", "4", "5")),
+        ("joints", np.full((N, 6), NAN)),
+        ("joints", np.zeros((N, 5))),
+        ("joints", [[0.0] * 6] * N),
+        ("joint_kinds", ("revolute",) * 5 + ("sliding",)),
+        ("targets", ("a", "a")),
+        ("configuration", np.full(2 * N, N)),
+        ("configuration", np.full(2 * N, -1)),
+        ("configuration", np.zeros(2 * N)),
+        ("target", np.full(2 * N, 2)),
+        ("position", np.zeros((2 * N, 2))),
+        ("position", np.full((2 * N, 3), INFINITY)),
+        ("quaternion", np.zeros((2 * N, 4))),
+        ("quaternion", np.zeros((2 * N, 3))),
+        ("distance", np.zeros(2)),
+        ("height", np.full(2 * N, INFINITY)),
+        ("fixture", np.full(2 * N, 1)),
+        ("fixture", np.full(2 * N, -2)),
+        ("sigma", np.zeros(2 * N)),
+        ("sigma", np.ones(N)),
+        ("sigma_rot", np.full(2 * N, -1.0)),
+        ("approach", np.zeros((N, 5))),
+        ("number", np.zeros(N + 1)),
+        ("temperature", np.full(N, NAN)),
+        ("wrench", np.full((N, 6), NAN)),
+        ("references", Dataset.of(joints(2), positions(2))),
+    ],
+)
+def test_a_dataset_checks_itself(field: str, value: Any) -> None:
+    data = sound()
+    wrong = replace(data, references=None) if field in ("labels", "joints", "joint_kinds") else data
+    refused("joints" if field == "joint_kinds" and len(value) < 6 else field, replace, wrong, **{field: value})
+
+
+def test_wrong_arrays_are_refused_before_a_job_starts() -> None:
+    """They ended in LinAlgError, ValueError or IndexError far from here."""
+    data = Dataset.of(joints(40), positions(40))
+    for job in (lambda d: calibrate("irb120", d), lambda d: check(d)):
+        for field, value in (("joints", data.joints * NAN), ("sigma", np.zeros(80)), ("position", np.zeros((80, 2)))):
+            refused(field, lambda job=job, field=field, value=value: job(replace(data, **{field: value})))
+
+
+# -- parts ------------------------------------------------------------------------------------------------
+
+
+def same(one: Dataset, other: Dataset) -> None:
+    for field, value in vars(one).items():
+        if isinstance(value, Dataset):
+            same(value, getattr(other, field))
+        else:
+            assert_array_equal(value, getattr(other, field), err_msg=field)
+
+
+def test_a_mask_of_configurations_chooses_where_it_is_true() -> None:
+    data, mask = sound(), np.array([False, True, True, False, False, True])
+    same(data.of_configurations(mask), data.of_configurations([1, 2, 5]))
+    same(data.of_configurations(mask.tolist()), data.of_configurations(np.array([1, 2, 5])))
+    assert data.of_configurations(mask).labels == ("2", "3", "6")
+
+
+def test_configurations_come_in_the_order_asked_for() -> None:
+    data = sound()
+    part = data.of_configurations([4, 0])
+    assert part.labels == ("5", "1")
+    assert_array_equal(part.joints, data.joints[[4, 0]])
+    assert_array_equal(part.configuration, [1, 1, 0, 0])
+    assert_array_equal(part.position, data.position[[0, 1, 8, 9]])
+    assert part.references is not None
+    assert part.references.labels == part.labels
+
+
+def test_repeated_configurations_are_configurations_of_their_own() -> None:
+    data, chosen = sound(), [3, 1, 3, 3, 0]
+    part = data.of_configurations(chosen)
+    assert part.labels == ("4", "2", "4#2", "4#3", "1")
+    assert len(part.target) == 2 * len(chosen)
+    for field in ("joints", "approach", "number", "temperature", "wrench"):
+        assert_array_equal(getattr(part, field), getattr(data, field)[chosen])
+    for row, original in enumerate(chosen):
+        here, there = part.configuration == row, data.configuration == original
+        for field in ("target", "position", "quaternion", "height", "fixture", "sigma", "sigma_rot"):
+            assert_array_equal(getattr(part, field)[here], getattr(data, field)[there], err_msg=field)
+    assert part.references is not None
+    assert_array_equal(part.references.position, part.position + 1.0)
+
+
+def test_repeated_labels_stay_distinct() -> None:
+    data = Dataset.of(joints(3), positions(3), configurations=["7", "7#2", "8"])
+    assert data.of_configurations([0, 0, 1, 0]).labels == ("7", "7#3", "7#2", "7#4")
+    again = data.of_configurations([0, 0]).of_configurations([1, 1, 0])
+    assert again.labels == ("7#2", "7#2#2", "7")
+
+
+def test_a_bootstrap_is_the_fit_with_weights() -> None:
+    """Drawing a configuration twice is as good as declaring its readings better by the square root of two."""
+    rng, true = np.random.default_rng(4), off_nominal()
+    q = true.random_configurations(40, rng)
+    position = true.forward(q, frame="world", target="1")[0] + rng.normal(0.0, 1e-5, (40, 3))
+    drawn = np.array([*range(40), *range(0, 40, 2)])
+    times = np.bincount(drawn, minlength=40)
+    data = Dataset.of(q, position, sigma=1e-5)
+    options: Any = {"train": "all", "model": "geometric"}
+    twice, weighed, plain = (
+        calibrate("irb120", part, **options).robot.forward(q, frame="world", target="1")[0]
+        for part in (data.of_configurations(drawn), replace(data, sigma=1e-5 / np.sqrt(times)), data)
+    )
+    assert np.abs(twice - weighed).max() < 1e-11
+    assert np.abs(twice - plain).max() > 1e-6
+
+
+def test_readings_by_mask_by_index_and_twice() -> None:
+    data = sound()
+    mask = data.target == 1
+    same(data.of_readings(mask), data.of_readings(np.flatnonzero(mask)))
+    twice = data.of_readings([3, 3, 0])
+    assert twice.configurations == N
+    assert_array_equal(twice.position, data.position[[3, 3, 0]])
+    assert_array_equal(twice.configuration, [1, 1, 0])
+
+
+def test_nothing_chosen_is_nothing() -> None:
+    data = sound()
+    nothing: tuple[Any, ...] = ([], np.zeros(0, dtype=np.intp), np.zeros(N, dtype=bool), range(0))
+    for none in nothing:
+        assert data.of_configurations(none).configurations == 0
+        assert len(data.of_configurations(none).target) == 0
+
+
+@pytest.mark.parametrize(
+    "chosen",
+    [[N], [-1], [0.0, 1.0], [NAN], [True] * (N - 1), np.ones(2 * N + 1, dtype=bool), [[0, 1]], 3, "1", None, ["1"]],
+    ids=repr,
+)
+def test_what_chooses_nothing_that_is_there_is_refused(chosen: Any) -> None:
+    refused("chosen", sound().of_configurations, chosen)
+    refused("chosen", sound().of_readings, [2 * N] if isinstance(chosen, list) and chosen[0] is N else chosen)
+
+
+# -- what it shows of itself ------------------------------------------------------------------------------
+
+
+def test_a_dataset_is_short() -> None:
+    assert repr(sound()) == (
+        "arrays: 6 configurations of 6 joints\n"
+        "2 targets: ball, cup\n"
+        "readings: 12 positions, 12 orientations, 0 distances, 12 heights\n"
+        "with: order of measurement, standard deviations, temperature, external forces, reference points"
+    )
+    many = Dataset.of(joints(1), positions(1, 3000), targets=[f"<{i}>" for i in range(3000)])
+    assert len(repr(many)) < 300
+    assert repr(many).splitlines()[1] == "3000 targets: <0>, <1>, <2>, <3>, <4>, <5>, <6> and 2993 more"
+    assert repr(many).splitlines()[3] == "with: nothing else"
+    assert "&lt;0&gt;" in many._repr_html_()
+    assert repr(Dataset.of(joints(1), positions(1, 1))).startswith("arrays: 1 configuration of 6 joints\n1 target: 1")

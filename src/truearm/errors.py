@@ -15,7 +15,7 @@ class InputError(ValueError):
     """Input that truearm refuses, with everything a person needs to mend it.
 
     Texts name parameters of a job in backticks (```seed```, ```train=all```), so that every caller can show them in its
-    own words: Python as they are, the command as its options (:meth:`told`).
+    own words: Python as they are, the command as its options (:meth:`message`).
 
     Parameters
     ----------
@@ -45,9 +45,9 @@ class InputError(ValueError):
     ) -> None:
         self.what, self.parameter, self.where = what, parameter, where
         self.came, self.allowed, self.cure = came, allowed, cure
-        super().__init__(self.told(str))
+        super().__init__(self.message(str))
 
-    def told(self, spelled: Callable[[str], str]) -> str:
+    def message(self, spelled: Callable[[str], str]) -> str:
         """Return the message with parameters as `spelled` names them, backticks included for those in texts."""
         where = self.where
         if where is None and self.parameter is not None:

@@ -150,7 +150,7 @@ _FAULTS: Final[Mapping[str, tuple[str, str]]] = {
     "invalid_key": ("the name of an entry must be a text", "a name, in quotes if it looks like a number"),
 }
 #: Of so many names the right one is found without a hint.
-_FEW: Final = 6
+_FEW_NAMES: Final = 6
 #: Lists and tables of more characters are not shown in messages.
 _LONGEST_SHOWN: Final = 60
 
@@ -217,7 +217,7 @@ def _refusal(error: ValidationError, content: Any, schema: type[BaseModel], wher
     if kind == "literal_error":
         known = re.findall("'([^']*)'", details["expected"])
         details = {"expected": ", ".join(known)}
-        cure = did_you_mean(str(came), known) if len(known) > _FEW else None
+        cure = did_you_mean(str(came), known) if len(known) > _FEW_NAMES else None
     if kind in ("too_short", "too_long"):
         came = details["actual_length"]
     return refused(what, shown_entry(came), allowed.format(**details), cure)

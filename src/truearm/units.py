@@ -62,7 +62,7 @@ def from_si(value: float, unit: str) -> float:
 
 
 @cache
-def believable(unit: str, *, deviation: bool = False) -> tuple[float, float]:
+def accepted_range(unit: str, *, deviation: bool = False) -> tuple[float, float]:
     """Return the lowest and highest number in `unit` that can be meant, as a value or as a standard deviation."""
     low, high = (-_LARGEST, _LARGEST)
     if deviation:
@@ -90,7 +90,7 @@ def sized_si(
     deviation
         Whether it is a standard deviation, which can be too small as well.
     """
-    low, high = believable(unit, deviation=deviation)
+    low, high = accepted_range(unit, deviation=deviation)
     if low <= value <= high:
         return to_si(value, unit)
     raise InputError(

@@ -1,4 +1,4 @@
-"""Corrected joint readings on the twin, which follows a computation of its own."""
+"""Corrected joint positions on the twin, which follows a computation of its own."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ from truearm.measurement.readers.canonical import read_csv
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
-from truearm.units import believable, sized_si
+from truearm.units import accepted_range, sized_si
 
 if TYPE_CHECKING:
     from truearm.simulation.devices import Device
@@ -41,7 +41,7 @@ def refusals_of(parameter: str) -> Iterator[None]:
 def _name(error: InputError, parameter: str) -> None:
     """Let a refusal name a parameter."""
     error.parameter = parameter
-    error.args = (error.told(str),)
+    error.args = (error.message(str),)
 
 
 def robot_argument(robot: object, parameter: str = "robot") -> Robot:
@@ -181,7 +181,7 @@ def number_argument(value: object, parameter: str, lowest: float = -math.inf, al
 def length_argument(value: object, parameter: str, lowest: float = -math.inf) -> float:
     """Return a length that can be meant [m], `lowest` or more."""
     length = number_argument(value, parameter, allowed="a length")
-    least, most = believable("m")
+    least, most = accepted_range("m")
     if not max(least, lowest) <= length <= most:
         span = f"up to {most:g} m" if lowest == -math.inf else f"{lowest:g} m to {most:g} m"
         raise InputError("the length is out of range", parameter=parameter, came=f"{length:g} m", allowed=span)

@@ -122,7 +122,7 @@ def calibrate(
     choice_argument(redundancy, "redundancy", {name: name for name in get_args(Redundant)})
     seed = whole_argument(seed, "seed")
     payload, fall = payload_argument(payload), gravity_argument(gravity)
-    told = command or python_call(
+    call = command or python_call(
         "calibrate",
         robot,
         data,
@@ -208,7 +208,7 @@ def calibrate(
         data=readings,
         training=training,
         held_out=held_out,
-        command=told,
+        command=call,
         history=history,
         urdf=urdf,
         selection=selection,

@@ -32,7 +32,7 @@ from truearm.simulation.twin_joint import PERFECT
 #: The program that is corrected, and where its work object is in the controller's base: the numbers it has itself.
 _PLATE: Final = "plate.mod"
 _PLATE_FRAME: Final = Transform((0.31, -0.11, 0.06))
-#: Lowest and highest joint readings [deg] that the thesis measures at (section 2.5), within the robot's limits.
+#: Lowest and highest joint positions [deg] that the thesis measures at (section 2.5), within the robot's limits.
 _REGION: Final = ((-90, 0, -80, -150, -90, -180), (90, 110, 70, 150, 90, 180))
 
 

@@ -100,7 +100,7 @@ def plan(
     InputError
         For anything that cannot be used, with a message that says what to do.
     """
-    told = command or python_call(
+    call = command or python_call(
         "plan",
         robot,
         poses=poses,
@@ -160,7 +160,7 @@ def plan(
         seen_from_the_origin=own,
         readings=readings,
     )
-    planned = Plan(made, told)
+    planned = Plan(made, call)
     if table is not None:
         progress("writing the files")
         planned.save(table)

@@ -69,7 +69,7 @@ def checked_selection(chosen: object, count: int, parameter: str, things: str) -
     """Return the indices that a mask or a sequence of indices chooses."""
     span = f"indices from 0 to {count - 1}, or a mask of {count} {things}" if count else "none: there are none"
     if axes(chosen) != 1 or isinstance(chosen, str | bytes):
-        raise InputError("indices or a mask belong here", parameter=parameter, came=_told(chosen), allowed=span)
+        raise InputError("indices or a mask belong here", parameter=parameter, came=_shown(chosen), allowed=span)
     values = np.asarray(chosen)
     if values.dtype.kind == "b":
         if len(values) != count:
@@ -90,11 +90,11 @@ def checked_labels(names: Sequence[str | int] | None, parameter: str, count: int
         return tuple(str(number + 1) for number in range(count))
     if isinstance(names, str | bytes) or axes(names) != 1 or len(names) != count:
         raise InputError(
-            "the names do not fit the positions", parameter=parameter, came=_told(names), allowed=f"{count} names"
+            "the names do not fit the positions", parameter=parameter, came=_shown(names), allowed=f"{count} names"
         )
     for name in names:
         if isinstance(name, bool) or not isinstance(name, str | Integral):
-            raise InputError("a name is a text", parameter=parameter, came=_told(name), allowed="texts")
+            raise InputError("a name is a text", parameter=parameter, came=_shown(name), allowed="texts")
     made = tuple(str(name) for name in names)
     _distinct(made, parameter)
     return made
@@ -122,7 +122,7 @@ def checked_kinds(kinds: Sequence[str] | None, count: int) -> tuple[str, ...]:
         raise InputError(
             "a kind of each joint belongs here",
             parameter="joint_kinds",
-            came=_told(kinds),
+            came=_shown(kinds),
             allowed=f"{count} of {', '.join(_KINDS)}",
         )
     return tuple(kinds)
@@ -149,7 +149,7 @@ def checked_order(order: ArrayLike, count: int) -> IntArray:
 
 def _array(values: object, field: str, shape: tuple[int | str, ...], *, missing: bool = False) -> None:
     if not isinstance(values, np.ndarray):
-        raise InputError("an array belongs here", parameter=field, came=_told(values), allowed=shape_text(shape))
+        raise InputError("an array belongs here", parameter=field, came=_shown(values), allowed=shape_text(shape))
     number_array(values, field, shape, missing=missing)
 
 
@@ -174,7 +174,7 @@ def _refuse(wrong: NDArray[np.bool_], values: NDArray[np.generic], field: str, w
         raise InputError(what, parameter=field, came=f"{values[place]:g} at index {place}", allowed=allowed)
 
 
-def _told(given: object) -> str:
+def _shown(given: object) -> str:
     if isinstance(given, str | bytes | int | float | None):
         return repr(given)
     size = f" of {len(given)}" if isinstance(given, Sequence | np.ndarray) else ""

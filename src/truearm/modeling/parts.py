@@ -37,7 +37,7 @@ class Joint:
     row
         Nominal value of each column of the convention [m and rad].
     limits
-        Lowest and highest reading [rad or m], where known.
+        Lowest and highest joint position [rad or m], where known.
     transmission_periods
         How often the joint's gear errs in a turn of the joint, where known: for a strain wave gear twice the turns of
         its wave generator.

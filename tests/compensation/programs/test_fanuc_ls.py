@@ -24,7 +24,7 @@ from truearm.modeling.inverse.branches import BRANCHES, branch_rule
 
 SAMPLES = Path(__file__).parent / "samples" / "fanuc_ls"
 HALF = (-pi, pi)
-NUT = Configuration("front", "up", readings=((1, *HALF), (4, *HALF), (5, -pi, 0.0), (6, *HALF)), literal=True)
+NUT = Configuration("front", "up", ranges=((1, *HALF), (4, *HALF), (5, -pi, 0.0), (6, *HALF)), literal=True)
 
 
 def sample(name: str) -> Source:

@@ -146,7 +146,7 @@ def test_base_axes_carry_the_robot() -> None:
 
 def allows(configuration: Configuration, joint: int, degrees: float) -> bool:
     reading = math.radians(degrees)
-    inside = all(low <= reading < high for j, low, high in configuration.readings if j == joint)
+    inside = all(low <= reading < high for j, low, high in configuration.ranges if j == joint)
     return inside and not any(low <= reading < high for j, low, high in configuration.outside if j == joint)
 
 

@@ -200,7 +200,7 @@ def test_status_and_turn(status: str, turn: str, shoulder: str, elbow: str, wris
     assert (configuration.shoulder, configuration.elbow, configuration.wrist) == (shoulder, elbow, None)
     number = {"'H32'": 50}.get(turn) or int(turn)
     signs = [(i + 1, -inf, 0.0) if number >> i & 1 else (i + 1, 0.0, inf) for i in range(6)]
-    assert configuration.readings == (wrist, *signs)
+    assert configuration.ranges == (wrist, *signs)
 
 
 def test_status_and_turn_are_for_moves_by_axes() -> None:
@@ -209,7 +209,7 @@ def test_status_and_turn_are_for_moves_by_axes() -> None:
     frame, line, both, unused = program.targets
     assert frame.configuration == ANY_POSTURE
     assert line.configuration == ANY_POSTURE
-    assert len(both.configuration.readings) == 7
+    assert len(both.configuration.ranges) == 7
     assert unused.configuration == both.configuration
     first = read(f"LIN {taught}").targets[0].configuration
     assert (first.shoulder, first.elbow, first.readings) == ("front", "up", ((5, 0.0, pi),))

@@ -124,17 +124,17 @@ def test_every_target_of_a_program_is_found(polish: Program) -> None:
 def test_the_configuration_data_say_which_postures_are_meant(polish: Program) -> None:
     (source,) = polish.sources
     looked_at = RAPID.read([Source(source.path, source.text.replace("ConfL \\Off", "ConfL \\On "))])
-    assert looked_at.targets[1].configuration.readings == quadrants(0, -1, -2)
+    assert looked_at.targets[1].configuration.ranges == quadrants(0, -1, -2)
     assert looked_at.targets[1].configuration.elbow == "up"
-    assert looked_at.targets[2].configuration.readings == quadrants(-1, 0, 1)
+    assert looked_at.targets[2].configuration.ranges == quadrants(-1, 0, 1)
     assert looked_at.targets[2].configuration.elbow == "down"
-    assert looked_at.targets[0].configuration.readings == ()
+    assert looked_at.targets[0].configuration.ranges == ()
     assert {t.configuration.wrist or t.configuration.shoulder for t in looked_at.targets} == {None}
 
 
 def test_the_configuration_data_are_free_where_the_controller_does_not_look_at_them(polish: Program) -> None:
     """ConfL Off frees what lines alone go to; p10 is also the target of a MoveJ."""
-    assert polish.targets[1].configuration.readings == quadrants(0, -1, -2)
+    assert polish.targets[1].configuration.ranges == quadrants(0, -1, -2)
     assert polish.targets[2].configuration == ANY_POSTURE
     target = "[[3,0,4],[0,0,1,0],[0,-1,1,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
     lines = [

@@ -23,7 +23,7 @@ _FORMATS: Final = ("PNG", "JPEG", "TIFF")
 #: Dots per inch that scanners have. Programs write 72 or 96 where they do not know.
 _RESOLUTIONS: Final = (100.0, 4800.0)
 #: Shortest edge of a page [m].
-_SMALLEST: Final = 0.02
+_SHORTEST_EDGE: Final = 0.02
 _TURNED: Final = (5, 6, 7, 8)  # EXIF orientations in which rows and columns are exchanged
 
 
@@ -85,12 +85,12 @@ def read_page(path: Path, dpi: float | tuple[float, float] | None = None) -> Pag
         )
     inch = to_si(1.0, "in")
     page = Page(source=str(path), brightness=_brightness(image, path), pitch=(inch / given[0], inch / given[1]))
-    if min(page.size) < _SMALLEST:
+    if min(page.size) < _SHORTEST_EDGE:
         raise InputError(
             "the page is too small",
             where=str(path),
             came=" x ".join(f"{1e3 * edge:.1f} mm" for edge in page.size),
-            allowed=f"{1e3 * _SMALLEST:g} mm or more",
+            allowed=f"{1e3 * _SHORTEST_EDGE:g} mm or more",
             cure="Check the resolution, or scan the whole page.",
         )
     return page

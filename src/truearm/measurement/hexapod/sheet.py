@@ -48,7 +48,7 @@ class Sheet:
     source
         The file, for messages.
     configurations
-        Labels and joint readings, one row each; None if the sheet has no joints.
+        Labels and joint positions, one row each; None if the sheet has no joints.
     labels
         One for each row.
     designs, solutions
@@ -94,7 +94,7 @@ class Sheet:
         """
         if self.configurations is None:
             raise InputError(
-                "the sheet has no joint readings", where=self.source, allowed="joint_1 [deg] ..", cure="Add them."
+                "the sheet has no joint positions", where=self.source, allowed="joint_1 [deg] ..", cure="Add them."
             )
         rows = self.measured
         if not len(rows):
@@ -249,7 +249,7 @@ class PlannedRow:
     design, solution
         Which legs, and how they are assembled.
     joints
-        Readings [rad or m], ``(joints,)``.
+        Joint positions [rad or m], ``(joints,)``.
     """
 
     configuration: str
@@ -279,8 +279,8 @@ def sheet_csv(rows: Sequence[PlannedRow], joints: Sequence[Joint], lengths: Sequ
     writer.writerow([*_PLAIN, *angles, *(f"{name} [mm]" for name in (*_FIXTURES, *_LEGS))])
     for number, row in enumerate(rows):
         known = lengths[number] if lengths else {}
-        readings = (repr(written(v, unit)) for v, unit in zip(row.joints.tolist(), units, strict=True))
+        joints = (repr(written(v, unit)) for v, unit in zip(row.joints.tolist(), units, strict=True))
         cells = (repr(written(known[name], "mm")) if name in known else "" for name in (*_FIXTURES, *_LEGS))
         plain = (row.configuration, row.pose, row.branch, row.design.name, row.solution)
-        writer.writerow([*plain, *readings, *cells])
+        writer.writerow([*plain, *joints, *cells])
     return stream.getvalue()

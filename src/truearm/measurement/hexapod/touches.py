@@ -1,4 +1,4 @@
-"""Joint readings at the three base cups: a CSV with ``cup`` (B1, B2, B3) and ``joint_1 [deg]`` .., one row a cup."""
+"""Joint positions at the three base cups: a CSV with ``cup`` (B1, B2, B3) and ``joint_1 [deg]`` .., one row a cup."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _CUPS: Final = ("B1", "B2", "B3")
 
 
 def read_touches(path: Path, robot: Robot) -> Array:
-    """Return the joint readings at B1, B2 and B3 [rad or m], ``(3, joints)``.
+    """Return the joint positions at B1, B2 and B3 [rad or m], ``(3, joints)``.
 
     Raises
     ------

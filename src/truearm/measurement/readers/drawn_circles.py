@@ -23,7 +23,7 @@ from truearm.units import ANGLE_UNITS, LENGTH_UNITS, checked_unit
 _HEADING: Final = re.compile(r"(configuration|joint_[1-9][0-9]*|angle|height)\s*(?:\[([^\]]*)\])?")
 _ALLOWED: Final = "configuration, joint_1 [deg] .., angle [deg], height [mm]"
 #: How well the middle of a circle lies in its paper [m].
-_FLAT: Final = 1e-5
+_PAPER_DEVIATION: Final = 1e-5
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ def read_drawn_circles(
         height=np.zeros(len(pages)),
         fixtures=data.fixtures,
         fixture=len(pages) + np.arange(len(pages)),
-        sigma=np.full(len(pages), _FLAT),
+        sigma=np.full(len(pages), _PAPER_DEVIATION),
     )
     return in_order(replace(data, setup=known))
 

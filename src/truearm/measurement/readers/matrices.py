@@ -33,7 +33,7 @@ def read_matrices(
     Parameters
     ----------
     joints
-        Joint readings, one column a joint; all joints are revolute.
+        Joint positions, one column a joint; all joints are revolute.
     targets, references
         Name and file of each point on the tool and of each fixed point beside the robot; columns x, y, z.
     angle_unit, length_unit

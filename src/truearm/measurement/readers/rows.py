@@ -30,7 +30,7 @@ class Configurations:
     labels
         Their names.
     joints
-        Joint readings [rad; m for prismatic joints], ``(configurations, joints)``.
+        Joint positions [rad; m for prismatic joints], ``(configurations, joints)``.
     kinds
         ``revolute`` or ``prismatic`` for each joint.
     of_row

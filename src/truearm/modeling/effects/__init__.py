@@ -1,4 +1,4 @@
-"""Joint effects: what moves a joint by something else than its reading.
+"""Joint effects: what moves a joint by something else than its commanded position.
 
 One effect a file, which knows all about itself: its parameters, what it needs to know, and where it may be used. A new
 one is a file here and a line in `EFFECTS`; the order there is that of parameters and of trials.

@@ -30,7 +30,7 @@ def _countable(pulses: float) -> float:
         raise InputError(
             "so many pulses cannot be",
             came=pulses,
-            allowed="0.000001 to 1e12, negative where the motor counts against the reading",
+            allowed="0.000001 to 1e12, negative where the motor counts against the joint",
         )
     return pulses
 
@@ -126,7 +126,7 @@ class ControllerEntry(BaseModel):
         )
         if np.linalg.cond(made.coupling(len(joints))) > _CONDITION:
             raise InputError(
-                "the couplings cannot be undone: other joints give the same readings",
+                "the couplings cannot be undone: other joints give the same counts",
                 where=f"{where}.joints",
                 came="; ".join(f"{e.joint} counts {', '.join(e.coupling)}" for e in self.joints if e.coupling),
             )

@@ -1,4 +1,4 @@
-"""What inverse kinematics answers: joint readings for poses, and how far each answer can be trusted."""
+"""What inverse kinematics answers: joint positions for poses, and how far each answer can be trusted."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class JointSolutions:
     orientation_error
         Angle from it [rad], ``(rows,)``; between the z axes where only those count, NaN where no orientation does.
     beyond
-        Which readings are beyond their limits, ``(rows, joints)``.
+        Which joint positions are beyond their limits, ``(rows, joints)``.
     singular_value
         How little the pose moves with a joint motion of norm 1, positions in reach lengths, ``(rows,)``. It is 0 in a
         singular posture.

@@ -85,7 +85,7 @@ class Constraints(BaseModel):
     Attributes
     ----------
     limits
-        Lowest and highest reading by joint number, within the robot's own limits.
+        Lowest and highest joint position by joint number, within the robot's own limits.
     moments
         Sign of the moment of the load about a joint's axis, by joint number.
     box

@@ -1,9 +1,9 @@
 """From the motion of the tip to the motion of the joints.
 
-The readings follow the path sample by sample with Newton's steps, on the branch on which they begin. Where the arm has
-more joints than the task has rows, they stay as near to the starting posture as the path lets them
-(:mod:`truearm.modeling.inverse.redundancy_resolution`), so that a closed path ends with the readings it began with.
-Velocities and accelerations are exact derivatives of the readings, not differences of samples.
+The joint positions follow the path sample by sample with Newton's steps, on the branch on which they begin. Where the
+arm has more joints than the task has rows, they stay as near to the starting posture as the path lets them
+(:mod:`truearm.modeling.inverse.redundancy_resolution`), so that a closed path ends with the joint positions it began
+with. Velocities and accelerations are exact derivatives of the joint positions, not differences of samples.
 
 The robot's geometry counts, its joint effects do not: the motion is what is commanded, and what effects make of it is
 for :mod:`truearm.compensation.trajectories` to correct.
@@ -42,7 +42,7 @@ _JUMP: Final = 0.3
 
 @dataclass(frozen=True, eq=False)
 class JointMotion:
-    """Joint readings over time.
+    """Joint positions over time.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class JointMotion:
     joint_names: tuple[str, ...]
 
     def postures(self, joints: Array | None = None) -> Postures:
-        """Return what a robot is asked with: this motion, or other readings ``(n, joints)`` with the same rates."""
+        """Return the postures of this motion, or of other joint positions ``(n, joints)`` with the same rates."""
         approach = approach_of(self.joints, np.arange(len(self.time)))
         return Postures(self.joints if joints is None else joints, self.velocity, self.acceleration, approach)
 
@@ -95,7 +95,7 @@ def joint_motion(
     rotation
         The orientation to keep, in the base frame, ``(3, 3)``; not needed where it is free.
     seed
-        Joint readings ``(joints,)`` [rad or m] near which the motion shall begin; zero if None.
+        Joint positions ``(joints,)`` [rad or m] near which the motion shall begin; zero if None.
 
     Raises
     ------
@@ -148,7 +148,7 @@ class _Follower:
         )
 
     def _start(self, seed: ArrayLike | None) -> Array:
-        """Return readings for the first sample."""
+        """Return joint positions for the first sample."""
         found = inverse(
             self._robot,
             self._path.position[:1],
@@ -167,7 +167,7 @@ class _Follower:
         return np.asarray(found.joints[0])
 
     def _followed(self, start: Array) -> Array:
-        """Return readings for every sample, or refuse the first one that has none."""
+        """Return joint positions for every sample, or refuse the first one that has none."""
         scaled = np.empty((len(self._path.time), len(start)))
         scaled[0] = start / self._scale
         side = 0.0
@@ -199,7 +199,7 @@ class _Follower:
         return np.asarray(scaled * self._scale)
 
     def _solved(self, k: int, guess: Array, posture: Array) -> tuple[Array, Array] | None:
-        """Return scaled readings for a sample, and the rows of its Jacobian; None if the steps do not end."""
+        """Return scaled joint positions for a sample, and the rows of its Jacobian; None if the steps do not end."""
         q = guess.copy()
         for _ in range(_MOST_STEPS):
             state = self._tip.at((q * self._scale)[None])

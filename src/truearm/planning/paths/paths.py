@@ -17,7 +17,7 @@ from truearm.modeling.chain import Array
 from truearm.planning.paths.trajectory import Trajectory, sample_times
 
 #: Points nearer than this are one point [m].
-_SAME: Final = 1e-9
+_SAME_POINT: Final = 1e-9
 #: A path whose speed over its parameter falls below this share of its mean has a cusp.
 _CUSP: Final = 1e-4
 #: A section is integrated over so many pieces, each with Gauss' points.
@@ -54,7 +54,7 @@ class Line:
     def __init__(self, start: ArrayLike, end: ArrayLike) -> None:
         self.start, self.end = point("start of the line", start), point("end of the line", end)
         self.length = float(np.linalg.norm(self.end - self.start))
-        if self.length < _SAME:
+        if self.length < _SAME_POINT:
             raise InputError("the line has no length", where="line", came=_shown(self.start), cure="Move one end.")
 
     def at(self, distance: Array) -> tuple[Array, Array, Array]:
@@ -81,7 +81,7 @@ class Circle:
         axis = point("normal of the circle", normal)
         self._x, size = first - self.centre, float(np.linalg.norm(axis))
         self.radius = float(np.linalg.norm(self._x))
-        if self.radius < _SAME or size < _SAME:
+        if self.radius < _SAME_POINT or size < _SAME_POINT:
             raise InputError("radius and normal of a circle are not zero", where="circle", came=_shown(first))
         self.normal = axis / size
         if abs(self._x @ self.normal) > 1e-6 * self.radius:

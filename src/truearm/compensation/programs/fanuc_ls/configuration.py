@@ -51,4 +51,4 @@ def configuration(text: str) -> Configuration | None:
         if len(turns) == 3:
             for joint, turn in zip((1, 4, 6), map(int, turns), strict=True):
                 readings.append((joint, (2 * turn - 1) * math.pi, (2 * turn + 1) * math.pi))
-    return Configuration(shoulder, elbow, readings=tuple(sorted(readings)), literal=bool(readings))
+    return Configuration(shoulder, elbow, ranges=tuple(sorted(readings)), literal=bool(readings))

@@ -162,11 +162,11 @@ def _whole(items: dict[str, Item], name: str) -> int | None:
 def _posture(status: int | None, turn: int | None) -> Configuration:
     signs = () if turn is None else tuple((i + 1, -inf, 0.0) if turn >> i & 1 else (i + 1, 0.0, inf) for i in range(6))
     if status is None:
-        return Configuration(readings=signs)
+        return Configuration(ranges=signs)
     back, bent = bool(status & 1), bool(status & 2)
     wrist = (5, -pi, 0.0) if status & 4 else (5, 0.0, pi)
     return Configuration(
-        shoulder="back" if back else "front", elbow="up" if bent != back else "down", readings=(wrist, *signs)
+        shoulder="back" if back else "front", elbow="up" if bent != back else "down", ranges=(wrist, *signs)
     )
 
 

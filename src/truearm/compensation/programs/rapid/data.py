@@ -91,7 +91,7 @@ def configuration(cf1: str, cf4: str, cf6: str, cfx: str) -> Configuration:
     elbow: Literal["up", "down"] | None = None
     if float(cfx) in range(8):
         elbow = "up" if int(float(cfx)) in (0, 1, 6, 7) else "down"
-    return Configuration(elbow=elbow, readings=tuple(readings))
+    return Configuration(elbow=elbow, ranges=tuple(readings))
 
 
 def why_no_target(text: str) -> str:

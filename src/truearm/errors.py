@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sized
 from typing import Final
 
 #: A parameter that a text names, with a value or without: `seed`, `train=all`.
@@ -59,6 +59,21 @@ class InputError(ValueError):
             parts.append(f"allowed: {self.allowed}")
         message = "; ".join(parts).rstrip(".") + "."
         return f"{message} {self.cure}" if self.cure else message
+
+
+def wrong_kind(what: str, came: object, parameter: str, allowed: str, *, where: str | None = None) -> InputError:
+    """Return the refusal of a value of another kind than belongs here."""
+    if isinstance(came, bytes | int | float | None):
+        came = repr(came)
+    elif not isinstance(came, str):
+        size = f" of {len(came)}" if isinstance(came, Sized) and getattr(came, "ndim", 1) else ""
+        came = f"an object of type {kind_of(came)}{size}"
+    return InputError(what, parameter=parameter, where=where, came=came, allowed=allowed)
+
+
+def kind_of(came: object) -> str:
+    """Return the name of an object's type, for messages."""
+    return type(came).__name__
 
 
 def with_parameters(text: str, spelled: Callable[[str, str | None], str]) -> str:

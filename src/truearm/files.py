@@ -48,7 +48,7 @@ def _broken_link(path: Path) -> InputError:
         "this is a link, and there is nothing where it points to",
         where=str(path),
         came=str(path.readlink()),
-        cure="Remove the link, or mend it.",
+        cure="Remove or repair the link.",
     )
 
 
@@ -140,7 +140,7 @@ _FAULTS: Final[Mapping[str, tuple[str, str]]] = {
     "string_type": ("a text belongs here", "a text, in quotes if it looks like a number, a date, yes or no"),
     "string_too_short": ("the text is empty", "at least one character"),
     "string_pattern_mismatch": ("the text does not have the form that belongs here", "{pattern}"),
-    "literal_error": ("this is not known here", "{expected}"),
+    "literal_error": ("this value is not known", "{expected}"),
     "dict_type": _TABLE,
     "model_type": _TABLE,
     "list_type": _LIST,
@@ -281,9 +281,9 @@ def writable_file(path: Path) -> Path:
         if path.is_symlink() and not path.exists():
             raise _broken_link(path)
         if path.is_dir():
-            raise InputError("this is a folder, a file is to be written here", where=str(path))
+            raise InputError("this is a folder, and a file must be written here", where=str(path))
         if path.exists() and not path.is_file():
-            raise InputError("this is a device or a pipe, a file is to be written here", where=str(path))
+            raise InputError("this is a device or a pipe, and a file must be written here", where=str(path))
     except OSError as error:
         raise InputError(f"the file cannot be written ({_reason(error)})", where=str(path)) from error
     return path

@@ -28,7 +28,7 @@ def quadrants(robot: Robot, joints: np.ndarray) -> Configuration:
         (axis, math.pi / 2 * q, math.pi / 2 * (q + 1))
         for axis, q in ((axis, math.floor(joints[axis - 1] / (math.pi / 2))) for axis in (1, 4, 6))
     )
-    return Configuration(elbow=elbow, readings=bounds)  # type: ignore[arg-type]
+    return Configuration(elbow=elbow, ranges=bounds)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("name", ["irb120", "irb1600", "kr5", "lrmate200ic"])
@@ -51,7 +51,7 @@ def test_a_configuration_tells_the_posture_and_the_turn(name: str) -> None:
     assert meant.guessed is None
 
 
-def test_readings_are_those_that_the_controller_shows() -> None:
+def test_joints_are_those_that_the_controller_shows() -> None:
     """A FANUC counts its third axis with the second, and its wrist the other way."""
     robot = load_robot("lrmate200ic")
     joints = np.radians([[20.0, 30, -10, 40, -50, 60]])

@@ -113,8 +113,8 @@ def test_pulses_are_of_readings(tmp_path: Path) -> None:
 )
 def test_unknown_pulses_are_refused(pulses: tuple[float | None, ...], missing: str) -> None:
     controller = Controller(pulses=pulses)
-    for convert in (controller.pulses_of, controller.readings_of):
-        with pytest.raises(InputError, match=f"^{missing}: nobody knows.*Give pulses_per_degree"):
+    for convert in (controller.to_pulses, controller.from_pulses):
+        with pytest.raises(InputError, match=f"^{missing}: the number of motor pulses.*Give pulses_per_degree"):
             convert(np.zeros((2, 3)))
 
 
@@ -131,12 +131,12 @@ def test_unknown_pulses_are_refused(pulses: tuple[float | None, ...], missing: s
         ("{joint: first, sign: true}", ["joints[1].sign", "a whole number belongs here"]),
         ("{joint: first, sign: -1.0}", ["joints[1].sign", "a whole number belongs here"]),
         ("{joint: first, zero: .nan}", ["joints[1].zero", "finite"]),
-        ("{joint: first, zero: 1e9}", ["zero of first", "too large to be meant"]),
+        ("{joint: first, zero: 1e9}", ["zero of first", "too large to be plausible"]),
         ("{joint: first, coupling: {first: 1}}", ["cannot be coupled with itself", "got 'first'"]),
         ("{joint: first, coupling: {slide: 1}}", ["both turn, or both slide", "revolute first, prismatic slide"]),
         (
             "{joint: first, pulses_per_degree: 0}",
-            ["joints[1].pulses_per_degree", "so many pulses cannot be", "got 0", "allowed: 0.000001"],
+            ["joints[1].pulses_per_degree", "the number of pulses is out of range", "got 0", "allowed: 0.000001"],
         ),
         ("{joint: first, pulses_per_degree: .inf}", ["joints[1].pulses_per_degree", "finite"]),
         ("{joint: first, pulses_per_mm: 5}", ["is revolute", "got 'pulses_per_mm'", "allowed: pulses_per_degree"]),
@@ -161,7 +161,7 @@ def test_refused(entry: str, parts: list[str], tmp_path: Path) -> None:
     ("entry", "parts"),
     [
         ("base: {quaternion: [1, 0, 0, 0.1]}", ["controller.base.quaternion", "must have length 1"]),
-        ("flange: {translation: [0, 0, 1e9]}", ["controller.flange.translation", "too large to be meant"]),
+        ("flange: {translation: [0, 0, 1e9]}", ["controller.flange.translation", "too large to be plausible"]),
         ("flange: {rotation: [0, 0, 0]}", ["controller.flange.rotation", "not known here"]),
         ("tool: {translation: [0, 0, 0]}", ["controller.tool", "not known here"]),
     ],

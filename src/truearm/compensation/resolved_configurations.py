@@ -250,7 +250,7 @@ class _Candidates:
         self._any: NDArray[np.bool_] = np.asarray(self._possible.any(axis=1))
 
     def chosen(self, row: int, reference: Array | None, branch: int | None) -> tuple[Array, int] | None:
-        """Return the joint positions of a pose nearest to a reference, on its branch if there is one, and which they are.
+        """Return the joints of a pose nearest to a reference, on its branch if there is one, and which they are.
 
         None if there are none.
         """

@@ -96,7 +96,7 @@ def _corrected_plate(
     cell = folder / "cell.yaml"
     write_files(folder, {cell.name: _CELL.format(place=f"{x}, {y}, {z}", quaternion=quaternion)})
     correction = compensate(folder / "calibrated.yaml", [folder / _PLATE], tools=cell, frames=cell, progress=progress)
-    progress("sending the twin there")
+    progress("running the program on the twin")
     before, after = correction.result.corrections[0].program, correction.as_written()[0]
     poses = [row for row, target in enumerate(before.targets) if target.form.kind == "pose"]
     wanted = (place @ correction.result.corrections[0].before)[poses, :3, 3]
@@ -104,7 +104,7 @@ def _corrected_plate(
     for program in (before, after):
         joints = commanded(calibration.robot, program)[poses]
         missed.append(np.linalg.norm(twin.frames(joints)["1"][:, :3, 3] - wanted, axis=1))
-    simulated = SimulatedRun(missed[0], missed[1], "the digital twin that plays the real robot")
+    simulated = SimulatedRun(missed[0], missed[1], "the digital twin in place of the real robot")
     return replace(correction, simulated=simulated)
 
 

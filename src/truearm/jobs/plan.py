@@ -8,7 +8,7 @@ from typing import Final, Literal
 
 import numpy as np
 
-from truearm.errors import InputError
+from truearm.errors import InputError, kind_of
 from truearm.identification.solving.models import MODELS
 from truearm.jobs.arguments import (
     choice_argument,
@@ -17,7 +17,6 @@ from truearm.jobs.arguments import (
     device_argument,
     file_for,
     gravity_argument,
-    kind_of,
     path_argument,
     payload_argument,
     python_call,

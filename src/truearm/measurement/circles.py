@@ -141,7 +141,7 @@ def fit_circle(points: Array, sigma: float | None = None, where: str = "circle")
     _, widths, (across, along, _) = np.linalg.svd(centred, full_matrices=False)
     if widths[1] <= max(_STRAIGHT_LINE * widths[0], _SAME_POINT):
         raise InputError(
-            "the points lie on a straight line or in one place, and make no circle",
+            "the points lie on a straight line or in one place, so no circle fits them",
             where=where,
             cure="Turn the joint further, or put the reflector further from its axis.",
         )

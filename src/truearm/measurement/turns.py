@@ -99,7 +99,7 @@ class Turn:
 
     @property
     def backlash(self) -> float | None:
-        """How far the joint lags behind, backward minus forward at the same joint position [rad]; None if nowhere known."""
+        """How far the joint lags, backward minus forward at the same joint position [rad]; None if nowhere known."""
         places = np.round(self.joint_position / SAME_POSITION).astype(int)
         lags = []
         for place in np.unique(places):

@@ -75,7 +75,7 @@ class Controller:
         return np.asarray(np.linalg.solve(self.coupling(counted.shape[1]), coupled.T).T, float)
 
     def to_pulses(self, counted: Array) -> Array:
-        """Return the pulses ``(n, joints)`` of the motors at joints ``(n, joints)`` as the controller counts them [rad or m].
+        """Return the pulses ``(n, joints)`` of the motors at joints ``(n, joints)`` [rad or m] of the controller.
 
         Raises
         ------
@@ -85,7 +85,7 @@ class Controller:
         return counted * self._known_pulses(counted.shape[1])
 
     def from_pulses(self, pulses: Array) -> Array:
-        """Return joints ``(n, joints)`` [rad or m] as the controller counts them, at pulses ``(n, joints)`` of the motors.
+        """Return joints ``(n, joints)`` [rad or m] as the controller counts them, at pulses of the motors.
 
         Raises
         ------
@@ -99,7 +99,7 @@ class Controller:
         missing = [number for number, per_unit in enumerate(pulses, 1) if per_unit is None]
         if missing:
             raise InputError(
-                "nobody knows how many motor pulses make a degree or a mm",
+                "the number of motor pulses per degree or per mm is not known",
                 where=f"joint {', '.join(map(str, missing))}",
                 cure="Give pulses_per_degree or pulses_per_mm in the robot file, under controller, joints.",
             )

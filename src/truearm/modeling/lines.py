@@ -84,7 +84,7 @@ def frame_between(axis: JointAxis, other: JointAxis) -> Array:
     sine = float(np.linalg.norm(normal))
     if sine < _LEAST_ANGLE:
         raise InputError(
-            "two axes that are parallel fix no frame",
+            "two parallel axes do not define a frame",
             where=f"{axis.joint.name} and {other.joint.name}",
             came=f"{math.degrees(axis.angle(other)):.3g} deg apart",
             allowed=f"{math.degrees(_LEAST_ANGLE):.3g} deg or more",

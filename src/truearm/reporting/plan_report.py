@@ -50,7 +50,7 @@ def number_figure(prediction: Prediction, planned: int) -> Figure:
             "line": {"color": colour, "width": 2},
         }
         for name, errors, colour in (
-            ("drawn by chance", prediction.random, BEFORE),
+            ("drawn at random", prediction.random, BEFORE),
             ("chosen", prediction.chosen, AFTER),
         )
     ]
@@ -71,7 +71,7 @@ def number_figure(prediction: Prediction, planned: int) -> Figure:
         traces,
         420,
         xaxis=axis("poses") | {"rangemode": "tozero"},
-        yaxis=axis("mean error of unseen readings [mm]") | {"range": [0.9e3 * prediction.floor, highest]},
+        yaxis=axis("mean error of other readings [mm]") | {"range": [0.9e3 * prediction.floor, highest]},
         shapes=shapes,
     )
 

@@ -94,11 +94,6 @@ class ParameterRow:
         return {"dropped": "held: redundant"}.get(self.fit_status, self.fit_status.replace("-", " "))
 
     @property
-    def uninformed(self) -> bool:
-        """Whether the readings say next to nothing of it: the estimate is its prior."""
-        return self.fit_status == "uninformed"
-
-    @property
     def change(self) -> float:
         """Estimate minus start."""
         return self.estimate - self.start

@@ -177,7 +177,7 @@ def test_posture_of_rconf() -> None:
     assert (rear.shoulder, rear.elbow) == ("back", None)
     assert not allows(rear, 6, 0.0)
     assert configuration("1,0") == configuration("1,0,7") == Configuration()
-    assert configuration("1,0,0").readings == ()
+    assert configuration("1,0,0").ranges == ()
 
 
 def test_pulses_have_no_posture() -> None:

@@ -530,7 +530,7 @@ def test_other_languages_are_not_taken_for_it() -> None:
 
 
 def test_elbow_words_agree_with_the_arm() -> None:
-    """The manual's table, worked out with the drawing of the IRB 120 for random readings."""
+    """The manual's table, worked out with the drawing of the IRB 120 for random joint positions."""
     robot = load_robot("irb120").rigid
     rule = branch_rule(robot)
     assert rule is not None
@@ -549,11 +549,11 @@ def test_elbow_words_agree_with_the_arm() -> None:
 @pytest.mark.parametrize("cfx", ["8", "-1", "1000", "0.5", "9E9"])
 def test_an_unknown_cfx_leaves_the_elbow_open(cfx: str) -> None:
     assert configuration("0", "-4", "3", cfx).elbow is None
-    assert configuration("0", "-4", "3", cfx).readings == quadrants(0, -4, 3)
+    assert configuration("0", "-4", "3", cfx).ranges == quadrants(0, -4, 3)
 
 
 def test_quadrants_that_are_none_are_left_open() -> None:
-    assert configuration("9E9", "0.5", "-1", "0").readings == ((6, -pi / 2, 0.0),)
+    assert configuration("9E9", "0.5", "-1", "0").ranges == ((6, -pi / 2, 0.0),)
 
 
 def split(program: Program, move: int, *points: tuple[float, ...]) -> list[Edit]:

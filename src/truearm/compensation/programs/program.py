@@ -101,7 +101,7 @@ class Configuration:
     shoulder: Literal["front", "back"] | None = None
     elbow: Literal["up", "down"] | None = None
     wrist: Literal["noflip", "flip"] | None = None
-    readings: tuple[tuple[int, float, float], ...] = ()
+    ranges: tuple[tuple[int, float, float], ...] = ()
     outside: tuple[tuple[int, float, float], ...] = ()
     literal: bool = False
     near: tuple[float, ...] | None = None

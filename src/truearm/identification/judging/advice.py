@@ -95,8 +95,8 @@ def check_fit(fit: Fit) -> list[Notice]:
             Notice(
                 "far-from-nominal",
                 f"{', '.join(far[:8])}{' and others' if len(far) > 8 else ''} moved by more than {_LARGEST_MOVE:g} "
-                "standard deviations of their priors. Check that it is this robot, in these units, with its joints in this "
-                "order. If it is, enter wider priors in the robot file.",
+                "standard deviations of their priors. Check that it is this robot, in these units, with its joints in "
+                "this order. If it is, enter wider priors in the robot file.",
             )
         )
     if fit.excess > 1.0:

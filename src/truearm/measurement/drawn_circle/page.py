@@ -115,7 +115,7 @@ def _opened(path: Path) -> tuple[Image, tuple[float, float] | None]:
         raise InputError(
             f"the image has more than {(Image.MAX_IMAGE_PIXELS or 0) / 1e6:.0f} million dots",
             where=str(path),
-            cure="Scan at 300 to 600 dpi; more tells nothing about a pencil's line.",
+            cure="Scan at 300 to 600 dpi; more does not show a pencil line better.",
         ) from error
     except Exception as error:  # Pillow's decoders fail in many ways on damaged files
         raise InputError(
@@ -139,7 +139,7 @@ def _brightness(image: Image, path: Path) -> NDArray[np.uint8]:
         return np.asarray(np.asarray(image) // 257, dtype=np.uint8)
     if image.mode in ("I", "F", "LAB"):
         raise InputError(
-            "this kind of image has no plain brightness",
+            "this kind of image holds no brightness that can be read",
             where=str(path),
             came=f"mode {image.mode}",
             cure="Scan in grey or colour, 8 bits.",

@@ -40,7 +40,7 @@ def read_touches(path: Path, robot: Robot) -> Array:
         match = _HEADING.fullmatch(heading)
         if match is None or match["name"] not in wanted or match["name"] in columns:
             raise InputError(
-                "the column is not known, or there twice", where=where, came=heading, allowed=", ".join(wanted)
+                "the column is not known, or appears twice", where=where, came=heading, allowed=", ".join(wanted)
             )
         if match["name"] == "cup":
             columns["cup"] = (place, "1")

@@ -73,7 +73,7 @@ def read_matrices(
         positions[name] = _matrix(path, 3, length_unit, missing=True)
         if len(positions[name]) != len(values):
             raise InputError(
-                f"the file has not as many rows as {joints}",
+                f"the file does not have as many rows as {joints}",
                 where=str(path),
                 came=counted(len(positions[name]), "row"),
                 allowed=counted(len(values), "row"),

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from truearm.errors import InputError, did_you_mean
+from truearm.errors import InputError, did_you_mean, wrong_kind
 from truearm.modeling.effects.approach import Approach
 from truearm.modeling.effects.backlash import Backlash
 from truearm.modeling.effects.bearing import BearingCompliance
@@ -49,12 +49,7 @@ def checked_effects(names: Sequence[str], parameter: str = "effects") -> tuple[s
     """Return names of joint effects, refusing those that there are not."""
     known = [effect.name for effect in EFFECTS]
     if isinstance(names, str | bytes) or not isinstance(names, Sequence):
-        raise InputError(
-            "a sequence of names belongs here",
-            parameter=parameter,
-            came=repr(names) if isinstance(names, str | bytes) else f"an object of type {type(names).__name__}",
-            allowed=", ".join(known),
-        )
+        raise wrong_kind("a sequence of names belongs here", names, parameter, ", ".join(known))
     for name in names:
         if name not in known:
             raise InputError(

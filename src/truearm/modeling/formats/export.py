@@ -95,7 +95,7 @@ def _urdf(robot: Robot) -> Export:
 
 def _json(robot: Robot) -> Export:
     names = [name for name, entries in (("tools", robot.tools), ("truths", robot.truths)) if entries]
-    left = (f"What is for simulation alone is left out: {' and '.join(names)}.",) if names else ()
+    left = (f"Left out, because it is for simulation alone: {' and '.join(names)}.",) if names else ()
     return Export(model_json(robot, frames(robot), left), frames(robot), left)
 
 

@@ -70,7 +70,7 @@ def read_urdf(path: Path, tip: str | None = None) -> Robot:
         raise InputError(
             f"no joint moves between the root {tree.root} and the link {tip}",
             where=tree.where,
-            cure="Name a link further out.",
+            cure="Name a link nearer to the end of the robot.",
         )
     masses = (_mass(tree, number, link.joint.child) for number, link in enumerate(links, 1))
     return Robot(

@@ -99,7 +99,7 @@ def inverse(
         return _answer(task, pool, pool.every_branch() if branch == "all" else pool.best(number), number)
     if branch is not None:
         raise InputError(
-            "the branches have no names here",
+            "branches have no names for this robot or pose",
             parameter="branch",
             came=branch,
             allowed="no branch: the answer nearest to the seed is taken",
@@ -223,14 +223,14 @@ def _rotations(given: ArrayLike, count: int) -> Array:
         row = int(wrong[0])
         left = off[row] <= ROTATION_TOLERANCE
         raise InputError(
-            "the matrix mirrors, it does not turn"
+            "the matrix is a reflection, not a rotation"
             if left
-            else "the matrix is no rotation: its columns are not orthonormal",
+            else "the matrix is not a rotation: its columns are not orthonormal",
             parameter="rotations",
             where=f"rotations, row {row}",
             came=f"determinant {np.linalg.det(R[row]):.6g}" if left else f"R'R off from 1 by {off[row]:.3g}",
             allowed="determinant 1" if left else f"within {ROTATION_TOLERANCE:g}",
-            cure="Check rows against columns, and that all digits were passed on.",
+            cure="Check rows against columns, and that no digits were lost.",
         )
     return rotation_from_quaternion(quaternion_from_rotation(R))
 

@@ -39,12 +39,12 @@ class PoseStatus(Enum):
             PoseStatus.REACHED: "The joints give the pose.",
             PoseStatus.NEAR_SINGULAR: "The joints give the pose, but near a singular posture, where a small change "
             "of the pose takes a large motion of the joints: go there by joint motion, or move the pose.",
-            PoseStatus.BEYOND_LIMIT: "The joints give the pose, but the robot cannot turn so far: take another branch, "
+            PoseStatus.BEYOND_LIMIT: "The joints give the pose, but a joint is beyond its limits: take another branch, "
             "or move the pose.",
             PoseStatus.BRANCH_LOST: "The pose is reached on another branch, whose joints are given, and not on the one "
             "asked for: take that one, or move the pose.",
-            PoseStatus.UNREACHABLE: "No joints give the pose; those given come as near as was found: move the pose, "
-            "and check its frame, its units and the target.",
+            PoseStatus.UNREACHABLE: "No joints give the pose; the joints given are the nearest that were found: move "
+            "the pose, and check its frame, its units and the target.",
         }[self]
 
 

@@ -151,7 +151,7 @@ def most_informative_number(rows: Array, known: Array) -> list[int]:
 def _refuse_too_many(count: int, candidates: int) -> None:
     if not 0 <= count <= candidates:
         raise InputError(
-            "there are not so many measurements to choose from",
+            "there are too few measurements to choose from",
             where="number of measurements",
             came=count,
             allowed=f"0 to {candidates}",

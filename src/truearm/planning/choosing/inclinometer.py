@@ -80,11 +80,11 @@ def plan_tilting(
     Raises
     ------
     InputError
-        If nothing may differ within a pair, or hardly any posture decides to which side the joints lean.
+        If nothing may differ within a pair, or too few postures decide to which side the joints tilt.
     """
     if not (force >= 0.0 and move >= 0.0 and (move > 0.0 or force > 0.0)):
         raise InputError(
-            "nothing differs within a pair of postures",
+            "the two postures of a pair do not differ",
             where="force and move",
             came=f"{force:g} N and {math.degrees(move):g} deg",
             allowed="0 or more, one of them more than 0",
@@ -95,7 +95,7 @@ def plan_tilting(
             where="force",
             came="0 N",
             allowed="more than 0",
-            cure="Give a force, or choose no pairs of poses; then joints about a vertical axis stay unknown.",
+            cure="Give a force, or choose no pairs of poses; then joints about a vertical axis stay unobservable.",
         )
     model = robot.with_effects(TILTING)
     effects, nuisance = tilting_parameters(model)
@@ -124,7 +124,7 @@ def _chosen(candidates: Pairs, rows: Array, count: int, known: Array, interest: 
     useful = np.flatnonzero(rows.any(axis=(1, 2)))
     if len(useful) < count:
         raise InputError(
-            "hardly any posture decides to which side the joints lean",
+            "too few postures decide to which side the joints tilt",
             where="postures to compare",
             came=f"{len(useful)} of {len(rows)} pairs that can be used",
             allowed=f"{DECIDING_MOMENTS}, in {count} pairs",

@@ -204,7 +204,7 @@ def plan_measurements(
         )
     if poses is None and objective != "O1":
         raise InputError(
-            "only O1 weighs the number of poses",
+            "only O1 can choose the number of poses",
             parameter="poses",
             came=f"auto, and the objective {objective}",
             cure="Name a number of poses, or use `objective=O1`.",

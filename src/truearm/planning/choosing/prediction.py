@@ -47,7 +47,7 @@ class Prediction:
     numbers
         Numbers of poses.
     chosen, random
-        Error after as many poses, chosen by O1 and drawn by chance, ``(numbers,)``.
+        Error after as many poses, chosen by O1 and drawn at random, ``(numbers,)``.
     places
         Where the flange is at random configurations, in the world, ``(k, 3)``.
     error

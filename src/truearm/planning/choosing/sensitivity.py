@@ -142,7 +142,7 @@ def check_known(robot: Robot, postures: Postures) -> None:
     for effect in robot.effects:
         if effect.warmed and postures.temperature is None:
             raise InputError(
-                f"the effect {effect.name} needs the temperature of the arm, which no plan knows",
+                f"the effect {effect.name} needs the temperature of the arm, which a plan does not have",
                 where=robot.name,
                 cure="Choose another model.",
             )

@@ -72,13 +72,13 @@ def largest_cube(
     Raises
     ------
     InputError
-        If the arm reaches no cube there.
+        If the arm reaches no cube in this direction.
     """
     if ahead not in DIRECTIONS:
         raise InputError("there is no such direction", where="ahead", came=ahead, allowed=", ".join(DIRECTIONS))
     for name, bound in (("nearest", nearest), ("floor", floor)):
         if not math.isfinite(bound):
-            raise InputError("a bound of the cube is a finite number", where=name, came=bound)
+            raise InputError("a bound of the cube must be a finite number", where=name, came=bound)
     return _Search(robot, target, ahead, nearest, floor).largest()
 
 
@@ -102,7 +102,7 @@ class _Search:
             places = self._grown(places[best], *_STEPS[1:])
         if not len(places):
             raise InputError(
-                "the arm reaches no cube there",
+                "the arm reaches no cube in this direction",
                 where=self._robot.name,
                 came=f"from {self._nearest * 1e3:g} mm ahead and {self._floor * 1e3:g} mm up",
                 cure="Choose another direction or floor, or give centre and side of the cube.",

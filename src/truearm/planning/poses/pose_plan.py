@@ -102,7 +102,7 @@ def plan_poses(
     if isinstance(count, bool) or count < 1:
         raise InputError("at least one pose is needed", where="count", came=count, allowed="1 or more")
     if not (math.isfinite(least_move) and least_move >= 0):
-        raise InputError("a move is not negative", where="least move", came=least_move, allowed="0 or more")
+        raise InputError("a move must not be negative", where="least move", came=least_move, allowed="0 or more")
     shares = [count // 4 + (plane < count % 4) for plane in range(4)]
     points = np.concatenate([plane.spread(share) for plane, share in zip(cube.planes, shares, strict=True)])
     names = np.repeat([plane.name for plane in cube.planes], shares)

@@ -54,7 +54,7 @@ class CalibrationTable:
                 allowed="(n, 3), n at least 1",
             )
         if not np.isfinite(self.points).all():
-            raise InputError("NaN and infinity are no place on a table", where="calibration table")
+            raise InputError("a point on a table cannot be NaN or infinite", where="calibration table")
 
     @property
     def in_world(self) -> Array:
@@ -173,7 +173,7 @@ def rectangular_grid(columns: int, rows: int, spacing: float) -> Array:
 
 
 def _jogged(twin: Twin, wanted: Array, start: Array, conditions: Conditions) -> Array:
-    """Return joint positions ``(n, joints)`` with the tip where it is wanted ``(n, 3)`` [m], by least-norm Newton steps.
+    """Return joints ``(n, joints)`` with the tip where it is wanted ``(n, 3)`` [m], by least-norm Newton steps.
 
     The Jacobian is that of the arm without its joints' imperfections: steps need not be exact, their end is. Most of
     the way that arm is followed too, since all its configurations are computed at once.

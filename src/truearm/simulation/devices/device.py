@@ -121,7 +121,7 @@ def measured_with(
     """
     if count < 1 or (sigma is not None and sigma < 0.0):
         raise InputError(
-            "a campaign needs configurations, and a deviation is not negative",
+            "a campaign needs a configuration or more, and no negative deviation",
             where=device.name,
             came=f"{counted(count, 'configuration')}, deviation {sigma}",
             allowed="1 configuration or more, deviation 0 or more",

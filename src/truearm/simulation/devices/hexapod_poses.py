@@ -59,7 +59,7 @@ class HexapodPoses(Device):
         kept = np.flatnonzero(there & ((at >= low) & (at <= high)).all(axis=1))[:count]
         if len(kept) < count:
             raise InputError(
-                f"{nominal.name} can take too few poses of the device",
+                f"{nominal.name} reaches too few poses of the device",
                 where=self.name,
                 came=f"{len(kept)} of {len(order)} tried, at {len(origins)} places of the fixture",
                 allowed=f"{count} or more",
@@ -91,7 +91,7 @@ class HexapodPoses(Device):
         """Return the places of the fixture, and place, pose and joints of all configurations there."""
         if branch_rule(nominal) is None:
             raise InputError(
-                f"{nominal.name} cannot take the poses of the device",
+                f"{nominal.name} cannot reach the poses of the device",
                 where=self.name,
                 allowed="a robot with six turning joints whose branches have names",
                 cure="Take another device.",

@@ -57,14 +57,14 @@ def jogged(nominal: Robot, arm: Arm, target: str, joints: Array, gap: Gap) -> Ar
             if beyond == 0:
                 return joints
             raise InputError(
-                "the tool can be jogged to where it is measured only beyond the limits of the joints",
+                "the tool reaches the place of measurement only beyond the joint limits",
                 where=nominal.name,
                 came=f"{beyond} of {len(joints)} postures beyond them",
                 cure="The truth is too far from the nominal robot: take another seed, or another truth.",
             )
         joints += _least(nominal.joint_jacobian(joints, target)[:, :3], missing)
     raise InputError(
-        "the tool cannot be jogged to where it is measured",
+        "the tool cannot be jogged to the place of measurement",
         where=nominal.name,
         came=f"{float(np.abs(missing).max()) * 1e3:.3g} mm missing",
         cure="The truth is too far from the nominal robot, or the postures are singular: take another seed.",
@@ -132,7 +132,7 @@ def postures_at(
     if len(reached) == count:
         return reached, found[reached]
     raise InputError(
-        f"{nominal.name} does not reach what it is to be measured against",
+        f"{nominal.name} does not reach enough places of the device",
         where=what,
         came=f"{len(reached)} of {len(goals)} places within reach",
         allowed=f"{count} or more",

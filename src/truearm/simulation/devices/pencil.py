@@ -132,7 +132,7 @@ class PencilCircle(Device):
             if np.isfinite(found).all():
                 return found
         raise InputError(
-            f"{nominal.name} does not come round the circle",
+            f"{nominal.name} cannot follow the whole circle",
             where=self.name,
             came=f"{int(np.isfinite(found[:, 0, 0]).sum())} of {len(pages)} circles drawn",
             cure="Take a smaller circle, pages that are less steep, or another device.",

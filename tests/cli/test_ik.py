@@ -128,4 +128,4 @@ def test_an_arm_of_five_joints(truearm: Truearm, tmp_path: Path) -> None:
     assert truearm("ik", "katana450", poses, "--axis-only", "--out", out).code == 0
     run = truearm("ik", "katana450", poses, "--branch", "all", "--out", out)
     assert run.code == 2
-    assert "no names here" in run.err
+    assert "have no names" in run.err

@@ -257,7 +257,7 @@ NAN = np.full((3, 3), np.nan)
         ("no target of this name", lambda: joint_motion(katana(), changed(), target="gripper")),
         ("times do not rise", lambda: joint_motion(katana(), changed(time=np.zeros(0)))),
         ("times do not rise", lambda: joint_motion(katana(), changed(time=-changed().time))),
-        ("trajectory, velocity: a trajectory has three", lambda: joint_motion(katana(), changed(velocity=NAN))),
+        ("trajectory, velocity: a trajectory needs three", lambda: joint_motion(katana(), changed(velocity=NAN))),
         ("NaN or infinity", lambda: joint_motion(katana(), changed(position=np.nan * changed().position))),
         ("wrong shape", lambda: joint_motion(katana(), changed(), seed=[0.0, 1.0])),
     ],

@@ -153,7 +153,7 @@ REFUSED = {
     "a fixture far from itself": (changed(9, "fixture", "cap"), r"line 9: the row does not say where"),
     "a fixture at a distance from nothing": (changed(9, "fixture", ""), r"line 9: the row does not say where"),
     "a fixture's distance of zero": (changed(9, "distance", "0.0"), r"line 9, column distance.*above zero; got '0.0'"),
-    "a fixture without a deviation": (changed(8, "sigma", ""), r"line 8, column sigma: .*no standard deviation.*above 0"),
+    "a fixture without a deviation": (changed(8, "sigma", ""), r"line 8, column sigma.*no standard deviation.*above 0"),
     "a fixture with no deviation": (changed(8, "sigma", "0"), r"line 8, column sigma"),
     "a fixture nobody uses": (changed(8, "target", "cupp"), r"line 8, column target: nothing is.*Did you mean cup or"),
     "a fixture far from one nobody uses": (changed(9, "fixture", "xyz"), r"line 9, column fixture: nothing is.*'xyz'"),

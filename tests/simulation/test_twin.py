@@ -415,7 +415,7 @@ def test_conditions_of_another_shape_are_refused(name: str) -> None:
 
 
 def test_readings_of_another_shape_are_refused() -> None:
-    with pytest.raises(InputError, match=r"joint readings; got 'an array of shape \(3, 1\)'; allowed: \(3, 2\)"):
+    with pytest.raises(InputError, match=r"joint positions; got 'an array of shape \(3, 1\)'; allowed: \(3, 2\)"):
         measure(Twin(planar(0.5, 0.4)), np.zeros((3, 1)), 0.0, RNG(0))
 
 

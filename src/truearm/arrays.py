@@ -62,6 +62,8 @@ def axes(given: object) -> int:
 
 def finite_number(value: object, parameter: str, *, where: str | None = None, lowest: float = -math.inf) -> float:
     """Return a finite number, `lowest` or more."""
+    if type(value) is float and math.isfinite(value) and value >= lowest:  # nearly all of them, and they are many
+        return value
     allowed = "a finite number" if lowest == -math.inf else f"a finite number, {lowest:g} or more"
     if isinstance(value, bool | np.bool_) or not isinstance(value, Real):
         raise InputError("a number belongs here", parameter=parameter, where=where, came=_shown(value), allowed=allowed)

@@ -21,7 +21,7 @@ from truearm.modeling.parameters import Parameter
 from truearm.modeling.parts import Payload, checked_gravity
 from truearm.modeling.placing import placed, with_fixtures_beside
 from truearm.modeling.postures import Postures
-from truearm.modeling.robot_data import RobotData
+from truearm.modeling.robot_data import STRUCTURE, RobotData
 from truearm.modeling.robot_parameters import by_parameters
 from truearm.modeling.transform import Transform
 
@@ -46,7 +46,11 @@ class Robot(RobotData):
         """Return the robot with some parameters replaced."""
         changed = {p.name: p for p in parameters}
         self._refuse_unknown(changed, "parameters")
-        return replace(self, known={**self.known, **changed})
+        other = replace(self, known={**self.known, **changed})
+        # A solver asks for hundreds of such copies: they share what does not depend on values.
+        other.__dict__.update({name: self.__dict__[name] for name in STRUCTURE if name in self.__dict__})
+        other.__dict__["parameters"] = {**self.parameters, **changed}
+        return other
 
     def with_values(self, values: Mapping[str, float]) -> Robot:
         """Return the robot with some parameter values replaced [SI].

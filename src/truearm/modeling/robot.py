@@ -22,7 +22,7 @@ from truearm.modeling.parts import Payload, checked_gravity
 from truearm.modeling.placing import placed, with_fixtures_beside
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot_data import STRUCTURE, RobotData
-from truearm.modeling.robot_parameters import by_parameters
+from truearm.modeling.robot_parameters import by_parameters, effect_rates
 from truearm.modeling.transform import Transform
 
 if TYPE_CHECKING:
@@ -361,7 +361,8 @@ class Robot(RobotData):
             ``(len(names), 3, ..., n)`` in the world; zero for parameters of other targets.
         """
         values = self.values if values is None else values
-        return by_parameters(self, kinematics, kinematics.position_jacobian, q, names, values)
+        rates = effect_rates(self, q, names, values)
+        return by_parameters(self, kinematics, kinematics.position_jacobian, names, rates)
 
     def orientation_jacobian(
         self, kinematics: ForwardKinematics, q: Array | Postures, names: Sequence[str], values: Values | None = None
@@ -371,14 +372,17 @@ class Robot(RobotData):
         Parameters and the shape of what is returned are as for :meth:`position_jacobian`.
         """
         values = self.values if values is None else values
-        return by_parameters(self, kinematics, kinematics.orientation_jacobian, q, names, values)
+        rates = effect_rates(self, q, names, values)
+        return by_parameters(self, kinematics, kinematics.orientation_jacobian, names, rates)
 
     def jacobians(
         self, kinematics: ForwardKinematics, q: Array | Postures, names: Sequence[str], values: Values | None = None
     ) -> tuple[Array, Array]:
         """Return :meth:`position_jacobian` and :meth:`orientation_jacobian`."""
-        return self.position_jacobian(kinematics, q, names, values), self.orientation_jacobian(
-            kinematics, q, names, values
+        rates = effect_rates(self, q, names, self.values if values is None else values)
+        return (
+            by_parameters(self, kinematics, kinematics.position_jacobian, names, rates),
+            by_parameters(self, kinematics, kinematics.orientation_jacobian, names, rates),
         )
 
     def random_configurations(self, count: int, rng: np.random.Generator) -> Array:

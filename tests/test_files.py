@@ -106,7 +106,7 @@ def test_a_permission_that_is_missing(tmp_path: Path, monkeypatch: pytest.Monkey
 
 def test_what_is_no_plain_file_is_not_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "folder").mkdir()
-    with pytest.raises(InputError, match="this is a folder, a file is to be written here"):
+    with pytest.raises(InputError, match="this is a folder, and a file must be written here"):
         write_files(tmp_path, {"new": "", "folder": ""})
     monkeypatch.chdir(tmp_path)  # the path of a socket must be short
     with socket.socket(socket.AF_UNIX) as pipe:
@@ -192,7 +192,7 @@ ALLOWED = {"truearm": "truearm-constraints/1", "units": {"length": "mm", "angle"
         (
             Constraints,
             ALLOWED | {"moments": {1: "up"}},
-            "moments.1: this is not known here; got 'up'; allowed: positive",
+            "moments.1: this value is not known; got 'up'; allowed: positive",
         ),
         (
             CorrectionRecord,

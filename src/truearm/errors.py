@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sized
 from typing import Final
 
 #: A parameter that a text names, with a value or without: `seed`, `train=all`.
@@ -15,7 +15,7 @@ class InputError(ValueError):
     """Input that truearm refuses, with everything a person needs to mend it.
 
     Texts name parameters of a job in backticks (```seed```, ```train=all```), so that every caller can show them in its
-    own words: Python as they are, the command as its options (:meth:`told`).
+    own words: Python as they are, the command as its options (:meth:`message`).
 
     Parameters
     ----------
@@ -45,9 +45,9 @@ class InputError(ValueError):
     ) -> None:
         self.what, self.parameter, self.where = what, parameter, where
         self.came, self.allowed, self.cure = came, allowed, cure
-        super().__init__(self.told(str))
+        super().__init__(self.message(str))
 
-    def told(self, spelled: Callable[[str], str]) -> str:
+    def message(self, spelled: Callable[[str], str]) -> str:
         """Return the message with parameters as `spelled` names them, backticks included for those in texts."""
         where = self.where
         if where is None and self.parameter is not None:
@@ -59,6 +59,21 @@ class InputError(ValueError):
             parts.append(f"allowed: {self.allowed}")
         message = "; ".join(parts).rstrip(".") + "."
         return f"{message} {self.cure}" if self.cure else message
+
+
+def wrong_kind(what: str, came: object, parameter: str, allowed: str, *, where: str | None = None) -> InputError:
+    """Return the refusal of a value of another kind than belongs here."""
+    if isinstance(came, bytes | int | float | None):
+        came = repr(came)
+    elif not isinstance(came, str):
+        size = f" of {len(came)}" if isinstance(came, Sized) and getattr(came, "ndim", 1) else ""
+        came = f"an object of type {kind_of(came)}{size}"
+    return InputError(what, parameter=parameter, where=where, came=came, allowed=allowed)
+
+
+def kind_of(came: object) -> str:
+    """Return the name of an object's type, for messages."""
+    return type(came).__name__
 
 
 def with_parameters(text: str, spelled: Callable[[str, str | None], str]) -> str:

@@ -48,7 +48,7 @@ def _broken_link(path: Path) -> InputError:
         "this is a link, and there is nothing where it points to",
         where=str(path),
         came=str(path.readlink()),
-        cure="Remove the link, or mend it.",
+        cure="Remove or repair the link.",
     )
 
 
@@ -140,7 +140,7 @@ _FAULTS: Final[Mapping[str, tuple[str, str]]] = {
     "string_type": ("a text belongs here", "a text, in quotes if it looks like a number, a date, yes or no"),
     "string_too_short": ("the text is empty", "at least one character"),
     "string_pattern_mismatch": ("the text does not have the form that belongs here", "{pattern}"),
-    "literal_error": ("this is not known here", "{expected}"),
+    "literal_error": ("this value is not known", "{expected}"),
     "dict_type": _TABLE,
     "model_type": _TABLE,
     "list_type": _LIST,
@@ -150,7 +150,7 @@ _FAULTS: Final[Mapping[str, tuple[str, str]]] = {
     "invalid_key": ("the name of an entry must be a text", "a name, in quotes if it looks like a number"),
 }
 #: Of so many names the right one is found without a hint.
-_FEW: Final = 6
+_FEW_NAMES: Final = 6
 #: Lists and tables of more characters are not shown in messages.
 _LONGEST_SHOWN: Final = 60
 
@@ -217,7 +217,7 @@ def _refusal(error: ValidationError, content: Any, schema: type[BaseModel], wher
     if kind == "literal_error":
         known = re.findall("'([^']*)'", details["expected"])
         details = {"expected": ", ".join(known)}
-        cure = did_you_mean(str(came), known) if len(known) > _FEW else None
+        cure = did_you_mean(str(came), known) if len(known) > _FEW_NAMES else None
     if kind in ("too_short", "too_long"):
         came = details["actual_length"]
     return refused(what, shown_entry(came), allowed.format(**details), cure)
@@ -281,9 +281,9 @@ def writable_file(path: Path) -> Path:
         if path.is_symlink() and not path.exists():
             raise _broken_link(path)
         if path.is_dir():
-            raise InputError("this is a folder, a file is to be written here", where=str(path))
+            raise InputError("this is a folder, and a file must be written here", where=str(path))
         if path.exists() and not path.is_file():
-            raise InputError("this is a device or a pipe, a file is to be written here", where=str(path))
+            raise InputError("this is a device or a pipe, and a file must be written here", where=str(path))
     except OSError as error:
         raise InputError(f"the file cannot be written ({_reason(error)})", where=str(path)) from error
     return path

@@ -62,7 +62,7 @@ def from_si(value: float, unit: str) -> float:
 
 
 @cache
-def believable(unit: str, *, deviation: bool = False) -> tuple[float, float]:
+def accepted_range(unit: str, *, deviation: bool = False) -> tuple[float, float]:
     """Return the lowest and highest number in `unit` that can be meant, as a value or as a standard deviation."""
     low, high = (-_LARGEST, _LARGEST)
     if deviation:
@@ -90,11 +90,11 @@ def sized_si(
     deviation
         Whether it is a standard deviation, which can be too small as well.
     """
-    low, high = believable(unit, deviation=deviation)
+    low, high = accepted_range(unit, deviation=deviation)
     if low <= value <= high:
         return to_si(value, unit)
     raise InputError(
-        f"the number is too {'small' if deviation and value < low else 'large'} to be meant",
+        f"the number is too {'small' if deviation and value < low else 'large'} to be plausible",
         parameter=parameter,
         where=where,
         came=value if came is None else came,
@@ -130,7 +130,7 @@ def checked_unit(
     # A file's unit says what its numbers are, so that no other is offered for it.
     meant = did_you_mean(unit, allowed) if unit and parameter is not None else None
     raise InputError(
-        "no unit is given" if not unit else "the unit is not one that fits here",
+        "no unit is given" if not unit else "this unit does not fit here",
         parameter=parameter,
         where=where,
         came=unit or None,

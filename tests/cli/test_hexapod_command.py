@@ -55,7 +55,7 @@ def test_one_pose(truearm: Truearm) -> None:
         ("numbers separated by commas", ["--legs", "300;300"]),
         ("--pose: the number is out of range; got 73; allowed: 1 to 72", ["--pose", "73"]),
         ("--out: one pose without joint positions is no data file", ["--out", "data.csv"]),
-        ("too large to be meant", ["--legs", "1e12,300,300,300,300,300"]),
+        ("too large to be plausible", ["--legs", "1e12,300,300,300,300,300"]),
     ],
 )
 def test_what_solve_refuses(truearm: Truearm, words: str, options: list[str]) -> None:

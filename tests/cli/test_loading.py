@@ -202,14 +202,18 @@ def test_what_is_simulated_has_the_effects_of_its_robot(truearm: Truearm, elasti
 @pytest.mark.parametrize(
     ("option", "text", "part"),
     [
-        ("--payload", "2.7,50,25,100", "--payload: no unit is given that fits here; got '2.7'; allowed: 2.7kg or 2.7g"),
+        ("--payload", "2.7,50,25,100", "--payload: no unit that fits is given; got '2.7'; allowed: 2.7kg or 2.7g"),
         ("--payload", "2.7kg,50cm,25mm,100mm", "got '50cm'; allowed: 50mm or 50m. Units are never guessed"),
         ("--payload", "2.7kg,50mm,25mm", "a mass and the three coordinates of its centre of gravity belong here"),
         ("--payload", "heavy,0mm,0mm,0mm", "--payload: a number with its unit belongs here; got 'heavy'"),
         ("--payload", "nankg,0mm,0mm,0mm", "--payload: a number with its unit belongs here; got 'nankg'"),
         ("--payload", "-1kg,0mm,0mm,0mm", "--payload: a mass cannot be negative; got '-1kg'"),
         ("--payload", "1e300kg,0mm,0mm,0mm", "--payload: the number is too large to be meant; got '1e300kg'"),
-        ("--gravity", "0,0,0", "this is no acceleration of free fall; got '0 m/s^2'; allowed: about 9.81 m/s^2"),
+        (
+            "--gravity",
+            "0,0,0",
+            "this cannot be the acceleration of free fall; got '0 m/s^2'; allowed: about 9.81 m/s^2",
+        ),
         ("--gravity", "0,-9.81", "--gravity: three numbers belong here; got '0,-9.81'; allowed: 0,0,-9.81"),
         ("--gravity", "0,0,nan", "--gravity: three numbers belong here; got '0,0,nan'"),
     ],
@@ -259,7 +263,7 @@ def test_a_robot_calibrated_with_its_temperature_asks_for_it(truearm: Truearm, d
     )
     assert truearm("calibrate", robot, tmp_path / "warm.csv", "--out", tmp_path / "out").code == 0
     message = refused(truearm, "validate", tmp_path / "out" / "calibrated.yaml", data)
-    assert "the robot was calibrated with its temperature, and the data do not say theirs" in message
+    assert "the robot was calibrated with its temperature, and the data hold no temperature" in message
     assert "Add the column temperature [degC]" in message
     assert truearm("validate", tmp_path / "out" / "calibrated.yaml", tmp_path / "warm.csv").code == 0
 

@@ -42,7 +42,7 @@ def test_a_plan_in_json_and_in_its_files(truearm: Truearm, tmp_path: Path) -> No
     assert list(rows[0])[1] == "joint_1 [deg]"
     assert list(rows[0])[-1] == "approach_6 [deg]"
     page = (tmp_path / "plan.html").read_text()
-    assert "Where the robot will be good" in page
+    assert "Where the robot will be accurate" in page
     assert "<script src" not in page
     first = out.read_bytes()
     assert truearm(*words).code == 0
@@ -74,7 +74,7 @@ def test_auto_and_a_calibrated_robot(truearm: Truearm, small: Path, tmp_path: Pa
     assert json.loads(run.out)["poses"] >= 11
     run = truearm("plan", "irb120", *words)
     assert run.code == 2
-    assert "nobody knows where the instrument stands" in run.err
+    assert "the position of the instrument is not known" in run.err
 
 
 @pytest.mark.parametrize(

@@ -127,7 +127,7 @@ def test_a_nominal_robot_cannot_be_validated(truearm: Truearm, small: Path) -> N
 @pytest.mark.parametrize("train", ["40", "41", "0", "-3"])
 def test_training_must_leave_something(truearm: Truearm, small: Path, tmp_path: Path, train: str) -> None:
     message = refused(truearm, "calibrate", "irb120", small / "data.csv", f"--train={train}", "--out", tmp_path)
-    assert f"--train: the number of training configurations must leave some to judge by; got {train}" in message
+    assert f"--train: the number of training configurations must leave some held out; got {train}" in message
     assert "allowed: 1 to 39, or all" in message
 
 

@@ -55,7 +55,7 @@ def test_the_fake_target_mirrors_the_error(lines: SevenLines) -> None:
     assert_allclose(mirrored, -miss, rtol=0, atol=2e-5)
 
 
-def test_readings_for_it_bring_the_robot_there(lines: SevenLines) -> None:
+def test_joints_for_it_bring_the_robot_there(lines: SevenLines) -> None:
     robot, joints = with_table_3(), lines.joints(load_robot("kr5"))
     commanded = usable_joints(fake_targets(robot, joints).solutions, lines.labels, "lines")
     left = np.linalg.norm(robot.world_poses(commanded)[0] - lines.position, axis=1)
@@ -93,7 +93,7 @@ def test_lines_are_those_of_the_box(lines: SevenLines) -> None:
         assert_allclose(lines.position[lines.rows(d)][5], [0.85, 0.0, 0.6], atol=1e-12)
 
 
-def test_readings_reach_the_poses_without_jumps(lines: SevenLines) -> None:
+def test_joints_reach_the_poses_without_jumps(lines: SevenLines) -> None:
     robot = load_robot("kr5")
     joints = lines.joints(robot)
     assert_allclose(robot.world_poses(joints)[0], lines.position, rtol=0, atol=1e-9)

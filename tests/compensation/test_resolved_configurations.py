@@ -28,7 +28,7 @@ def quadrants(robot: Robot, joints: np.ndarray) -> Configuration:
         (axis, math.pi / 2 * q, math.pi / 2 * (q + 1))
         for axis, q in ((axis, math.floor(joints[axis - 1] / (math.pi / 2))) for axis in (1, 4, 6))
     )
-    return Configuration(elbow=elbow, readings=bounds)  # type: ignore[arg-type]
+    return Configuration(elbow=elbow, ranges=bounds)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("name", ["irb120", "irb1600", "kr5", "lrmate200ic"])
@@ -51,11 +51,11 @@ def test_a_configuration_tells_the_posture_and_the_turn(name: str) -> None:
     assert meant.guessed is None
 
 
-def test_readings_are_those_that_the_controller_shows() -> None:
+def test_joints_are_those_that_the_controller_shows() -> None:
     """A FANUC counts its third axis with the second, and its wrist the other way."""
     robot = load_robot("lrmate200ic")
     joints = np.radians([[20.0, 30, -10, 40, -50, 60]])
-    shown = robot.controller.readings(joints)
+    shown = robot.controller.from_model(joints)
     assert np.degrees(shown[0, 3]) == pytest.approx(-40)
     wanted = matrices(robot, joints)
     for reading, low, high, found in ((4, -math.pi / 2, 0, True), (4, 0, math.pi / 2, False)):
@@ -114,7 +114,7 @@ def test_out_of_reach_and_out_of_configuration_are_told_apart() -> None:
     joints = np.radians([[10.0, 20, -10, 15, 40, 30]])
     poses = np.concatenate([matrices(IRB120, joints)] * 2)
     poses[1, 0, 3] += 2.0
-    never = Configuration(readings=((1, math.radians(100), math.radians(120)),))
+    never = Configuration(ranges=((1, math.radians(100), math.radians(120)),))
     meant = resolved_configurations(IRB120, poses, [never, ANY_POSTURE], np.stack([UNKNOWN, UNKNOWN]), [])
     assert meant.reachable.tolist() == [True, False]
     assert np.isnan(meant.joints).all()
@@ -122,7 +122,7 @@ def test_out_of_reach_and_out_of_configuration_are_told_apart() -> None:
 
 def test_a_joint_on_the_edge_of_its_quadrant_may_be_a_little_beyond() -> None:
     joints = np.radians([[10.0, 20, -10, -0.5, 40, 30]])
-    inside = Configuration(readings=((4, 0.0, math.pi / 2),))
+    inside = Configuration(ranges=((4, 0.0, math.pi / 2),))
     assert agrees(IRB120, joints, inside).all()
     assert not agrees(IRB120, joints, inside, slack=0.0).any()
     meant = resolved_configurations(IRB120, matrices(IRB120, joints), [inside], UNKNOWN[None], [])
@@ -134,7 +134,7 @@ def test_a_side_without_an_end_is_the_turn_next_to_zero() -> None:
     robot = load_robot("kr5")
     joints = np.radians([[-20.0, -80, 90, -170, 40, -300], [-20.0, -80, 90, 170, 40, 300]])
     words = [
-        Configuration(readings=tuple((i, *((-math.inf, 0.0) if v < 0 else (0.0, math.inf))) for i, v in signs))
+        Configuration(ranges=tuple((i, *((-math.inf, 0.0) if v < 0 else (0.0, math.inf))) for i, v in signs))
         for signs in (list(enumerate(q, 1)) for q in joints)
     ]
     meant = resolved_configurations(robot, matrices(robot, joints), words, np.stack([UNKNOWN, UNKNOWN]), [])

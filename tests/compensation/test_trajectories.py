@@ -1,4 +1,4 @@
-"""Corrected joint readings on the twin, which follows a computation of its own."""
+"""Corrected joint positions on the twin, which follows a computation of its own."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def circle(speed: float = 0.2, step: float = 0.05) -> tuple[Trajectory, JointMot
     return path, joint_motion(nominal(), path, target="tip")
 
 
-def test_the_twin_keeps_to_the_circle_with_corrected_readings() -> None:
+def test_the_twin_keeps_to_the_circle_with_corrected_joints() -> None:
     path, motion = circle()
     robot = calibrated("compliance", "clearance")
     correction = corrected(robot, motion, path.position, "tip")

@@ -86,5 +86,5 @@ def test_a_calibrated_arm_is_placed_to_its_noise() -> None:
 
 def test_data_without_positions_are_refused() -> None:
     _, data = campaign("irb120", 5, 0.0, 0)
-    with pytest.raises(InputError, match=r"twin: there is no position reading at all.*Fill in x, y and z"):
+    with pytest.raises(InputError, match=r"twin: there is no position reading.*Fill in x, y and z"):
         initial_frames(load_robot("irb120"), replace(data, position=np.full_like(data.position, np.nan)))

@@ -113,7 +113,7 @@ def test_missing_readings_cost_certainty_only() -> None:
 def test_believed_constants_are_priors() -> None:
     fit = first_stage()
     for name in fit.names:
-        found, believed = fit.robot.parameters[name], fit.believed.parameters[name]
+        found, believed = fit.robot.parameters[name], fit.with_priors.parameters[name]
         assert (believed.nominal, believed.value, believed.prior) == (found.value, found.value, found.deviation)
 
 
@@ -133,7 +133,7 @@ def test_two_stages_and_all_at_once_leave_little_of_what_geometry_alone_leaves()
     two_stages = identify(fit.robot, data, model["geometric"])
     assert two_stages.robot.values["backlash_3"] == fit.robot.values["backlash_3"]
     assert mean_error(two_stages.robot, twin, 6) < 0.15 * conventional
-    at_once = identify(fit.believed, data, model["tilting"])
+    at_once = identify(fit.with_priors, data, model["tilting"])
     assert mean_error(at_once.robot, twin, 6) < 0.15 * conventional
     assert at_once.robot.values["backlash_3"] != fit.robot.values["backlash_3"]
 

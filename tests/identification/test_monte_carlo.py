@@ -23,13 +23,13 @@ BY_NAME = {m.name: m for m in MODELS}
 SIGMA = 0.05e-3
 
 
-def stationed() -> Robot:
+def at_station() -> Robot:
     return truth_twin(load_robot("irb120"), "nominal", np.random.default_rng(0)).robot
 
 
 @cache
 def simulated(model: str, trials: int) -> MonteCarlo:
-    robot = stationed()
+    robot = at_station()
     rng = np.random.default_rng(2024)
     q, held_out = robot.random_configurations(50, rng), robot.random_configurations(20, rng)
     return monte_carlo(robot, q, BY_NAME[model], SIGMA, trials, rng, held_out)
@@ -58,7 +58,7 @@ def test_trials_together_are_what_the_solver_finds_alone(model: str) -> None:
 def test_trials_together_are_calibrations_of_their_datasets() -> None:
     """The base and the targets have another nominal place there, so predictions are compared, not what is shared."""
     together = simulated("geometric", 5)
-    robot, names = stationed(), together.problem.free.names
+    robot, names = at_station(), together.problem.free.names
     q = robot.random_configurations(20, np.random.default_rng(1))
     for trial in range(5):
         fit = identify(load_robot("irb120"), together.dataset(trial), BY_NAME["geometric"])
@@ -77,7 +77,7 @@ def test_trials_together_are_calibrations_of_their_datasets() -> None:
 def test_readings_and_position_errors_are_those_of_the_twin() -> None:
     trials = simulated("geometric", 3)
     names = trials.problem.free.names
-    robot = stationed()
+    robot = at_station()
     rng = np.random.default_rng(2024)
     q, held_out = robot.random_configurations(50, rng), robot.random_configurations(20, rng)
     for trial in range(3):

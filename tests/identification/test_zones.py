@@ -23,7 +23,7 @@ GEOMETRIC = next(model for model in MODELS if model.name == "geometric")
 
 
 def to_either_side(count: int, rng: np.random.Generator) -> Array:
-    """Joint readings with the flange clearly to the left for the first half, to the right for the second."""
+    """Joint positions with the flange clearly to the left for the first half, to the right for the second."""
     joints = load_robot("irb120").random_configurations(20 * count, rng)
     y = load_robot("irb120").world_poses(joints)[0][:, 1]
     left, right = joints[y > 0.05], joints[y < -0.05]

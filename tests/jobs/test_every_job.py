@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import json
 import math
+import pkgutil
 import re
 import typing
 from collections.abc import Iterator
@@ -19,8 +20,10 @@ import pytest
 from tests.jobs.examples import EXAMPLES
 
 import truearm
+from truearm import results
 from truearm.errors import InputError
 from truearm.jobs import JOBS
+from truearm.library import library
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.effects import EFFECTS
 from truearm.modeling.parts import Payload
@@ -202,3 +205,69 @@ def test_a_payload_that_is_none_is_refused(mass: float) -> None:
     with pytest.raises(InputError) as refusal:
         Payload(mass)
     assert refusal.value.parameter == "mass"
+
+
+def records() -> list[type[Record]]:
+    for module in pkgutil.iter_modules(results.__path__, "truearm.results."):
+        import_module(module.name)
+    import_module("truearm.studies.study")
+
+    found, left = list[type[Record]](), [Record]
+    while left:
+        kinds = left.pop().__subclasses__()
+        left += kinds
+        found += [kind for kind in kinds if not inspect.isabstract(kind)]
+    return sorted(found, key=lambda kind: kind.__name__)
+
+
+@pytest.mark.parametrize("record", records(), ids=lambda record: record.__name__)
+def test_every_result_is_frozen_typed_and_on_the_page(record: type[Record]) -> None:
+    assert is_dataclass(record)
+    assert record.__dataclass_params__.frozen
+    assert record.__repr__ is Record.__repr__
+    assert get_type_hints(record.lines)["return"] == list[str]
+    assert re.search(rf"\b{record.__name__}\b", (ROOT / "docs" / "api.md").read_text())
+
+
+@pytest.mark.parametrize("name", library())
+def test_every_robot_refuses_what_it_cannot_use(name: str) -> None:
+    robot = truearm.load_robot(name)
+    count = len(robot.joints)
+    assert len(repr(robot)) <= 2000
+    wrong: list[Any] = [
+        np.full(count, math.nan),
+        np.full(count, math.inf),
+        np.zeros((2, count + 1)),
+        np.zeros((2, 2, count)),
+    ]
+    for joints in (*wrong, [], "joints", None, Odd()):
+        for answer in (robot.forward, robot.jacobian):
+            with pytest.raises(InputError) as refusal:
+                answer(joints)
+            assert refusal.value.parameter == "joints"
+    for parameter, wrongly in (("frame", "bas"), ("frame", 1), ("target", "nothing"), ("target", 1)):
+        with pytest.raises(InputError) as refusal:
+            robot.forward(np.zeros(count), **{parameter: wrongly})  # type: ignore[arg-type]
+        assert refusal.value.parameter == parameter
+    position, rotation = robot.forward(np.zeros(count))
+    bad: list[tuple[str, tuple[Any, ...], dict[str, Any]]] = [
+        ("positions", (position * math.nan, rotation), {}),
+        ("positions", (position[:, :2], rotation), {}),
+        ("rotations", (position, 2.0 * rotation), {}),
+        ("rotations", (position, rotation[:, :2]), {}),
+        ("seed", (position, rotation), {"seed": np.zeros(count + 1)}),
+        ("frame", (position, rotation), {"frame": "bas"}),
+    ]
+    for parameter, arrays, keywords in bad:
+        with pytest.raises(InputError) as refusal:
+            robot.inverse(*arrays, **keywords)
+        assert refusal.value.parameter == parameter
+
+
+@pytest.mark.parametrize("device", [device.name for device in DEVICES])
+@pytest.mark.parametrize(("parameter", "wrongly"), [("poses", 0), ("noise", math.nan), ("noise", -1.0), ("seed", -1)])
+def test_every_device_refuses_what_it_cannot_use(device: str, parameter: str, wrongly: float) -> None:
+    arguments: dict[str, Any] = {"truth": "nominal", "poses": 3, "device": device, parameter: wrongly}
+    with pytest.raises(InputError) as refusal:
+        truearm.simulate("irb120", **arguments)
+    assert refusal.value.parameter == parameter

@@ -118,7 +118,7 @@ SIDES, JOINTS = (0.3, 0.3, 0.3), np.zeros((3, 6))
         (lambda: truearm.hexapod_plan("irb120", "here"), "fixture", "an array of numbers"),  # type: ignore[arg-type]
         (lambda: truearm.hexapod_plan("irb120", (0, 0, np.nan, 0)), "fixture", "NaN and infinity"),
         (lambda: truearm.hexapod_plan("irb120", (0, 0, 0, 1, 1, 0, 0)), "fixture", "has not length 1"),
-        (lambda: truearm.hexapod_plan("irb120", (9.0, 0, 0, 0)), "fixture", "can take none of the 72 poses"),
+        (lambda: truearm.hexapod_plan("irb120", (9.0, 0, 0, 0)), "fixture", "can reach none of the 72 poses"),
         (lambda: truearm.hexapod_plan("irb120", FIXTURE, branches="front-up"), "branches", "a sequence of names"),
         (lambda: truearm.hexapod_plan("irb120", FIXTURE, branches=["front-upp"]), "branches", "no such branch"),
         (lambda: truearm.hexapod_plan("irb120", FIXTURE, tool="hammer"), "tool", "no such tool"),

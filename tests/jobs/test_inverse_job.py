@@ -66,6 +66,6 @@ def test_orientations_come_from_one_place(tmp_path: Path) -> None:
 
 
 def test_a_branch_of_an_arm_without_named_ones() -> None:
-    with pytest.raises(InputError, match="the branches have no names here") as refusal:
+    with pytest.raises(InputError, match="branches have no names for this robot or pose") as refusal:
         truearm.inverse("irb120", poses()[0], branch="all", orientation="free")
     assert refusal.value.parameter == "branch"

@@ -64,11 +64,11 @@ def test_a_truth_is_a_name_a_file_or_a_robot(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("given", "parameter", "words"),
     [
-        ({"noise": None}, "noise", "nobody knows how good the instrument is. Give `noise`, or a `device`"),
+        ({"noise": None}, "noise", "no noise is given. Give `noise`, or a `device`"),
         ({"truth": "randon"}, "truth", "Did you mean random"),
         ({"truth": "li3.yaml"}, "truth", "there is no such file"),
         ({"truth": truearm.load_robot("li3")}, "truth", "other joints than irb120; got '3 joints'; allowed: 6"),
-        ({"noise": 1e-12}, "noise", "too small to be meant"),
+        ({"noise": 1e-12}, "noise", "too small to be plausible"),
         ({"poses": 0}, "poses", "allowed: 1 or more"),
     ],
 )

@@ -202,9 +202,9 @@ Q = ",qw,qx,qy,qz"
         (PLAIN.replace("target", ""), ["column 4", "the column has no name"]),
         (
             PLAIN.replace("y [mm]", "x [m]"),
-            ["column 6 as well as column 5", "column x is there twice", "Remove one"],
+            ["column 6 as well as column 5", "column x appears twice", "Remove one"],
         ),
-        (PLAIN.replace("joint_2", "joint_1"), ["joint_1 is there twice"]),
+        (PLAIN.replace("joint_2", "joint_1"), ["joint_1 appears twice"]),
         (
             PLAIN.replace("joint_2", "joint_3"),
             ["joint_2 is missing", "joint_1, joint_3", "without a gap", "Add joint_2"],
@@ -233,14 +233,14 @@ Q = ",qw,qx,qy,qz"
         (PLAIN.replace("1001", "1e999"), ["line 3, column x [mm]", "too large", "'1e999'"]),
         (
             PLAIN.replace("1001", "-1.001e9"),
-            ["line 3, column x [mm]", "too large to be meant", "'-1.001e9'", "-1e+09 to 1e+09 mm", "or its unit"],
+            ["line 3, column x [mm]", "too large to be plausible", "'-1.001e9'", "-1e+09 to 1e+09 mm", "or its unit"],
         ),
         (PLAIN.replace("10.0", "1e8"), ["line 3, column joint_1 [deg]", "too large", "5.72958e+07 deg"]),
         (PLAIN.replace("side", "si\tde"), ["line 3, column target", "control character", r"'si\tde'"]),
         (PLAIN.replace("side", "si\0de"), ["line 3, column target", "control character"]),
         (
             f"{HEADER},sigma [mm]\na,1,2,t,1,2,3,1e-7\n",
-            ["line 2, column sigma [mm]", "too small to be meant", "'1e-7'", "1e-06 to 1e+06 mm"],
+            ["line 2, column sigma [mm]", "too small to be plausible", "'1e-7'", "1e-06 to 1e+06 mm"],
         ),
         (f"{HEADER},sigma [m]\na,1,2,t,1,2,3,1001\n", ["column sigma [m]", "too large", "1e-09 to 1000 m"]),
         (

@@ -66,7 +66,7 @@ def test_distances_and_heights_of_two_pages(scan: Path, tmp_path: Path) -> None:
         (HEADER.replace("angle [deg]", "angle"), ["1,10,20,0,0"], r"no unit is given"),
         (HEADER.replace("height [mm]", "depth [mm]"), ["1,10,20,0,0"], r"the column is not known.*depth \[mm\]"),
         (HEADER.replace("joint_2", "joint_3"), ["1,10,20,0,0"], r"numbered without a gap"),
-        (HEADER.replace("joint_2", "joint_1"), ["1,10,20,0,0"], r"joint_1 is there twice"),
+        (HEADER.replace("joint_2", "joint_1"), ["1,10,20,0,0"], r"joint_1 appears twice"),
         (HEADER.replace(",height [mm]", ""), ["1,10,20,0"], r"the column height is missing"),
         (HEADER, ["1,10,20,north,0"], r"line 2, column angle \[deg\].*north"),
         (HEADER.replace(",", ";"), ["1;10;20;0;0"], r"not separated by commas"),

@@ -164,7 +164,7 @@ REFUSED = {
     "a height in degrees": (DISTANCES.replace("distance [mm]", "height [deg]"), r"height \[deg\].*mm"),
     "a fixture with a unit": (DISTANCES.replace("fixture", "fixture [mm]"), r"this column takes no unit"),
     "two columns of distances": (DISTANCES.replace("fixture,", "fixture,distance [m],").replace("cup,", "cup,,")
-        .replace("cap,", "cap,,"), r"the column distance is there twice"),
+        .replace("cap,", "cap,,"), r"the column distance appears twice"),
     "some deviations": (changed(3, "sigma", ""), r"line 3, column sigma: this reading has no sigma"),
 }  # fmt: skip
 

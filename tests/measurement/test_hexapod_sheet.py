@@ -76,7 +76,7 @@ def test_a_row_without_all_its_legs_is_left_out(tmp_path: Path, filled: list[dic
         (r"the design \d+ has no leg", 1, "no leg", "300"),
         ("there is no such design", 2, "design", "112212332"),
         ("there is no such solution", 2, "solution", "5"),
-        ("the configuration is there twice", 2, "configuration", "a"),
+        ("the configuration appears twice", 2, "configuration", "a"),
         ("a number belongs here", 2, "leg", "about 300"),
     ],
 )
@@ -95,7 +95,7 @@ def test_bad_cells(tmp_path: Path, filled: list[dict[str, str]], words: str, row
     ("words", "before", "after"),
     [
         ("no unit is given", "B1-T1 [mm]", "B1-T1"),
-        ("column B1-T1 is there twice", "B1-T2 [mm]", "B1-T1 [mm]"),
+        ("column B1-T1 appears twice", "B1-T2 [mm]", "B1-T1 [mm]"),
         ("Did you mean solution", "solution", "solutions"),
         ("the column is not known", "T1-T2 [mm]", "T1-T4 [mm]"),
         ("joint readings", "joint", ""),

@@ -79,7 +79,7 @@ def test_units_are_taken_as_given(tmp_path: Path) -> None:
         ),
         (JOINTS, "1;2;3\n", ["'1;2;3'", "import table"]),
         (JOINTS, "1_0 2 3\n", ["'1_0'"]),
-        (JOINTS, "1 2e9 3\n", ["a.txt, line 1, column 2", "too large to be meant", "'2e9'", "1e+09 mm"]),
+        (JOINTS, "1 2e9 3\n", ["a.txt, line 1, column 2", "too large to be plausible", "'2e9'", "1e+09 mm"]),
         ("1 2\n1 1e8\n1 2", GOOD, ["q.txt, line 2, column 2", "too large", "5.72958e+07 deg"]),
         (JOINTS, "", ["a.txt: the file is empty"]),
         (JOINTS, "# nothing\n", ["a.txt: the file holds no rows", "exported whole"]),

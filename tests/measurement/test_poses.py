@@ -44,7 +44,7 @@ def test_any_order_and_unit(tmp_path: Path) -> None:
         ("there twice", HEAD.replace("qx", "qw") + ROW),
         ("column z is missing", HEAD.replace("z [mm],", "") + ROW.replace("500,", "")),
         ("column qz is missing", HEAD.replace(",qz", "") + ROW.replace(",0\n", "\n")),
-        ("'P1' is there twice", HEAD + ROW + ROW),
+        ("'P1' appears twice", HEAD + ROW + ROW),
         ("has not length 1", HEAD + ROW.replace(",1,", ",1.002,")),
         ("NaN and infinity", HEAD + ROW.replace("300", "nan")),
         ("cell is empty", HEAD + ROW.replace("300", "")),

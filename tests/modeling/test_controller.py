@@ -48,7 +48,7 @@ def controller_poses(robot: Robot, readings: Array) -> Array:
     its, world = robot.controller, robot.base
     base = matrix(world.rotation, world.translation) @ matrix(its.base.rotation, its.base.translation)
     flange = matrix(its.flange.rotation, its.flange.translation)
-    places, rotations = robot.world_poses(its.joints(readings))
+    places, rotations = robot.world_poses(its.to_model(readings))
     return np.array(
         [np.linalg.inv(base) @ matrix(R, p) @ flange for p, R in zip(places, rotations, strict=True)], float
     )
@@ -65,7 +65,7 @@ def read(tmp_path: Path, entry: str, length: str = "m", angle: str = "rad") -> R
 
 def test_joint_3_of_a_fanuc_robot_is_the_forearm_to_the_horizontal() -> None:
     joints = np.radians([[10.0, 20.0, 30.0, 40.0, 50.0, 60.0], [0.0, 20.0, -20.0, 0.0, 0.0, 0.0]])
-    readings = np.degrees(FANUC.readings(joints))
+    readings = np.degrees(FANUC.from_model(joints))
     assert_allclose(readings, [[10, 20, -50, -40, -50, -60], [0, 20, 0, 0, 0, 0]], rtol=0, atol=1e-13)
 
 
@@ -75,7 +75,7 @@ def test_readings_by_the_formula() -> None:
     )
     a, b, c = 0.3, -0.7, 1.1
     expected = [0.5 - (a + 0.5 * c - b), b, -0.25 + c + 0.25 * a]
-    assert_allclose(controller.readings(np.array([[a, b, c]])), [expected], rtol=0, atol=1e-15)
+    assert_allclose(controller.from_model(np.array([[a, b, c]])), [expected], rtol=0, atol=1e-15)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -84,14 +84,14 @@ def test_joints_are_the_inverse_of_readings(seed: int) -> None:
     others = {i: {j: rng.uniform(-0.3, 0.3) for j in range(1, 7) if j != i} for i in range(1, 7)}
     controller = Controller(tuple(rng.choice([-1, 1], 6).tolist()), tuple(rng.uniform(-4, 4, 6).tolist()), others)
     joints = rng.uniform(-3, 3, (20, 6))
-    assert_allclose(controller.joints(controller.readings(joints)), joints, rtol=0, atol=1e-14)
-    assert_allclose(controller.readings(controller.joints(joints)), joints, rtol=0, atol=1e-14)
+    assert_allclose(controller.to_model(controller.from_model(joints)), joints, rtol=0, atol=1e-14)
+    assert_allclose(controller.from_model(controller.to_model(joints)), joints, rtol=0, atol=1e-14)
 
 
 def test_a_controller_as_the_model_changes_no_bit() -> None:
     joints = np.random.default_rng(0).uniform(-3, 3, (20, 6))
-    assert_array_equal(AS_THE_MODEL.readings(joints), joints)
-    assert_array_equal(AS_THE_MODEL.joints(joints), joints)
+    assert_array_equal(AS_THE_MODEL.from_model(joints), joints)
+    assert_array_equal(AS_THE_MODEL.to_model(joints), joints)
 
 
 def test_pulses_are_of_readings(tmp_path: Path) -> None:
@@ -102,10 +102,10 @@ def test_pulses_are_of_readings(tmp_path: Path) -> None:
         "    - {joint: second, pulses_per_degree: -250}\n"
         "    - {joint: slide, zero: 0.002, pulses_per_mm: 40}\n",
     )
-    readings = robot.controller.readings(np.array([[np.radians(-2.0), np.radians(3.0), 0.005]]))
-    pulses = robot.controller.pulses_of(readings)
+    readings = robot.controller.from_model(np.array([[np.radians(-2.0), np.radians(3.0), 0.005]]))
+    pulses = robot.controller.to_pulses(readings)
     assert_allclose(pulses, [[2001.0, -750.0, 280.0]], rtol=1e-14, atol=0)
-    assert_allclose(robot.controller.readings_of(pulses), readings, rtol=1e-14, atol=0)
+    assert_allclose(robot.controller.from_pulses(pulses), readings, rtol=1e-14, atol=0)
 
 
 @pytest.mark.parametrize(
@@ -113,8 +113,8 @@ def test_pulses_are_of_readings(tmp_path: Path) -> None:
 )
 def test_unknown_pulses_are_refused(pulses: tuple[float | None, ...], missing: str) -> None:
     controller = Controller(pulses=pulses)
-    for convert in (controller.pulses_of, controller.readings_of):
-        with pytest.raises(InputError, match=f"^{missing}: nobody knows.*Give pulses_per_degree"):
+    for convert in (controller.to_pulses, controller.from_pulses):
+        with pytest.raises(InputError, match=f"^{missing}: the number of motor pulses.*Give pulses_per_degree"):
             convert(np.zeros((2, 3)))
 
 
@@ -131,12 +131,12 @@ def test_unknown_pulses_are_refused(pulses: tuple[float | None, ...], missing: s
         ("{joint: first, sign: true}", ["joints[1].sign", "a whole number belongs here"]),
         ("{joint: first, sign: -1.0}", ["joints[1].sign", "a whole number belongs here"]),
         ("{joint: first, zero: .nan}", ["joints[1].zero", "finite"]),
-        ("{joint: first, zero: 1e9}", ["zero of first", "too large to be meant"]),
+        ("{joint: first, zero: 1e9}", ["zero of first", "too large to be plausible"]),
         ("{joint: first, coupling: {first: 1}}", ["cannot be coupled with itself", "got 'first'"]),
         ("{joint: first, coupling: {slide: 1}}", ["both turn, or both slide", "revolute first, prismatic slide"]),
         (
             "{joint: first, pulses_per_degree: 0}",
-            ["joints[1].pulses_per_degree", "so many pulses cannot be", "got 0", "allowed: 0.000001"],
+            ["joints[1].pulses_per_degree", "the number of pulses is out of range", "got 0", "allowed: 0.000001"],
         ),
         ("{joint: first, pulses_per_degree: .inf}", ["joints[1].pulses_per_degree", "finite"]),
         ("{joint: first, pulses_per_mm: 5}", ["is revolute", "got 'pulses_per_mm'", "allowed: pulses_per_degree"]),
@@ -161,7 +161,7 @@ def test_refused(entry: str, parts: list[str], tmp_path: Path) -> None:
     ("entry", "parts"),
     [
         ("base: {quaternion: [1, 0, 0, 0.1]}", ["controller.base.quaternion", "must have length 1"]),
-        ("flange: {translation: [0, 0, 1e9]}", ["controller.flange.translation", "too large to be meant"]),
+        ("flange: {translation: [0, 0, 1e9]}", ["controller.flange.translation", "too large to be plausible"]),
         ("flange: {rotation: [0, 0, 0]}", ["controller.flange.rotation", "not known here"]),
         ("tool: {translation: [0, 0, 0]}", ["controller.tool", "not known here"]),
     ],

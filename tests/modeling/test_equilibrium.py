@@ -30,7 +30,7 @@ def test_readings_are_those_that_the_variables_came_from(effects: tuple[str, ...
     q = robot.random_configurations(200, rng)
     variables = robot.variables(q, robot.values)
     assert len(variables) == len(robot.moving)
-    assert_allclose(robot.readings(variables), q, rtol=0, atol=1e-12)
+    assert_allclose(robot.joints_of(variables), q, rtol=0, atol=1e-12)
 
 
 def pendulum(play: float, up: float) -> Robot:
@@ -64,7 +64,7 @@ def test_equilibrium_in_the_play_of_a_joint_is_a_root_of_its_equation(play: floa
         assert_allclose(variables[1], roots, rtol=0, atol=5e-12)
     else:  # above its axis a weight may balance on either side of the play: any root will do
         assert_allclose([sideways(*pair) for pair in zip(variables[1], q[:, 1], strict=True)], 0.0, rtol=0, atol=5e-12)
-    assert_allclose(robot.readings(variables), q, rtol=0, atol=5e-12)
+    assert_allclose(robot.joints_of(variables), q, rtol=0, atol=5e-12)
 
 
 def test_tilts_under_their_own_loads_are_those_of_the_variables() -> None:
@@ -77,6 +77,6 @@ def test_tilts_under_their_own_loads_are_those_of_the_variables() -> None:
 def test_variables_of_another_number_are_refused() -> None:
     robot = load_robot("irb120").with_effects(["bearing-compliance"])
     with pytest.raises(InputError, match=r"wrong number of variables.*\(6, 5\).*allowed: \(23, n\)"):
-        robot.readings(np.zeros((6, 5)))
+        robot.joints_of(np.zeros((6, 5)))
     with pytest.raises(InputError, match="wrong number of variables"):
-        robot.readings(np.zeros(23))
+        robot.joints_of(np.zeros(23))

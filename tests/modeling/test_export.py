@@ -279,7 +279,7 @@ def test_json_holds_what_is_known_of_every_parameter() -> None:
 
 def test_json_says_that_simulation_is_left_out() -> None:
     robot = replace(load_robot("li3"), tools={"pin": Tool({"1": (0.0, 0.0, 0.1)})}, truths={})
-    assert says(robot, "json", "What is for simulation alone is left out: tools.")
+    assert says(robot, "json", "Left out, because it is for simulation alone: tools.")
 
 
 # -- Python ----------------------------------------------------------------------------------------------------

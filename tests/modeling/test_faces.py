@@ -205,7 +205,7 @@ WRONG_JOINTS: list[Any] = [
     ["0"] * 6,
     [True] * 6,
     np.zeros((2, 6), dtype=complex),
-    object(),
+    slice(None),
     {"joint_1": 0.0},
 ]
 

@@ -138,7 +138,7 @@ def test_what_does_not_fit_the_robot_is_refused(
 
 def test_an_instrument_must_stand_somewhere(arm: Robot, postures: Postures) -> None:
     rules = Constraints.model_validate(HEAD | {"visibility": {"within": 30, "targets": {"1": [0, 0, 1]}}})
-    with pytest.raises(InputError, match="nobody knows where the instrument stands"):
+    with pytest.raises(InputError, match="the position of the instrument is not known"):
         allowed(arm, postures, rules, "rules.yaml", seen_from_the_origin=False)
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from truearm.errors import InputError
 from truearm.modeling.chain import Array
-from truearm.planning.choosing.exchange import Candidates, exchanged, most_telling, most_telling_number
+from truearm.planning.choosing.exchange import Candidates, exchanged, most_informative, most_informative_number
 from truearm.planning.choosing.observability import INDICES, O1, OfInterest, observability
 
 
@@ -31,7 +31,7 @@ def total_of(rows: Array, chosen: Iterable[int]) -> Array:
 def test_hardly_any_choice_tells_more(interest: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     rows, known = rng.normal(size=(12, 2, 4)), 0.01 * np.eye(4)
-    chosen = most_telling(rows, 4, known, OfInterest(interest))
+    chosen = most_informative(rows, 4, known, OfInterest(interest))
     every = np.array([told(rows, list(c), known, interest) for c in combinations(range(12), 4)])
     assert len(set(chosen)) == 4
     found = told(rows, chosen, known, interest)
@@ -46,7 +46,7 @@ def test_every_index_comes_near_to_the_best_choice(name: str, seed: int) -> None
     rows, known = rng.normal(size=(12, 2, 4)), 1e-6 * np.eye(4)
     value = INDICES[name].value
     every = np.array([value(known + total_of(rows, c)) for c in combinations(range(12), 5)])
-    chosen = most_telling(rows, 5, known, INDICES[name])
+    chosen = most_informative(rows, 5, known, INDICES[name])
     assert len(set(chosen)) == 5
     found = value(known + total_of(rows, chosen))
     # The condition number is neither concave nor smooth: exchanges of one get stuck sooner.
@@ -58,7 +58,7 @@ def test_with_all_pairs_exchanged_the_choice_is_often_the_best(seed: int) -> Non
     rng = np.random.default_rng(seed)
     rows, known = rng.normal(size=(9, 3, 3)), 1e-6 * np.eye(3)
     every = [float(O1().value(known + total_of(rows, c))) for c in combinations(range(9), 3)]
-    found = float(O1().value(known + total_of(rows, most_telling(rows, 3, known, O1()))))
+    found = float(O1().value(known + total_of(rows, most_informative(rows, 3, known, O1()))))
     assert found == pytest.approx(max(every), abs=1e-9) or sum(v > found for v in every) <= 2
 
 
@@ -67,7 +67,7 @@ def test_no_single_exchange_and_no_random_choice_is_better(name: str) -> None:
     rng = np.random.default_rng(1)
     rows = rng.normal(size=(120, 3, 6)) * rng.uniform(0.2, 2.0, size=(120, 1, 6))
     known, value = 1e-6 * np.eye(6), INDICES[name].value
-    chosen = most_telling(rows, 10, known, INDICES[name])
+    chosen = most_informative(rows, 10, known, INDICES[name])
     best = value(known + total_of(rows, chosen))
     by_chance = [value(known + total_of(rows, rng.permutation(120)[:10])) for _ in range(200)]
     assert best > max(by_chance)
@@ -104,7 +104,7 @@ def test_the_promise_is_the_first_order_of_what_is_added() -> None:
 def test_the_number_is_chosen_so_that_one_more_or_less_is_worse() -> None:
     rng = np.random.default_rng(4)
     rows, known = rng.normal(size=(60, 2, 6)), 1e-6 * np.eye(6)
-    chosen = most_telling_number(rows, known)
+    chosen = most_informative_number(rows, known)
 
     def index(choice: Sequence[int]) -> float:
         return observability(known + total_of(rows, choice), len(choice))["O1"]
@@ -113,26 +113,26 @@ def test_the_number_is_chosen_so_that_one_more_or_less_is_worse() -> None:
     more = [index([*chosen, new]) for new in range(60) if new not in chosen]
     less = [index(chosen[:place] + chosen[place + 1 :]) for place in range(len(chosen))]
     assert index(chosen) >= max(*more, *less) - 1e-9
-    assert index(chosen) >= index(most_telling(rows, 11, known, O1()))
+    assert index(chosen) >= index(most_informative(rows, 11, known, O1()))
 
 
 def test_a_number_needs_eleven_candidates() -> None:
     with pytest.raises(InputError, match="0 to 10"):
-        most_telling_number(np.ones((10, 1, 1)), np.eye(1))
+        most_informative_number(np.ones((10, 1, 1)), np.eye(1))
 
 
 def test_a_line_is_measured_at_its_ends() -> None:
     x = np.linspace(-1.0, 1.0, 21)
     rows = np.stack([np.ones_like(x), x], axis=1)[:, None]
-    assert set(most_telling(rows, 4, 1e-6 * np.eye(2), O1())) == {0, 1, 19, 20}
+    assert set(most_informative(rows, 4, 1e-6 * np.eye(2), O1())) == {0, 1, 19, 20}
 
 
 def test_what_only_a_nuisance_feels_is_left_out() -> None:
     rows = np.array([[[0.0, 100.0]], [[1.0, 0.0]]])
-    assert most_telling(rows, 1, np.eye(2), OfInterest(1)) == [1]
-    assert most_telling(rows, 1, np.eye(2), OfInterest(2)) == [0]
+    assert most_informative(rows, 1, np.eye(2), OfInterest(1)) == [1]
+    assert most_informative(rows, 1, np.eye(2), OfInterest(2)) == [0]
 
 
 def test_more_than_there_are_is_refused() -> None:
     with pytest.raises(InputError, match="0 to 3"):
-        most_telling(np.ones((3, 1, 1)), 4, np.eye(1), O1())
+        most_informative(np.ones((3, 1, 1)), 4, np.eye(1), O1())

@@ -124,7 +124,7 @@ def test_the_steps_name_every_leg(arm: tuple[Robot, tuple[HexapodPose, ...]], pl
 
 def test_refusals(arm: tuple[Robot, tuple[HexapodPose, ...]]) -> None:
     robot, wanted = arm
-    with pytest.raises(InputError, match=r"can take none of the 72 poses.*out of reach"):
+    with pytest.raises(InputError, match=r"can reach none of the 72 poses.*out of reach"):
         reachable(robot, Transform((5.0, 0.0, 0.0)), wanted)
     with pytest.raises(InputError, match="there is no such branch"):
         reachable(robot, FIXTURE, wanted, branches=("left",))

@@ -184,7 +184,7 @@ NORMAL = np.array([[1, 0, 0], [0, -np.sqrt(0.5), np.sqrt(0.5)], [0, -np.sqrt(0.5
 @pytest.mark.parametrize("turned", [NORMAL, NORMAL @ DOWN])
 def test_the_katana_cannot_hold_its_tool_across_the_circle(turned: Array) -> None:
     path = line((0.0, -0.3707107, 0.21), (0.0, -0.36, 0.2))
-    with pytest.raises(InputError, match=r"0\.0 mm along the path, at 0 s \(sample 0\): the motion cannot begin.*free"):
+    with pytest.raises(InputError, match=r"0\.0 mm along the path, at 0 s \(sample 0\): the motion cannot start.*free"):
         joint_motion(katana(), path, target="tip", orientation="axis", rotation=turned)
     assert len(joint_motion(katana(), path, target="tip").time) == len(path.time)
 

@@ -57,8 +57,8 @@ def test_a_plan_is_better_than_chance_and_within_limits(plan: MeasurementPlan) -
     assert (told.chosen < told.random).all()
     assert (np.diff(told.chosen) < 0).all()
     assert told.floor < told.planned < told.random[0]
-    assert told.enough is not None
-    assert told.chosen[told.numbers.tolist().index(told.enough)] <= 1.1 * told.floor
+    assert told.sufficient_number is not None
+    assert told.chosen[told.numbers.tolist().index(told.sufficient_number)] <= 1.1 * told.floor
 
 
 def test_every_joint_comes_from_below(plan: MeasurementPlan) -> None:

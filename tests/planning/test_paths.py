@@ -144,9 +144,9 @@ def test_a_timed_path_runs_from_rest_to_rest(path: Path) -> None:
         ("not as many velocities", lambda: Hermite(WAYPOINTS, VELOCITIES[:2])),
         ("NaN and infinity", lambda: Hermite(WAYPOINTS + np.inf, VELOCITIES)),
         ("stands still", lambda: Hermite(WAYPOINTS, 0 * VELOCITIES).length),
-        ("speed: it has to be a positive number", lambda: timed(PATHS[0], 0, 1, 0.01)),
-        ("acceleration: it has to be a positive number", lambda: timed(PATHS[0], 1, np.inf, 0.01)),
-        ("step: it has to be a positive number", lambda: timed(PATHS[0], 1, 1, -1)),
+        ("speed: it must be a positive number", lambda: timed(PATHS[0], 0, 1, 0.01)),
+        ("acceleration: it must be a positive number", lambda: timed(PATHS[0], 1, np.inf, 0.01)),
+        ("step: it must be a positive number", lambda: timed(PATHS[0], 1, 1, -1)),
         ("too many samples", lambda: timed(PATHS[0], 1, 1, 1e-9)),
     ],
 )

@@ -106,8 +106,8 @@ def test_refusals() -> None:
     for words, options in (
         ("at least one pose", {"count": 0}),
         ("at least one pose", {"count": True}),
-        ("a move is not negative", {"least_move": -0.1}),
-        ("a move is not negative", {"least_move": np.nan}),
+        ("a move must not be negative", {"least_move": -0.1}),
+        ("a move must not be negative", {"least_move": np.nan}),
         ("no target of this name", {"target": "gripper"}),
     ):
         with pytest.raises(InputError, match=words):

@@ -280,7 +280,7 @@ def test_parameters_in_their_units() -> None:
         row = f"{start.value * scale:.{digits}f} {p.value * scale:.{digits}f} {change:+.{digits}f}"
         assert f"{unit} {row}" in text
     assert " uninformed" in text
-    assert "believed" in report_html(report)
+    assert "is its prior" in report_html(report)
     assert "Base, targets and fixtures (15 parameters)" in text
 
 
@@ -391,7 +391,7 @@ def test_residuals_are_means_over_targets_in_measuring_order() -> None:
 
 
 @pytest.mark.parametrize("loss", ["huber", "cauchy", "l1"])
-def test_doubted_readings_are_marked(loss: Loss) -> None:
+def test_readings_with_little_weight_are_marked(loss: Loss) -> None:
     report = made(loss=loss, outlier=True)
     marks = page(report).figures["residuals"]["data"][2]
     worst = int(np.argmax(marks["y"]))

@@ -29,7 +29,7 @@ def ik(
         typer.Option(
             "--seed-joints",
             metavar="DEG,DEG,..",
-            help="Readings to stay near to (mm if sliding).",
+            help="Joint positions to stay near to (mm if sliding).",
             show_default="zeros",
         ),
     ] = None,
@@ -47,7 +47,7 @@ def ik(
     gravity: GravityText = None,
     json: Json = False,
 ) -> None:
-    """Find the joint readings that bring a robot to poses, with its calibration and joint effects."""
+    """Find the joint positions that bring a robot to poses, with its calibration and joint effects."""
     from truearm.jobs.inverse import inverse as run
 
     if orientation_free and orientation_axis:

@@ -42,7 +42,7 @@ class Command(TyperCommand):
         try:
             return super().invoke(ctx)
         except InputError as error:
-            raise CommandError(spelled(error.told(_option))) from error
+            raise CommandError(spelled(error.message(_option))) from error
         finally:
             _running.reset(mark)
 

@@ -23,7 +23,7 @@ def simulate(
     noise: Annotated[
         float | None,
         typer.Option(
-            metavar="MM", min=0.0, help="Standard deviation of a reading.", show_default="what the device is good for"
+            metavar="MM", min=0.0, help="Standard deviation of a reading.", show_default="the deviation of the device"
         ),
     ] = None,
     device: Annotated[

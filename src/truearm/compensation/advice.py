@@ -18,9 +18,9 @@ from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 
 #: Corrections of calibration errors are smaller [m]; a larger mean comes of a wrong tool, frame or robot.
-_LARGE: Final = 0.02
+_LARGE_MEAN: Final = 0.02
 #: With so few targets and no frame, a correction without a mean is no correction.
-_FEW: Final = 3
+_FEW_TARGETS: Final = 3
 _LISTED: Final = 5
 
 
@@ -80,7 +80,7 @@ def check_correction(
             )
         )
     moved = np.concatenate([one.moved[one.corrected] for one in corrections]) if count else np.zeros(0)
-    if count and float(moved.mean()) > _LARGE:
+    if count and float(moved.mean()) > _LARGE_MEAN:
         made.append(
             Notice(
                 "corrections-large",
@@ -112,7 +112,7 @@ def _assumed(frames: Frames, count: int) -> list[Notice]:
     made = []
     if frames.frames == "assumed":
         few = f" With so few targets ({count}) little or nothing of the correction is left: give `frames`."
-        made.append(Notice("frames-assumed", f"{frame_words(frames)[0]}{few if count <= _FEW else ''}"))
+        made.append(Notice("frames-assumed", f"{frame_words(frames)[0]}{few if count <= _FEW_TARGETS else ''}"))
     if frames.tools == "assumed":
         made.append(Notice("tools-assumed", frame_words(frames)[-1]))
     return made

@@ -138,7 +138,7 @@ class Cell:
 
 
 #: No tool and no frame was given.
-NOTHING_GIVEN: Final = Cell({}, {})
+EMPTY_CELL: Final = Cell({}, {})
 
 
 def read_tools(robot: Robot, path: Path | None) -> dict[str, Placed]:

@@ -1,7 +1,7 @@
 """Fake targets: what to write into a program so that the real robot goes where it says (Nubiola, 1.5).
 
 The controller believes in the nominal robot. It is sent to another pose: the one the nominal robot would have with the
-joint readings with which the calibrated robot reaches the wanted one.
+joint positions with which the calibrated robot reaches the wanted one.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class FakeTargets:
     flange
         Where the nominal robot would have its flange in its base frame, ``(n, 4, 4)``: what to write.
     solutions
-        Readings of the calibrated robot for the wanted poses, one row a pose, and how each was found.
+        Joint positions of the calibrated robot for the wanted poses, one row a pose, and how each was found.
     """
 
     flange: Array
@@ -69,7 +69,7 @@ class FakeTargets:
 
     @property
     def joints(self) -> Array:
-        """Readings with which the calibrated robot reaches the wanted poses [rad or m], ``(n, joints)``."""
+        """Joint positions with which the calibrated robot reaches the wanted poses [rad or m], ``(n, joints)``."""
         return self.solutions.joints
 
 
@@ -83,8 +83,8 @@ def fake_targets(robot: Robot, flange: Array, near: Array) -> FakeTargets:
     flange
         Wanted poses of the flange in the identified base frame, ``(n, 4, 4)`` [m], at least one.
     near
-        Readings of the nominal robot at the wanted poses, ``(n, joints)`` [rad or m]: the answers are on the same
-        branch and in the same turns.
+        Joint positions of the nominal robot at the wanted poses, ``(n, joints)`` [rad or m]: the answers are on the
+        same branch and in the same turns.
 
     Raises
     ------

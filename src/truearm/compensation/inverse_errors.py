@@ -1,7 +1,7 @@
 """Off-line compensation through the model with inverted joint errors (KR5 paper, equation 11).
 
-The robot with errors is ``A1 E1 A2 E2 ..``. At the nominal joint readings ``A1 inv(E1) A2 inv(E2) ..`` is as far from
-the wanted pose as the real robot, on the other side: it is the fake target. The nominal robot's readings for the
+The robot with errors is ``A1 E1 A2 E2 ..``. At the nominal joint positions ``A1 inv(E1) A2 inv(E2) ..`` is as far from
+the wanted pose as the real robot, on the other side: it is the fake target. The nominal robot's joint positions for the
 fake target bring the real robot to the pose, up to terms of second order in the errors. (Solving the inverse
 kinematics of the inverted model for the pose itself would double the error.)
 """
@@ -36,7 +36,7 @@ class FakeTargets:
     position, rotation
         The fake targets in the base frame, ``(n, 3)`` [m] and ``(n, 3, 3)``.
     solutions
-        The nominal robot's joint readings for them, with a status each.
+        The nominal robot's joint positions for them, with a status each.
     """
 
     position: Array
@@ -82,14 +82,14 @@ def inverted(robot: Robot) -> Robot:
 
 
 def fake_targets(robot: Robot, joints: Array) -> FakeTargets:
-    """Return fake targets, and the readings to command, for nominal joint readings ``(n, joints)`` [rad].
+    """Return fake targets, and the joint positions to command, for nominal joint positions ``(n, joints)`` [rad].
 
     Parameters
     ----------
     robot
         With identified joint errors.
     joints
-        Readings at which the nominal robot is at the wanted poses.
+        Joint positions at which the nominal robot is at the wanted poses.
     """
     position, rotation = inverted(robot).world_poses(joints)
     return FakeTargets(position, rotation, inverse(design(robot), position, rotation, seed=joints))

@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.compensation.cell import NOTHING_GIVEN, Cell
+from truearm.compensation.cell import EMPTY_CELL, Cell
 from truearm.compensation.fake_targets import FakeTargets, fake_targets, matrices, nominal_robot
 from truearm.compensation.gauge import base_shift, best_agreement, turns_between
 from truearm.compensation.program_places import Places, Provenance, provenance
@@ -63,9 +63,10 @@ class Correction:
     tips
         Tips of the targets in the controller's base frame, ``(n, 4, 4)`` [m].
     joints
-        Readings of the model with which the real robot reaches the targets [rad or m], ``(n, joints)``.
+        Joint positions of the model with which the real robot reaches the targets [rad or m], ``(n, joints)``.
     on_edge
-        Corrected targets with a joint that leaves the readings of its configuration, by less than controllers refuse.
+        Corrected targets with a joint that leaves the ranges of its configuration, by less than controllers
+        refuse.
     """
 
     program: Program
@@ -187,8 +188,8 @@ def corrected_programs(
     )
 
 
-def commanded(robot: Robot, program: Program, cell: Cell = NOTHING_GIVEN) -> Array:
-    """Return the readings of the model to which the controller sends the robot, ``(n, joints)`` [rad or m].
+def commanded(robot: Robot, program: Program, cell: Cell = EMPTY_CELL) -> Array:
+    """Return the joint positions of the model to which the controller sends the robot, ``(n, joints)`` [rad or m].
 
     The controller knows the nominal robot alone. NaN where it finds no joints; `cell` has tools and frames that the
     program does not define.
@@ -313,12 +314,12 @@ class _ResolvedProgram:
         return fake_targets(self._robot, wanted, self._resolved.joints[rows])
 
     def _changed_turns(self, rows: NDArray[np.intp], joints: Array, reasons: Mapping[int, str]) -> dict[int, str]:
-        """Return the targets that would leave the readings of their configuration, with the reason."""
+        """Return the targets that would leave the ranges of their configuration, with the reason."""
         changed: dict[int, str] = {}
         for configuration, members in self._configured(rows, reasons):
             slack = _ROUNDING if configuration.literal else ON_EDGE
             for row in members[~agrees(self._robot, joints[members], configuration, slack)].tolist():
-                shown = self._robot.controller.readings(joints[row][None])[0]
+                shown = self._robot.controller.from_model(joints[row][None])[0]
                 words = ", ".join(
                     f"{math.degrees(value):.2f} deg" if joint.kind == "revolute" else f"{value * 1e3:.2f} mm"
                     for value, joint in zip(shown.tolist(), self._robot.joints, strict=True)
@@ -327,7 +328,7 @@ class _ResolvedProgram:
         return changed
 
     def _on_edge(self, rows: NDArray[np.intp], joints: Array, reasons: Mapping[int, str]) -> tuple[int, ...]:
-        """Return the targets that leave the readings of their configuration and did not before."""
+        """Return the targets that leave the ranges of their configuration and did not before."""
         found: list[int] = []
         for configuration, members in self._configured(rows, reasons):
             before = agrees(self._robot, self._resolved.joints[members], configuration, _ROUNDING)
@@ -338,11 +339,11 @@ class _ResolvedProgram:
     def _configured(
         self, rows: NDArray[np.intp], reasons: Mapping[int, str]
     ) -> Iterator[tuple[Configuration, NDArray[np.intp]]]:
-        """Return the targets without a reason against them by their configuration, where it says readings."""
+        """Return the targets without a reason against them by their configuration, where it gives ranges."""
         groups: dict[Configuration, list[int]] = {}
         for row in rows.tolist():
             configuration = self._program.targets[row].configuration
-            if row not in reasons and (configuration.readings or configuration.outside):
+            if row not in reasons and (configuration.ranges or configuration.outside):
                 groups.setdefault(configuration, []).append(row)
         for configuration, members in groups.items():
             yield configuration, np.array(members)

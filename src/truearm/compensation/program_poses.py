@@ -33,7 +33,7 @@ def poses_of(program: Program) -> Array:
 
 
 def joints_of(robot: Robot, program: Program) -> Array:
-    """Return the readings of the model for targets given by joints, ``(n, joints)`` [rad or m]; else NaN.
+    """Return the joint positions of the model for targets given by joints, ``(n, joints)`` [rad or m]; else NaN.
 
     Raises
     ------
@@ -55,10 +55,10 @@ def joints_of(robot: Robot, program: Program) -> Array:
                 )
         values = np.array([targets[row].values for row in rows])
         if form.kind == "pulses":
-            readings = robot.controller.readings_of(values)
+            counted = robot.controller.from_pulses(values)
         else:
-            readings = values * _joint_units(robot, form)
-        joints[rows] = robot.controller.joints(readings)
+            counted = values * _joint_units(robot, form)
+        joints[rows] = robot.controller.to_model(counted)
     return joints
 
 
@@ -100,11 +100,11 @@ def joint_numbers(robot: Robot, program: Program, joints: Array, rows: NDArray[n
     for form, members in _by_form(program.targets, rows):
         if form.kind == "pose":
             continue
-        readings = robot.controller.readings(joints[members])
+        counted = robot.controller.from_model(joints[members])
         if form.kind == "pulses":
-            numbers = robot.controller.pulses_of(readings)
+            numbers = robot.controller.to_pulses(counted)
         else:
-            numbers = readings / _joint_units(robot, form)
+            numbers = counted / _joint_units(robot, form)
         made |= dict(zip(members.tolist(), numbers, strict=True))
     return made
 

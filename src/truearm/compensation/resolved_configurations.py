@@ -28,7 +28,7 @@ _TURN: Final = 2.0 * np.pi
 _STRETCHED: Final = 0.03
 #: Turns that a joint may have made.
 _TURNS: Final = np.arange(-2.0, 3.0)
-#: A reading may be this far [rad] beyond a bound of the configuration. Joints often stand at a bound, as at 0, and
+#: A joint may be this far [rad] beyond a bound of the configuration. Joints often stand at a bound, as at 0, and
 #: controllers then take the posture at hand: KUKA's ignore the turn of a joint within 2 deg of zero.
 ON_EDGE: Final = float(np.radians(2.0))
 #: A posture may be this far [rad] beyond a limit: the numbers of the program are rounded.
@@ -62,8 +62,8 @@ class ResolvedConfigurations:
 
 
 def agrees(robot: Robot, joints: Array, configuration: Configuration, slack: float = ON_EDGE) -> NDArray[np.bool_]:
-    """Return whether joints ``(n, joints)`` of a robot lie within the readings of a configuration, ``(n,)``."""
-    shown = robot.controller.readings(joints)
+    """Return whether joints ``(n, joints)`` of a robot lie within the ranges of a configuration, ``(n,)``."""
+    shown = robot.controller.from_model(joints)
     inside = np.ones(len(joints), dtype=bool)
     for joint in _bound(configuration):
         inside &= _allowed(configuration, joint, shown[:, joint - 1], slack)
@@ -71,20 +71,20 @@ def agrees(robot: Robot, joints: Array, configuration: Configuration, slack: flo
 
 
 def _bound(configuration: Configuration) -> tuple[int, ...]:
-    """Return the joints, from 1, whose readings a configuration says something of."""
-    return tuple(dict.fromkeys(joint for joint, _, _ in (*configuration.readings, *configuration.outside)))
+    """Return the joints, from 1, whose ranges a configuration gives."""
+    return tuple(dict.fromkeys(joint for joint, _, _ in (*configuration.ranges, *configuration.outside)))
 
 
-def _allowed(configuration: Configuration, joint: int, reading: Array, slack: float) -> NDArray[np.bool_]:
-    """Return which readings of a joint a configuration allows, in the shape of `reading`."""
-    allowed = np.ones(reading.shape, dtype=bool)
+def _allowed(configuration: Configuration, joint: int, position: Array, slack: float) -> NDArray[np.bool_]:
+    """Return which joint positions of a joint a configuration allows, in the shape of `position`."""
+    allowed = np.ones(position.shape, dtype=bool)
     with np.errstate(invalid="ignore"):
-        for number, low, high in configuration.readings:
+        for number, low, high in configuration.ranges:
             if number == joint:
-                allowed &= (reading >= low - slack) & (reading < high + slack)
+                allowed &= (position >= low - slack) & (position < high + slack)
         for number, low, high in configuration.outside:
             if number == joint:
-                allowed &= (reading < low + slack) | (reading >= high - slack)
+                allowed &= (position < low + slack) | (position >= high - slack)
     return allowed
 
 
@@ -108,7 +108,7 @@ def resolved_configurations(
     configurations
         What the program says of each.
     known
-        Readings ``(n, joints)`` [rad or m] of the model where the program gives joints, else NaN.
+        Joint positions ``(n, joints)`` [rad or m] of the model where the program gives joints, else NaN.
     order
         Indices in the order in which the robot goes from one to the next; none of them need be there.
     parents
@@ -143,7 +143,7 @@ def resolved_configurations(
     branch: int | None = None
 
     def parent_of(index: int) -> Array | None:
-        """Return the readings of what an offset starts from, where the program says them and none of its own."""
+        """Return the joint positions of what an offset starts from, where the program says them and none of its own."""
         parent = parents[index] if parents and configurations[index] == ANY_POSTURE else None
         while parent is not None and configurations[parent] == ANY_POSTURE and parents[parent] is not None:
             parent = parents[parent]
@@ -156,7 +156,7 @@ def resolved_configurations(
         row = place.get(index)
         if row is not None:
             near = configurations[index].near
-            reference = before if near is None else nominal.controller.joints(np.array([near]))[0]
+            reference = before if near is None else nominal.controller.to_model(np.array([near]))[0]
             above = parent_of(index)
             reference = reference if above is None else above
             if reference is None and guessed is None and choice.open[row]:
@@ -220,11 +220,11 @@ class _Candidates:
             if name is not None:
                 self._possible[rows] &= (self._number[rows] & bit) == values[name]
         for joint in _bound(configuration):
-            shown = controller.readings(joints[rows].reshape(-1, joints.shape[2]))
-            reading = shown[:, joint - 1].reshape(len(rows), SLOTS, 1) + _TURNS * _TURN
-            allowed = _allowed(configuration, joint, reading, ON_EDGE)
+            shown = controller.from_model(joints[rows].reshape(-1, joints.shape[2]))
+            position = shown[:, joint - 1].reshape(len(rows), SLOTS, 1) + _TURNS * _TURN
+            allowed = _allowed(configuration, joint, position, ON_EDGE)
             # Of the turns that are allowed the one nearest to zero.
-            turn = np.argmin(np.where(allowed, np.abs(reading), np.inf), axis=2)
+            turn = np.argmin(np.where(allowed, np.abs(position), np.inf), axis=2)
             turns = np.where(allowed.any(axis=2), _TURNS[turn], 0.0)
             joints[rows, :, joint - 1] += signs[joint - 1] * turns * _TURN
             self._given[rows, :, joint - 1] = True
@@ -250,7 +250,7 @@ class _Candidates:
         self._any: NDArray[np.bool_] = np.asarray(self._possible.any(axis=1))
 
     def chosen(self, row: int, reference: Array | None, branch: int | None) -> tuple[Array, int] | None:
-        """Return the readings of a pose nearest to a reference, on a branch if it has one there, and which they are.
+        """Return the joints of a pose nearest to a reference, on its branch if there is one, and which they are.
 
         None if there are none.
         """
@@ -279,7 +279,7 @@ def _by_seeds(
 ) -> ResolvedConfigurations:
     """Return the joints of an arm whose branches have no names: nearest to what the program says, else to zero."""
     zero = (0.0,) * len(nominal.joints)
-    seeds = nominal.controller.joints(np.array([configurations[i].near or zero for i in wanted]))
+    seeds = nominal.controller.to_model(np.array([configurations[i].near or zero for i in wanted]))
     found = inverse(nominal, flange[wanted, :3, 3], flange[wanted, :3, :3], seed=seeds)
     reached = np.array([status is not PoseStatus.UNREACHABLE for status in found.status])
     joints[np.array(wanted)[reached]] = found.joints[reached]

@@ -1,12 +1,12 @@
-"""Joint readings changed so that the calibrated robot keeps to the wanted path (Patel, equation 5.22).
+"""Joint positions changed so that the calibrated robot keeps to the wanted path (Patel, equation 5.22).
 
-The calibrated robot predicts where the tip will be with the readings of the nominal motion. By how much it is beside
-the path is turned into a change of the readings by the step of least norm, ``J^T (J J^T)^-1 (P_predicted -
-P_desired)``. That is subtracted (the document does not say so; added, it would double the error), and the prediction is
-made again until the tip is on the path. The norm counts rad, and m for sliding joints.
+The calibrated robot predicts where the tip will be with the joint positions of the nominal motion. By how much it is
+beside the path is turned into a change of the joint positions by the step of least norm, ``J^T (J J^T)^-1 (P_predicted
+- P_desired)``. That is subtracted (the document does not say so; added, it would double the error), and the prediction
+is made again until the tip is on the path. The norm counts rad, and m for sliding joints.
 
-Readings are changed by fractions of a degree. The velocities and accelerations of the nominal motion are therefore kept
-for the moments that bend the arm in motion.
+Joint positions are changed by fractions of a degree. The velocities and accelerations of the nominal motion are
+therefore kept for the moments that bend the arm in motion.
 """
 
 from __future__ import annotations
@@ -28,23 +28,23 @@ from truearm.planning.poses.tip import Tip
 #: The tip is on the path within this [m].
 AGREED: Final = 1e-9
 _MOST_ROUNDS: Final = 20
-#: A change of a reading this large corrects no calibration error [rad or m]: something else is wrong.
+#: A change of a joint this large corrects no calibration error [rad or m]: something else is wrong.
 _LARGEST_CHANGE: Final = math.radians(10.0)
 
 
 @dataclass(frozen=True, eq=False)
 class JointCorrection:
-    """Corrected joint readings, and what the calibrated robot predicts of them.
+    """Corrected joint positions, and what the calibrated robot predicts of them.
 
     Attributes
     ----------
     joints
-        Readings to command [rad or m], ``(n, joints)``.
+        Joint positions to command [rad or m], ``(n, joints)``.
     change
-        What was added to the readings of the nominal motion, ``(n, joints)``.
+        What was added to the joint positions of the nominal motion, ``(n, joints)``.
     before, after
         Predicted distance from the path without and with the correction [m], ``(n,)``. After is zero within 1e-9
-        unless an effect jumps (backlash where the moment changes its sign) and no reading gives the point.
+        unless an effect jumps (backlash where the moment changes its sign) and no joint position gives the point.
     rounds
         How often the prediction was made again.
     """
@@ -79,7 +79,7 @@ def path_error(robot: Robot, motion: JointMotion, desired: Array, target: str | 
 
 
 def corrected(robot: Robot, motion: JointMotion, desired: Array, target: str | None = None) -> JointCorrection:
-    """Return joint readings with which the calibrated robot keeps to the path.
+    """Return joint positions with which the calibrated robot keeps to the path.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def _check_change(change: Array, motion: JointMotion) -> None:
     if len(far):
         row, joint = far[0]
         raise InputError(
-            "the readings would have to change by more than a calibration can account for",
+            "the joints would have to change by more than a calibration can account for",
             where=f"{_place(motion, int(row))}, {motion.joint_names[joint]}",
             allowed=f"{math.degrees(_LARGEST_CHANGE):g} deg",
             cure="Check that motion, path and target belong together.",

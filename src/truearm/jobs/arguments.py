@@ -7,11 +7,12 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from numbers import Integral, Real
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from truearm.errors import InputError, did_you_mean
+from truearm.arrays import finite_number, number_array
+from truearm.errors import InputError, did_you_mean, wrong_kind
 from truearm.files import new_file, refuse_overwriting, writable_file, writable_folder
 from truearm.library import is_robot, load_robot, urdf_source
 from truearm.measurement.dataset import Dataset
@@ -19,7 +20,7 @@ from truearm.measurement.readers.canonical import read_csv
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
-from truearm.units import believable, sized_si
+from truearm.units import accepted_range, sized_si
 
 if TYPE_CHECKING:
     from truearm.simulation.devices import Device
@@ -41,7 +42,7 @@ def refusals_of(parameter: str) -> Iterator[None]:
 def _name(error: InputError, parameter: str) -> None:
     """Let a refusal name a parameter."""
     error.parameter = parameter
-    error.args = (error.told(str),)
+    error.args = (error.message(str),)
 
 
 def robot_argument(robot: object, parameter: str = "robot") -> Robot:
@@ -153,7 +154,7 @@ def numbers_argument(values: object, parameter: str, count: int, allowed: str) -
     found = [*values]
     if len(found) != count:
         raise InputError(f"{count} numbers belong here", parameter=parameter, came=len(found), allowed=allowed)
-    return tuple(number_argument(value, parameter) for value in found)
+    return tuple(finite_number(value, parameter) for value in found)
 
 
 def whole_argument(value: object, parameter: str, lowest: int = 0, highest: int | None = None) -> int:
@@ -167,21 +168,10 @@ def whole_argument(value: object, parameter: str, lowest: int = 0, highest: int 
     return number
 
 
-def number_argument(value: object, parameter: str, lowest: float = -math.inf, allowed: str | None = None) -> float:
-    """Return a finite number, `lowest` or more."""
-    span = allowed or ("a finite number" if lowest == -math.inf else f"a finite number, {lowest:g} or more")
-    if isinstance(value, bool | np.bool_) or not isinstance(value, Real):
-        raise wrong_kind("a number belongs here", value, parameter, span)
-    number = float(value)
-    if not math.isfinite(number) or number < lowest:
-        raise InputError("the number cannot be used", parameter=parameter, came=number, allowed=span)
-    return number
-
-
 def length_argument(value: object, parameter: str, lowest: float = -math.inf) -> float:
     """Return a length that can be meant [m], `lowest` or more."""
-    length = number_argument(value, parameter, allowed="a length")
-    least, most = believable("m")
+    length = finite_number(value, parameter, allowed="a length")
+    least, most = accepted_range("m")
     if not max(least, lowest) <= length <= most:
         span = f"up to {most:g} m" if lowest == -math.inf else f"{lowest:g} m to {most:g} m"
         raise InputError("the length is out of range", parameter=parameter, came=f"{length:g} m", allowed=span)
@@ -190,7 +180,7 @@ def length_argument(value: object, parameter: str, lowest: float = -math.inf) ->
 
 def deviation_argument(value: object, parameter: str) -> float:
     """Return a standard deviation of lengths that can be meant [m]."""
-    return sized_si(number_argument(value, parameter), "m", parameter=parameter, deviation=True)
+    return sized_si(finite_number(value, parameter), "m", parameter=parameter, deviation=True)
 
 
 def lengths_argument(
@@ -209,35 +199,11 @@ def lengths_argument(
     return tuple(length_argument(value, parameter, lowest) for value in found)
 
 
-def array_argument(values: object, parameter: str, shape: tuple[int | None, ...], allowed: str) -> Array:
-    """Return an array of finite numbers, or refuse what is none.
-
-    Parameters
-    ----------
-    shape
-        With None where any length will do.
-    allowed
-        What belongs here, for the message.
-    """
-    try:
-        found = np.asarray(values)
-    except ValueError as error:  # rows of different lengths
-        raise wrong_kind("an array of numbers belongs here", values, parameter, allowed) from error
-    if found.dtype.kind not in "iuf":
-        raise wrong_kind("an array of numbers belongs here", values, parameter, allowed)
-    array = found.astype(np.float64)
-    fits = array.ndim == len(shape) and all(n in (None, m) for n, m in zip(shape, array.shape, strict=True))
-    if not fits or array.size == 0:
-        raise InputError(
-            "the array has another shape", parameter=parameter, came=f"shape {array.shape}", allowed=allowed
-        )
-    if not np.isfinite(array).all():
-        raise InputError(
-            "NaN and infinity are no values",
-            parameter=parameter,
-            came=f"{array[~np.isfinite(array)][0]}",
-            allowed=allowed,
-        )
+def array_argument(values: object, parameter: str, shape: tuple[int | str, ...], allowed: str) -> Array:
+    """Return an array of finite numbers, not an empty one; `shape` as for :func:`truearm.arrays.number_array`."""
+    array = number_array(values, parameter, shape, allowed=allowed)
+    if not array.size:
+        raise InputError("the array is empty", parameter=parameter, allowed=allowed)
     return array
 
 
@@ -316,14 +282,3 @@ def _written(value: object) -> str:
         return f"[{words}]"
     plain = value is None or isinstance(value, str | bool | int | float)
     return repr(value) if plain else type(value).__name__.upper()
-
-
-def wrong_kind(what: str, came: object, parameter: str, allowed: str) -> InputError:
-    """Return the refusal of a value of another kind than belongs here."""
-    text = repr(came) if isinstance(came, str | bytes | int | float | None) else f"an object of type {kind_of(came)}"
-    return InputError(what, parameter=parameter, came=came if isinstance(came, str) else text, allowed=allowed)
-
-
-def kind_of(came: Any) -> str:
-    """Return the name of an object's type, for messages."""
-    return type(came).__name__

@@ -10,7 +10,7 @@ from typing import Final, Literal, get_args
 
 import numpy as np
 
-from truearm.errors import InputError, nearest_names
+from truearm.errors import InputError, kind_of, nearest_names
 from truearm.files import read_bytes, refuse_overwriting, writable_folder
 from truearm.identification.choosing.selection import AUTO, select
 from truearm.identification.judging.advice import check_fit
@@ -26,7 +26,6 @@ from truearm.jobs.arguments import (
     choices_argument,
     data_argument,
     gravity_argument,
-    kind_of,
     path_argument,
     payload_argument,
     python_call,
@@ -123,7 +122,7 @@ def calibrate(
     choice_argument(redundancy, "redundancy", {name: name for name in get_args(Redundant)})
     seed = whole_argument(seed, "seed")
     payload, fall = payload_argument(payload), gravity_argument(gravity)
-    told = command or python_call(
+    call = command or python_call(
         "calibrate",
         robot,
         data,
@@ -156,9 +155,9 @@ def calibrate(
     order = np.random.default_rng(seed).permutation(n)
     training, held_out = order[:count], order[count:]
     if not readings.has_reading.any():
-        raise InputError("there is no reading at all", where=readings.source, cure="Fill in x, y and z, or distance.")
+        raise InputError("there is no reading", where=readings.source, cure="Fill in x, y and z, or distance.")
     if readings.fixture is None and not readings.has_position.any():
-        raise InputError("there is no position reading at all", where=readings.source, cure="Fill in x, y and z.")
+        raise InputError("there is no position reading", where=readings.source, cure="Fill in x, y and z.")
     _check_split(readings.of_configurations(training), readings.of_configurations(held_out))
 
     progress("checking the data")
@@ -209,7 +208,7 @@ def calibrate(
         data=readings,
         training=training,
         held_out=held_out,
-        command=told,
+        command=call,
         history=history,
         urdf=urdf,
         selection=selection,
@@ -235,7 +234,7 @@ def _check_split(training: Dataset, held_out: Dataset) -> None:
     """Refuse a held-out part that holds nothing, or readings of targets that the training part does not place."""
     if held_out.configurations and not held_out.has_reading.any():
         raise InputError(
-            "the held-out part has no reading at all",
+            "the held-out part has no reading",
             where=held_out.source,
             cure="Lower `train`, change `seed`, or measure again where readings are missing.",
         )
@@ -283,7 +282,7 @@ def _train_count(train: object, n: int, where: str) -> int:
         )
     if not 1 <= int(train) < n:
         raise InputError(
-            "the number of training configurations must leave some to judge by",
+            "the number of training configurations must leave some held out",
             parameter="train",
             came=int(train),
             allowed=f"1 to {n - 1}, or all ({where} has {n} configurations)",

@@ -7,6 +7,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from truearm.arrays import finite_number
 from truearm.compensation.advice import check_correction
 from truearm.compensation.cell import Cell, read_frames, read_tools
 from truearm.compensation.program_correction import CorrectedPrograms, Correction, corrected_programs
@@ -17,7 +18,6 @@ from truearm.errors import InputError
 from truearm.jobs.arguments import (
     flag_argument,
     folder_for,
-    number_argument,
     path_argument,
     paths_argument,
     payload_argument,
@@ -83,7 +83,7 @@ def compensate(
     payload = payload_argument(payload)
     strict, again = flag_argument(strict, "strict"), flag_argument(again, "again")
     if split is not None:
-        split = number_argument(split, "split")
+        split = finite_number(split, "split")
         check_tolerance(split)
     folder = None if out is None else folder_for((), out)
     invocation = command or python_call(

@@ -32,7 +32,7 @@ from truearm.simulation.twin_joint import PERFECT
 #: The program that is corrected, and where its work object is in the controller's base: the numbers it has itself.
 _PLATE: Final = "plate.mod"
 _PLATE_FRAME: Final = Transform((0.31, -0.11, 0.06))
-#: Lowest and highest joint readings [deg] that the thesis measures at (section 2.5), within the robot's limits.
+#: Lowest and highest joint positions [deg] that the thesis measures at (section 2.5), within the robot's limits.
 _REGION: Final = ((-90, 0, -80, -150, -90, -180), (90, 110, 70, 150, 90, 180))
 
 
@@ -96,7 +96,7 @@ def _corrected_plate(
     cell = folder / "cell.yaml"
     write_files(folder, {cell.name: _CELL.format(place=f"{x}, {y}, {z}", quaternion=quaternion)})
     correction = compensate(folder / "calibrated.yaml", [folder / _PLATE], tools=cell, frames=cell, progress=progress)
-    progress("sending the twin there")
+    progress("running the program on the twin")
     before, after = correction.result.corrections[0].program, correction.as_written()[0]
     poses = [row for row, target in enumerate(before.targets) if target.form.kind == "pose"]
     wanted = (place @ correction.result.corrections[0].before)[poses, :3, 3]
@@ -104,7 +104,7 @@ def _corrected_plate(
     for program in (before, after):
         joints = commanded(calibration.robot, program)[poses]
         missed.append(np.linalg.norm(twin.frames(joints)["1"][:, :3, 3] - wanted, axis=1))
-    simulated = SimulatedRun(missed[0], missed[1], "the digital twin that plays the real robot")
+    simulated = SimulatedRun(missed[0], missed[1], "the digital twin in place of the real robot")
     return replace(correction, simulated=simulated)
 
 

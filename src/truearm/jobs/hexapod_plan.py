@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from truearm.errors import InputError
+from truearm.errors import InputError, wrong_kind
 from truearm.files import write_text
 from truearm.jobs.arguments import (
     array_argument,
@@ -19,7 +19,6 @@ from truearm.jobs.arguments import (
     name_argument,
     refusals_of,
     robot_argument,
-    wrong_kind,
 )
 from truearm.measurement.hexapod.poses import distinct as distinct_poses
 from truearm.measurement.hexapod.poses import poses
@@ -69,7 +68,7 @@ def hexapod_plan(
     Raises
     ------
     InputError
-        If the robot has no such tool or no closed form, or can take none of the poses with the fixture there.
+        If the robot has no such tool or no closed form, or can reach none of the poses with the fixture there.
     """
     place = _fixture_argument(fixture)
     wanted_branches = _branches_argument(branches)
@@ -78,7 +77,7 @@ def hexapod_plan(
     sheet = None if out is None else file_for(out, robot)
     text = None if steps is None else file_for(steps, robot, parameter="steps")
     if sheet is not None and sheet == text:
-        raise InputError("the sheet and the steps cannot be one file", parameter="steps", came=str(text))
+        raise InputError("the sheet and the steps must be different files", parameter="steps", came=str(text))
     name = None if tool is None else name_argument(tool, "tool")
     loaded = robot_argument(robot)
     with refusals_of("tool"):
@@ -104,7 +103,7 @@ def _fixture_argument(fixture: object) -> Transform:
     if isinstance(fixture, Transform):
         return fixture
     allowed = "x, y, z and a turn about z, or x, y, z and a quaternion w, x, y, z"
-    numbers = array_argument(fixture, "fixture", (None,), allowed).tolist()
+    numbers = array_argument(fixture, "fixture", ("n",), allowed).tolist()
     if len(numbers) not in (4, 7):
         raise InputError("the fixture has 4 or 7 numbers", parameter="fixture", came=len(numbers), allowed=allowed)
     x, y, z = lengths_argument(numbers[:3], "fixture", 3)
@@ -114,7 +113,7 @@ def _fixture_argument(fixture: object) -> Transform:
     length = math.sqrt(sum(part * part for part in numbers[3:]))
     if abs(length - 1.0) > QUATERNION_TOLERANCE:
         raise InputError(
-            "the quaternion (w, x, y, z) has not length 1",
+            "the quaternion (w, x, y, z) does not have length 1",
             parameter="fixture",
             came=f"length {length:.6g}",
             allowed=f"1 within {QUATERNION_TOLERANCE:g}",

@@ -5,16 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from truearm.arrays import finite_number
 from truearm.errors import InputError
 from truearm.files import write_text
-from truearm.jobs.arguments import (
-    deviation_argument,
-    file_for,
-    files_argument,
-    number_argument,
-    numbers_argument,
-    refusals_of,
-)
+from truearm.jobs.arguments import deviation_argument, file_for, files_argument, numbers_argument, refusals_of
 from truearm.measurement.readers.canonical import csv_text
 from truearm.measurement.readers.drawn_circles import Page, read_drawn_circles
 from truearm.results.imported import ImportedCircles
@@ -72,6 +66,6 @@ def import_circle(
 def _resolution(dpi: float | Sequence[float] | None) -> float | tuple[float, float] | None:
     """Return dots per inch, one number or two."""
     if dpi is None or not isinstance(dpi, Sequence) or isinstance(dpi, str):
-        return None if dpi is None else number_argument(dpi, "dpi", allowed="a number above zero, or two")
+        return None if dpi is None else finite_number(dpi, "dpi", allowed="a number above zero, or two")
     along, across = numbers_argument(dpi, "dpi", 2, "a number above zero, or two")
     return along, across

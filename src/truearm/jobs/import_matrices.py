@@ -26,7 +26,7 @@ def import_matrices(
     Parameters
     ----------
     joints
-        File of the joint readings, one column a joint; all joints are revolute.
+        File of the joint positions, one column a joint; all joints are revolute.
     targets
         File of the positions of each target on the tool, by name; columns x, y, z.
     references

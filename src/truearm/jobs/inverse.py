@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from truearm.errors import InputError
+from truearm.errors import InputError, wrong_kind
 from truearm.files import write_text
 from truearm.jobs.arguments import (
     array_argument,
@@ -16,7 +16,6 @@ from truearm.jobs.arguments import (
     payload_argument,
     refusals_of,
     robot_argument,
-    wrong_kind,
 )
 from truearm.measurement.readers.poses import read_poses
 from truearm.modeling.chain import Array
@@ -94,7 +93,7 @@ def inverse(
             parameter="poses" if given else "rotations",
             where=str(poses) if given else None,
             allowed="the columns qw, qx, qy, qz" if given else "rotation matrices, (n, 3, 3)",
-            cure="Add them, or say `orientation=free`.",
+            cure="Add them, or use `orientation=free`.",
         )
     near = None
     if seed is not None:
@@ -123,7 +122,7 @@ def _poses(poses: object, rotations: object) -> tuple[tuple[str, ...], Array, Ar
             )
         turned = None if read.quaternion is None else rotation_from_quaternion(read.quaternion)
         return read.labels, read.position, turned
-    positions = array_argument(poses, "poses", (None, 3), "positions in m, (n, 3), or a CSV file")
+    positions = array_argument(poses, "poses", ("n", 3), "positions in m, (n, 3), or a CSV file")
     labels = tuple(str(number + 1) for number in range(len(positions)))
     if rotations is None:
         return labels, positions, None

@@ -75,7 +75,7 @@ def lines(
     scatter, repeats = length_argument(noise, "noise", 0.0), whole_argument(repeats, "repeats", 1)
     seed = whole_argument(seed, "seed")
     if truth is not None and data is not None:
-        raise InputError("only one of them can be judged", parameter="truth, data", cure="Leave one out.")
+        raise InputError("only one of them can be compared", parameter="truth, data", cure="Leave one out.")
     path = None if out is None else file_for(out, robot, joint_errors, truth, data)
     nominal = robot_argument(robot)
     errors = None if joint_errors is None else robot_argument(joint_errors, "joint_errors")

@@ -8,7 +8,7 @@ from typing import Final, Literal
 
 import numpy as np
 
-from truearm.errors import InputError
+from truearm.errors import InputError, kind_of
 from truearm.identification.solving.models import MODELS
 from truearm.jobs.arguments import (
     choice_argument,
@@ -17,7 +17,6 @@ from truearm.jobs.arguments import (
     device_argument,
     file_for,
     gravity_argument,
-    kind_of,
     path_argument,
     payload_argument,
     python_call,
@@ -100,7 +99,7 @@ def plan(
     InputError
         For anything that cannot be used, with a message that says what to do.
     """
-    told = command or python_call(
+    call = command or python_call(
         "plan",
         robot,
         poses=poses,
@@ -160,7 +159,7 @@ def plan(
         seen_from_the_origin=own,
         readings=readings,
     )
-    planned = Plan(made, told)
+    planned = Plan(made, call)
     if table is not None:
         progress("writing the files")
         planned.save(table)

@@ -8,20 +8,19 @@ from pathlib import Path
 
 import numpy as np
 
-from truearm.errors import InputError
+from truearm.arrays import finite_number
+from truearm.errors import InputError, wrong_kind
 from truearm.files import write_text
 from truearm.jobs.arguments import (
     deviation_argument,
     device_argument,
     file_for,
     gravity_argument,
-    number_argument,
     path_argument,
     payload_argument,
     refusals_of,
     robot_argument,
     whole_argument,
-    wrong_kind,
 )
 from truearm.measurement.readers.canonical import csv_text
 from truearm.modeling.parts import Payload
@@ -62,7 +61,7 @@ def simulate(
     out
         Canonical CSV file to write; None writes nothing.
     noise
-        Standard deviation of a reading [m], 0 for none; None for what the device is good for.
+        Standard deviation of a reading [m], 0 for none; None for the deviation of the device.
     device
         Name of the instrument, of ``truearm.devices()``; None for one that sees every target everywhere.
     seed
@@ -79,13 +78,11 @@ def simulate(
         For anything that cannot be used, with a message that says what to do.
     """
     if noise is None and device is None:
-        raise InputError(
-            "nobody knows how good the instrument is", parameter="noise", cure="Give `noise`, or a `device`."
-        )
+        raise InputError("no noise is given", parameter="noise", cure="Give `noise`, or a `device`.")
     instrument = None if device is None else device_argument(device)
     sigma = 0.0 if instrument is None else instrument.sigma
     if noise is not None:
-        sigma = deviation_argument(noise, "noise") if number_argument(noise, "noise", 0.0) else 0.0
+        sigma = deviation_argument(noise, "noise") if finite_number(noise, "noise", lowest=0.0) else 0.0
     count = whole_argument(poses, "poses", 1)
     if not isinstance(truth, Robot):
         if not isinstance(truth, str | Path):

@@ -44,7 +44,7 @@ def validate(
     identified = {p.group for p in robot.parameters.values() if p.deviation is not None}
     if data.anchored and robot.fixtures and identified and "base" not in identified:
         raise InputError(
-            "the robot was calibrated without any instrument's frame, so it does not know where this one stands",
+            "the robot was calibrated without the frame of an instrument, so the place of this instrument is unknown",
             where=data.source,
             cure="Place it first: calibrate the calibrated robot with `model=frames`, or compare distances with "
             "'truearm distances'.",
@@ -57,7 +57,7 @@ def as_measured(robot: object, data: Dataset, payload: object, gravity: object) 
     robot = robot_argument(robot)
     if not robot.targets:
         raise InputError(
-            "the robot has no targets, so it cannot say where the instrument should have seen them",
+            "the robot has no targets, so its positions cannot be compared with the readings",
             where=robot.name,
             cure="Use the calibrated.yaml that 'truearm calibrate' wrote: it holds base and targets.",
         )
@@ -65,7 +65,7 @@ def as_measured(robot: object, data: Dataset, payload: object, gravity: object) 
     robot = robot.with_payload(payload_argument(payload), gravity_argument(gravity))
     if data.temperature is None and any(effect.warmed for effect in robot.effects):
         raise InputError(
-            "the robot was calibrated with its temperature, and the data do not say theirs",
+            "the robot was calibrated with its temperature, and the data hold no temperature",
             where=data.source,
             cure="Add the column temperature [degC].",
         )
@@ -74,5 +74,5 @@ def as_measured(robot: object, data: Dataset, payload: object, gravity: object) 
     for name in data.fixtures:
         robot.fixture(name)
     if not data.has_reading.any():
-        raise InputError("there is no reading at all", where=data.source, cure="Fill in x, y and z, or distance.")
+        raise InputError("there is no reading", where=data.source, cure="Fill in x, y and z, or distance.")
     return robot

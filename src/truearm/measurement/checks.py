@@ -26,14 +26,14 @@ Suspicion = Literal["outliers", "targets-swapped", "target-mistaken"]
 _COLDEST: Final = -30.0
 _WARMEST: Final = 80.0
 #: A distance, or a place, that holds better than this is never doubted [m].
-_HOLDS: Final = 1e-4
+_UNMOVED: Final = 1e-4
 #: How many robust deviations a distance or a place may be off.
 _DEVIATIONS: Final = 10.0
 #: A reading this close to another known point was taken from it [m].
 _SAME_POINT: Final = 1e-3
 #: A reading this far off was taken from another reflector, even an unknown one [m].
-_ANOTHER: Final = 0.02
-_NAMED: Final = 6
+_OTHER_REFLECTOR: Final = 0.02
+_MOST_NAMED: Final = 6
 
 
 @dataclass(frozen=True)
@@ -178,7 +178,7 @@ def rigid_suspects(data: Dataset) -> list[Suspect]:
     usual = _nanmedian(distance)
     off = abs(distance - usual)
     i, j = np.triu_indices(count, 1)
-    allowed = max(_HOLDS, _DEVIATIONS * 1.4826 * float(_nanmedian(off[:, i, j].reshape(-1))))
+    allowed = max(_UNMOVED, _DEVIATIONS * 1.4826 * float(_nanmedian(off[:, i, j].reshape(-1))))
     known = _fixed_points(data)
     suspects: list[Suspect] = []
     for c in np.flatnonzero((off > allowed).any(axis=(1, 2))).tolist():
@@ -203,11 +203,11 @@ def _blamed(
     suspects = []
     for t in doubted:
         size = float(np.max(off[t, seen]))
-        suspects.append(judged(here[t], label, names[t], size, known | others | before))
+        suspects.append(suspect(here[t], label, names[t], size, known | others | before))
     return suspects
 
 
-def judged(point: Array, label: str, target: str, size: float, known: dict[str, Array]) -> Suspect:
+def suspect(point: Array, label: str, target: str, size: float, known: dict[str, Array]) -> Suspect:
     """Say what a wrong reading is: another known point, another reflector, or an outlier.
 
     Parameters
@@ -225,7 +225,7 @@ def judged(point: Array, label: str, target: str, size: float, known: dict[str, 
     nearest = min(gaps, key=lambda name: gaps[name]) if gaps else None
     if nearest is not None and gaps[nearest] < _SAME_POINT < size:
         return Suspect("target-mistaken", label, target, f"is {nearest}")
-    if size > _ANOTHER:
+    if size > _OTHER_REFLECTOR:
         return Suspect("target-mistaken", label, target, f"{size * 1e3:.0f} mm off")
     return Suspect("outliers", label, target, f"{size * 1e3:.1f} mm off")
 
@@ -287,7 +287,7 @@ def _mistaken_references(data: Dataset) -> list[tuple[int, int, Suspect]]:
         alone = bool(neighbours) and all(off[k, t] <= allowed for k in neighbours)
         if gaps[nearest] < _SAME_POINT:
             found.append((c, t, Suspect("target-mistaken", data.labels[c], names[t], f"is {nearest}")))
-        elif alone and off[c, t] > _ANOTHER:
+        elif alone and off[c, t] > _OTHER_REFLECTOR:
             words = f"{off[c, t] * 1e3:.0f} mm off"
             found.append((c, t, Suspect("target-mistaken", data.labels[c], names[t], words)))
     return found
@@ -297,7 +297,7 @@ def _places(points: Array) -> tuple[Array, Array, float]:
     """Return usual places, how far each reading is from them, and how far it may be."""
     usual = _nanmedian(points)
     off = np.linalg.norm(points - usual, axis=2)
-    return usual, off, max(_HOLDS, _DEVIATIONS * float(_nanmedian(off.reshape(-1))))
+    return usual, off, max(_UNMOVED, _DEVIATIONS * float(_nanmedian(off.reshape(-1))))
 
 
 def _moved(data: Dataset) -> list[Notice]:
@@ -397,8 +397,8 @@ def _are(things: Sequence[object]) -> str:
 
 
 def _listed(words: Sequence[str]) -> str:
-    more = len(words) - _NAMED
-    return ", ".join(words[:_NAMED]) + (f" and {more} more" if more > 0 else "")
+    more = len(words) - _MOST_NAMED
+    return ", ".join(words[:_MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
 
 
 def _nanmedian(values: Array) -> Array:

@@ -26,9 +26,9 @@ FEWEST: Final = 4
 _LARGEST_TILT: Final = 0.05
 _LARGEST_SHARE: Final = 0.1
 #: Share of its length that an arc must be wide to be no straight line.
-_STRAIGHT: Final = 1e-9
+_STRAIGHT_LINE: Final = 1e-9
 #: Points nearer together than this are one [m].
-_ONE_PLACE: Final = 1e-9
+_SAME_POINT: Final = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +99,7 @@ class Circle:
         around = np.sort(self.angle)
         return float(2 * math.pi - np.diff(around, append=around[0] + 2 * math.pi).max())
 
-    def believed(self, sigma: float) -> Circle:
+    def with_sigma(self, sigma: float) -> Circle:
         """Return the circle with another standard deviation of a coordinate [m]."""
         return replace(self, sigma=sigma)
 
@@ -139,9 +139,9 @@ def fit_circle(points: Array, sigma: float | None = None, where: str = "circle")
     centroid = points.mean(axis=0)
     centred = points - centroid
     _, widths, (across, along, _) = np.linalg.svd(centred, full_matrices=False)
-    if widths[1] <= max(_STRAIGHT * widths[0], _ONE_PLACE):
+    if widths[1] <= max(_STRAIGHT_LINE * widths[0], _SAME_POINT):
         raise InputError(
-            "the points lie on a straight line or in one place, and make no circle",
+            "the points lie on a straight line or in one place, so no circle fits them",
             where=where,
             cure="Turn the joint further, or put the reflector further from its axis.",
         )
@@ -162,7 +162,7 @@ def fit_circle(points: Array, sigma: float | None = None, where: str = "circle")
         shares=np.asarray(np.linalg.inv(J.T @ J)),
         tilts=1.0 / widths[:2] ** 2,
     )
-    circle = circle.believed(circle.residual if sigma is None else sigma)
+    circle = circle.with_sigma(circle.residual if sigma is None else sigma)
     if circle.tilt_deviation > _LARGEST_TILT or circle.radius_deviation > _LARGEST_SHARE * radius:
         raise InputError(
             "the arc is too short for a circle",

@@ -1,4 +1,4 @@
-"""Datasets: joint readings and what an instrument saw there, in SI units."""
+"""Datasets: joint positions and what an instrument saw there, in SI units."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Dataset:
     labels
         Name of each configuration, in file order.
     joints
-        Joint readings [rad; m for prismatic joints], ``(configurations, joints)``.
+        Joint positions [rad; m for prismatic joints], ``(configurations, joints)``.
     joint_kinds
         ``revolute`` or ``prismatic`` for each joint, as the units of the file say.
     targets

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truearm.arrays import axes, number_array, shape_text
-from truearm.errors import InputError
+from truearm.errors import InputError, wrong_kind
 from truearm.modeling.chain import Array
 
 if TYPE_CHECKING:
@@ -56,20 +56,20 @@ def refuse_unsound(data: Dataset) -> None:
         if values is not None:
             _array(values, field, shape)
     if data.references is not None and data.references.labels != data.labels:
-        raise InputError("the reference points are of other configurations", parameter="references")
+        raise InputError("the reference points belong to other configurations", parameter="references")
 
 
 def refuse_other_lengths(quaternions: Array, parameter: str) -> None:
     """Refuse quaternions ``(n, 4)`` that are neither of length 1 nor missing."""
     length = np.sqrt((quaternions * quaternions).sum(axis=1))
-    _refuse(np.abs(length - 1.0) > _UNIT, length, parameter, "a quaternion has not length 1", "1, or NaN")
+    _refuse(np.abs(length - 1.0) > _UNIT, length, parameter, "a quaternion does not have length 1", "1, or NaN")
 
 
 def checked_selection(chosen: object, count: int, parameter: str, things: str) -> IntArray:
     """Return the indices that a mask or a sequence of indices chooses."""
     span = f"indices from 0 to {count - 1}, or a mask of {count} {things}" if count else "none: there are none"
     if axes(chosen) != 1 or isinstance(chosen, str | bytes):
-        raise InputError("indices or a mask belong here", parameter=parameter, came=_told(chosen), allowed=span)
+        raise wrong_kind("indices or a mask belong here", chosen, parameter, span)
     values = np.asarray(chosen)
     if values.dtype.kind == "b":
         if len(values) != count:
@@ -78,7 +78,7 @@ def checked_selection(chosen: object, count: int, parameter: str, things: str) -
     if not values.size:
         return np.zeros(0, dtype=np.intp)
     if values.dtype.kind not in "iu":
-        raise InputError("indices are whole numbers", parameter=parameter, came=str(values[0]), allowed=span)
+        raise InputError("indices must be whole numbers", parameter=parameter, came=str(values[0]), allowed=span)
     outside = (values < 0) | (values >= count)
     _refuse(outside, values, parameter, "there is no such index", span)
     return np.asarray(values, dtype=np.intp)
@@ -89,12 +89,10 @@ def checked_labels(names: Sequence[str | int] | None, parameter: str, count: int
     if names is None:
         return tuple(str(number + 1) for number in range(count))
     if isinstance(names, str | bytes) or axes(names) != 1 or len(names) != count:
-        raise InputError(
-            "the names do not fit the positions", parameter=parameter, came=_told(names), allowed=f"{count} names"
-        )
+        raise wrong_kind("the names do not fit the positions", names, parameter, f"{count} names")
     for name in names:
         if isinstance(name, bool) or not isinstance(name, str | Integral):
-            raise InputError("a name is a text", parameter=parameter, came=_told(name), allowed="texts")
+            raise wrong_kind("a name must be a text", name, parameter, "texts")
     made = tuple(str(name) for name in names)
     _distinct(made, parameter)
     return made
@@ -119,12 +117,8 @@ def checked_kinds(kinds: Sequence[str] | None, count: int) -> tuple[str, ...]:
     if kinds is None:
         return ("revolute",) * count
     if isinstance(kinds, str | bytes) or axes(kinds) != 1 or len(kinds) != count or {*kinds} - {*_KINDS}:
-        raise InputError(
-            "a kind of each joint belongs here",
-            parameter="joint_kinds",
-            came=_told(kinds),
-            allowed=f"{count} of {', '.join(_KINDS)}",
-        )
+        allowed = f"{count} of {', '.join(_KINDS)}"
+        raise wrong_kind("a kind of each joint belongs here", kinds, "joint_kinds", allowed)
     return tuple(kinds)
 
 
@@ -141,7 +135,9 @@ def checked_order(order: ArrayLike, count: int) -> IntArray:
     """Return the place of each configuration in the order of measurement."""
     places = number_array(order, "order", (count,))
     whole = np.asarray(np.round(places), dtype=np.intp)
-    _refuse((places != whole) | (places < 0), places, "order", "places are whole numbers", "whole numbers, 0 or more")
+    _refuse(
+        (places != whole) | (places < 0), places, "order", "places must be whole numbers", "whole numbers, 0 or more"
+    )
     if len(np.unique(whole)) < count:
         raise InputError("two configurations have the same place", parameter="order", allowed="each place once")
     return whole
@@ -149,7 +145,7 @@ def checked_order(order: ArrayLike, count: int) -> IntArray:
 
 def _array(values: object, field: str, shape: tuple[int | str, ...], *, missing: bool = False) -> None:
     if not isinstance(values, np.ndarray):
-        raise InputError("an array belongs here", parameter=field, came=_told(values), allowed=shape_text(shape))
+        raise wrong_kind("an array belongs here", values, field, shape_text(shape))
     number_array(values, field, shape, missing=missing)
 
 
@@ -158,7 +154,7 @@ def _places(values: object, field: str, count: int, end: int, lowest: int = 0) -
     assert isinstance(values, np.ndarray)
     allowed = f"{lowest} to {end - 1}"
     if values.dtype.kind not in "iu":
-        raise InputError("indices are whole numbers", parameter=field, came=str(values.dtype), allowed=allowed)
+        raise InputError("indices must be whole numbers", parameter=field, came=str(values.dtype), allowed=allowed)
     _refuse((values < lowest) | (values >= end), values, field, "there is no such index", allowed)
 
 
@@ -172,10 +168,3 @@ def _refuse(wrong: NDArray[np.bool_], values: NDArray[np.generic], field: str, w
     if wrong.any():
         place = int(np.flatnonzero(wrong)[0])
         raise InputError(what, parameter=field, came=f"{values[place]:g} at index {place}", allowed=allowed)
-
-
-def _told(given: object) -> str:
-    if isinstance(given, str | bytes | int | float | None):
-        return repr(given)
-    size = f" of {len(given)}" if isinstance(given, Sequence | np.ndarray) else ""
-    return f"an object of type {type(given).__name__}{size}"

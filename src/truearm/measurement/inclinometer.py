@@ -36,10 +36,10 @@ class Pairs:
     @property
     def in_turn(self) -> Postures:
         """All postures, first and second of each pair in turn, as they are measured."""
-        joints, wrench = self.readings_in_turn()
+        joints, wrench = self.joints_in_turn()
         return Postures(joints, wrench=wrench)
 
-    def readings_in_turn(self) -> tuple[Array, Array]:
+    def joints_in_turn(self) -> tuple[Array, Array]:
         """Return readings ``(2n, joints)`` and wrenches ``(2n, 6)``."""
         wrenches = [np.zeros((len(p), 6)) if p.wrench is None else p.wrench for p in (self.first, self.second)]
         joints = np.stack([self.first.joints, self.second.joints], axis=1)

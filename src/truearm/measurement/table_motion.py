@@ -10,7 +10,7 @@ from truearm.measurement.checks import clean_references
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.transform import quaternion_from_rotation, rigid_motion, rotation_from_quaternion
 
-_HOLDS = 1e-4  # references that keep their distances better than this moved together [m]
+_UNMOVED = 1e-4  # references that keep their distances better than this moved together [m]
 
 
 def without_table_motion(data: Dataset) -> Dataset:
@@ -33,7 +33,7 @@ def without_table_motion(data: Dataset) -> Dataset:
         seen = there[c]
         R, shift = rigid_motion(points[c, seen], usual[seen])
         misfit = np.linalg.norm(points[c, seen] @ R.T + shift - usual[seen], axis=1).max()
-        if misfit > _HOLDS:
+        if misfit > _UNMOVED:
             continue
         mine = data.configuration == c
         position[mine] = position[mine] @ R.T + shift

@@ -1,8 +1,8 @@
 """A joint turned alone: the runs of a campaign in which it is, and how far what it does is from what it reads.
 
 Source: Nubiola, section 2.4.1. A point on the tool goes round the joint's axis. The circle through its places is fitted
-by :mod:`.circles`; the angular error is the angle about that axis beyond the reading, the tangential error the same at
-the radius, and backlash is by how much the joint lags when it comes back.
+by :mod:`.circles`; the angular error is the angle about that axis beyond the joint position, the tangential error the
+same at the radius, and backlash is by how much the joint lags when it comes back.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from truearm.measurement.circles import FEWEST, Circle
 from truearm.measurement.dataset import Dataset, IntArray
 from truearm.modeling.chain import Array
 
-#: Readings that differ by less are the same: encoders flicker [rad].
-SAME_READING: Final = math.radians(0.01)
+#: Joint positions that differ by less are the same: encoders flicker [rad].
+SAME_POSITION: Final = math.radians(0.01)
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class Run:
 def find_runs(data: Dataset) -> tuple[Run, ...]:
     """Return the runs of a dataset, in the order of its configurations.
 
-    A run has four different readings or more. A configuration may end one run and begin the next.
+    A run has four different joint positions or more. A configuration may end one run and begin the next.
     """
     runs: list[Run] = []
     start, joint = 0, -1
@@ -58,11 +58,11 @@ def find_runs(data: Dataset) -> tuple[Run, ...]:
 
 
 def _moved(before: Array, after: Array) -> list[int]:
-    return [int(i) for i in np.flatnonzero(np.abs(after - before) > SAME_READING)]
+    return [int(i) for i in np.flatnonzero(np.abs(after - before) > SAME_POSITION)]
 
 
-def _different(readings: Array) -> int:
-    return 1 + int((np.diff(np.sort(readings)) > SAME_READING).sum())
+def _different(joints: Array) -> int:
+    return 1 + int((np.diff(np.sort(joints)) > SAME_POSITION).sum())
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,17 +72,18 @@ class Turn:
     Attributes
     ----------
     circle
-        Through the places of the point; its normal points along the joint's axis, so that angles grow with readings.
-    reading
-        Joint readings [rad], ``(n,)``.
+        Through the places of the point; its normal points along the joint's axis, so that angles grow with joint
+        positions.
+    joint_position
+        Joint positions [rad], ``(n,)``.
     error
-        Angle about the axis beyond the reading, zero on average [rad], ``(n,)``.
+        Angle about the axis beyond the joint position, zero on average [rad], ``(n,)``.
     direction
         Sign of the last move, 0 where it is not known, ``(n,)``.
     """
 
     circle: Circle
-    reading: Array
+    joint_position: Array
     error: Array
     direction: Array
 
@@ -98,8 +99,8 @@ class Turn:
 
     @property
     def backlash(self) -> float | None:
-        """How far the joint lags behind, backward minus forward at the same reading [rad]; None if nowhere known."""
-        places = np.round(self.reading / SAME_READING).astype(int)
+        """How far the joint lags, backward minus forward at the same joint position [rad]; None if nowhere known."""
+        places = np.round(self.joint_position / SAME_POSITION).astype(int)
         lags = []
         for place in np.unique(places):
             here = places == place
@@ -109,26 +110,26 @@ class Turn:
         return float(np.mean(lags)) if lags else None
 
 
-def turn_of(circle: Circle, reading: Array, direction: Array | None = None) -> Turn:
-    """Compare the angles about a fitted circle with joint readings ``(n,)`` [rad].
+def turn_of(circle: Circle, positions: Array, direction: Array | None = None) -> Turn:
+    """Compare the angles about a fitted circle with joint positions ``(n,)`` [rad].
 
     Parameters
     ----------
     circle
-        Fitted to the point's places; it is turned round where angles fall as readings grow.
+        Fitted to the point's places; it is turned round where angles fall as joint positions grow.
     direction
-        Sign of the last move, ``(n,)``; from the order of the readings if None, unknown until the first move.
+        Sign of the last move, ``(n,)``; from the order of the joint positions if None, unknown until the first move.
     """
-    agreement = [abs(np.exp(1j * (sense * circle.angle - reading)).mean()) for sense in (1, -1)]
+    agreement = [abs(np.exp(1j * (sense * circle.angle - positions)).mean()) for sense in (1, -1)]
     circle = circle if agreement[0] >= agreement[1] else circle.reversed()
-    beyond = np.exp(1j * (circle.angle - reading))
+    beyond = np.exp(1j * (circle.angle - positions))
     error = np.angle(beyond / beyond.mean())
-    return Turn(circle, reading, error - error.mean(), _directions(reading) if direction is None else direction)
+    return Turn(circle, positions, error - error.mean(), _directions(positions) if direction is None else direction)
 
 
-def _directions(reading: Array) -> Array:
-    signs = np.zeros(len(reading))
-    for row in range(1, len(reading)):
-        step = reading[row] - reading[row - 1]
-        signs[row] = signs[row - 1] if abs(step) <= SAME_READING else math.copysign(1.0, step)
+def _directions(positions: Array) -> Array:
+    signs = np.zeros(len(positions))
+    for row in range(1, len(positions)):
+        step = positions[row] - positions[row - 1]
+        signs[row] = signs[row - 1] if abs(step) <= SAME_POSITION else math.copysign(1.0, step)
     return signs

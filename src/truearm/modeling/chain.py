@@ -205,7 +205,7 @@ class ForwardKinematics:
         tips = [tip]
         for element, move in zip(reversed(self.elements), reversed(self.moves), strict=True):
             if move:
-                tip = seen_before(tip, element, move)
+                tip = in_frame_before(tip, element, move)
             tips.append(tip)
         tips.reverse()
         return tips
@@ -329,7 +329,7 @@ def _turned(axes: Axes, element: Element, move: Move) -> Axes:
     return turned[0], turned[1], turned[2]
 
 
-def seen_before(point: Coordinates, element: Element, move: Move) -> Coordinates:
+def in_frame_before(point: Coordinates, element: Element, move: Move) -> Coordinates:
     """Return a point seen from the frame before an element, from how it is seen from the frame behind."""
     if element.axis is not None:
         if element.turns:
@@ -347,7 +347,7 @@ def seen_before(point: Coordinates, element: Element, move: Move) -> Coordinates
     return seen[0], seen[1], seen[2]
 
 
-def seen_behind(vector: Coordinates, element: Element, move: Move) -> Coordinates:
+def in_frame_behind(vector: Coordinates, element: Element, move: Move) -> Coordinates:
     """Return a vector seen from the frame behind a turn, from how it is seen from the frame before."""
     if element.axis is not None:
         return _combined(move[0::3], vector), _combined(move[1::3], vector), _combined(move[2::3], vector)

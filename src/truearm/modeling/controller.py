@@ -1,7 +1,8 @@
 """How a robot's controller counts its joints, and where it has its frames.
 
-Programs and teach pendants speak in the controller's readings and frames, which need not be the model's: a joint may
-count the other way, from another zero, or together with another joint, as the third of a FANUC robot counts the second.
+Programs and teach pendants speak in the controller's joint positions and frames, which need not be the model's: a joint
+may count the other way, from another zero, or together with another joint, as the third of a FANUC robot counts the
+second.
 """
 
 from __future__ import annotations
@@ -21,20 +22,20 @@ from truearm.modeling.transform import IDENTITY, Transform
 class Controller:
     """What a robot's controller shows of the joints, and where its frames stand in those of the model.
 
-    ``reading_i = zero_i + sign_i * (joint_i + sum_j coupling_ij * joint_j)``
+    ``count_i = zero_i + sign_i * (joint_i + sum_j coupling_ij * joint_j)``
 
     Attributes
     ----------
     signs
         1 or -1 for each joint; empty if all are 1.
     zeros
-        What the controller reads where the joint is zero, and all that it is coupled with [rad or m]; empty if all
+        What the controller counts where the joint is zero, and all that it is coupled with [rad or m]; empty if all
         are 0.
     couplings
-        For a joint how much of others its reading counts, by joint numbers from 1: ``{3: {2: 1.0}}`` if the reading
-        of joint 3 counts joint 2 as well.
+        For a joint how much of others its count includes, by joint numbers from 1: ``{3: {2: 1.0}}`` if the count of
+        joint 3 includes joint 2.
     pulses
-        Pulses of the motor per unit of the reading [1/rad or 1/m], None where unknown; empty if all are.
+        Pulses of the motor per unit of the count [1/rad or 1/m], None where unknown; empty if all are.
     base
         ``T_base_controllerbase``: the controller's base frame in the robot's.
     flange
@@ -52,39 +53,39 @@ class Controller:
     source: str = ""
 
     def coupling(self, count: int) -> Array:
-        """Return what readings of `count` joints count, before signs and zeros: a matrix ``(count, count)``."""
+        """Return which joints the counts of `count` joints include, before signs and zeros, ``(count, count)``."""
         matrix = np.eye(count)
         for joint, others in self.couplings.items():
             for other, share in others.items():
                 matrix[joint - 1, other - 1] = share
         return matrix
 
-    def readings(self, joints: Array) -> Array:
-        """Return the controller's readings ``(n, joints)`` [rad or m] of joints ``(n, joints)`` of the model."""
+    def from_model(self, joints: Array) -> Array:
+        """Return joints ``(n, joints)`` [rad or m] as the controller counts them, from those of the model."""
         counted = joints @ self.coupling(joints.shape[1]).T if self.couplings else joints
         turned = counted * self.signs if self.signs else counted
         return turned + self.zeros if self.zeros else turned
 
-    def joints(self, readings: Array) -> Array:
-        """Return the joints ``(n, joints)`` [rad or m] of the model at readings ``(n, joints)`` of the controller."""
-        turned = readings - self.zeros if self.zeros else readings
-        counted = turned * self.signs if self.signs else turned
+    def to_model(self, counted: Array) -> Array:
+        """Return the joints ``(n, joints)`` [rad or m] of the model from joints as the controller counts them."""
+        turned = counted - self.zeros if self.zeros else counted
+        coupled = turned * self.signs if self.signs else turned
         if not self.couplings:
-            return counted
-        return np.asarray(np.linalg.solve(self.coupling(readings.shape[1]), counted.T).T, float)
+            return coupled
+        return np.asarray(np.linalg.solve(self.coupling(counted.shape[1]), coupled.T).T, float)
 
-    def pulses_of(self, readings: Array) -> Array:
-        """Return the pulses ``(n, joints)`` of the motors at readings ``(n, joints)`` of the controller [rad or m].
+    def to_pulses(self, counted: Array) -> Array:
+        """Return the pulses ``(n, joints)`` of the motors at joints ``(n, joints)`` [rad or m] of the controller.
 
         Raises
         ------
         InputError
             If a joint's pulses are not known.
         """
-        return readings * self._known_pulses(readings.shape[1])
+        return counted * self._known_pulses(counted.shape[1])
 
-    def readings_of(self, pulses: Array) -> Array:
-        """Return the controller's readings ``(n, joints)`` [rad or m] at pulses ``(n, joints)`` of the motors.
+    def from_pulses(self, pulses: Array) -> Array:
+        """Return joints ``(n, joints)`` [rad or m] as the controller counts them, at pulses of the motors.
 
         Raises
         ------
@@ -98,7 +99,7 @@ class Controller:
         missing = [number for number, per_unit in enumerate(pulses, 1) if per_unit is None]
         if missing:
             raise InputError(
-                "nobody knows how many motor pulses make a degree or a mm",
+                "the number of motor pulses per degree or per mm is not known",
                 where=f"joint {', '.join(map(str, missing))}",
                 cure="Give pulses_per_degree or pulses_per_mm in the robot file, under controller, joints.",
             )

@@ -60,15 +60,15 @@ def postures_in_equilibrium(robot: Robot, at: Postures) -> Postures:
     return replace(at, loads=_loads(robot, at, variables))
 
 
-def readings_in_equilibrium(robot: Robot, variables: Array) -> Array:
-    """Return the readings ``(joints, n)`` that lead to variables, whose loads are known from the start."""
+def joints_in_equilibrium(robot: Robot, variables: Array) -> Array:
+    """Return the joint positions ``(joints, n)`` that lead to variables, whose loads are known from the start."""
     loads = joint_loads(robot, variables) if any(effect.loaded for effect in robot.effects) else None
     turned = variables[: len(robot.joints)]
 
-    def corrected(rows: NDArray[np.intp], readings: Array) -> Array:
-        at = Postures(readings.T, loads=None if loads is None else loads[:, :, rows])
-        missing = turned[:, rows] - robot.variables(at, robot.values)[: len(readings)]
-        return np.asarray(readings + missing)
+    def corrected(rows: NDArray[np.intp], joints: Array) -> Array:
+        at = Postures(joints.T, loads=None if loads is None else loads[:, :, rows])
+        missing = turned[:, rows] - robot.variables(at, robot.values)[: len(joints)]
+        return np.asarray(joints + missing)
 
     return settled(corrected, turned)
 

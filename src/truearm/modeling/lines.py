@@ -17,10 +17,10 @@ from truearm.modeling.robot import Robot
 #: Below this angle [rad] two axes are parallel: they part by less than 1 nm over the reach of a robot.
 PARALLEL: Final = 1e-9
 #: Below this angle [rad] two axes fix no frame that is worth it: where it stands would be uncertain.
-_SQUARE_ENOUGH: Final = 0.1
+_LEAST_ANGLE: Final = 0.1
 #: Two opposite normals are as near to a direction if they are this square to it [cosine]: 10 deg, so that the small
 #: errors of a real robot do not turn its frames round.
-_AS_NEAR: Final = math.sin(math.radians(10.0))
+_UNDECIDED: Final = math.sin(math.radians(10.0))
 #: Below this distance [m] two parallel axes are one line.
 ONE_LINE: Final = 1e-12
 
@@ -45,7 +45,7 @@ class JointAxis:
 
 
 def joint_axes(robot: Robot) -> list[JointAxis]:
-    """Return the joint axes of a robot as it is now, readings at zero."""
+    """Return the joint axes of a robot as it is now, joint positions at zero."""
     kinematics = robot.rigid.forward_kinematics(np.zeros((1, len(robot.joints))))
     places = {e.variable: i for i, e in enumerate(kinematics.elements) if e.variable is not None}
     return [
@@ -82,12 +82,12 @@ def frame_between(axis: JointAxis, other: JointAxis) -> Array:
     """
     normal = np.cross(axis.along, other.along)
     sine = float(np.linalg.norm(normal))
-    if sine < _SQUARE_ENOUGH:
+    if sine < _LEAST_ANGLE:
         raise InputError(
-            "two axes that are parallel fix no frame",
+            "two parallel axes do not define a frame",
             where=f"{axis.joint.name} and {other.joint.name}",
             came=f"{math.degrees(axis.angle(other)):.3g} deg apart",
-            allowed=f"{math.degrees(_SQUARE_ENOUGH):.3g} deg or more",
+            allowed=f"{math.degrees(_LEAST_ANGLE):.3g} deg or more",
         )
     apart = other.point - axis.point
     foot = axis.point + float(np.cross(apart, other.along) @ normal) / sine**2 * axis.along
@@ -118,16 +118,16 @@ def common_normal(axis: JointAxis, following: JointAxis, before: Array, here: Ar
         apart = following.point - axis.point
         foot = axis.point + float(np.cross(apart, following.along) @ normal) / sine * axis.along
         landing = following.point + float(np.cross(apart, axis.along) @ normal) / sine * following.along
-    return nearer_way(normal, before, landing - foot), foot, landing
+    return nearer_sense(normal, before, landing - foot), foot, landing
 
 
-def nearer_way(normal: Array, before: Array, gap: Array) -> Array:
+def nearer_sense(normal: Array, before: Array, gap: Array) -> Array:
     """Return `normal` or its opposite: the one nearer to `before`, where both are as near the one along `gap`."""
-    leaning = float(normal @ before)
-    if abs(leaning) < _AS_NEAR:
+    along = float(normal @ before)
+    if abs(along) < _UNDECIDED:
         distance = float(gap @ normal)
-        leaning = distance if abs(distance) > ONE_LINE else 1.0
-    return normal if leaning > 0 else -normal
+        along = distance if abs(distance) > ONE_LINE else 1.0
+    return normal if along > 0 else -normal
 
 
 def across(rotation: Array, along: Array) -> Array:

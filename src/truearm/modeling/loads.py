@@ -28,15 +28,15 @@ from truearm.modeling.chain import (
     across,
     axis_of,
     cross,
-    seen_before,
-    seen_behind,
+    in_frame_before,
+    in_frame_behind,
 )
 from truearm.modeling.parts import POINT_MASS, Inertia
 
 if TYPE_CHECKING:
     from truearm.modeling.robot import Robot
 
-_NOTHING: Final[Coordinates] = (0.0, 0.0, 0.0)
+_ZERO: Final[Coordinates] = (0.0, 0.0, 0.0)
 
 
 def has_weight(robot: Robot) -> bool:
@@ -102,17 +102,17 @@ def joint_loads(
     qdd = rest if acceleration is None else acceleration
 
     fall: Coordinates = robot.gravity
-    omega = alpha = force = moment = _NOTHING
+    omega = alpha = force = moment = _ZERO
     if wrench is not None:
         force, moment = (wrench[0], wrench[1], wrench[2]), (wrench[3], wrench[4], wrench[5])
     applied: dict[int, list[tuple[Coordinates, Coordinates]]] = {}
     for place, (element, move) in enumerate(zip(elements, moves, strict=True), 1):
         if move and element.turns:
-            fall = seen_behind(fall, element, move)
+            fall = in_frame_behind(fall, element, move)
             if moving:
-                omega, alpha = seen_behind(omega, element, move), seen_behind(alpha, element, move)
+                omega, alpha = in_frame_behind(omega, element, move), in_frame_behind(alpha, element, move)
             if wrench is not None:
-                force, moment = seen_behind(force, element, move), seen_behind(moment, element, move)
+                force, moment = in_frame_behind(force, element, move), in_frame_behind(moment, element, move)
         elif move and moving:
             fall = _less(fall, _swing(omega, alpha, _scaled(axis_of(element), move[0])))
         if moving and element.variable is not None and element.variable < count:
@@ -125,8 +125,8 @@ def joint_loads(
                 fall = _less(fall, _plus(_plus(turned, turned), surge))
         for end, mass, cog, inertia in bodies:
             if end == place:
-                felt = _less(fall, _swing(omega, alpha, cog)) if moving else fall
-                pull = _scaled(felt, mass)
+                apparent = _less(fall, _swing(omega, alpha, cog)) if moving else fall
+                pull = _scaled(apparent, mass)
                 turn = cross(cog, pull)
                 if moving and any(inertia):
                     turn = _less(turn, _plus(_times(inertia, alpha), cross(omega, _times(inertia, omega))))
@@ -142,7 +142,7 @@ def joint_loads(
                 loads[element.variable, k] = _along(axis, force)
                 loads[element.variable, 3 + k] = _along(axis, moment)
         if move and element.turns:
-            force, moment = seen_before(force, element, move), seen_before(moment, element, move)
+            force, moment = in_frame_before(force, element, move), in_frame_before(moment, element, move)
         elif move:
             moment = _plus(moment, cross(_scaled(axis_of(element), move[0]), force))
     return loads

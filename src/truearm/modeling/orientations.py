@@ -38,9 +38,9 @@ from truearm.modeling.transform import (
 )
 
 #: Two rotations that differ by less [rad] are the same: the rounding of the arithmetic behind them.
-_SAME: Final = 1e-8
+_SAME_ROTATION: Final = 1e-8
 #: Below this cosine of the middle angle the other two turn about one axis.
-_LOCKED: Final = 1e-6
+_GIMBAL_LOCK: Final = 1e-6
 _TURN: Final = 2.0 * np.pi
 
 
@@ -74,7 +74,7 @@ class Orientation:
             Numbers ``(n, count)`` to stay near to. Where they mean the same rotation they are returned as they are.
         """
         turned = np.linalg.norm(rotation_vector(self.matrices(near).swapaxes(1, 2) @ R), axis=1)
-        return np.where(turned[:, None] < _SAME, near, self.nearest(R, near))
+        return np.where(turned[:, None] < _SAME_ROTATION, near, self.nearest(R, near))
 
 
 def _matrices_of_quaternions(numbers: Array) -> Array:
@@ -105,7 +105,7 @@ def _nearest_zyx(R: Array, near: Array) -> Array:
     middle = np.arctan2(-R[:, 2, 0], upright)
     first = np.arctan2(R[:, 1, 0], R[:, 0, 0])
     last = np.arctan2(R[:, 2, 1], R[:, 2, 2])
-    locked = upright < _LOCKED
+    locked = upright < _GIMBAL_LOCK
     first = np.where(locked, near[:, 0], first)
     # With the first turn undone the rest is Ry(B) Rx(C), whose second row is 0, cos C, -sin C.
     undone = _about(2, -first) @ R
@@ -139,7 +139,7 @@ def _nearest_vectors(R: Array, near: Array) -> Array:
     angle, size = (np.linalg.norm(u, axis=1, keepdims=True) for u in (v, near))
     # No turn at all, or whole turns, about any axis: that of the given numbers.
     along_near = near / np.where(size > 0.0, size, 1.0)
-    axis = np.where(angle > _SAME, v / np.where(angle > 0.0, angle, 1.0), along_near)
+    axis = np.where(angle > _SAME_ROTATION, v / np.where(angle > 0.0, angle, 1.0), along_near)
     turns = np.round(((near * axis).sum(axis=1, keepdims=True) - angle) / _TURN)
     return np.asarray(v + _TURN * turns * axis)
 

@@ -10,7 +10,7 @@ from functools import cached_property
 from typing import Final
 
 from truearm.arrays import finite_number, number_array
-from truearm.errors import InputError
+from truearm.errors import InputError, wrong_kind
 from truearm.modeling.chain import Chain, Element, Motion
 from truearm.modeling.conventions import JointKind
 from truearm.modeling.transform import fixed_rotation
@@ -37,7 +37,7 @@ class Joint:
     row
         Nominal value of each column of the convention [m and rad].
     limits
-        Lowest and highest reading [rad or m], where known.
+        Lowest and highest joint position [rad or m], where known.
     transmission_periods
         How often the joint's gear errs in a turn of the joint, where known: for a strain wave gear twice the turns of
         its wave generator.
@@ -105,12 +105,8 @@ class Payload:
             return payload
         if isinstance(payload, str):
             return cls.of_text(payload, parameter)
-        raise InputError(
-            "a payload belongs here",
-            parameter=parameter,
-            came=f"an object of type {type(payload).__name__}",
-            allowed="a Payload, or a text: 2.7kg,50mm,25mm,100mm",
-        )
+        allowed = "a Payload, or a text: 2.7kg,50mm,25mm,100mm"
+        raise wrong_kind("a payload belongs here", payload, parameter, allowed)
 
     @classmethod
     def of_text(cls, text: str, parameter: str = "payload") -> Payload:
@@ -147,7 +143,7 @@ def _quantity(text: str, units: tuple[str, ...], parameter: str) -> float:
     number = None if match is None else as_number(match["number"].strip())
     if match is None or number is None or match["unit"] not in units:
         raise InputError(
-            "a number with its unit belongs here" if number is None else "no unit is given that fits here",
+            "a number with its unit belongs here" if number is None else "no unit that fits is given",
             parameter=parameter,
             came=text,
             allowed=" or ".join(f"{'2.7' if units is _MASSES else '50'}{unit}" for unit in units),
@@ -164,7 +160,7 @@ def checked_gravity(gravity: object, parameter: str = "gravity") -> tuple[float,
     x, y, z = number_array(gravity, parameter, (3,)).tolist()
     if not 0.1 <= math.hypot(x, y, z) <= 100.0:
         raise InputError(
-            "this is no acceleration of free fall",
+            "this cannot be the acceleration of free fall",
             parameter=parameter,
             came=f"{math.hypot(x, y, z):g} m/s^2",
             allowed="about 9.81 m/s^2 on Earth, 0.1 to 100",

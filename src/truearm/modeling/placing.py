@@ -28,7 +28,7 @@ def placed(robot: Robot, base: Transform, targets: Mapping[str, Transform | Sequ
     return moved.with_parameters(moved.parameters[n].restarted(v) for n, v in places.items())
 
 
-def with_fixtures_beside(robot: Robot, places: Mapping[str, tuple[FixtureKind, Transform]]) -> Robot:
+def fixtures_placed(robot: Robot, places: Mapping[str, tuple[FixtureKind, Transform]]) -> Robot:
     """Return a robot with other fixtures beside it, as :meth:`truearm.Robot.with_fixtures` does."""
     kept = {n: p for n, p in robot.known.items() if p.group != "fixture"}
     made = tuple(Fixture(name, kind, place.quaternion) for name, (kind, place) in places.items())

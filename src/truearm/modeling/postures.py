@@ -1,4 +1,4 @@
-"""Postures: joint readings, and what else the shape of an arm depends on."""
+"""Postures: joint positions, and what else the shape of an arm depends on."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from truearm.modeling.chain import Array
 
 @dataclass(frozen=True, eq=False)
 class Postures:
-    """Joint readings under known circumstances.
+    """Joint positions under known circumstances.
 
     Attributes
     ----------
     joints
-        Readings [rad; m for sliding joints], ``(n, joints)``.
+        Joint positions [rad; m for sliding joints], ``(n, joints)``.
     velocity, acceleration
         Of the joints [rad/s, m/s and so on], ``(n, joints)``; at rest if None.
     approach
@@ -46,7 +46,7 @@ class Postures:
 
     @classmethod
     def of(cls, q: Array | Postures) -> Postures:
-        """Return plain readings ``(n, joints)`` as postures at rest."""
+        """Return plain joint positions ``(n, joints)`` as postures at rest."""
         return q if isinstance(q, Postures) else cls(np.asarray(q, float))
 
     @property
@@ -84,7 +84,7 @@ def approach_of(joints: Array, order: NDArray[np.int64]) -> Array:
     Parameters
     ----------
     joints
-        Readings ``(n, joints)``.
+        Joint positions ``(n, joints)``.
     order
         Number of each row in the sequence of measurement, ``(n,)``. A row whose predecessor is not there came from
         nowhere known: its signs are 0. A joint that did not move keeps the sign of its move before.

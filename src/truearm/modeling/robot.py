@@ -13,13 +13,13 @@ from truearm.arrays import finite_numbers
 from truearm.errors import InputError, did_you_mean
 from truearm.modeling.chain import Array, ForwardKinematics
 from truearm.modeling.effects import checked_effects
-from truearm.modeling.equilibrium import postures_in_equilibrium, readings_in_equilibrium
+from truearm.modeling.equilibrium import joints_in_equilibrium, postures_in_equilibrium
 from truearm.modeling.fixtures import FixtureKind
 from truearm.modeling.frames import Frame, forward, jacobian
 from truearm.modeling.loads import joint_loads
 from truearm.modeling.parameters import Parameter
 from truearm.modeling.parts import Payload, checked_gravity
-from truearm.modeling.placing import placed, with_fixtures_beside
+from truearm.modeling.placing import fixtures_placed, placed
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot_data import STRUCTURE, RobotData
 from truearm.modeling.robot_parameters import by_parameters, effect_rates
@@ -128,7 +128,7 @@ class Robot(RobotData):
         places
             What each fixture is and where it stands in the world, see :meth:`Fixture.values_at`.
         """
-        return with_fixtures_beside(self, places)
+        return fixtures_placed(self, places)
 
     # -- kinematics ----------------------------------------------------------------------------------------
 
@@ -152,31 +152,31 @@ class Robot(RobotData):
         return postures_in_equilibrium(self, at)
 
     def variables(self, q: Array | Postures, values: Values) -> Array:
-        """Return the variables ``(joints or more, ..., n)`` of the trunk behind the readings `q`.
+        """Return the variables ``(joints or more, ..., n)`` of the trunk behind the joint positions `q`.
 
         Those of the joints come first; the rest of :attr:`layout` is there if some effect tilts or stretches.
         """
         at = self.loaded(q)
-        readings = np.ascontiguousarray(at.joints.T)
+        joints = np.ascontiguousarray(at.joints.T)
         moved: dict[int, Array] = {}
         for effect in self.effects:
             for variable, part in effect.deflection(at, values).items():
                 moved[variable] = moved[variable] + part if variable in moved else part
-        if not moved and len(self.moving) == len(readings):
-            return readings
-        shape = np.broadcast_shapes(readings.shape[1:], *(part.shape for part in moved.values()))
+        if not moved and len(self.moving) == len(joints):
+            return joints
+        shape = np.broadcast_shapes(joints.shape[1:], *(part.shape for part in moved.values()))
         variables = np.zeros((len(self.moving), *shape))
-        variables[: len(readings)] = readings if len(shape) == 1 else readings[:, None, :]
+        variables[: len(joints)] = joints if len(shape) == 1 else joints[:, None, :]
         for variable, part in moved.items():
             variables[variable] += part
         return variables
 
-    def readings(self, variables: Array) -> Array:
-        """Return the readings ``(n, joints)`` behind variables ``(joints or more, n)``: the inverse of `variables`.
+    def joints_of(self, variables: Array) -> Array:
+        """Return the joints ``(n, joints)`` behind variables ``(joints or more, n)``: the inverse of `variables`.
 
-        They are those of the arm at rest, where nothing but the readings is known, with its own parameter values. The
-        loads of an arm that has bent are known, so that there is one answer even where two ends of a joint's play are
-        in equilibrium.
+        They are those of the arm at rest, where nothing but the joint positions is known, with its own parameter
+        values. The loads of an arm that has bent are known, so that there is one answer even where two ends of a
+        joint's play are in equilibrium.
         """
         if variables.ndim != 2 or len(variables) != len(self.moving):
             raise InputError(
@@ -185,7 +185,7 @@ class Robot(RobotData):
                 came=f"an array of shape {variables.shape}",
                 allowed=f"({len(self.moving)}, n)",
             )
-        return np.ascontiguousarray(readings_in_equilibrium(self, variables).T)
+        return np.ascontiguousarray(joints_in_equilibrium(self, variables).T)
 
     def without_deflections(self, joints: Array) -> Array:
         """Return the variables ``(joints or more, n)`` of joints ``(joints, n)`` that turn and do nothing else."""
@@ -215,7 +215,7 @@ class Robot(RobotData):
         Parameters
         ----------
         q
-            Joint readings ``(n, joints)``, or postures.
+            Joint positions ``(n, joints)``, or postures.
         target
             Name of a target; the flange if None.
         values
@@ -386,7 +386,7 @@ class Robot(RobotData):
         )
 
     def random_configurations(self, count: int, rng: np.random.Generator) -> Array:
-        """Return joint readings ``(count, joints)`` drawn evenly within the limits (or a turn, or 1 m)."""
+        """Return joint positions ``(count, joints)`` drawn evenly within the limits (or a turn, or 1 m)."""
         default = {"revolute": (-np.pi, np.pi), "prismatic": (-0.5, 0.5)}
         low, high = np.array([j.limits or default[j.kind] for j in self.joints]).T
         return rng.uniform(low, high, (count, len(self.joints)))

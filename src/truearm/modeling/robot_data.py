@@ -172,7 +172,7 @@ class RobotData:
 
     @cached_property
     def rigid(self) -> Self:
-        """The robot without its joint effects: every joint turns by its reading."""
+        """The robot without its joint effects: every joint turns by its joint position."""
         return replace(self, effect_names=())
 
     @cached_property

@@ -158,7 +158,7 @@ def workspace(part: Dataset, tips: Array, before: Array, after: Array) -> Figure
 
 
 def residuals(
-    data: Dataset, parts: Sequence[tuple[str, NDArray[np.intp], Array]], doubted: NDArray[np.bool_]
+    data: Dataset, parts: Sequence[tuple[str, NDArray[np.intp], Array]], down_weighted: NDArray[np.bool_]
 ) -> Figure:
     """Show the error after calibration of every configuration, mean over its targets, as measured.
 
@@ -168,8 +168,8 @@ def residuals(
         All readings.
     parts
         Training and then held-out: name, indices of the configurations, error of each reading [mm].
-    doubted
-        Which training readings the loss doubted.
+    down_weighted
+        Which training readings the loss gave little weight.
     """
     looks = ({"symbol": "circle-open", "size": 6}, {"symbol": "diamond", "size": 6})
     traces: list[Figure] = []
@@ -196,7 +196,7 @@ def residuals(
             }
         )
     _, training, errors = parts[0]
-    marked = np.flatnonzero(doubted & np.isfinite(errors))
+    marked = np.flatnonzero(down_weighted & np.isfinite(errors))
     if len(marked):
         part = data.of_configurations(training)
         configuration = part.configuration[marked]
@@ -204,7 +204,7 @@ def residuals(
             {
                 "type": "scatter",
                 "mode": "markers",
-                "name": "single readings that the loss doubted",
+                "name": "single readings with little weight",
                 "x": (training[configuration] + 1).tolist(),
                 "y": rounded(errors[marked], 4),
                 "customdata": [

@@ -37,9 +37,9 @@ def plan_html(planned: Plan) -> str:
     )
 
 
-def number_figure(told: Prediction, planned: int) -> Figure:
+def number_figure(prediction: Prediction, planned: int) -> Figure:
     """Show how the predicted error falls with the number of poses."""
-    numbers = told.numbers.tolist()
+    numbers = prediction.numbers.tolist()
     traces: list[Figure] = [
         {
             "type": "scatter",
@@ -49,7 +49,10 @@ def number_figure(told: Prediction, planned: int) -> Figure:
             "y": rounded(1e3 * errors, 4),
             "line": {"color": colour, "width": 2},
         }
-        for name, errors, colour in (("drawn by chance", told.random, BEFORE), ("chosen", told.chosen, AFTER))
+        for name, errors, colour in (
+            ("drawn at random", prediction.random, BEFORE),
+            ("chosen", prediction.chosen, AFTER),
+        )
     ]
     traces.append(
         {
@@ -57,28 +60,28 @@ def number_figure(told: Prediction, planned: int) -> Figure:
             "mode": "markers",
             "name": "this plan",
             "x": [planned],
-            "y": rounded(np.array([1e3 * told.planned]), 4),
+            "y": rounded(np.array([1e3 * prediction.planned]), 4),
             "marker": {"color": "#b3261e", "size": 10, "symbol": "diamond"},
         }
     )
     line = {"type": "line", "x0": 0, "x1": 1, "xref": "paper", "line": {"dash": "dot", "color": "#646b72"}}
-    shapes = [line | {"y0": 1e3 * told.floor, "y1": 1e3 * told.floor}]
-    highest = 1e3 * max([2.0 * told.floor, told.planned * 1.05])
+    shapes = [line | {"y0": 1e3 * prediction.floor, "y1": 1e3 * prediction.floor}]
+    highest = 1e3 * max([2.0 * prediction.floor, prediction.planned * 1.05])
     return figure(
         traces,
         420,
         xaxis=axis("poses") | {"rangemode": "tozero"},
-        yaxis=axis("mean error of unseen readings [mm]") | {"range": [0.9e3 * told.floor, highest]},
+        yaxis=axis("mean error of other readings [mm]") | {"range": [0.9e3 * prediction.floor, highest]},
         shapes=shapes,
     )
 
 
 def workspace_figure(plan: MeasurementPlan) -> Figure:
     """Show where in the workspace the calibrated model will be good: its own error, without the noise of a reading."""
-    told = plan.prediction
+    prediction = plan.prediction
     base = plan.robot.base
-    points = 1e3 * (told.places - np.array(base.translation)) @ base.rotation
-    errors = rounded(1e3 * told.error, 3)
+    points = 1e3 * (prediction.places - np.array(base.translation)) @ base.rotation
+    errors = rounded(1e3 * prediction.error, 3)
     trace = {
         "type": "scatter3d",
         "mode": "markers",

@@ -90,7 +90,7 @@ def pose_cube(plan: PosePlan, paths: Mapping[str, Array] | None = None) -> Figur
 
 
 def joint_trajectories(motion: JointMotion, robot: Robot) -> Figure:
-    """Show readings, velocities and accelerations of all joints over time, one below the other."""
+    """Show joint positions, velocities and accelerations of all joints over time, one below the other."""
     kept = _thinned(len(motion.time))
     traces: list[Figure] = []
     panels = ((motion.joints, "y", ""), (motion.velocity, "y2", "/s"), (motion.acceleration, "y3", "/s²"))
@@ -114,7 +114,7 @@ def joint_trajectories(motion: JointMotion, robot: Robot) -> Figure:
             )
     kinds = dict.fromkeys(joint.kind for joint in robot.joints)
     units = [" or ".join(f"{_SHOWN[kind][1]}{per}" for kind in kinds) for _, _, per in panels]
-    titles = ("reading", "velocity", "acceleration")
+    titles = ("position", "velocity", "acceleration")
     domains: Sequence[list[float]] = ([0.70, 1.0], [0.36, 0.66], [0.0, 0.30])
     axes = {
         f"yaxis{number or ''}": {**axis(f"{title} [{unit}]"), "domain": domain}

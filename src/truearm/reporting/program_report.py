@@ -42,7 +42,7 @@ def program_html(correction: ProgramCorrection) -> str:
             correction.simulated.original * 1e3,
             correction.simulated.corrected * 1e3,
             "mm",
-            "distance from where it was meant",
+            "distance from the programmed path",
             "targets",
         )
     every = [(file.name, one) for file in correction.files for one in file.skipped]

@@ -29,8 +29,8 @@ from truearm.reporting.tables import (
 from truearm.results.calibration import Calibration
 
 _FRAMES: Final = ("base", "target", "fixture")
-#: A reading whose weight is less than this share of the median weight was not believed.
-_DOUBTED: Final = 0.5
+#: A reading is down-weighted if its weight is less than this share of the median weight.
+_DOWN_WEIGHTED: Final = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +94,7 @@ class Report:
         parts = [("training", run.training, _millimetres(run.train))]
         if run.validation is not None:
             parts.append(("held out", run.held_out, _millimetres(run.validation)))
-        drawn["residuals"] = residuals(run.data, parts, self._doubted())
+        drawn["residuals"] = residuals(run.data, parts, self._down_weighted())
         drawn["correlations"] = correlation_map(run.fit)
         return drawn
 
@@ -106,14 +106,14 @@ class Report:
         base = robot.base
         return np.asarray((tips[part.target, part.configuration] - np.array(base.translation)) @ base.rotation)
 
-    def _doubted(self) -> NDArray[np.bool_]:
+    def _down_weighted(self) -> NDArray[np.bool_]:
         """Return which training readings a robust loss left less than half the weight of a typical one.
 
         The weights of ``l1`` are 1 over the residual, so a weight says something only beside the others.
         """
         weight = self.calibration.fit.weight
-        doubted: NDArray[np.bool_] = weight < _DOUBTED * np.nanmedian(weight)
-        return doubted
+        down_weighted: NDArray[np.bool_] = weight < _DOWN_WEIGHTED * np.nanmedian(weight)
+        return down_weighted
 
 
 def report_html(calibration: Calibration) -> str:
@@ -133,8 +133,8 @@ def report_html(calibration: Calibration) -> str:
         pairs=strongest_pairs(fit),
         noise_rows=noise_rows(fit),
         noise_sentence=noise_sentence(fit),
-        doubted=int(report._doubted().sum()),
-        standing=GRAVITY,
+        down_weighted=int(report._down_weighted().sum()),
+        default_gravity=GRAVITY,
     )
 
 

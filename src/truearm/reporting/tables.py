@@ -86,17 +86,12 @@ class ParameterRow:
     estimate: float
     deviation: float | None
     informed: float | None
-    standing: ParameterStatus
+    fit_status: ParameterStatus
 
     @property
     def status(self) -> str:
-        """The standing as it is printed."""
-        return {"dropped": "held: redundant"}.get(self.standing, self.standing.replace("-", " "))
-
-    @property
-    def believed(self) -> bool:
-        """Whether the estimate is what was believed before, for lack of readings that say otherwise."""
-        return self.standing == "uninformed"
+        """The status as it is printed."""
+        return {"dropped": "held: redundant"}.get(self.fit_status, self.fit_status.replace("-", " "))
 
     @property
     def change(self) -> float:
@@ -137,7 +132,7 @@ def parameter_rows(fit: Fit) -> tuple[ParameterRow, ...]:
                 estimate=from_si(p.value, unit),
                 deviation=from_si(p.deviation, unit) if was_free and p.deviation is not None else None,
                 informed=p.informed if was_free else None,
-                standing=fit.parameter_status(p.name),
+                fit_status=fit.parameter_status(p.name),
             )
         )
     return tuple(rows)

@@ -191,7 +191,7 @@ def _circle(measured: AxisCircle) -> dict[str, Any]:
     return {
         "joint": measured.joint,
         "target": measured.target,
-        "points": len(turn.reading),
+        "points": len(turn.joint_position),
         "arc_deg": math.degrees(circle.arc),
         "centre_mm": (circle.centre * 1e3).tolist(),
         "centre_deviation_mm": circle.centre_deviation * 1e3,

@@ -73,9 +73,9 @@ class JointTable(Record):
 
     def lines(self) -> list[str]:
         """Return how many poses are reached, and what is wrong with the others."""
-        told = self.summary()
-        counts = ", ".join(f"{count} {status}" for status, count in told["status"].items())
-        text = [f"{told['poses_reached']} of {told['poses']} poses reached. Rows: {counts}"]
+        summary = self.summary()
+        counts = ", ".join(f"{count} {status}" for status, count in summary["status"].items())
+        text = [f"{summary['poses_reached']} of {summary['poses']} poses reached. Rows: {counts}"]
         for entry in self.attention[:_EXPLAINED]:
             name = f"{entry['pose']} ({entry['branch']})" if entry["branch"] else entry["pose"]
             text.append(f"  {name}: {entry['status']}. {entry['advice']}")

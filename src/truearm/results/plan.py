@@ -43,19 +43,19 @@ class Plan(Record):
         """How accurate the calibration will be and how many poses it needs, in words."""
         from truearm.reporting.numbers import significant
 
-        told = self.made.prediction
-        planned, floor = (significant(value * 1e3, 3) for value in (told.planned, told.floor))
+        prediction = self.made.prediction
+        planned, floor = (significant(value * 1e3, 3) for value in (prediction.planned, prediction.floor))
         first = (
             f"Measured at these {len(self.joints)} configurations, the {self.made.model.name} model will miss readings "
             f"elsewhere by {planned} mm on average. No number of poses brings that below {floor} mm, the noise."
         )
-        if told.enough is None:
+        if prediction.sufficient_number is None:
             return first, "More poses than were looked at are needed to come within 10 % of that."
-        return first, f"{told.enough} well-chosen poses are enough to come within 10 % of that."
+        return first, f"{prediction.sufficient_number} well-chosen poses are enough to come within 10 % of that."
 
     def summary(self) -> dict[str, Any]:
         """Return the figures as JSON holds them: errors in mm."""
-        made, told = self.made, self.made.prediction
+        made, prediction = self.made, self.made.prediction
         return {
             "poses": len(made.joints),
             "objective": made.objective,
@@ -67,12 +67,14 @@ class Plan(Record):
             **({"fixtures_mm": {n: (1e3 * p).tolist() for n, p in made.fixtures.items()}} if made.fixtures else {}),
             "seconds": made.seconds,
             "prediction": {
-                "floor_mm": told.floor * 1e3,
-                "planned_mm": told.planned * 1e3,
-                "enough": told.enough,
+                "floor_mm": prediction.floor * 1e3,
+                "planned_mm": prediction.planned * 1e3,
+                "enough": prediction.sufficient_number,
                 "by_number": [
                     {"poses": int(n), "chosen_mm": c * 1e3, "random_mm": r * 1e3}
-                    for n, c, r in zip(told.numbers, told.chosen.tolist(), told.random.tolist(), strict=True)
+                    for n, c, r in zip(
+                        prediction.numbers, prediction.chosen.tolist(), prediction.random.tolist(), strict=True
+                    )
                 ],
             },
         }

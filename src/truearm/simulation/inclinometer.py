@@ -20,7 +20,7 @@ def inclinations(
     resolution: float = 0.0,
     **conditions: Unpack[Conditions],
 ) -> Array:
-    """Return what inclinometers on all links read at joint readings ``(n, joints)``.
+    """Return what inclinometers on all links read at joint positions ``(n, joints)``.
 
     Each link carries one with three sensitive axes along x, y and z of the link's frame (the frame behind the tilt of
     its joint, :attr:`Posture.links`). A reading is the angle of such an axis above the horizontal plane, -pi/2 to
@@ -61,12 +61,12 @@ def compare(
     resolution, noise
         Of each reading [rad]; see :func:`inclinations`.
     """
-    joints, wrench = pairs.readings_in_turn()
+    joints, wrench = pairs.joints_in_turn()
     read = inclinations(twin, joints, noise, rng, resolution, wrench=wrench)
     return InclinometerReadings(pairs, read[1::2] - read[::2], deviation_of_change(resolution, noise))
 
 
 def measure_pairs(twin: Twin, pairs: Pairs, noise: float, rng: np.random.Generator) -> Dataset:
     """Return what an instrument reads of a twin's targets at the postures of pairs, in turn; noise in metres."""
-    joints, wrench = pairs.readings_in_turn()
+    joints, wrench = pairs.joints_in_turn()
     return measure(twin, joints, noise, rng, wrench=wrench)

@@ -60,16 +60,16 @@ def truth_twin(robot: Robot, truth: Robot | str | Path, rng: np.random.Generator
         joints = joint_truths(true)
         for number, compliance in published.compliance.items():
             joints[number] = replace(joints.get(number, PERFECT), compliance=compliance)
-        return Twin(stationed(true, tool), joints, _contact(true))
+        return Twin(at_station(true, tool), joints, _contact(true))
     if truth == "nominal":
-        return Twin(stationed(robot, tool), joint_truths(robot), _contact(robot))
+        return Twin(at_station(robot, tool), joint_truths(robot), _contact(robot))
     if truth == "random":
         drawn = {
             p.name: p.value + p.prior * float(rng.standard_normal())
             for p in robot.parameters.values()
             if p.group in ("geometry", "joint zero")
         }
-        return Twin(stationed(robot.with_values(drawn), tool), joint_truths(robot), _contact(robot))
+        return Twin(at_station(robot.with_values(drawn), tool), joint_truths(robot), _contact(robot))
     if not Path(truth).suffix and not exists(Path(truth)):
         known = truth_names(robot)
         raise InputError(
@@ -92,7 +92,7 @@ def _twin_of(robot: Robot, other: Robot, where: str) -> Twin:
             allowed=f"{len(robot.joints)}, of the same kinds",
         )
     tool = next(iter(robot.tools.values()), DEFAULT_TOOL)
-    return Twin(other if other.targets else stationed(other, tool), joint_truths(other), _contact(other))
+    return Twin(other if other.targets else at_station(other, tool), joint_truths(other), _contact(other))
 
 
 def joint_truths(robot: Robot) -> dict[int, JointTruth]:
@@ -133,7 +133,7 @@ def _contact(robot: Robot) -> Contact:
     return "document" if any(isinstance(effect, LinearContactClearance) for effect in robot.effects) else "exact"
 
 
-def stationed(robot: Robot, tool: Tool) -> Robot:
+def at_station(robot: Robot, tool: Tool) -> Robot:
     """Return a robot with its base as it is, seen from the station, carrying a tool.
 
     A payload that the robot has already includes the tool's mass.

@@ -22,10 +22,10 @@ from truearm.modeling.robot import Robot
 from truearm.simulation.twin_body import (
     Link,
     forces_of,
-    leaning,
     moved,
     product,
     second_moments,
+    tilt,
     weight,
     wrench_at,
 )
@@ -79,7 +79,8 @@ class Posture:
         the joint's origin in the joint's axes: z along the joint, x and y of the frame right behind its own element
         (of Rz(theta) for DH), before the tilt; joints that are not about their frame's z have some x and y across it.
     deflection
-        What each joint leans about x and y and turns about, or slides along, z beyond its reading ``(joints, 3)``.
+        What each joint leans about x and y and turns about, or slides along, z beyond its joint position ``(joints,
+        3)``.
     """
 
     links: Array
@@ -116,30 +117,30 @@ class Twin:
             if (truth.clearance or truth.bearing) and not (link.turns and link.generator[1, 0] == 1.0):
                 raise InputError("only a joint that turns about its frame's z can tilt", where=where)
 
-    def target_frames(self, reading: Array) -> Mapping[str, Array]:
-        """Return ``T_world_target`` ``(4, 4)`` of every target for one joint reading ``(joints,)``, at rest."""
-        return self.postures(np.asarray(reading)[None])[0].targets
+    def target_frames(self, joints: Array) -> Mapping[str, Array]:
+        """Return ``T_world_target`` ``(4, 4)`` of every target for one joint position ``(joints,)``, at rest."""
+        return self.postures(np.asarray(joints)[None])[0].targets
 
     def frames(self, joints: Array, **conditions: Unpack[Conditions]) -> Mapping[str, Array]:
-        """Return ``T_world_target`` ``(n, 4, 4)`` of every target at joint readings ``(n, joints)``."""
+        """Return ``T_world_target`` ``(n, 4, 4)`` of every target at joint positions ``(n, joints)``."""
         found = [posture.targets for posture in self.postures(joints, **conditions)]
         return {target.name: np.array([at[target.name] for at in found]) for target in self.robot.targets}
 
     def postures(self, joints: Array, **conditions: Unpack[Conditions]) -> tuple[Posture, ...]:
-        """Return where the twin stands at joint readings ``(n, joints)``.
+        """Return where the twin stands at joint positions ``(n, joints)``.
 
-        A joint turns by gain times reading plus what its :class:`JointTruth` adds, and leans right behind that turn
-        by ``Rx Ry``. Moments are those of the arm as it has given way: deflections are found again until none
+        A joint turns by gain times joint position plus what its :class:`JointTruth` adds, and leans right behind that
+        turn by ``Rx Ry``. Moments are those of the arm as it has given way: deflections are found again until none
         changes by more than 1e-13 rad. A backlash may not come to rest, then the 50th round stays.
 
         Raises
         ------
         InputError
-            If readings or conditions have another shape.
+            If joints or conditions have another shape.
         """
         n, count = len(joints), len(self.robot.joints)
         rest = np.zeros((n, count))
-        joints = _shaped("joint readings", joints, (n, count))
+        joints = _shaped("joint positions", joints, (n, count))
         approach = _shaped("approach", conditions.get("approach", directions(joints)), (n, count))
         number = None if "number" not in conditions else _shaped("number", conditions["number"], (n,))
         cold = np.zeros(n) if number is None else self._cold_share(number)
@@ -157,7 +158,7 @@ class Twin:
 
     def _settled(
         self,
-        reading: Array,
+        joints: Array,
         approach: Array,
         temperature: float,
         cold: float,
@@ -168,10 +169,10 @@ class Twin:
         links = self._links(temperature - REFERENCE_TEMPERATURE, cold)
         numbers = range(1, len(links) + 1)
         truths = [self.joints.get(number, PERFECT) for number in numbers]
-        geared = np.array([self.robot.values.get(f"gain_{number}", 1.0) for number in numbers]) * reading
+        geared = np.array([self.robot.values.get(f"gain_{number}", 1.0) for number in numbers]) * joints
 
-        def given_way(loads: Array) -> Array:
-            rows = zip(truths, reading, approach, loads, links, strict=True)
+        def deflections(loads: Array) -> Array:
+            rows = zip(truths, joints, approach, loads, links, strict=True)
             return np.array(
                 [
                     (*t.tilt(load[3], load[4], self.contact), t.turn(q, a, load[5 if link.turns else 2]))
@@ -179,11 +180,11 @@ class Twin:
                 ]
             )
 
-        settled = given_way(np.zeros((len(links), 6)))
+        settled = deflections(np.zeros((len(links), 6)))
         for _ in range(_ROUNDS):
             deflection = settled
             posture = self._posture(links, geared, deflection, wrench, velocity, acceleration)
-            settled = given_way(posture.loads)
+            settled = deflections(posture.loads)
             if np.abs(settled - deflection).max() < _SETTLED:
                 break
         return posture
@@ -205,7 +206,7 @@ class Twin:
         ):
             T = moved(T, link, q + gamma, qd, qdd)
             axes.append(T[0] @ link.axes)
-            T = T @ leaning(alpha, beta) @ link.after if alpha or beta else T @ link.after
+            T = T @ tilt(alpha, beta) @ link.after if alpha or beta else T @ link.after
             frames.append(T[0])
             weights.append(weight(link.body, T, gravity))
         flange = T @ self._flange
@@ -258,7 +259,7 @@ class Twin:
 
 
 def directions(joints: Array) -> Array:
-    """Return the direction of the last move of each joint, +1 or -1, by the order of its readings ``(n, joints)``.
+    """Return the direction of the last move of each joint, +1 or -1, by the order of its positions ``(n, joints)``.
 
     It is 0 as long as the joint has not moved.
     """
@@ -277,7 +278,7 @@ def measure(
     source: str = "twin",
     **conditions: Unpack[Conditions],
 ) -> Dataset:
-    """Return what an instrument reads of the twin at joint readings ``(n, joints)``.
+    """Return what an instrument reads of the twin at joint positions ``(n, joints)``.
 
     Parameters
     ----------

@@ -78,7 +78,7 @@ def product(elements: Sequence[Element], values: Mapping[str, float], growth: fl
 
 
 def amount(element: Element, values: Mapping[str, float], growth: float) -> float:
-    """Return how far an element turns or slides at reading zero [rad or m]."""
+    """Return how far an element turns or slides at joint position zero [rad or m]."""
     own = element.value if element.parameter is None else values[element.parameter]
     return own if element.turns else own + growth * element.value
 
@@ -147,7 +147,7 @@ def forces_of(wrench: Array, point: Array) -> Array:
     return carried
 
 
-def leaning(alpha: float, beta: float) -> Array:
+def tilt(alpha: float, beta: float) -> Array:
     """Return ``Rx(alpha) Ry(beta)``."""
     about_x, about_y = generator(Element("Rx")), generator(Element("Ry"))
     return exponential(about_x, alpha, turns=True) @ exponential(about_y, beta, turns=True)

@@ -1,4 +1,4 @@
-"""What a joint of the digital twin does besides following its reading."""
+"""What a joint of the digital twin does besides following its commanded position."""
 
 from __future__ import annotations
 
@@ -53,19 +53,19 @@ class JointTruth:
     growth: float = 0.0
     warm_up: float = 0.0
 
-    def turn(self, reading: float, approach: float, load: float) -> float:
-        """Return what the joint turns, or slides, beyond its reading [rad or m].
+    def turn(self, position: float, approach: float, load: float) -> float:
+        """Return what the joint turns, or slides, beyond its commanded position [rad or m].
 
         Parameters
         ----------
-        reading
+        position
             [rad or m].
         approach
             Direction of the last move, +1 or -1, 0 if it is not known.
         load
             Moment about the axis [N m], or force along it [N].
         """
-        geared = sum(amplitude * math.sin(k * reading + phase) for k, amplitude, phase in self.gear)
+        geared = sum(amplitude * math.sin(k * position + phase) for k, amplitude, phase in self.gear)
         sprung = self.compliance * load + self.quadratic * load * abs(load) + self.cubic * load**3
         return geared + self.hysteresis * approach + sprung + self.backlash / 2 * _sign(load)
 
@@ -87,7 +87,7 @@ class JointTruth:
         return laid_x + self.bearing * x, laid_y + self.bearing * y
 
 
-#: Follows its reading and nothing else.
+#: Follows its commanded position and nothing else.
 PERFECT: Final = JointTruth()
 
 

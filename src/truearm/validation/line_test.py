@@ -88,7 +88,7 @@ def from_data(lines: SevenLines, robot: Robot, data: Dataset) -> LineErrors:
     unknown = [label for label in data.labels if label not in of]
     if unknown:
         raise InputError(
-            "the configuration is no pose of the line test",
+            "the configuration is not a pose of the line test",
             where=data.source,
             came=unknown[0],
             allowed=f"{lines.labels[0]} to {lines.labels[-1]}",

@@ -67,7 +67,10 @@ def pair_distances(predicted: ArrayLike, measured: ArrayLike, configuration: Arr
     P, M = np.asarray(predicted, float), np.asarray(measured, float)
     if P.ndim != 2 or P.shape[1] != 3 or P.shape != M.shape:
         raise InputError(
-            "the points are not the same twice", where="points", came=f"{P.shape} and {M.shape}", allowed="(n, 3) both"
+            "the two sets of points have different shapes",
+            where="points",
+            came=f"{P.shape} and {M.shape}",
+            allowed="(n, 3) both",
         )
     if not (np.isfinite(P).all() and np.isfinite(M).all()):
         raise InputError("a point has no position", where="points", cure="Leave it out.")

@@ -47,7 +47,7 @@ def pose_errors(on_flange: Array, wanted: Array, reached: Array) -> PoseErrors:
     """
     if wanted.shape != reached.shape or wanted.ndim != 3 or wanted.shape[1:] != on_flange.shape:
         raise InputError(
-            "the poses are not the same twice",
+            "the poses have different shapes",
             where="poses",
             came=f"{wanted.shape} and {reached.shape}",
             allowed=f"(n, {len(on_flange)}, 3) both",

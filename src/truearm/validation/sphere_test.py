@@ -62,7 +62,7 @@ def sphere_test(
     robot
         The model to judge.
     joints
-        Readings at which the bar was read [rad or m], ``(n, joints)``.
+        Joint positions at which the bar was read [rad or m], ``(n, joints)``.
     lengths
         What the bar read [m], ``(n,)``; NaN where it was beyond its range, which is left out.
     target

@@ -24,7 +24,7 @@ from truearm.modeling.inverse.branches import BRANCHES, branch_rule
 
 SAMPLES = Path(__file__).parent / "samples" / "fanuc_ls"
 HALF = (-pi, pi)
-NUT = Configuration("front", "up", readings=((1, *HALF), (4, *HALF), (5, -pi, 0.0), (6, *HALF)), literal=True)
+NUT = Configuration("front", "up", ranges=((1, *HALF), (4, *HALF), (5, -pi, 0.0), (6, *HALF)), literal=True)
 
 
 def sample(name: str) -> Source:
@@ -330,7 +330,7 @@ TEXT = program(["J P[1] 10% FINE"], pose(1) + pose(2)).text
         (TEXT.replace("};\nP[2]", "\nP[2]"), 6, "no complete position"),
         (TEXT.replace("};\n/END", "\n/END"), 12, "no complete position"),
         (TEXT.replace("P[2]{", "Q[2]{"), 12, "no complete position"),
-        (TEXT.replace("P[2]{", "P[01]{"), 12, "P[1] is there twice"),
+        (TEXT.replace("P[2]{", "P[01]{"), 12, "P[1] appears twice"),
         (TEXT.replace("500.000", "1000001.0"), 9, "out of all proportion"),
         (TEXT.replace("500.000", "9" * 400), 9, "out of all proportion"),
     ],
@@ -343,7 +343,7 @@ def test_what_is_refused(text: str, line: int, what: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "shoulder", "elbow", "readings"),
+    ("text", "shoulder", "elbow", "ranges"),
     [
         ("N U T, 0, 0, 0", "front", "up", {1: HALF, 4: HALF, 5: (-pi, 0), 6: HALF}),
         ("FUT,1,-1,0", "front", "up", {1: (pi, 3 * pi), 4: (-3 * pi, -pi), 5: (0, pi), 6: HALF}),
@@ -356,12 +356,12 @@ def test_what_is_refused(text: str, line: int, what: str) -> None:
     ],
 )
 def test_configurations(
-    text: str, shoulder: str | None, elbow: str | None, readings: dict[int, tuple[float, float]]
+    text: str, shoulder: str | None, elbow: str | None, ranges: dict[int, tuple[float, float]]
 ) -> None:
     found = configuration(text)
     assert found is not None
     assert (found.shoulder, found.elbow, found.wrist, found.near) == (shoulder, elbow, None, None)
-    assert {joint: pytest.approx((low, high)) for joint, low, high in found.readings} == readings
+    assert {joint: pytest.approx((low, high)) for joint, low, high in found.ranges} == ranges
 
 
 @pytest.mark.parametrize(
@@ -388,8 +388,8 @@ def test_configurations_that_controllers_show(text: str, joints: tuple[float, ..
     assert found is not None
     assert other is not None
     shown = dict(zip((1, 4, 5, 6), map(radians, joints), strict=True))
-    assert all(low <= shown[joint] < high for joint, low, high in found.readings)
-    assert not all(low <= shown[joint] < high for joint, low, high in other.readings)
+    assert all(low <= shown[joint] < high for joint, low, high in found.ranges)
+    assert not all(low <= shown[joint] < high for joint, low, high in other.ranges)
 
 
 def test_up_stays_up_when_the_arm_leans_back_over_its_first_axis() -> None:

@@ -146,7 +146,7 @@ def test_base_axes_carry_the_robot() -> None:
 
 def allows(configuration: Configuration, joint: int, degrees: float) -> bool:
     reading = math.radians(degrees)
-    inside = all(low <= reading < high for j, low, high in configuration.readings if j == joint)
+    inside = all(low <= reading < high for j, low, high in configuration.ranges if j == joint)
     return inside and not any(low <= reading < high for j, low, high in configuration.outside if j == joint)
 
 
@@ -177,7 +177,7 @@ def test_posture_of_rconf() -> None:
     assert (rear.shoulder, rear.elbow) == ("back", None)
     assert not allows(rear, 6, 0.0)
     assert configuration("1,0") == configuration("1,0,7") == Configuration()
-    assert configuration("1,0,0").readings == ()
+    assert configuration("1,0,0").ranges == ()
 
 
 def test_pulses_have_no_posture() -> None:

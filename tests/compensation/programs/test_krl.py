@@ -200,7 +200,7 @@ def test_status_and_turn(status: str, turn: str, shoulder: str, elbow: str, wris
     assert (configuration.shoulder, configuration.elbow, configuration.wrist) == (shoulder, elbow, None)
     number = {"'H32'": 50}.get(turn) or int(turn)
     signs = [(i + 1, -inf, 0.0) if number >> i & 1 else (i + 1, 0.0, inf) for i in range(6)]
-    assert configuration.readings == (wrist, *signs)
+    assert configuration.ranges == (wrist, *signs)
 
 
 def test_status_and_turn_are_for_moves_by_axes() -> None:
@@ -209,10 +209,10 @@ def test_status_and_turn_are_for_moves_by_axes() -> None:
     frame, line, both, unused = program.targets
     assert frame.configuration == ANY_POSTURE
     assert line.configuration == ANY_POSTURE
-    assert len(both.configuration.readings) == 7
+    assert len(both.configuration.ranges) == 7
     assert unused.configuration == both.configuration
     first = read(f"LIN {taught}").targets[0].configuration
-    assert (first.shoulder, first.elbow, first.readings) == ("front", "up", ((5, 0.0, pi),))
+    assert (first.shoulder, first.elbow, first.ranges) == ("front", "up", ((5, 0.0, pi),))
 
 
 @pytest.mark.parametrize(
@@ -296,7 +296,7 @@ def test_a_tool_that_is_set_too_late() -> None:
         ("LIN {X 1,Y 2,Z ZPOS,A 4,B 5,C 6}", "", "Z is not a number"),
         ("LIN {X 1,Y 'B01',Z 3,A 4,B 5,C 6}", "", "Y is not a number"),
         ("LIN XP1:{X 5,Y DY,Z 0}", f"DECL POS XP1={FRAMES}", "Y is not a number"),
-        ("LIN {X 1,X 2,Y 2,Z 3,A 4,B 5,C 6}", "", "X is there twice"),
+        ("LIN {X 1,X 2,Y 2,Z 3,A 4,B 5,C 6}", "", "X appears twice"),
         ("LIN {X 1,Y 2,Z 3,A 4,B 5,C 6,Q 1}", "", "Q is no part of a position"),
         ("LIN {X 1,Y 2,Z 3,A 4,B 5,C 6,E2 5}", "", EXTERNAL),
         ("LIN P[I]", "DECL POS P[2]", "P[I] is not written out in this program"),

@@ -124,17 +124,17 @@ def test_every_target_of_a_program_is_found(polish: Program) -> None:
 def test_the_configuration_data_say_which_postures_are_meant(polish: Program) -> None:
     (source,) = polish.sources
     looked_at = RAPID.read([Source(source.path, source.text.replace("ConfL \\Off", "ConfL \\On "))])
-    assert looked_at.targets[1].configuration.readings == quadrants(0, -1, -2)
+    assert looked_at.targets[1].configuration.ranges == quadrants(0, -1, -2)
     assert looked_at.targets[1].configuration.elbow == "up"
-    assert looked_at.targets[2].configuration.readings == quadrants(-1, 0, 1)
+    assert looked_at.targets[2].configuration.ranges == quadrants(-1, 0, 1)
     assert looked_at.targets[2].configuration.elbow == "down"
-    assert looked_at.targets[0].configuration.readings == ()
+    assert looked_at.targets[0].configuration.ranges == ()
     assert {t.configuration.wrist or t.configuration.shoulder for t in looked_at.targets} == {None}
 
 
 def test_the_configuration_data_are_free_where_the_controller_does_not_look_at_them(polish: Program) -> None:
     """ConfL Off frees what lines alone go to; p10 is also the target of a MoveJ."""
-    assert polish.targets[1].configuration.readings == quadrants(0, -1, -2)
+    assert polish.targets[1].configuration.ranges == quadrants(0, -1, -2)
     assert polish.targets[2].configuration == ANY_POSTURE
     target = "[[3,0,4],[0,0,1,0],[0,-1,1,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
     lines = [
@@ -530,7 +530,7 @@ def test_other_languages_are_not_taken_for_it() -> None:
 
 
 def test_elbow_words_agree_with_the_arm() -> None:
-    """The manual's table, worked out with the drawing of the IRB 120 for random readings."""
+    """The manual's table, worked out with the drawing of the IRB 120 for random joint positions."""
     robot = load_robot("irb120").rigid
     rule = branch_rule(robot)
     assert rule is not None
@@ -549,11 +549,11 @@ def test_elbow_words_agree_with_the_arm() -> None:
 @pytest.mark.parametrize("cfx", ["8", "-1", "1000", "0.5", "9E9"])
 def test_an_unknown_cfx_leaves_the_elbow_open(cfx: str) -> None:
     assert configuration("0", "-4", "3", cfx).elbow is None
-    assert configuration("0", "-4", "3", cfx).readings == quadrants(0, -4, 3)
+    assert configuration("0", "-4", "3", cfx).ranges == quadrants(0, -4, 3)
 
 
 def test_quadrants_that_are_none_are_left_open() -> None:
-    assert configuration("9E9", "0.5", "-1", "0").readings == ((6, -pi / 2, 0.0),)
+    assert configuration("9E9", "0.5", "-1", "0").ranges == ((6, -pi / 2, 0.0),)
 
 
 def split(program: Program, move: int, *points: tuple[float, ...]) -> list[Edit]:

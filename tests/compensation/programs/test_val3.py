@@ -177,8 +177,8 @@ def test_postures() -> None:
     program = VAL3.read(sample(*CELL))
     by_name = {t.name: t.configuration for t in program.targets}
     inf = math.inf
-    assert by_name["pApproach"] == Configuration(shoulder="front", readings=((3, 0.0, inf), (5, 0.0, inf)))
-    assert by_name["pGrid"] == Configuration(shoulder="back", readings=((3, -inf, 0.0), (5, -inf, 0.0)))
+    assert by_name["pApproach"] == Configuration(shoulder="front", ranges=((3, 0.0, inf), (5, 0.0, inf)))
+    assert by_name["pGrid"] == Configuration(shoulder="back", ranges=((3, -inf, 0.0), (5, -inf, 0.0)))
     assert by_name["pGrid[1]"] == by_name["pVia"] == by_name["jHome"] == Configuration()
 
 
@@ -192,7 +192,7 @@ def test_the_old_format() -> None:
     ]
     assert texts(program)[1] == ["366.58", "-390.36", "-359.79", "-179.84", "4.22", "29.87"]
     assert program.targets[0].values == (0.0, -10.5, 100.0, 0.0, 45.25, 0.0)
-    first = Configuration(shoulder="front", readings=((3, 0.0, math.inf), (5, -math.inf, 0.0)))
+    first = Configuration(shoulder="front", ranges=((3, 0.0, math.inf), (5, -math.inf, 0.0)))
     assert program.targets[1].configuration == first
     assert program.targets[2].configuration == Configuration()
     assert way(program) == [

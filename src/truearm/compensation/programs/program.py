@@ -46,8 +46,8 @@ class Source:
 class Form:
     """What the numbers of a target mean.
 
-    A pose is x, y, z and the numbers of its orientation, in the order that `orientation` has; joints are readings as
-    the controller shows them, one for each joint of the robot.
+    A pose is x, y, z and the numbers of its orientation, in the order that `orientation` has; joints are joint
+    positions as the controller shows them, one for each joint of the robot.
 
     Attributes
     ----------
@@ -85,23 +85,23 @@ class Configuration:
     ----------
     shoulder, elbow, wrist
         Words of the branches of :mod:`truearm.modeling.inverse.branches`.
-    readings
+    ranges
         ``(joint, low, high)``: the joint, from 1, reads `low` or more and less than `high` [rad], as the controller
         shows it.
     outside
         ``(joint, low, high)``: the joint reads less than `low`, or `high` or more [rad].
     literal
-        Whether the controller takes the readings to the letter. Others take the nearest posture where a joint is a
-        little beyond.
+        Whether the controller takes the ranges to the letter. Others take the nearest posture where a joint is
+        a little beyond.
     near
-        Readings [rad or m], as the controller shows them, that the posture is nearest to; if None, and the rest leaves
-        a choice, nearest to where the robot comes from.
+        Joint positions [rad or m], as the controller shows them, that the posture is nearest to; if None, and the rest
+        leaves a choice, nearest to where the robot comes from.
     """
 
     shoulder: Literal["front", "back"] | None = None
     elbow: Literal["up", "down"] | None = None
     wrist: Literal["noflip", "flip"] | None = None
-    readings: tuple[tuple[int, float, float], ...] = ()
+    ranges: tuple[tuple[int, float, float], ...] = ()
     outside: tuple[tuple[int, float, float], ...] = ()
     literal: bool = False
     near: tuple[float, ...] | None = None

@@ -28,7 +28,7 @@ from truearm.notices import Notice
 #: Tables of parameters that are made of the axes; parallel axes leave only Hayati's.
 TABLES: Final = ("standard-dh", "s-model", "hayati")
 #: Axes and circles that differ by more than this many deviations are not those of a rigid arm.
-_MISFIT: Final = 2.0
+_LARGEST_MISFIT: Final = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,7 +177,7 @@ class AxisAnalysis:
                 )
             )
         misfit = self.calibrated.residual
-        if misfit is not None and misfit > _MISFIT:
+        if misfit is not None and misfit > _LARGEST_MISFIT:
             said.append(
                 Notice(
                     "misfit",

@@ -25,7 +25,7 @@ from truearm.modeling.parameters import FreeParameters
 from truearm.modeling.robot import Robot
 
 #: No instrument is better than this [m]; noise-free circles would have no finite weight.
-_FINEST: Final = 1e-9
+_SMALLEST_DEVIATION: Final = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,17 +124,19 @@ def axis_circles(data: Dataset) -> AxisCircles:
     if data.sigma is not None:
         ratio = sum((c.circle.residual / c.circle.sigma) ** 2 * c.circle.freedom for c in found) / freedom
         excess = math.sqrt(ratio) if ratio > _by_chance(freedom) else 1.0
-    believed = tuple(
+    weighted = tuple(
         replace(
             c,
             turn=replace(
                 c.turn,
-                circle=c.circle.believed(max(together if data.sigma is None else excess * c.circle.sigma, _FINEST)),
+                circle=c.circle.with_sigma(
+                    max(together if data.sigma is None else excess * c.circle.sigma, _SMALLEST_DEVIATION)
+                ),
             ),
         )
         for c in found
     )
-    return AxisCircles(believed, data.configurations - len(used), tuple(refused), data.sigma is not None, excess)
+    return AxisCircles(weighted, data.configurations - len(used), tuple(refused), data.sigma is not None, excess)
 
 
 def _circle(data: Dataset, run: Run, target: int) -> list[AxisCircle]:

@@ -26,7 +26,7 @@ from truearm.modeling.robot import Robot
 #: Half the width of the interval that holds a normal value in 95 of 100 cases, in deviations.
 NORMAL_95: Final = 1.959964
 #: A direction that moves the flange by less than this share of what its parameter alone does moves nothing.
-_MOVES_NOTHING: Final = 1e-6
+_NO_MOTION: Final = 1e-6
 _STEP: Final = 1e-2  # of a deviation, for derivatives of what is derived from axes
 
 
@@ -180,7 +180,7 @@ def _moving_flange(robot: Robot, redundancies: Sequence[Redundancy], seed: int =
         for part in (linear, angular):
             together = np.tensordot(weights, part, axes=1)
             alone = max(float(np.abs(w * p).max()) for w, p in zip(weights, part, strict=True))
-            if float(np.abs(together).max()) > _MOVES_NOTHING * alone:
+            if float(np.abs(together).max()) > _NO_MOTION * alone:
                 found.append(redundancy.dropped)
                 break
     return tuple(found)

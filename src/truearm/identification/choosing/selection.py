@@ -30,7 +30,7 @@ from truearm.modeling.robot import Robot
 
 AUTO: Final = "auto"
 FOLDS: Final = 5
-_ROUGH: Final = 1e-3  # priors; errors of folds are not compared more closely
+_FOLD_TOLERANCE: Final = 1e-3  # priors; errors of folds are not compared more closely
 _START: Final = next(model for model in MODELS if model.name == "elastic")
 #: Joint effects that are tried, in this order.
 SELECTABLE: Final = tuple(effect.name for effect in EFFECTS if effect.selectable)
@@ -137,7 +137,7 @@ def select(
                 redundancy=redundancy,
                 bounds=bounds,
                 bounds_file=bounds_file,
-                small=_ROUGH,
+                small=_FOLD_TOLERANCE,
             )
             judged = errors_of(found.robot, held_out)
             spread = judged.position or judged.length

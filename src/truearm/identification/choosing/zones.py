@@ -24,7 +24,7 @@ from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 
 #: Training configurations that a zone needs for a model of its own.
-LEAST: Final = 12
+LEAST_CONFIGURATIONS: Final = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +99,7 @@ def identify_zones(
     model: Model,
     divisions: tuple[int, int, int],
     overlap: float,
-    least: int = LEAST,
+    least: int = LEAST_CONFIGURATIONS,
 ) -> Zones:
     """Identify a model for the whole workspace and one for each of its zones.
 

@@ -26,8 +26,8 @@ from truearm.modeling.transform import rigid_motion
 from truearm.simulation.hexapod.session import joined
 
 #: Turns at most, and the movement of a reading at which the places are taken to stand still [m].
-_TURNS: Final = 30
-_STILL: Final = 2e-6
+_MOST_ROUNDS: Final = 30
+_SETTLED: Final = 2e-6
 
 
 def identify_placements(robot: Robot, places: Sequence[Dataset], model: Model) -> Fit:
@@ -57,10 +57,10 @@ def identify_placements(robot: Robot, places: Sequence[Dataset], model: Model) -
     if len(places) == 1:
         return fit
     before = np.full((sum(len(data.position) for data in places), 3), np.inf)
-    for _ in range(_TURNS):
+    for _ in range(_MOST_ROUNDS):
         together = reduce(joined, in_one_frame(fit.robot, places))
         fit = identify(robot, together, model)
-        if np.nanmax(np.abs(together.position - before)) < _STILL:
+        if np.nanmax(np.abs(together.position - before)) < _SETTLED:
             break
         before = together.position
     return fit

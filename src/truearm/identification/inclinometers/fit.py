@@ -73,8 +73,8 @@ class TiltingFit:
     converged: bool
 
     @property
-    def believed(self) -> Robot:
-        """The robot that believes these values as well as their deviations say, for a fit that frees them again."""
+    def with_priors(self) -> Robot:
+        """The robot with these values, their deviations as priors, for a fit that frees them again."""
         found = [self.robot.parameters[name] for name in self.names]
         return self.robot.with_parameters(replace(p.restarted(p.value), prior=p.deviation or p.prior) for p in found)
 

@@ -18,14 +18,14 @@ from truearm.notices import Notice
 #: Groups of parameters of the rigid arm.
 _KINEMATIC: Final = frozenset({"joint zero", "geometry", *(effect.name for effect in EFFECTS if effect.kinematic)})
 #: Priors that a parameter may move before the robot, its units or its joint order are doubted.
-_FAR: Final = 6.0
+_LARGEST_MOVE: Final = 6.0
 #: Standard deviations below zero from which a stiffness or a play is doubted.
-_NEGATIVE: Final = 4.0
+_NEGATIVE_DEVIATIONS: Final = 4.0
 #: Share of the prior variance that the data should remove, and of parameters of effects that may fall short of it.
-_HALF: Final = 0.5
-_CROWDED: Final = 0.05
+_LEAST_INFORMED: Final = 0.5
+_LARGEST_UNINFORMED_SHARE: Final = 0.05
 #: Configurations at which positions are asked for.
-_ANYWHERE: Final = 200
+_CONFIGURATIONS: Final = 200
 
 
 def check_fit(fit: Fit) -> list[Notice]:
@@ -86,15 +86,17 @@ def check_fit(fit: Fit) -> list[Notice]:
             )
         )
     far = [
-        p.name for p in robot.parameters.values() if p.group in _KINEMATIC and abs(p.value - p.nominal) > _FAR * p.prior
+        p.name
+        for p in robot.parameters.values()
+        if p.group in _KINEMATIC and abs(p.value - p.nominal) > _LARGEST_MOVE * p.prior
     ]
     if far:
         found.append(
             Notice(
                 "far-from-nominal",
-                f"{', '.join(far[:8])}{' and others' if len(far) > 8 else ''} moved by more than {_FAR:g} standard "
-                "deviations of their priors. Check that it is this robot, in these units, with its joints in this "
-                "order. If it is, enter wider priors in the robot file.",
+                f"{', '.join(far[:8])}{' and others' if len(far) > 8 else ''} moved by more than {_LARGEST_MOVE:g} "
+                "standard deviations of their priors. Check that it is this robot, in these units, with its joints in "
+                "this order. If it is, enter wider priors in the robot file.",
             )
         )
     if fit.excess > 1.0:
@@ -160,8 +162,8 @@ def _check_effects(fit: Fit) -> list[Notice]:
                 "stay near zero.",
             )
         )
-    vague = [name for name in own if name not in unknown and (robot.parameters[name].informed or 1.0) < _HALF]
-    if len(vague) > _CROWDED * len(own):
+    vague = [name for name in own if name not in unknown and (robot.parameters[name].informed or 1.0) < _LEAST_INFORMED]
+    if len(vague) > _LARGEST_UNINFORMED_SHARE * len(own):
         found.append(
             Notice(
                 "too-many-effects",
@@ -194,11 +196,15 @@ def _negative(fit: Fit) -> list[str]:
         if of[name].group in NON_NEGATIVE and fit.parameter_status(name) == "identified"
     ]
     names, spread = fit.free.names, fit.covariance
-    found = {i: names[i] for i in places if of[names[i]].value < -_NEGATIVE * math.sqrt(spread[i, i])}
+    found = {i: names[i] for i in places if of[names[i]].value < -_NEGATIVE_DEVIATIONS * math.sqrt(spread[i, i])}
     for i, j in combinations([place for place in places if place not in found], 2):
         total, variance = of[names[i]].value + of[names[j]].value, spread[i, i] + spread[j, j] + 2.0 * spread[i, j]
         better_known = variance < min(spread[i, i], spread[j, j])
-        if of[names[i]].group == of[names[j]].group and better_known and total < -_NEGATIVE * math.sqrt(variance):
+        if (
+            of[names[i]].group == of[names[j]].group
+            and better_known
+            and total < -_NEGATIVE_DEVIATIONS * math.sqrt(variance)
+        ):
             found[i] = f"the sum of {names[i]} and {names[j]}"
     return [found[place] for place in sorted(found)]
 
@@ -209,7 +215,7 @@ def _expected_position_error(fit: Fit, seed: int = 0) -> float:
     The gauge freedoms, the pose of the base and perhaps the size of everything, are removed.
     """
     robot, names = fit.robot, fit.free.names
-    q = robot.loaded(robot.random_configurations(_ANYWHERE, np.random.default_rng(seed)))
+    q = robot.loaded(robot.random_configurations(_CONFIGURATIONS, np.random.default_rng(seed)))
     lengths = []
     for target in robot.targets:
         kinematics = robot.forward_kinematics(q, target.name)

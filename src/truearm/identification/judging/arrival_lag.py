@@ -22,8 +22,8 @@ from truearm.notices import Notice
 from truearm.units import from_si
 
 #: Part of the residuals that the direction of arrival must explain, and of the joints that must lag with one sign.
-_SHARE: Final = 0.05
-_MOST: Final = 2 / 3
+_LEAST_EXPLAINED: Final = 0.05
+_LEAST_OF_ONE_SIGN: Final = 2 / 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,7 @@ class ArrivalLag:
         """Whether it explains at least 5 % with one sign on most joints."""
         positive = int((self.lags > 0).sum())
         same = max(positive, len(self.lags) - positive)
-        return self.share >= _SHARE and same > _MOST * len(self.lags)
+        return self.share >= _LEAST_EXPLAINED and same > _LEAST_OF_ONE_SIGN * len(self.lags)
 
 
 def arrival_lag(fit: Fit, data: Dataset) -> ArrivalLag | None:

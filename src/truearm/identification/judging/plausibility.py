@@ -20,7 +20,7 @@ from truearm.identification.solving.models import MODELS
 from truearm.identification.solving.problem import Problem
 from truearm.identification.start_values.frames import initial_frames
 from truearm.identification.start_values.from_readings import start_from_readings
-from truearm.measurement.checks import Suspect, Suspicion, constellation, judged
+from truearm.measurement.checks import Suspect, Suspicion, constellation, suspect
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.observations import OBSERVATIONS
 from truearm.measurement.statistics import Errors, errors_of
@@ -31,21 +31,21 @@ from truearm.notices import Notice
 from truearm.units import from_si
 
 #: A nominal robot that is placed better than this needs no explanation [m].
-_GOOD: Final = 3e-3
-_GOOD_FROM_FIXTURES: Final = 6e-3
+_PLACED_WITHIN: Final = 3e-3
+_PLACED_WITHIN_BY_FIXTURES: Final = 6e-3
 #: A slip explains the data if they fit this many times better with it mended.
-_BETTER: Final = 4.0
+_LEAST_IMPROVEMENT: Final = 4.0
 #: Configurations looked at; more tell nothing new.
 _CONFIGURATIONS_TRIED: Final = 60
 #: A reading is doubted beyond this many median residuals, and at least so far off [m].
-_FAR: Final = 20.0
-_FAR_AT_LEAST: Final = 1e-3
+_OUTLIER_RATIO: Final = 20.0
+_LEAST_OUTLIER: Final = 1e-3
 #: A campaign moves some joint by more than this [rad or m].
-_STILL: Final = 0.3
+_LEAST_TRAVEL: Final = 0.3
 #: What is said of a fixture is doubted beyond this many deviations.
-_FIXTURE_OFF: Final = 8.0
+_FIXTURE_OUTLIER: Final = 8.0
 #: A joint may be this far beyond its limit by rounding [rad or m].
-_OVER: Final = math.radians(0.05)
+_LIMIT_ROUNDING: Final = math.radians(0.05)
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +88,7 @@ def _beyond_limits(robot: Robot, data: Dataset) -> list[Notice]:
         if joint.limits is None:
             continue
         low, high = joint.limits
-        out = (data.joints[:, i] < low - _OVER) | (data.joints[:, i] > high + _OVER)
+        out = (data.joints[:, i] < low - _LIMIT_ROUNDING) | (data.joints[:, i] > high + _LIMIT_ROUNDING)
         if out.any():
             count += int(out.sum())
             unit = "deg" if joint.kind == "revolute" else "mm"
@@ -113,9 +113,9 @@ def _slips(robot: Robot, data: Dataset) -> list[Notice]:
     some = _some(data)
     misfit = {t: _misfit(robot, _only(some, t)) for t in range(len(some.targets)) if _seen(some, t)}
     least = min(misfit.values())
-    bad = [t for t, size in misfit.items() if size > max(_GOOD, _BETTER * least)]
+    bad = [t for t, size in misfit.items() if size > max(_PLACED_WITHIN, _LEAST_IMPROVEMENT * least)]
     if not bad:
-        if least <= _GOOD:
+        if least <= _PLACED_WITHIN:
             return []
         best = _best(robot, some, [*_joint_slips(some), *_length_slips(some)])
         return [] if best is None else [Notice(best.code, f"{best.words}.")]
@@ -132,19 +132,21 @@ def _best(robot: Robot, data: Dataset, slips: list[_Slip]) -> _Slip | None:
     """Return the slip that explains the data, None if none does."""
     shares = [_misfit(robot, slip.data) / _spread(slip.data) for slip in slips]
     best = int(np.argmin(shares))
-    return slips[best] if shares[best] * _BETTER < _misfit(robot, data) / _spread(data) else None
+    return slips[best] if shares[best] * _LEAST_IMPROVEMENT < _misfit(robot, data) / _spread(data) else None
 
 
 def _fixture_slips(robot: Robot, data: Dataset) -> list[Notice]:
     """Return the first slip that explains readings against fixtures: turned about, several may fit alike."""
     size = _misfit(robot, data)
-    if size <= _GOOD_FROM_FIXTURES:
+    if size <= _PLACED_WITHIN_BY_FIXTURES:
         return []
     for slip in (*_length_slips(data), *_joint_slips(data, at_once=1)):
-        if np.ptp(slip.data.joints, axis=0).max() < _STILL:
+        if np.ptp(slip.data.joints, axis=0).max() < _LEAST_TRAVEL:
             continue  # an arm that hardly moves fits any fixture
         mended = _misfit(robot, slip.data)
-        if mended <= _GOOD_FROM_FIXTURES and _BETTER * mended / _spread(slip.data) < size / _spread(data):
+        if mended <= _PLACED_WITHIN_BY_FIXTURES and _LEAST_IMPROVEMENT * mended / _spread(slip.data) < size / _spread(
+            data
+        ):
             return [Notice(slip.code, f"{slip.words}.")]
     return [
         Notice(
@@ -162,7 +164,7 @@ def _far_from_fixtures(robot: Robot, data: Dataset) -> tuple[list[Notice], list[
     fit = identify(robot, data, geometric, loss="cauchy")
     errors = errors_of(fit.robot, data)
     off = _off(errors)
-    allowed = max(_FAR_AT_LEAST, _FAR * float(np.nanmedian(off)))
+    allowed = max(_LEAST_OUTLIER, _OUTLIER_RATIO * float(np.nanmedian(off)))
     doubted = np.flatnonzero(np.nan_to_num(off) > allowed).tolist()
     where = [(data.labels[data.configuration[r]], data.targets[data.target[r]]) for r in doubted]
     suspects = [Suspect("outliers", *at, f"{off[r] * 1e3:.3g} mm off") for r, at in zip(doubted, where, strict=True)]
@@ -182,7 +184,7 @@ def _unlike_its_readings(fit: Fit, data: Dataset) -> list[Notice]:
         if block.data is data:
             continue
         for off, sigma in zip(np.linalg.norm(rows, axis=1).tolist(), block.sigma.tolist(), strict=True):
-            if off > _FIXTURE_OFF:
+            if off > _FIXTURE_OUTLIER:
                 beside = "" if block.fixture is None else f" against {block.fixture}"
                 found.append(f"{block.target}{beside} by {off * sigma * 1e3:.3g} mm, {off:.0f} times its deviation")
     if not found:
@@ -298,7 +300,7 @@ def _far_off(robot: Robot, data: Dataset) -> list[Suspect]:
     fit = identify(robot, data, geometric, loss="cauchy")
     errors = errors_of(fit.robot, data)
     off = np.linalg.norm(errors.position_errors, axis=1)
-    allowed = max(_FAR_AT_LEAST, _FAR * float(np.nanmedian(off)))
+    allowed = max(_LEAST_OUTLIER, _OUTLIER_RATIO * float(np.nanmedian(off)))
     doubted = np.flatnonzero(np.nan_to_num(off) > allowed)
     if len(doubted) == 0:
         return []
@@ -326,5 +328,5 @@ def _far_off(robot: Robot, data: Dataset) -> list[Suspect]:
             if data.references is not None:
                 usual = np.nanmedian(constellation(data.references), axis=0)
                 known |= {f"reference {n}": p for n, p in zip(data.references.targets, usual, strict=True)}
-            suspects.append(judged(at, label, name, float(off[reading]), known))
+            suspects.append(suspect(at, label, name, float(off[reading]), known))
     return suspects

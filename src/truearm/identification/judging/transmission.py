@@ -1,6 +1,6 @@
 """Find gears that err periodically, in what a fit leaves over.
 
-The residuals of each joint are held against sines of its readings, one number of periods in a turn after the other: a
+The residuals of each joint are held against sines of its positions, one number of periods in a turn after the other: a
 periodogram on readings at uneven places (Lomb 1976, "Least-squares frequency analysis of unequally spaced data"). The
 strongest is taken out before the next one is looked for. A sine is looked for only where the readings could tell one of
 the size that gears have: a joint that hardly turns, or whose axis passes the only target, says nothing.
@@ -22,12 +22,12 @@ from truearm.notices import Notice
 #: Periods in a turn that are looked at; fewer than the first are the Fourier series' business.
 _PERIODS: Final = np.arange(20, 401)
 #: A periodic error is believed if chance would show one as strong in any joint less often than this.
-_CHANCE: Final = 1e-3
-_FEWEST: Final = 60  # configurations
+_LARGEST_CHANCE: Final = 1e-3
+_LEAST_CONFIGURATIONS: Final = 60  # configurations
 #: Largest standard deviation of an amplitude [rad] at which the readings see a gear; good ones err by less.
-_SEEN: Final = 5e-4
+_LARGEST_DEVIATION: Final = 5e-4
 #: Periods that a joint must pass through, or else a sine is the same as an offset or a gain.
-_PASSED: Final = 4.0
+_LEAST_PERIODS: Final = 4.0
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ def periodic_errors(fit: Fit, data: Dataset) -> tuple[PeriodicError, ...]:
         The readings it is held against; fewer than 60 configurations say nothing.
     """
     robot = fit.robot
-    if data.configurations < _FEWEST or not data.has_position.any():
+    if data.configurations < _LEAST_CONFIGURATIONS or not data.has_position.any():
         return ()
     at = robot.loaded(data.postures)
     count = len(robot.joints)
@@ -95,7 +95,7 @@ def periodic_errors(fit: Fit, data: Dataset) -> tuple[PeriodicError, ...]:
         tried = [(*_strongest(at.joints[:, i], pull[:, i], weight[:, i, i], noise), i) for i in open_joints]
         explained, periods, a, b, joint = max(tried)
         chance = len(open_joints) * len(_PERIODS) * math.exp(-0.5 * free * explained / total)
-        if chance >= _CHANCE:
+        if chance >= _LARGEST_CHANCE:
             break
         found.append(PeriodicError(joint + 1, periods, math.hypot(a, b), explained / total, chance))
         wave = a * np.sin(periods * at.joints[:, joint]) + b * np.cos(periods * at.joints[:, joint])
@@ -125,7 +125,7 @@ def _strongest(q: Array, pull: Array, weight: Array, noise: float) -> tuple[floa
     ys, yc = s @ pull, c @ pull
     least = 0.5 * (ss + cc) - np.hypot(0.5 * (ss - cc), sc)  # what is known of the sine of the phase known least [m^2]
     passed = _PERIODS * math.sqrt(12.0) * q.std() / (2.0 * math.pi)  # of a range that is passed through evenly
-    seen = (least * _SEEN**2 > noise) & (passed > _PASSED)
+    seen = (least * _LARGEST_DEVIATION**2 > noise) & (passed > _LEAST_PERIODS)
     safe = np.where(seen, ss * cc - sc * sc, 1.0)
     a, b = (cc * ys - sc * yc) / safe, (ss * yc - sc * ys) / safe
     explained = np.where(seen, a * ys + b * yc, 0.0)
@@ -138,15 +138,15 @@ def check_transmission(fit: Fit, data: Dataset) -> list[Notice]:
     found = periodic_errors(fit, data)
     if not found:
         return []
-    told = "; ".join(
+    listed = "; ".join(
         f"joint {error.joint} {error.periods} times in a turn, by {np.rad2deg(error.amplitude) * 1e3:.1f} millidegrees"
         for error in found
     )
     return [
         Notice(
             "transmission-error",
-            f"What is left over repeats with the joints' angles: {told}. Strain wave gears do that, twice in a turn of "
-            "their wave generator. Write transmission_periods to these joints in the robot file, and `model=auto` "
+            f"What is left over repeats with the joints' angles: {listed}. Strain wave gears do that, twice in a turn "
+            "of their wave generator. Write transmission_periods to these joints in the robot file, and `model=auto` "
             "will try to take the error out.",
         )
     ]

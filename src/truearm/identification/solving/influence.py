@@ -21,7 +21,7 @@ from truearm.modeling.robot import Robot
 
 #: +0.05 deg and +0.1 mm, by SI unit (Patel, section 3.5).
 PERTURBATION: Final[Mapping[str, float]] = {"rad": math.radians(0.05), "m": 1e-4}
-_NOTHING: Final = 1e-13  # m: what rounding moves
+_ROUNDING: Final = 1e-13  # m: what rounding moves
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +67,7 @@ class Influence:
             If no parameter moves the tip at some configuration.
         """
         most = self.size.max(axis=0)
-        if (most < _NOTHING).any():
+        if (most < _ROUNDING).any():
             raise InputError(
                 "none of the parameters moves the tip, so none is the most influential",
                 where=f"configuration {int(np.argmin(most)) + 1}",

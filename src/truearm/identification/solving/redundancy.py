@@ -25,14 +25,22 @@ from truearm.modeling.parameters import FreeParameters, Parameter
 from truearm.modeling.robot import Robot
 
 _ORDER: Final = ("base", "fixture", "target", "", "joint zero", "geometry")  # "" is every joint effect
-_APART: Final = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)  # share of a column outside the span of the others
-_MEMBER: Final = 1e-9  # priors per prior below which a parameter takes no part in a combination
+_INDEPENDENT_SHARES: Final = (
+    1e-1,
+    1e-2,
+    1e-3,
+    1e-4,
+    1e-5,
+    1e-6,
+    1e-7,
+)  # share of a column outside the span of the others
+_LEAST_MEMBER: Final = 1e-9  # priors per prior below which a parameter takes no part in a combination
 _SHOWN: Final = 0.02
-_KNOWS_NOTHING: Final = 0.3  # readings that tell a parameter no better than to three priors do not tell it
+_LEAST_INFORMATION: Final = 0.3  # readings that tell a parameter no better than to three priors do not tell it
 _UNOBSERVED: Final = 1e-8  # share of the best observed direction
-_MATTERS: Final = 1e-6  # share of the largest effect of a parameter
-_MATTERS_UP_TO_GAUGE: Final = 1e-3  # the same up to gauge freedoms: noise hides the size of everything
-_INVOLVED: Final = 0.1  # share of a parameter in the lost directions
+_NEGLIGIBLE: Final = 1e-6  # share of the largest effect of a parameter
+_NEGLIGIBLE_UP_TO_GAUGE: Final = 1e-3  # the same up to gauge freedoms: noise hides the size of everything
+_LEAST_INVOLVED: Final = 0.1  # share of a parameter in the lost directions
 
 
 @dataclass(frozen=True)
@@ -107,10 +115,10 @@ def independent_columns(A: Array, among: Iterable[int], free: FreeParameters) ->
     left = [i for i in _in_order(free) if i in set(among) and norms[i] > 1e-12 * norms.max()]
     rests = {i: A[:, i].copy() for i in left}
     kept: list[int] = []
-    for apart in _APART:
+    for apart in _INDEPENDENT_SHARES:
         for i in list(left):
             size = float(np.linalg.norm(rests[i]))
-            if size <= max(apart * norms[i], _KNOWS_NOTHING):
+            if size <= max(apart * norms[i], _LEAST_INFORMATION):
                 continue
             direction = rests[i] / size
             kept.append(i)
@@ -131,7 +139,7 @@ def _combinations(A: Array, dropped: Sequence[int], kept: Sequence[int]) -> Arra
 
 def _redundancy(free: FreeParameters, dropped: int, here: Array, away: Array) -> Redundancy:
     involved = [dropped]
-    involved += [i for i in range(len(here)) if i != dropped and max(abs(here[i]), abs(away[i])) > _MEMBER]
+    involved += [i for i in range(len(here)) if i != dropped and max(abs(here[i]), abs(away[i])) > _LEAST_MEMBER]
     members = {free.names[i]: float(here[i] * free.prior[i] / free.prior[dropped]) for i in involved}
     return Redundancy(free.names[dropped], members, in_words(members, free))
 
@@ -196,12 +204,12 @@ def unobservable_parameters(robot: Robot, data: Dataset, free: FreeParameters, s
         effects = np.concatenate([effects, *moved])
     _, strength, turned = np.linalg.svd(effects @ unobserved.T, full_matrices=False)
     largest = np.linalg.norm(effects, axis=0)
-    least = _MATTERS * largest.max()
+    least = _NEGLIGIBLE * largest.max()
     if gauge:
         own = [p.group not in ("base", "target", "fixture") for p in free.parameters]
-        least = _MATTERS_UP_TO_GAUGE * max(largest[own], default=0.0)
+        least = _NEGLIGIBLE_UP_TO_GAUGE * max(largest[own], default=0.0)
     lost = turned[: len(strength)][strength > least] @ unobserved
-    involved = np.linalg.norm(lost, axis=0) > _INVOLVED
+    involved = np.linalg.norm(lost, axis=0) > _LEAST_INVOLVED
     return tuple(name for name, is_in in zip(free.names, involved.tolist(), strict=True) if is_in)
 
 

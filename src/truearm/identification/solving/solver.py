@@ -23,7 +23,7 @@ SMALL: Final = 1e-6
 _GEOMETRIC: Final = 1e-3
 _STEPS: Final = {"linear": 60, "huber": 100, "cauchy": 100, "l1": 300}
 #: How much larger the last step may be where single numbers pull with one strength however near they are.
-_CREEPS: Final = 10.0
+_CREEPING_FACTOR: Final = 10.0
 
 
 class Solvable(Protocol):
@@ -137,23 +137,25 @@ def solve(
         if not accepted:
             break
         here = trial
-        last = float(np.abs(step / np.minimum(prior, _GEOMETRIC)).max()) < small * (_CREEPS if loss == "l1" else 1.0)
+        last = float(np.abs(step / np.minimum(prior, _GEOMETRIC)).max()) < small * (
+            _CREEPING_FACTOR if loss == "l1" else 1.0
+        )
         if last or predicted <= 1e-24 * max(cost, 1.0):
-            converged = loss != "l1" or scale <= _FLOOR * float(np.median(_norms(here, loss)) + 1e-300)
+            converged = loss != "l1" or scale <= _L1_FLOOR * float(np.median(_norms(here, loss)) + 1e-300)
             if converged:
                 break
     final = weights(loss, _norms(here, loss), scale or 1.0)
     return Solution(here.vector, converged, steps, here.residual, here.jacobian, final)
 
 
-_FLOOR: Final = 1e-4  # an l1 reading closer than this share of the median counts as met
+_L1_FLOOR: Final = 1e-4  # an l1 reading closer than this share of the median counts as met
 
 
 def _next_scale(loss: Loss, norms: Array, components: NDArray[np.intp], scale: float | None, step: int) -> float:
     if loss == "linear":
         return 1.0
     if loss == "l1":
-        floor = 0.3 * _FLOOR * float(np.median(norms)) + 1e-300
+        floor = 0.3 * _L1_FLOOR * float(np.median(norms)) + 1e-300
         return max(floor, float(np.median(norms)) if scale is None else 0.5 * scale)
     if scale is None or step <= 10:  # then held, so that the weights can settle
         return max(robust_scale(norms, components), 1e-300)

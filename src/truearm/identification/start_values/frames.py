@@ -44,7 +44,7 @@ def initial_frames(robot: Robot, data: Dataset) -> Robot:
     p, R = placed.world_poses(data.postures)
     with_position = data.has_position
     if not with_position.any():
-        raise InputError("there is no position reading at all", where=data.source, cure="Fill in x, y and z.")
+        raise InputError("there is no position reading", where=data.source, cure="Fill in x, y and z.")
     seen = [t for t in range(len(data.targets)) if (with_position & (data.target == t)).any()]
     readings = np.flatnonzero(with_position)
     where, what = data.configuration[readings], data.target[readings]

@@ -30,18 +30,18 @@ from truearm.modeling.transform import Transform
 Place = tuple[FixtureKind, Transform]
 
 #: How far from the flange a target is looked for, and in what steps [m].
-_REACH: Final = 0.45
-_STEP: Final = 0.09
+_SEARCH_REACH: Final = 0.45
+_SEARCH_STEP: Final = 0.09
 #: How many of the places tried are gone on from.
-_TRIED: Final = 6
+_PLACES_KEPT: Final = 6
 #: Deviation that readings are weighed with while targets are looked for [m or rad].
-_ROUGH: Final = 1e-3
+_SEARCH_DEVIATION: Final = 1e-3
 #: How many readings are used for that.
-_READINGS_TRIED: Final = 120
+_READINGS_USED: Final = 120
 #: How many of one fixture, at least.
-_FEW: Final = 12
+_LEAST_OF_A_FIXTURE: Final = 12
 #: Singular values below this share of the largest belong to unknowns that are not determined.
-_DETERMINES: Final = 1e-5
+_LEAST_SINGULAR_VALUE: Final = 1e-5
 
 
 def start_from_readings(robot: Robot, data: Dataset) -> Robot:
@@ -235,7 +235,7 @@ def _with_target(robot: Robot, data: Dataset, target: int, kinds: Mapping[str, F
     name = data.targets[target]
     p, R = robot.world_poses(mine.postures)
     p, R = p[mine.configuration], R[mine.configuration]
-    steps = np.arange(-_REACH, _REACH + 1e-9, _STEP)
+    steps = np.arange(-_SEARCH_REACH, _SEARCH_REACH + 1e-9, _SEARCH_STEP)
     grid = np.stack(np.meshgrid(steps, steps, steps), axis=-1).reshape(-1, 3)
     tips = p + np.einsum("nij,gj->gni", R, grid)
     cost = np.zeros(len(grid))
@@ -254,12 +254,12 @@ def _with_target(robot: Robot, data: Dataset, target: int, kinds: Mapping[str, F
             continue
         cost += np.sum(off**2, axis=1)
     found = []
-    for start in np.argsort(cost)[:_TRIED].tolist():
+    for start in np.argsort(cost)[:_PLACES_KEPT].tolist():
         tried = _also(robot, {name: grid[start]})
         tried = tried.with_fixtures(_fixture_places(tried, mine, kinds))
         own = tried.target(name).chain.parameters
         free = FreeParameters(tuple(q for q in tried.parameters.values() if q.group == "fixture" or q.name in own))
-        solution = solve(Problem(tried, mine, free, dict.fromkeys(_names(), _ROUGH)))
+        solution = solve(Problem(tried, mine, free, dict.fromkeys(_names(), _SEARCH_DEVIATION)))
         there = solution.vector[[free.names.index(tried.target(name).parameter(axis)) for axis in "xyz"]]
         found.append((float(solution.residual @ solution.residual), there))
     return _also(robot, {name: min(found, key=lambda one: one[0])[1]})
@@ -267,13 +267,13 @@ def _with_target(robot: Robot, data: Dataset, target: int, kinds: Mapping[str, F
 
 def _some_of_each_fixture(data: Dataset) -> Dataset:
     """Return readings that are enough to look for a target, as many of each fixture as of the others."""
-    if len(data.target) <= _READINGS_TRIED:
+    if len(data.target) <= _READINGS_USED:
         return data
     fixtures = np.unique(data.against)
     some = np.zeros(len(data.target), dtype=bool)
     for fixture in fixtures.tolist():
         mine = np.flatnonzero(data.against == fixture)
-        count = min(len(mine), max(_FEW, _READINGS_TRIED // len(fixtures)))
+        count = min(len(mine), max(_LEAST_OF_A_FIXTURE, _READINGS_USED // len(fixtures)))
         some[mine[np.linspace(0, len(mine) - 1, count).astype(np.intp)]] = True
     return data.of_readings(some)
 
@@ -376,10 +376,10 @@ def _names() -> tuple[str, ...]:
 def _refuse_alike(robot: Robot, data: Dataset) -> None:
     """Refuse readings that do not even determine where base, targets and fixtures are."""
     free = _start_parameters(robot, data, ("base", "target", "fixture"))
-    noise = dict.fromkeys(_names(), _ROUGH)
+    noise = dict.fromkeys(_names(), _SEARCH_DEVIATION)
     J = Problem(robot, data, free, noise, priors=False).linearised(free.start)[1]
     s = np.linalg.svd(np.linalg.qr(J, mode="r"), compute_uv=False)
-    determined = int((s > _DETERMINES * s[0]).sum())
+    determined = int((s > _LEAST_SINGULAR_VALUE * s[0]).sum())
     if determined < len(free.names):
         raise InputError(
             "the readings do not determine where targets and fixtures are: the postures are too few or too much alike",

@@ -10,7 +10,7 @@ from truearm.modeling.chain import Array
 from truearm.modeling.transform import Transform
 
 #: Heights that fit worse than this on one side of a plane belong to the other [m].
-_CLEARLY: Final = 5e-3
+_WRONG_SIDE_ERROR: Final = 5e-3
 
 
 def point_at_distances(anchors: Array, lengths: Array, side: float) -> Array:
@@ -49,7 +49,7 @@ def plane_under(points: Array, heights: Array, flange: Array) -> Transform:
     h = heights - heights.mean()
     normal = normals_of((points - middle)[None], h)[0]
     off = (points - middle) @ -normal - h
-    if float(normal @ (flange - points).mean(axis=0)) < 0.0 and float(np.sqrt(np.mean(off**2))) < _CLEARLY:
+    if float(normal @ (flange - points).mean(axis=0)) < 0.0 and float(np.sqrt(np.mean(off**2))) < _WRONG_SIDE_ERROR:
         normal = -normal
     x = np.cross(np.eye(3)[np.argmin(np.abs(normal))], normal)
     x /= np.linalg.norm(x)

@@ -17,18 +17,18 @@ from truearm.measurement.drawn_circle.ink import Ink, faintest
 from truearm.modeling.chain import Array
 
 #: Extent of the smallest thing that may be part of a circle [m].
-_SPECK: Final = 5e-3
+_LARGEST_SPECK: Final = 5e-3
 _CELL: Final = 1e-3
 _CELLS: Final = 300  # along the page's longer edge at most
 #: Smallest radius in cells, largest as a share of the page's shorter edge.
 _RADII: Final = (5, 0.6)
 #: Share of a candidate's circumference that lies on lines, and how many are looked at.
-_SCORE: Final = 0.4
-_MOST: Final = 12
+_LEAST_SCORE: Final = 0.4
+_MOST_CANDIDATES: Final = 12
 #: Candidates differ by more cells than this.
-_APART: Final = 3
+_LEAST_DISTANCE: Final = 3
 #: A page on which more than this share of cells is inked has no lines.
-_FULL: Final = 0.4
+_LARGEST_INKED_SHARE: Final = 0.4
 
 
 class Candidate(NamedTuple):
@@ -61,7 +61,7 @@ def lines(darkness: Array, pitch: tuple[float, float], threshold: float) -> NDAr
     large = np.zeros(int(pieces.max()) + 1, dtype=bool)
     for number, (rows, columns) in enumerate(find_objects(pieces), 1):
         extent = max((rows.stop - rows.start) * pitch[1], (columns.stop - columns.start) * pitch[0])
-        large[number] = extent >= _SPECK
+        large[number] = extent >= _LARGEST_SPECK
     return np.asarray(skeletonize(large[pieces]), dtype=np.bool_)
 
 
@@ -77,15 +77,15 @@ def candidates(thinned: NDArray[np.bool_], ink: Ink) -> Iterator[Candidate]:
     cells[((rows + 0.5) * ink.pitch[1] / cell).astype(int), ((columns + 0.5) * ink.pitch[0] / cell).astype(int)] = True
     cells = binary_dilation(cells, np.ones((3, 3), dtype=bool))
     radii = np.arange(_RADII[0], int(_RADII[1] * min(width, height) / cell) + 1)
-    if not len(radii) or cells.mean() > _FULL:
+    if not len(radii) or cells.mean() > _LARGEST_INKED_SHARE:
         return
     scores = np.asarray(hough_circle(cells, radii))
-    for _ in range(_MOST):
+    for _ in range(_MOST_CANDIDATES):
         r, row, column = (int(i) for i in np.unravel_index(np.argmax(scores), scores.shape))
-        if scores[r, row, column] < _SCORE:
+        if scores[r, row, column] < _LEAST_SCORE:
             return
         yield Candidate(
-            (column + 0.5) * cell, height - (row + 0.5) * cell, float(radii[r]) * cell, (_APART + 0.5) * cell
+            (column + 0.5) * cell, height - (row + 0.5) * cell, float(radii[r]) * cell, (_LEAST_DISTANCE + 0.5) * cell
         )
-        near = tuple(slice(max(0, i - _APART), i + _APART + 1) for i in (r, row, column))
+        near = tuple(slice(max(0, i - _LEAST_DISTANCE), i + _LEAST_DISTANCE + 1) for i in (r, row, column))
         scores[near] = 0.0

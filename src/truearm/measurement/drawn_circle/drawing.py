@@ -26,7 +26,7 @@ class DrawnCircle:
     source
         The scanned file.
     joints
-        Readings [rad or m], ``(n, joints)``.
+        Joint positions [rad or m], ``(n, joints)``.
     angle
         Direction from the centre [rad], ``(n,)``.
     radius
@@ -58,7 +58,7 @@ def drawn_circle(scan: ScannedCircle, angle: Array, joints: Array, height: Array
         At which directions of the circle the robot was read [rad], ``(n,)``, from the page's x towards y. A degree of
         error matters little: it moves a radius by its slope only.
     joints
-        Readings there [rad or m], ``(n, joints)``.
+        Joint positions there [rad or m], ``(n, joints)``.
     height
         Of the tool over the paper by the potentiometer, along the pencil [m], ``(n,)``.
 
@@ -70,13 +70,13 @@ def drawn_circle(scan: ScannedCircle, angle: Array, joints: Array, height: Array
     angle, joints, height = (np.asarray(values, dtype=np.float64) for values in (angle, joints, height))
     if angle.ndim != 1 or not len(angle) or height.shape != angle.shape or joints.ndim != 2 or not joints.shape[1]:
         raise InputError(
-            "angles, joint readings and heights do not belong together",
+            "angles, joint positions and heights do not belong together",
             came=", ".join(str(values.shape) for values in (angle, joints, height)),
             allowed="(n,), (n, joints) and (n,)",
         )
     if len(joints) != len(angle):
         raise InputError(
-            "there are not as many joint readings as angles", where="joints", came=len(joints), allowed=str(len(angle))
+            "there are not as many joint positions as angles", where="joints", came=len(joints), allowed=str(len(angle))
         )
     for name, values in (("angle", angle), ("joints", joints), ("height", height)):
         if not np.isfinite(values).all():

@@ -21,19 +21,19 @@ from truearm.measurement.drawn_circle.ink import Ink
 from truearm.modeling.chain import Array
 
 #: How far the line may be from what its neighbours let expect [m].
-_REACH: Final = 1e-3
+_SEARCH_REACH: Final = 1e-3
 #: Share of a turn, on either side, that counts as neighbourhood when following and when judging.
-_AROUND: Final = (1 / 16, 1 / 90)
+_NEIGHBOURHOODS: Final = (1 / 16, 1 / 90)
 #: Shares of a line's usual darkness between which the weight grows.
 _LEVELS: Final = (1 / 3, 1 / 2)
 #: A line that jumps by more from one sector to the next is none [m]; nor one further from a circle than this share.
-_ROUGH: Final = 0.15e-3
-_NO_CIRCLE: Final = 0.04
+_LARGEST_JUMP: Final = 0.15e-3
+_LARGEST_OUT_OF_ROUND: Final = 0.04
 #: Share of the sectors that must be seen.
-_SEEN: Final = 0.5
+_LEAST_SECTORS: Final = 0.5
 #: The centre is found when it moves by a smaller share of a dot; it does so at the second or third look.
-_STILL: Final = 0.02
-_LOOKS: Final = 5
+_CENTRE_SETTLED: Final = 0.02
+_MOST_LOOKS: Final = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,19 +71,19 @@ def follow(ink: Ink, start: Candidate, sectors: int, threshold: float) -> Line |
         Darkness of what is inked.
     """
     centre, radius, reach = np.array([start.x, start.y]), start.radius, start.tolerance
-    for _ in range(_LOOKS):
+    for _ in range(_MOST_LOOKS):
         radii, rays = _rays(ink, centre, radius, reach, sectors)
         profile, width = _middle(radii, rays, threshold)
         seen = np.isfinite(profile)
-        if seen.sum() < _SEEN * sectors:
+        if seen.sum() < _LEAST_SECTORS * sectors:
             return None
         angle = 2 * math.pi * np.flatnonzero(seen) / sectors
         points = np.stack([profile[seen] * np.cos(angle), profile[seen] * np.sin(angle), np.zeros(len(angle))], axis=1)
         circle = fit_circle(points)
         centre, radius = centre + circle.centre[:2], circle.radius
-        if np.hypot(*circle.centre[:2]) < _STILL * min(ink.pitch):
+        if np.hypot(*circle.centre[:2]) < _CENTRE_SETTLED * min(ink.pitch):
             break
-    if math.sqrt(float(circle.radial @ circle.radial) / len(angle)) > _NO_CIRCLE * radius:
+    if math.sqrt(float(circle.radial @ circle.radial) / len(angle)) > _LARGEST_OUT_OF_ROUND * radius:
         return None
     own = np.abs(radii - np.where(seen, profile, np.inf)[:, None]) <= width
     beside = (np.where(own, 0.0, rays) > threshold).any(axis=1)
@@ -117,31 +117,31 @@ def _middle(radii: Array, rays: Array, threshold: float) -> tuple[Array, float]:
     sectors = len(rays)
     nothing = np.full(sectors, np.nan), 0.0
     first = np.where(rays.max(axis=1) > threshold, radii[rays.argmax(axis=1)], np.nan)
-    if np.isfinite(first).sum() < _SEEN * sectors:
+    if np.isfinite(first).sum() < _LEAST_SECTORS * sectors:
         return nothing
-    near = np.abs(radii - _smooth(first, _AROUND[0])[:, None]) <= _REACH
+    near = np.abs(radii - _smooth(first, _NEIGHBOURHOODS[0])[:, None]) <= _SEARCH_REACH
     at = np.where(near, rays, -1.0).argmax(axis=1)
     darkest = rays[np.arange(sectors), at]
     if not (darkest > threshold).any():
         return nothing
     place = np.arange(len(radii))
-    usual = _smooth(np.where(darkest > threshold, darkest, np.nan), _AROUND[0])[:, None]
+    usual = _smooth(np.where(darkest > threshold, darkest, np.nan), _NEIGHBOURHOODS[0])[:, None]
     light = rays < _LEVELS[0] * usual
     left = np.where(light & (place < at[:, None]), place, -1).max(axis=1)
     right = np.where(light & (place > at[:, None]), place, len(radii)).min(axis=1)
     run = (place > left[:, None]) & (place < right[:, None])
     weights = np.where(run, np.minimum(rays, _LEVELS[1] * usual) - _LEVELS[0] * usual, 0.0)
     found = (darkest > np.maximum(threshold, _LEVELS[0] * usual[:, 0])) & (left >= 0) & (right < len(radii))
-    if found.sum() < _SEEN * sectors:
+    if found.sum() < _LEAST_SECTORS * sectors:
         return nothing
     profile = np.where(found, weights @ radii / np.where(found, weights.sum(axis=1), 1.0), np.nan)
     step = radii[1] - radii[0]
     widths = (right - left - 1) * step
     width = float(np.median(widths[found]))
     profile[widths > 2 * width + 4 * step] = np.nan
-    off = np.abs(profile - _smooth(profile, _AROUND[1]))
+    off = np.abs(profile - _smooth(profile, _NEIGHBOURHOODS[1]))
     spread = 1.4826 * float(np.nanmedian(off))
-    if spread > _ROUGH:
+    if spread > _LARGEST_JUMP:
         return nothing
     profile[off > max(width / 2, 4 * spread)] = np.nan
     return profile, width

@@ -23,7 +23,7 @@ _FORMATS: Final = ("PNG", "JPEG", "TIFF")
 #: Dots per inch that scanners have. Programs write 72 or 96 where they do not know.
 _RESOLUTIONS: Final = (100.0, 4800.0)
 #: Shortest edge of a page [m].
-_SMALLEST: Final = 0.02
+_SHORTEST_EDGE: Final = 0.02
 _TURNED: Final = (5, 6, 7, 8)  # EXIF orientations in which rows and columns are exchanged
 
 
@@ -85,12 +85,12 @@ def read_page(path: Path, dpi: float | tuple[float, float] | None = None) -> Pag
         )
     inch = to_si(1.0, "in")
     page = Page(source=str(path), brightness=_brightness(image, path), pitch=(inch / given[0], inch / given[1]))
-    if min(page.size) < _SMALLEST:
+    if min(page.size) < _SHORTEST_EDGE:
         raise InputError(
             "the page is too small",
             where=str(path),
             came=" x ".join(f"{1e3 * edge:.1f} mm" for edge in page.size),
-            allowed=f"{1e3 * _SMALLEST:g} mm or more",
+            allowed=f"{1e3 * _SHORTEST_EDGE:g} mm or more",
             cure="Check the resolution, or scan the whole page.",
         )
     return page
@@ -115,7 +115,7 @@ def _opened(path: Path) -> tuple[Image, tuple[float, float] | None]:
         raise InputError(
             f"the image has more than {(Image.MAX_IMAGE_PIXELS or 0) / 1e6:.0f} million dots",
             where=str(path),
-            cure="Scan at 300 to 600 dpi; more tells nothing about a pencil's line.",
+            cure="Scan at 300 to 600 dpi; more does not show a pencil line better.",
         ) from error
     except Exception as error:  # Pillow's decoders fail in many ways on damaged files
         raise InputError(
@@ -139,7 +139,7 @@ def _brightness(image: Image, path: Path) -> NDArray[np.uint8]:
         return np.asarray(np.asarray(image) // 257, dtype=np.uint8)
     if image.mode in ("I", "F", "LAB"):
         raise InputError(
-            "this kind of image has no plain brightness",
+            "this kind of image holds no brightness that can be read",
             where=str(path),
             came=f"mode {image.mode}",
             cure="Scan in grey or colour, 8 bits.",

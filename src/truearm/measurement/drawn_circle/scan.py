@@ -19,15 +19,15 @@ from truearm.modeling.chain import Array
 
 _SECTORS: Final = (90, 3600)
 #: Lines whose circles are nearer together than this are one [m].
-_SAME: Final = 1e-3
+_SAME_CIRCLE: Final = 1e-3
 #: Share of the turn over which something else may be drawn within 3.5 mm.
-_BESIDE: Final = 0.1
+_LARGEST_DOUBLE_SHARE: Final = 0.1
 #: How far from the circle its line is looked for in the end, at most [m]; and as a share of the radius.
-_REACH: Final = (4e-3, 0.25)
+_SEARCH_REACH: Final = (4e-3, 0.25)
 #: How near the edge of the page a line is cut [m].
 _MARGIN: Final = 0.5e-3
 #: Brightness of the darkest page that can be read.
-_DARK: Final = 64.0
+_DARKEST_PAGE: Final = 64.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +96,7 @@ def read_circle(path: Path, dpi: float | tuple[float, float] | None = None, sect
         )
     page = read_page(path, dpi)
     ink, coarse = ink_of(page)
-    if float(np.median(coarse.brightness)) < _DARK:
+    if float(np.median(coarse.brightness)) < _DARKEST_PAGE:
         raise InputError(
             "the page is dark", where=str(path), cure="Draw on white paper, and scan without turning it to a negative."
         )
@@ -110,7 +110,7 @@ def read_circle(path: Path, dpi: float | tuple[float, float] | None = None, sect
             cure="Scan a page with one of them, or paint the others over with white.",
         )
     (line,) = found
-    if line.beside > _BESIDE:
+    if line.beside > _LARGEST_DOUBLE_SHARE:
         raise InputError(
             "another line, or writing, runs along the circle, or its line is not clear",
             where=str(path),
@@ -126,7 +126,7 @@ def read_circle(path: Path, dpi: float | tuple[float, float] | None = None, sect
             cure="Lay the whole circle onto the scanner, or draw a smaller one.",
         )
     start = Candidate(
-        float(line.centre[0]), float(line.centre[1]), line.radius, min(_REACH[0], _REACH[1] * line.radius)
+        float(line.centre[0]), float(line.centre[1]), line.radius, min(_SEARCH_REACH[0], _SEARCH_REACH[1] * line.radius)
     )
     fine = follow(ink, start, sectors, threshold)
     if fine is None:
@@ -150,7 +150,7 @@ def _found(coarse: Ink, where: str) -> tuple[list[Line], float]:
         found: list[Line] = []
         for candidate in candidates(thinned, coarse):
             line = follow(coarse, candidate, 360, threshold)
-            if line is not None and all(_distance(line, other) > _SAME for other in found):
+            if line is not None and all(_distance(line, other) > _SAME_CIRCLE for other in found):
                 found.append(line)
         if found:
             return found, threshold

@@ -152,7 +152,8 @@ def triangle(sides: Sequence[float] | Array, fixture: str) -> Array:
         names, worst = side_names(fixture), lengths[:, flat[0]]
         longest = names[int(np.argmax(worst))]
         raise InputError(
-            f"the cups {', '.join(f'{fixture}{n + 1}' for n in range(3))} lie on one line, or cannot lie so at all",
+            f"the cups {', '.join(f'{fixture}{n + 1}' for n in range(3))} lie on one line, or no triangle has these "
+            "distances",
             where=longest,
             came=", ".join(f"{name} {length * 1e3:.3f} mm" for name, length in zip(names, worst, strict=True)),
             allowed="three distances of a triangle, each well below the sum of the others",

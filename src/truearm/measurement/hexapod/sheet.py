@@ -48,7 +48,7 @@ class Sheet:
     source
         The file, for messages.
     configurations
-        Labels and joint readings, one row each; None if the sheet has no joints.
+        Labels and joint positions, one row each; None if the sheet has no joints.
     labels
         One for each row.
     designs, solutions
@@ -94,7 +94,7 @@ class Sheet:
         """
         if self.configurations is None:
             raise InputError(
-                "the sheet has no joint readings", where=self.source, allowed="joint_1 [deg] ..", cure="Add them."
+                "the sheet has no joint positions", where=self.source, allowed="joint_1 [deg] ..", cure="Add them."
             )
         rows = self.measured
         if not len(rows):
@@ -128,7 +128,7 @@ def read_sheet(path: Path, device: Device = DEVICE) -> Sheet:
     labels = cells.texts(columns["configuration"][0])
     if len(set(labels)) < len(labels):
         twice = next(label for row, label in enumerate(labels) if label in labels[:row])
-        raise InputError("the configuration is there twice", where=str(path), came=twice, cure="One row each.")
+        raise InputError("the configuration appears twice", where=str(path), came=twice, cure="One row each.")
     by_name = {design.name: design for design in designs()}
     found = [_one_of(cells, row, columns["design"][0], by_name) for row in range(len(labels))]
     solutions = {str(number): number for number in SOLUTIONS}
@@ -210,7 +210,7 @@ def _columns(cells: Cells) -> dict[str, tuple[int, str]]:
         match = _HEADING.fullmatch(heading)
         name, unit = (match["name"], match["unit"]) if match else (heading, None)
         if name in columns:
-            raise InputError(f"the column {name} is there twice", where=where, cure="Remove one of them.")
+            raise InputError(f"the column {name} appears twice", where=where, cure="Remove one of them.")
         if name in _PLAIN:
             columns[name] = (place, "1")
         elif name in _FIXTURES or name in _LEGS:
@@ -249,7 +249,7 @@ class PlannedRow:
     design, solution
         Which legs, and how they are assembled.
     joints
-        Readings [rad or m], ``(joints,)``.
+        Joint positions [rad or m], ``(joints,)``.
     """
 
     configuration: str
@@ -279,8 +279,8 @@ def sheet_csv(rows: Sequence[PlannedRow], joints: Sequence[Joint], lengths: Sequ
     writer.writerow([*_PLAIN, *angles, *(f"{name} [mm]" for name in (*_FIXTURES, *_LEGS))])
     for number, row in enumerate(rows):
         known = lengths[number] if lengths else {}
-        readings = (repr(written(v, unit)) for v, unit in zip(row.joints.tolist(), units, strict=True))
+        places = (repr(written(v, unit)) for v, unit in zip(row.joints.tolist(), units, strict=True))
         cells = (repr(written(known[name], "mm")) if name in known else "" for name in (*_FIXTURES, *_LEGS))
         plain = (row.configuration, row.pose, row.branch, row.design.name, row.solution)
-        writer.writerow([*plain, *readings, *cells])
+        writer.writerow([*plain, *places, *cells])
     return stream.getvalue()

@@ -1,4 +1,4 @@
-"""Joint readings at the three base cups: a CSV with ``cup`` (B1, B2, B3) and ``joint_1 [deg]`` .., one row a cup."""
+"""Joint positions at the three base cups: a CSV with ``cup`` (B1, B2, B3) and ``joint_1 [deg]`` .., one row a cup."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _CUPS: Final = ("B1", "B2", "B3")
 
 
 def read_touches(path: Path, robot: Robot) -> Array:
-    """Return the joint readings at B1, B2 and B3 [rad or m], ``(3, joints)``.
+    """Return the joint positions at B1, B2 and B3 [rad or m], ``(3, joints)``.
 
     Raises
     ------
@@ -40,7 +40,7 @@ def read_touches(path: Path, robot: Robot) -> Array:
         match = _HEADING.fullmatch(heading)
         if match is None or match["name"] not in wanted or match["name"] in columns:
             raise InputError(
-                "the column is not known, or there twice", where=where, came=heading, allowed=", ".join(wanted)
+                "the column is not known, or appears twice", where=where, came=heading, allowed=", ".join(wanted)
             )
         if match["name"] == "cup":
             columns["cup"] = (place, "1")

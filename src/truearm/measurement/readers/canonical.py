@@ -167,7 +167,7 @@ def _columns(cells: Cells) -> dict[str, _Column]:
             )
         if name in columns:
             raise InputError(
-                f"the column {name} is there twice",
+                f"the column {name} appears twice",
                 where=f"{where} as well as column {columns[name].place + 1}",
                 came=heading,
                 cure="Remove one of them.",
@@ -317,11 +317,11 @@ def csv_text(dataset: Dataset, length_unit: str = "mm", angle_unit: str = "deg")
             row = [dataset.labels[configuration], *joints[configuration], *reading_cells(part, role, reading)]
             row += [_shown(float(values[configuration]), "1") for values in circumstances.values()]
             rows[configuration].append(row)
-    unseen = next((label for label, found in zip(dataset.labels, rows, strict=True) if not found), None)
-    if unseen is not None:
+    unmeasured = next((label for label, found in zip(dataset.labels, rows, strict=True) if not found), None)
+    if unmeasured is not None:
         raise InputError(
-            "a configuration has no reading, and a file could not hold it",
-            where=f"{dataset.source}, configuration {unseen}",
+            "a configuration without a reading cannot be written to a file",
+            where=f"{dataset.source}, configuration {unmeasured}",
             cure="Leave it out, or give it missing readings.",
         )
     stream = io.StringIO()

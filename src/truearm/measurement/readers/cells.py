@@ -143,7 +143,7 @@ class Cells:
                     where=where,
                     came=came,
                     allowed="a number above 0, or nothing",
-                    cure="Write what the instrument is good for, or leave the whole column out.",
+                    cure="Write the standard deviation of the instrument, or leave the whole column out.",
                 )
             parsed[cell] = sized_si(value, unit, where, came=came, deviation=deviation)
         return np.array([parsed[cell] for cell in cells])
@@ -225,7 +225,7 @@ def _ragged(where: str, came: int, wanted: int, layout: Layout) -> InputError:
         cure = "Check for decimal commas, or for a comma in a name without quotes around it."
     else:
         cure = "Check for a separator inside a name without quotes around it."
-    what = f"the row has not as many cells as {'the first row' if layout.header is None else 'the header'}"
+    what = f"the row does not have as many cells as {'the first row' if layout.header is None else 'the header'}"
     return InputError(what, where=where, came=f"{came} cells", allowed=f"{wanted} cells", cure=cure)
 
 

@@ -23,7 +23,7 @@ from truearm.units import ANGLE_UNITS, LENGTH_UNITS, checked_unit
 _HEADING: Final = re.compile(r"(configuration|joint_[1-9][0-9]*|angle|height)\s*(?:\[([^\]]*)\])?")
 _ALLOWED: Final = "configuration, joint_1 [deg] .., angle [deg], height [mm]"
 #: How well the middle of a circle lies in its paper [m].
-_FLAT: Final = 1e-5
+_PAPER_DEVIATION: Final = 1e-5
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ def read_drawn_circles(
         height=np.zeros(len(pages)),
         fixtures=data.fixtures,
         fixture=len(pages) + np.arange(len(pages)),
-        sigma=np.full(len(pages), _FLAT),
+        sigma=np.full(len(pages), _PAPER_DEVIATION),
     )
     return in_order(replace(data, setup=known))
 
@@ -124,7 +124,7 @@ def _page(page: Page, dpi: float | tuple[float, float] | None) -> tuple[Configur
     if len(found.labels) < len(labels):
         again = next(label for k, label in enumerate(labels) if label in labels[:k])
         raise InputError(
-            "a configuration is there twice",
+            "a configuration appears twice",
             where=f"{page.points}, column configuration",
             came=again,
             cure="Number the configurations through, in the order in which they were drawn.",
@@ -140,7 +140,7 @@ def _columns(cells: Cells) -> dict[str, tuple[int, str]]:
         where = f"{cells.source}, line {cells.header}, column {place + 1}"
         match = _HEADING.fullmatch(heading)
         if match is None or match[1] in columns:
-            what = "the column is not known" if match is None else f"the column {match[1]} is there twice"
+            what = "the column is not known" if match is None else f"the column {match[1]} appears twice"
             raise InputError(what, where=where, came=heading, allowed=_ALLOWED)
         units = {"angle": ANGLE_UNITS, "height": LENGTH_UNITS}.get(match[1], (*ANGLE_UNITS, *LENGTH_UNITS))
         unit = "1" if match[1] == "configuration" else checked_unit(match[2], units, f"{where}, {heading}")

@@ -44,7 +44,7 @@ def check_lengths(cells: Cells, readings: Readings, places: Mapping[str, int]) -
         for row in np.flatnonzero(np.isfinite(values)).tolist():
             if readings.fixture is None or not readings.fixture[row]:
                 raise InputError(
-                    f"the {name} is measured from nothing",
+                    f"the {name} names no fixture that it is measured from",
                     where=cells.place(row, places[name]),
                     allowed="a fixture in the column fixture",
                     cure="Name what it is measured from, with any name.",
@@ -85,7 +85,7 @@ def read_setup(cells: Cells, columns: Mapping[str, tuple[int, str]], data: Datas
             for row, cell in enumerate(cells.columns[place]):
                 if cell:
                     raise InputError(
-                        "this says nothing of a fixture, which stands still beside the robot",
+                        "this cell does not apply to a fixture, which stands still beside the robot",
                         where=cells.place(row, place),
                         came=cell,
                         allowed=f"cells filled in {', '.join(_OF_SETUP)} alone",
@@ -119,7 +119,7 @@ def read_setup(cells: Cells, columns: Mapping[str, tuple[int, str]], data: Datas
         part_missing = placed and not np.isfinite(position[row]).all()
         if placed + apart + over != 1 or part_missing or placed == bool(other) or name == other:
             raise InputError(
-                "the row does not say what is known of the fixture",
+                "the row does not say where the fixture is",
                 where=where,
                 allowed="x, y and z of its place in the instrument's frame, its distance from another fixture, or its"
                 " height over one that is a plane",
@@ -134,9 +134,9 @@ def read_setup(cells: Cells, columns: Mapping[str, tuple[int, str]], data: Datas
             )
         if np.isnan(sigma[row]):
             raise InputError(
-                "what is known of a fixture has no deviation",
+                "the row of a fixture has no standard deviation",
                 where=f"{where}, column sigma",
-                allowed="how well it is known, above 0",
+                allowed="a standard deviation above 0",
                 cure="Fill in sigma, for example 0.001 mm of a ground scale bar.",
             )
     targets = tuple(dict.fromkeys(names))

@@ -33,7 +33,7 @@ def read_matrices(
     Parameters
     ----------
     joints
-        Joint readings, one column a joint; all joints are revolute.
+        Joint positions, one column a joint; all joints are revolute.
     targets, references
         Name and file of each point on the tool and of each fixed point beside the robot; columns x, y, z.
     angle_unit, length_unit
@@ -73,7 +73,7 @@ def read_matrices(
         positions[name] = _matrix(path, 3, length_unit, missing=True)
         if len(positions[name]) != len(values):
             raise InputError(
-                f"the file has not as many rows as {joints}",
+                f"the file does not have as many rows as {joints}",
                 where=str(path),
                 came=counted(len(positions[name]), "row"),
                 allowed=counted(len(values), "row"),

@@ -59,7 +59,7 @@ def read_poses(path: Path) -> Poses:
     for label, line in zip(labels, cells.lines, strict=True):
         if lines.setdefault(label, line) != line:
             raise InputError(
-                f"the pose {label!r} is there twice",
+                f"the pose {label!r} appears twice",
                 where=f"{path}, lines {lines[label]} and {line}",
                 cure="Give each pose a name of its own.",
             )
@@ -88,7 +88,7 @@ def _columns(cells: Cells) -> dict[str, tuple[int, str]]:
                 cure=f"Did you mean {_SHOWN[near[0]]}?" if near else "Rename it, or leave it out.",
             )
         if name in columns:
-            raise InputError(f"the column {name} is there twice", where=where, cure="Remove one of them.")
+            raise InputError(f"the column {name} appears twice", where=where, cure="Remove one of them.")
         if name in _POSITION:
             unit = checked_unit(unit, LENGTH_UNITS, f"{where}, {heading}")
         elif unit is not None:

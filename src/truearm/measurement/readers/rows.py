@@ -30,7 +30,7 @@ class Configurations:
     labels
         Their names.
     joints
-        Joint readings [rad; m for prismatic joints], ``(configurations, joints)``.
+        Joint positions [rad; m for prismatic joints], ``(configurations, joints)``.
     kinds
         ``revolute`` or ``prismatic`` for each joint.
     of_row
@@ -255,7 +255,7 @@ def unit_quaternions(q: Array, source: str, lines: Sequence[int]) -> Array:
     bad = np.flatnonzero(np.abs(norm - 1.0) > QUATERNION_TOLERANCE)
     if len(bad):
         raise InputError(
-            "the quaternion (qw, qx, qy, qz) has not length 1",
+            "the quaternion (qw, qx, qy, qz) does not have length 1",
             where=f"{source}, line {lines[bad[0]]}, columns qw qx qy qz",
             came=f"length {norm[bad[0]]:.6g}",
             allowed=f"1 within {QUATERNION_TOLERANCE:g}",

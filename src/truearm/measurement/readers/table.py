@@ -137,7 +137,7 @@ def _split_names(cells: Cells, entry: NamesEntry, mapping: Path) -> tuple[Cells,
             where=cells.place(row, place),
             came=texts[row],
             allowed=f"a name that is {entry.pattern} from end to end",
-            cure="Mend the pattern (names.pattern), or say others: skip to leave such rows out.",
+            cure="Correct the pattern (names.pattern), or write others: skip to leave such rows out.",
         )
     if not any(whole):
         raise InputError(
@@ -145,7 +145,7 @@ def _split_names(cells: Cells, entry: NamesEntry, mapping: Path) -> tuple[Cells,
             where=f"{mapping}, names.pattern",
             came=entry.pattern,
             allowed=f"a pattern for names such as {texts[0]!r}",
-            cure="Mend the pattern.",
+            cure="Correct the pattern.",
         )
     found = [match.groupdict() for match in compress(matches, whole) if match is not None]
     kept = replace(
@@ -173,7 +173,7 @@ def _configurations(
         row_labels = list(dict.fromkeys(labels))
         if len(row_labels) != len(table.lines):
             raise InputError(
-                f"the file has not as many rows as {cells.source} has configurations",
+                f"the file does not have as many rows as {cells.source} has configurations",
                 where=table.source,
                 came=counted(len(table.lines), "row"),
                 allowed=counted(len(row_labels), "row"),

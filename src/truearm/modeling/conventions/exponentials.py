@@ -1,8 +1,8 @@
-"""Product of exponentials: every joint by its twist in the base frame, robot at zero readings.
+"""Product of exponentials: every joint by its twist in the base frame, robot at zero joint positions.
 
 Source: R. W. Brockett, "Robotic manipulators and the product of exponentials formula", 1984; K. Okamura and F. C. Park,
 "Kinematic calibration using the product of exponentials formula", Robotica 14(4), 1996. The pose is
-``exp(xi_1 q_1) ... exp(xi_n q_n) M`` with the flange M at zero readings. A joint that turns has the twist
+``exp(xi_1 q_1) ... exp(xi_n q_n) M`` with the flange M at zero joint positions. A joint that turns has the twist
 ``xi = (w, v)`` with the unit vector w along its axis and ``v = -w x p`` for any point p of it; one that slides has
 ``w = 0`` and the unit vector v. (Twists are angular part first.)
 

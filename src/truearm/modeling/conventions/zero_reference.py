@@ -1,10 +1,10 @@
-"""The zero-reference model: every joint axis by its direction and one of its points, robot at zero readings.
+"""The zero-reference model: every joint axis by its direction and one of its points, robot at zero joint positions.
 
 Source: B. W. Mooring, "The effect of joint axis misalignment on robot positioning accuracy", ASME Computers in
 Engineering, 1983; K. C. Gupta, "Kinematic analysis of manipulators using the zero reference position description",
-International Journal of Robotics Research 5(2), 1986. The pose is ``D_1(q_1) ... D_n(q_n) M`` with
-``D = Trans(p) R(u, q) Trans(-p)``: u and p are direction and point of the axis in the base frame and M is the flange,
-all at zero readings. No link frame has to be laid anywhere: at zero readings every link's frame is the base frame.
+International Journal of Robotics Research 5(2), 1986. The pose is ``D_1(q_1) ... D_n(q_n) M`` with ``D = Trans(p) R(u,
+q) Trans(-p)``: u and p are direction and point of the axis in the base frame and M is the flange, all at zero joint
+positions. No link frame has to be laid anywhere: at zero joint positions every link's frame is the base frame.
 
 A parameter stands in the chain once, so what identification changes are slides and small turns before the joint,
 ``Trans(p + dp) Rx(rx) Ry(ry) R(u, q) Trans(-p)`` without those closest to the axis, which move it nowhere. They carry
@@ -48,7 +48,7 @@ class ZeroReferenceConvention(Convention):
 def displaced_joint(
     number: int, kind: JointKind, axis: tuple[float, float, float], point: list[float], zero: str
 ) -> tuple[Element, ...]:
-    """Return the elements of a joint about an axis of the base frame, as given at zero readings.
+    """Return the elements of a joint about an axis of the base frame, as given at zero joint positions.
 
     Parameters
     ----------

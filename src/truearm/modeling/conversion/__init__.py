@@ -1,8 +1,8 @@
 """Robots from one convention into another, with the same kinematics.
 
 The joint axes of a robot are lines in space; every convention is a way to write such lines down. A conversion looks at
-them at zero readings, with the current values, and writes them anew. Sense and zero of every joint stay, so readings,
-limits and joint effects mean what they meant.
+them at zero joint positions, with the current values, and writes them anew. Sense and zero of every joint stay, so
+joint positions, limits and joint effects mean what they meant.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ CONVERSIONS: Final[Mapping[str, Callable[[Robot], Links]]] = {
 }
 
 #: A frame that moves by less [m, rad] has not moved, and a flange behind it that is as small is none.
-_SAME: Final = 1e-12
+_SAME_FRAME: Final = 1e-12
 #: Decimals [m, rad] behind which there is only the rounding of right angles.
 _DECIMALS: Final = 15
 #: How far [cosine] the base's z may turn and still point where weights have been taken to hang from: 1 deg.
@@ -77,7 +77,7 @@ def converted(robot: Robot, convention_name: str) -> Robot:
         )
     base, flange = base_and_flange(robot)
     links = CONVERSIONS[convention_name](robot)
-    moved = links.base is not None and bool(np.abs(links.base - base).max() > _SAME)
+    moved = links.base is not None and bool(np.abs(links.base - base).max() > _SAME_FRAME)
     stay = {
         name: p.restarted(p.value)
         for name, p in robot.known.items()
@@ -101,7 +101,7 @@ def converted(robot: Robot, convention_name: str) -> Robot:
         controller = replace(robot.controller, base=_transform(its))
         made = replace(_based(made, links.base), gravity=(x, y, z), controller=controller)
     behind = np.linalg.inv(at_zero(made, made.rigid.trunk.elements)) @ flange
-    if np.abs(behind - np.eye(4)).max() > _SAME:
+    if np.abs(behind - np.eye(4)).max() > _SAME_FRAME:
         made = replace(made, flange=_transform(behind))
     upright = float(made.base.rotation[:, 2] @ base[:3, 2]) > _UPRIGHT
     lost = [

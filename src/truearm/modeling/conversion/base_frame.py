@@ -1,4 +1,4 @@
-"""Into the zero-reference model and the product of exponentials: axes in the base frame at zero readings."""
+"""Into the zero-reference model and the product of exponentials: axes in the base frame at zero joint positions."""
 
 from __future__ import annotations
 

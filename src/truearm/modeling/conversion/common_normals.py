@@ -30,7 +30,7 @@ from truearm.modeling.lines import (
     common_normal,
     first_frame,
     joint_axes,
-    nearer_way,
+    nearer_sense,
     turn,
 )
 from truearm.modeling.robot import Robot
@@ -116,7 +116,7 @@ def _tilted_in_modified_form(
 def _side(gap: Array, before: Array) -> Array:
     """Return the direction of a gap between two axes, or the x direction before if they meet."""
     distance = float(np.linalg.norm(gap))
-    return before if distance < ONE_LINE else nearer_way(gap / distance, before, gap)
+    return before if distance < ONE_LINE else nearer_sense(gap / distance, before, gap)
 
 
 def _tilt(along: Array, x: Array, y: Array, z: Array) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""Joint effects: what moves a joint by something else than its reading.
+"""Joint effects: what moves a joint by something else than its commanded position.
 
 One effect a file, which knows all about itself: its parameters, what it needs to know, and where it may be used. A new
 one is a file here and a line in `EFFECTS`; the order there is that of parameters and of trials.
@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from truearm.errors import InputError, did_you_mean
+from truearm.errors import InputError, did_you_mean, wrong_kind
 from truearm.modeling.effects.approach import Approach
 from truearm.modeling.effects.backlash import Backlash
 from truearm.modeling.effects.bearing import BearingCompliance
@@ -49,12 +49,7 @@ def checked_effects(names: Sequence[str], parameter: str = "effects") -> tuple[s
     """Return names of joint effects, refusing those that there are not."""
     known = [effect.name for effect in EFFECTS]
     if isinstance(names, str | bytes) or not isinstance(names, Sequence):
-        raise InputError(
-            "a sequence of names belongs here",
-            parameter=parameter,
-            came=repr(names) if isinstance(names, str | bytes) else f"an object of type {type(names).__name__}",
-            allowed=", ".join(known),
-        )
+        raise wrong_kind("a sequence of names belongs here", names, parameter, ", ".join(known))
     for name in names:
         if name not in known:
             raise InputError(

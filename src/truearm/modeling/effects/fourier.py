@@ -38,7 +38,7 @@ class Fourier(LinearEffect):
         )
 
     def shapes(self, at: Postures) -> Rates:
-        """Return sines and cosines of multiples of the readings."""
+        """Return sines and cosines of multiples of the joint positions."""
         found = {}
         for i in self.layout.turning:
             for k in HARMONICS:

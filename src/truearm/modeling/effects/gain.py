@@ -1,4 +1,4 @@
-"""Joint gain: the joint turns by k1 times its reading (Nubiola, section 1.3.1: k1 theta + k0).
+"""Joint gain: the joint turns by k1 times its joint position (Nubiola, section 1.3.1: k1 theta + k0).
 
 The offset k0 is no effect: it is the value of the joint's own element, ``theta_offset_i``.
 """
@@ -29,5 +29,5 @@ class Gain(LinearEffect):
         return tuple(self.parameter(f"gain_{i + 1}", "1", 1e-3, nominal=1.0) for i in self.layout.joints)
 
     def shapes(self, at: Postures) -> Rates:
-        """Return the readings."""
+        """Return the joint positions."""
         return {f"gain_{i + 1}": {i: at.joints[:, i]} for i in self.layout.joints}

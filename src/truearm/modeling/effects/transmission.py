@@ -39,7 +39,7 @@ class TransmissionError(LinearEffect):
         )
 
     def shapes(self, at: Postures) -> Rates:
-        """Return the sines and cosines of the readings times the periods in a turn."""
+        """Return the sines and cosines of the joint positions times the periods in a turn."""
         found = {}
         for i, periods in self._geared():
             found[f"transmission_sin_{i + 1}"] = {i: np.sin(periods * at.joints[:, i])}

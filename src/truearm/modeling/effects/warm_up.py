@@ -21,7 +21,7 @@ from truearm.modeling.postures import Postures
 
 RATE: Final = "warm_up_rate"
 #: No arm starts this many powers of e away from where it ends; it keeps a stray step of a fit finite.
-_FARTHEST: Final = 30.0
+_LARGEST_POWER: Final = 30.0
 
 
 @dataclass(frozen=True)
@@ -67,4 +67,4 @@ class WarmUp(Effect):
 
 def _left(number: Array, values: Mapping[str, float | Array]) -> Array:
     """Return the share of the growth that is still to come."""
-    return np.asarray(np.exp(np.minimum(-number * np.asarray(values[RATE]), _FARTHEST)))
+    return np.asarray(np.exp(np.minimum(-number * np.asarray(values[RATE]), _LARGEST_POWER)))

@@ -21,16 +21,16 @@ _CONDITION = 1e9
 
 def _direction(sign: int) -> int:
     if sign not in (1, -1):
-        raise InputError("this is no sign", came=sign, allowed="1, -1")
+        raise InputError("a sign is 1 or -1", came=sign, allowed="1, -1")
     return sign
 
 
 def _countable(pulses: float) -> float:
     if not 1e-6 <= abs(pulses) <= 1e12:
         raise InputError(
-            "so many pulses cannot be",
+            "the number of pulses is out of range",
             came=pulses,
-            allowed="0.000001 to 1e12, negative where the motor counts against the reading",
+            allowed="0.000001 to 1e12, negative where the motor counts against the joint",
         )
     return pulses
 
@@ -85,7 +85,7 @@ class ControllerEntry(BaseModel):
             here = f"{where}.joints[{place}]"
             number = _number(entry.joint, numbers, here)
             if number in counted:
-                raise InputError("a joint stands here twice", where=here, came=entry.joint)
+                raise InputError("a joint appears twice", where=here, came=entry.joint)
             counted[number] = entry
             unit, other = ("degree", "mm") if joints[number - 1].kind == "revolute" else ("mm", "degree")
             if getattr(entry, f"pulses_per_{other}") is not None:
@@ -126,7 +126,7 @@ class ControllerEntry(BaseModel):
         )
         if np.linalg.cond(made.coupling(len(joints))) > _CONDITION:
             raise InputError(
-                "the couplings cannot be undone: other joints give the same readings",
+                "the couplings cannot be inverted: other joint positions give the same counts",
                 where=f"{where}.joints",
                 came="; ".join(f"{e.joint} counts {', '.join(e.coupling)}" for e in self.joints if e.coupling),
             )

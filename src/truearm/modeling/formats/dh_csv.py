@@ -141,7 +141,7 @@ def _frames(lines: Sequence[tuple[str, Sequence[str]]], path: str) -> dict[str, 
 def _count(cells: Sequence[str], expected: int, where: str) -> None:
     if len(cells) != expected:
         raise InputError(
-            "the row has not as many cells as the header", where=where, came=len(cells), allowed=str(expected)
+            "the row does not have as many cells as the header", where=where, came=len(cells), allowed=str(expected)
         )
 
 

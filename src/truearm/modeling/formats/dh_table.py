@@ -159,7 +159,7 @@ def _axes(robot: Robot) -> list[JointAxis]:
                 came=f"{axis.joint.name} and {following.joint.name}, "
                 f"{math.degrees(axis.angle(following)):.3g} deg apart",
                 allowed=f"parallel to 1e-9 rad, or at least {math.degrees(_NEARLY_PARALLEL):g} deg apart",
-                cure="What describes such axes is Hayati's beta: take the convention hayati (a format of 'truearm "
+                cure="Hayati's beta describes such axes: take the convention hayati (a format of 'truearm "
                 "export' too), keep the robot file, or write a URDF.",
             )
     return axes

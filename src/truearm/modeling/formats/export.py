@@ -14,7 +14,7 @@ from truearm.modeling.formats.dh_csv import complete_dh_csv
 from truearm.modeling.formats.dh_table import DHRow, DHTable, TableConvention
 from truearm.modeling.formats.model_json import model_json
 from truearm.modeling.formats.python_file import python_text
-from truearm.modeling.formats.remarks import comments, first_frame_said, frames, left_out, masses_left_out
+from truearm.modeling.formats.remarks import comments, first_frame_remark, frames, left_out, masses_left_out
 from truearm.modeling.formats.urdf_writing import urdf_text
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY
@@ -75,7 +75,7 @@ def _table(robot: Robot, convention_name: TableConvention) -> Export:
     name = "A table"
     limits = [f"{name} cannot hold the limits of joints."] if any(joint.limits for joint in robot.joints) else []
     left = (*left_out(robot, name), *masses_left_out(robot, name), *limits)
-    frame = f"{frames(robot)} {first_frame_said(made.base)}"
+    frame = f"{frames(robot)} {first_frame_remark(made.base)}"
     said = [*comments(robot, frame, left), f"convention {convention_name}: link = {_PRODUCTS[convention_name]}"]
     return Export(complete_dh_csv(table, said), frame, left)
 
@@ -95,7 +95,7 @@ def _urdf(robot: Robot) -> Export:
 
 def _json(robot: Robot) -> Export:
     names = [name for name, entries in (("tools", robot.tools), ("truths", robot.truths)) if entries]
-    left = (f"What is for simulation alone is left out: {' and '.join(names)}.",) if names else ()
+    left = (f"Left out, because it is for simulation alone: {' and '.join(names)}.",) if names else ()
     return Export(model_json(robot, frames(robot), left), frames(robot), left)
 
 

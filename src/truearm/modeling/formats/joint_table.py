@@ -35,14 +35,14 @@ def joints_csv(solutions: JointSolutions, labels: Sequence[str], joints: Sequenc
             "orientation_error [mrad]",
         ]
     )
-    for row, readings in enumerate(solutions.joints.tolist()):
+    for row, positions in enumerate(solutions.joints.tolist()):
         angle = float(solutions.orientation_error[row])
         writer.writerow(
             [
                 labels[solutions.pose[row]],
                 solutions.branch[row],
                 solutions.status[row].value,
-                *(repr(written(value, unit)) for value, unit in zip(readings, units, strict=True)),
+                *(repr(written(value, unit)) for value, unit in zip(positions, units, strict=True)),
                 f"{solutions.position_error[row] * 1e3:.6g}",
                 "" if math.isnan(angle) else f"{angle * 1e3:.6g}",
             ]

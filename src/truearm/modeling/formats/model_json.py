@@ -17,8 +17,8 @@ def model_json(robot: Robot, frames: str, left_out: Iterable[str]) -> str:
     """Return the JSON text of a robot.
 
     A frame is the product of its elements. An element turns (``R``) or slides (``T``) about or along x, y or z of the
-    moving frame (``Rx`` to ``Tz``) or its own ``axis``, by ``value``, and by the reading of ``joint`` (from 1) where it
-    has one. Numbers are written so that they read back exactly.
+    moving frame (``Rx`` to ``Tz``) or its own ``axis``, by ``value``, and by the position of ``joint`` (from 1) where
+    it has one. Numbers are written so that they read back exactly.
     """
     content = {
         "truearm": SCHEMA,

@@ -55,7 +55,7 @@ def _description(robot: Robot, comments: Sequence[str]) -> str:
     return f'''"""{text}
 Only NumPy is needed, and nothing of truearm. Run as a program, the file compares itself with stored poses.
 
-    position, rotation = forward(q)  # readings (n, {count}) [rad, m] -> (n, 3) [m], (n, 3, 3)
+    position, rotation = forward(q)  # joint positions (n, {count}) [rad, m] -> (n, 3) [m], (n, 3, 3)
     q, within = inverse(position, rotation, seed)  # a seed ({count},) or (n, {count}) on the branch that is wanted
 
 For another payload change PAYLOAD; the stored poses then hold no longer.

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 JOINTS: tuple[str, ...] = ("shoulder", "elbow")
 #: Whether a joint slides; the others turn.
 SLIDING: tuple[bool, ...] = (False,) * 2
-#: Lowest and highest reading.
+#: Lowest and highest joint position.
 LIMITS: tuple[tuple[float, float] | None, ...] = ((-2.0, 2.0), None)
 #: Where each joint stands in the frame behind the joint before, the first one in the base frame, and at last the flange
 #: in the frame behind the last joint: x, y, z and roll, pitch, yaw, R = Rz(yaw) Ry(pitch) Rx(roll). A joint turns about
@@ -33,8 +33,8 @@ GRAVITY: tuple[float, float, float] = (0.0, 0.0, -9.80665)
 MASSES: tuple[tuple[int, float, tuple[float, float, float]], ...] = ((0, 2.0, (0.2, 0.0, 0.0)),)
 #: What the flange carries: mass, and centre of gravity in the flange frame.
 PAYLOAD: tuple[float, tuple[float, float, float]] = (1.0, (0.0, 0.0, 0.0))
-#: Joint effects, one entry a joint. By readings: how far a joint turns per unit read; its Fourier series (sine and
-#: cosine of the reading, then of twice the reading); the error of its gear (periods in a turn, sine, cosine).
+#: Joint effects, one entry a joint. By joint positions: how far a joint turns per unit read; its Fourier series (sine
+#: and cosine of the reading, then of twice the reading); the error of its gear (periods in a turn, sine, cosine).
 GAIN: tuple[float, ...] = (1.0,) * 2
 FOURIER: tuple[tuple[float, float, float, float], ...] = ((0.0, 0.0, 0.0, 0.0),) * 2
 TRANSMISSION: tuple[tuple[int, float, float], ...] = ((0, 0.0, 0.0),) * 2
@@ -49,7 +49,7 @@ CLEARANCE: tuple[float, ...] = (0.0,) * 2
 #: Whether the contact angle of clearances is taken as linear in the moments.
 LINEAR_CONTACT: bool = False
 
-#: Readings and the poses that truearm found for them; run this file to compare.
+#: Joint positions and the poses that truearm found for them; run this file to compare.
 READINGS: tuple[tuple[float, ...], ...] = ((0.0, 0.0),)
 POSITIONS: tuple[tuple[float, ...], ...] = ((0.6999999740147642, 0.0, -0.00018632634066900316),)
 ROTATIONS: tuple[tuple[tuple[float, ...], ...], ...] = (
@@ -62,18 +62,18 @@ ROTATIONS: tuple[tuple[tuple[float, ...], ...], ...] = (
 def forward(q: ArrayLike) -> tuple[Array, Array]:
     """Return positions ``(n, 3)`` [m] and rotations ``(n, 3, 3)`` of the flange in the base frame.
 
-    `q` are joint readings ``(n, joints)`` [rad, m]. The arm is at rest and bends under its weight.
+    `q` are joint positions ``(n, joints)`` [rad, m]. The arm is at rest and bends under its weight.
     """
     turned, tilted = _bent(_checked(q, (None, len(JOINTS)), "readings"))
     return _frames(turned, tilted)[2]
 
 
 def inverse(position: ArrayLike, rotation: ArrayLike, seed: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
-    """Return joint readings ``(n, joints)`` for poses of the flange, and which of them are within the joint's limits.
+    """Return joint positions ``(n, joints)`` for poses of the flange, and which of them are within the joint's limits.
 
-    Damped Newton steps lead from `seed`, readings ``(joints,)`` or ``(n, joints)``, to the positions ``(n, 3)`` [m] and
-    rotations ``(n, 3, 3)``: to the branch on which the seed lies, if it is not far away. A joint that turns gets
-    the turn nearest to the seed within its limits. ValueError names the poses that were not reached.
+    Damped Newton steps lead from `seed`, joint positions ``(joints,)`` or ``(n, joints)``, to the positions ``(n, 3)``
+    [m] and rotations ``(n, 3, 3)``: to the branch on which the seed lies, if it is not far away. A joint that turns
+    gets the turn nearest to the seed within its limits. ValueError names the poses that were not reached.
     """
     p = _checked(position, (None, 3), "positions")
     R = _checked(rotation, (len(p), 3, 3), "rotations")
@@ -149,7 +149,7 @@ def _loads(turned: Array, tilted: Array) -> tuple[Array, Array]:
 def _bent(q: Array) -> tuple[Array, Array]:
     """Return how far the joints turn ``(n, joints)`` and tilt ``(n, joints, 2)``, in equilibrium with their loads."""
     count = len(JOINTS)
-    driven = q + _by_reading(q)
+    driven = q + _by_position(q)
     by_load = (COMPLIANCE, COMPLIANCE_QUADRATIC, COMPLIANCE_CUBIC, BACKLASH, BEARING_COMPLIANCE, CLEARANCE)
     if not np.any(by_load):
         return driven, np.zeros((*q.shape, 2))
@@ -169,8 +169,8 @@ def _bent(q: Array) -> tuple[Array, Array]:
     return now[:, :count], now[:, count:].reshape(len(now), count, 2)
 
 
-def _by_reading(q: Array) -> Array:
-    """Return what is added to the readings, whatever the load."""
+def _by_position(q: Array) -> Array:
+    """Return what is added to the joint positions, whatever the load."""
     s1, c1, s2, c2 = np.array(FOURIER).T
     periods, s, c = np.array(TRANSMISSION).T
     series = s1 * np.sin(q) + c1 * np.cos(q) + s2 * np.sin(2 * q) + c2 * np.cos(2 * q)
@@ -236,7 +236,7 @@ def _missing(q: Array, position: Array, rotation: Array) -> tuple[Array, Array]:
 
 
 def _by_differences(q: Array) -> Array:
-    """Return how the pose follows the readings, joint effects included, ``(n, 6, joints)``."""
+    """Return how the pose follows the joint positions, joint effects included, ``(n, 6, joints)``."""
     count, steps = len(JOINTS), 1e-6 * np.eye(len(JOINTS))
     p, R = forward(np.concatenate([q[:, None] + steps, q[:, None] - steps], axis=1).reshape(-1, count))
     p, R = p.reshape(-1, 2, count, 3), R.reshape(-1, 2, count, 3, 3)
@@ -260,7 +260,7 @@ def _distances(q: Array, position: Array, rotation: Array) -> tuple[Array, Array
 
 
 def _nearest_turns(q: Array, seed: Array) -> Array:
-    """Return readings of turning joints whole turns away: nearest to the seed, if they can be within the limits."""
+    """Return joint positions whole turns away: nearest to the seed, if they can be within the limits."""
     q = q.copy()
     for i, limits in enumerate(LIMITS):
         if not SLIDING[i]:

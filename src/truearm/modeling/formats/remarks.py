@@ -11,7 +11,7 @@ from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 
 #: Two frames less than this apart [m, rad] are the same to any instrument.
-_SAME: Final = 1e-9
+_SAME_FRAME: Final = 1e-9
 
 
 def left_out(robot: Robot, format_: str, held: Collection[str] = ()) -> list[str]:
@@ -56,10 +56,10 @@ def frames(robot: Robot) -> str:
     return f"Poses are those of the flange in the base frame, both as in the robot file of {robot.name}."
 
 
-def first_frame_said(base: Transform) -> str:
+def first_frame_remark(base: Transform) -> str:
     """Say where the frame that a table starts from stands in the base frame."""
     turned = 2.0 * math.atan2(math.hypot(*base.quaternion[1:]), abs(base.quaternion[0]))
-    if math.hypot(*base.translation) < _SAME and turned < _SAME:
+    if math.hypot(*base.translation) < _SAME_FRAME and turned < _SAME_FRAME:
         return "The table starts at the base frame."
     x, y, z = (f"{1e3 * v:.6g}" for v in base.translation)
     return (

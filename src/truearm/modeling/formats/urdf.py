@@ -64,13 +64,13 @@ def read_urdf(path: Path, tip: str | None = None) -> Robot:
         ``tool0`` or else ``flange`` fixed behind the last of them, or else that joint's own link.
     """
     tree = read_tree(read_bytes(path), str(path))
-    way = tree.way(_only_end(tree, path) if tip is None else tree.known(tip, str(path)))
-    links, tail = _links(tree.where, way)
+    route = tree.joints_to(_only_end(tree, path) if tip is None else tree.known(tip, str(path)))
+    links, tail = _links(tree.where, route)
     if not links:
         raise InputError(
             f"no joint moves between the root {tree.root} and the link {tip}",
             where=tree.where,
-            cure="Name a link further out.",
+            cure="Name a link nearer to the end of the robot.",
         )
     masses = (_mass(tree, number, link.joint.child) for number, link in enumerate(links, 1))
     return Robot(
@@ -141,11 +141,11 @@ class _Link:
         return KIND[self.joint.type]
 
 
-def _links(where: str, way: Sequence[UrdfJoint]) -> tuple[list[_Link], Array]:
-    """Return the moving joints on a way, and the transform from the last of them to its end ``(4, 4)``."""
+def _links(where: str, route: Sequence[UrdfJoint]) -> tuple[list[_Link], Array]:
+    """Return the moving joints on a route, and the transform from the last of them to its end ``(4, 4)``."""
     links: list[_Link] = []
     prefix = np.eye(4)
-    for joint in way:
+    for joint in route:
         xyz, rpy = origin(joint.tag, joint.where)
         if joint.type == "fixed":
             prefix = prefix @ placement(xyz, rpy)
@@ -166,19 +166,19 @@ def _links(where: str, way: Sequence[UrdfJoint]) -> tuple[list[_Link], Array]:
 def _only_end(tree: Tree, path: Path) -> str:
     """Return the end of the one path on which all moving joints lie."""
     moving = [joint for joint in tree.joints.values() if joint.type != "fixed"]
-    ways = [[step for step in tree.way(joint.child) if step.type != "fixed"] for joint in moving]
-    if not ways:
+    routes = [[step for step in tree.joints_to(joint.child) if step.type != "fixed"] for joint in moving]
+    if not routes:
         raise InputError("there is no moving joint", where=tree.where, allowed=f"a joint of type {', '.join(KIND)}")
-    passed = {joint.name for way in ways for joint in way[:-1]}
-    outermost = [way for way in ways if way[-1].name not in passed]
+    passed = {joint.name for route in routes for joint in route[:-1]}
+    outermost = [route for route in routes if route[-1].name not in passed]
     if len(outermost) == 1:
         return tree.end(outermost[0][-1])
     common = [steps[0] for steps in zip(*outermost, strict=False) if len({step.name for step in steps}) == 1]
-    tips = [tree.end(joint) for joint in (*common[-1:], *(way[-1] for way in outermost))]
+    tips = [tree.end(joint) for joint in (*common[-1:], *(route[-1] for route in outermost))]
     raise InputError(
         "the moving joints branch, and one chain is needed",
         where=tree.where,
-        came=f"several outermost joints: {', '.join(way[-1].name for way in outermost)}",
+        came=f"several outermost joints: {', '.join(route[-1].name for route in outermost)}",
         allowed=f"a chain that ends at a link you name, such as {', '.join(tips)}",
         cure=f"Name the end of the chain: {path.name}#{tips[0]}",
     )
@@ -194,7 +194,7 @@ def _refuse_unfit(joint: UrdfJoint) -> None:
         )
     if child_tag(joint.tag, "mimic", joint.where) is not None:
         raise InputError(
-            "a joint that mimics another has no reading of its own",
+            "a joint that mimics another has no position of its own",
             where=joint.where,
             cure="End the chain before it, with #LINK behind the file name, or delete <mimic>.",
         )
@@ -299,7 +299,7 @@ def _own_links(tree: Tree, robot: Robot) -> list[_Link]:
     last = robot.joints[-1].name
     if last not in tree.joints:
         raise refuse(f"it has no joint {last}")
-    links, _ = _links(tree.where, tree.way(tree.joints[last].child))
+    links, _ = _links(tree.where, tree.joints_to(tree.joints[last].child))
     names = [link.joint.name for link in links]
     if names != [joint.name for joint in robot.joints]:
         raise refuse("other joints move", ", ".join(names), ", ".join(joint.name for joint in robot.joints))

@@ -81,7 +81,7 @@ class Tree:
             found[joint.parent].append(joint)
         return found
 
-    def way(self, link: str) -> list[UrdfJoint]:
+    def joints_to(self, link: str) -> list[UrdfJoint]:
         """Return the joints from the root to a link."""
         joints: list[UrdfJoint] = []
         while (joint := self._above.get(joints[-1].parent if joints else link)) is not None:

@@ -21,19 +21,19 @@ from truearm.modeling.inverse.turns import beyond_limits, nearest_turns
 from truearm.modeling.transform import homogeneous
 
 #: A nominal start that misses by more [reach lengths, rad] is no start but for the nearest pose.
-_NEAR: Final = 0.05
+_USABLE_START: Final = 0.05
 #: A seed may be beside an answer if it misses by less than this [reach lengths, rad] ..
-_BESIDE: Final = 0.5
+_NEAR_SEED: Final = 0.5
 #: .. and was not met if the answer found is further away than this [rad].
-_AWAY: Final = 0.1
+_SEED_MISSED: Final = 0.1
 #: A nominal start may be this far beyond a limit [rad]: the calibrated arm may reach the pose within it.
 _SLACK: Final = 0.02
 #: Fake targets tried one after the other.
 _FAKE_TARGETS: Final = 6
 #: The way to a lost branch leads from a posture with a singular value below this ..
-_WEAK: Final = 0.1
+_NEARLY_SINGULAR: Final = 0.1
 #: .. along the joint motion that moves the pose least, by one of these amounts [rad]; the last one turns a wrist over.
-_ACROSS: Final = (
+_AMOUNTS_ACROSS: Final = (
     (True, (0.02, 0.1, 0.4)),
     (False, (0.05, 0.2, 0.9, 1.8, float(np.sqrt(2) * np.pi))),
     (True, (0.05, 0.2, 0.9, 1.8, float(np.sqrt(2) * np.pi))),
@@ -50,7 +50,7 @@ class BranchSearch:
     task
         The poses, with their whole orientation.
     seed, turned
-        Readings to stay near to, and what they turn the joints by [rad], ``(n, 6)`` each.
+        Joint positions to stay near to, and what they turn the joints by [rad], ``(n, 6)`` each.
     rule, form
         Names and closed form of the robot's branches.
     """
@@ -78,7 +78,7 @@ class BranchSearch:
         slot = np.argmin(cost, axis=1)
         self._pool.add(every, self._joints[every, slot])
         # A seed that is nearly there is a start of its own: at its end a branch of the nominal arm may be missing.
-        there = np.flatnonzero(_missed(self._task, self._turned) < _NEAR)
+        there = np.flatnonzero(_missed(self._task, self._turned) < _USABLE_START)
         self._pool.add(there, self._turned[there])
         missing = ~self._pool.satisfied(wanted)
         if missing.any():
@@ -103,10 +103,10 @@ class BranchSearch:
         The nominal solution nearest to the seed may be out of reach, or lead the calibrated arm to another branch.
         """
         away = self._pool.away()
-        beside = np.flatnonzero((_missed(self._task, self._turned) < _BESIDE) & (away > _AWAY))
+        beside = np.flatnonzero((_missed(self._task, self._turned) < _NEAR_SEED) & (away > _SEED_MISSED))
         tried = Candidates(self._task, self._seed, self._rule)
         tried.add(beside, self._turned[beside])
-        nearer = np.flatnonzero(tried.away() < np.minimum(away, _AWAY))
+        nearer = np.flatnonzero(tried.away() < np.minimum(away, _SEED_MISSED))
         self._pool.add(nearer, self._turned[nearer])
 
     def every_branch(self) -> Candidates:
@@ -129,7 +129,7 @@ class BranchSearch:
         pose, slot = np.nonzero((self._number >= 0) & chosen[:, None])
         size = np.full(self._number.shape, np.inf)
         size[pose, slot] = _missed(self._task.of(pose), self._joints[pose, slot])
-        near = np.asarray(size < _NEAR)
+        near = np.asarray(size < _USABLE_START)
         nearest = np.isfinite(size) & (size <= size.min(axis=1, keepdims=True))
         pose, slot = np.nonzero(near | nearest)
         self._pool.add(pose, self._joints[pose, slot])
@@ -171,9 +171,9 @@ class BranchSearch:
         origins = pool.reached | unreached[pool.pose] | thorough
         tried = np.flatnonzero(self._lost(expected)[pool.pose] & origins)
         value, motion = weakest_motion(self._task.of(pool.pose[tried]), pool.variables[:, tried])
-        weak = value < _WEAK
+        weak = value < _NEARLY_SINGULAR
         pose, origin, motion = pool.pose[tried][weak], pool.variables[:6, tried[weak]].T, motion[weak]
-        for bold, amounts in _ACROSS:
+        for bold, amounts in _AMOUNTS_ACROSS:
             left = np.flatnonzero(self._lost(expected)[pose])
             way = np.tile([*amounts, *(-amount for amount in amounts)], len(left))[:, None]
             again = np.repeat(left, 2 * len(amounts))

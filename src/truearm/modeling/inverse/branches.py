@@ -15,8 +15,8 @@ noflip or flip h5 . (h4 x h6)                               joint 5 bends to its
 ============== ============================================ ==============================================
 
 S is where axes 5 and 6 cross and W where axes 4 and 5 cross; in a spherical wrist both are the wrist centre. Front is
-where the wrist is when all readings are zero (where the arm then stands upright, the side to which joint 2 turns it).
-Above is away from the base plate. Noflip is the side on which joint 5 reads +90 deg.
+where the wrist is when all joint positions are zero (where the arm then stands upright, the side to which joint 2 turns
+it). Above is away from the base plate. Noflip is the side on which joint 5 reads +90 deg.
 
 The lines of a calibrated arm cross no more, but pass each other closely. The points are then the feet of the common
 normals, which move with the calibration errors and no more than that, because axes 4, 5 and 6 stay far from parallel.
@@ -118,9 +118,9 @@ def branch_rule(robot: Robot) -> BranchRule | None:
     """
     if len(robot.joints) != 6 or any(joint.kind != "revolute" for joint in robot.joints):
         return None
-    readings = np.zeros((6, 2))
-    readings[4, 1] = np.pi / 2
-    kinematics = robot.rigid.trunk.forward_kinematics(readings)
+    joints = np.zeros((6, 2))
+    joints[4, 1] = np.pi / 2
+    kinematics = robot.rigid.trunk.forward_kinematics(joints)
     lines = [
         Line(np.broadcast_to(line.along, (3, 2))[:, :1], np.broadcast_to(line.point, (3, 2))[:, :1])
         for line in joint_axes(kinematics)

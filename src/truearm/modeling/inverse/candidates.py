@@ -24,7 +24,7 @@ class Candidates:
     task
         The poses.
     seed
-        Readings that the answer of each pose shall lie near to [rad or m], ``(n, joints)``.
+        Joint positions that the answer of each pose shall lie near to [rad or m], ``(n, joints)``.
     rule
         Of the robot's branches, where they have names.
 
@@ -33,9 +33,9 @@ class Candidates:
     pose
         Index of the pose of each candidate, ``(candidates,)``; the other arrays have the same first axis.
     joints
-        Readings [rad or m], in the turn nearest to the seed within the limits.
+        Joint positions [rad or m], in the turn nearest to the seed within the limits.
     variables
-        What the readings turn the joints by, with tilts [rad or m], ``(joints or more, candidates)``.
+        What the joint positions turn the joints by, with tilts [rad or m], ``(joints or more, candidates)``.
     position_error, orientation_error
         [m], [rad]; 0 where the orientation is free.
     reached
@@ -73,12 +73,12 @@ class Candidates:
         robot, part = self._task.robot, self._task.of(pose)
         solved = solve(part, starts, bold=bold)
         variables, error = solved.variables, solved.error
-        joints = robot.readings(variables)
+        joints = robot.joints_of(variables)
         turns = nearest_turns(robot, joints, self._seed[pose]) - joints
         changed = np.flatnonzero((np.abs(turns) > 1.0).any(axis=1))
         # A whole turn on, the arm stands as it stood; a joint effect (a gain) need not be the same there.
         variables[: joints.shape[1], changed] += turns[changed].T
-        joints[changed] = robot.readings(variables[:, changed])
+        joints[changed] = robot.joints_of(variables[:, changed])
         position, angle = part.distances(error)
         number = np.full(len(pose), -1)
         if self._rule is not None:

@@ -4,9 +4,9 @@ The solutions come from EAIK (Ostermeier, Kuelz and Althoff, "Automatic geometri
 kinematics", arXiv 2409.14815, with the subproblems of Elias and Wen, arXiv 2211.05737). It needs axes that are exactly
 parallel or crossing, which only the nominal arm has.
 
-What the calibrated arm is asked for must therefore be said in terms that both arms share: where its last two axes
-stand to its first two. A frame on the first two axes and one on the last two, both at zero readings, say it. Base, tool
-and the zeros of the first and last joint then drop out, however far they are from nominal (identification may have
+What the calibrated arm is asked for must therefore be said in terms that both arms share: where its last two axes stand
+to its first two. A frame on the first two axes and one on the last two, both at zero joint positions, say it. Base,
+tool and the zeros of the first and last joint then drop out, however far they are from nominal (identification may have
 moved metres from ``d_1`` to ``base_z``), and the start is off by the errors between the axes alone.
 """
 

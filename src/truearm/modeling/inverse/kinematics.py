@@ -1,4 +1,4 @@
-"""Inverse kinematics of the robot as it is: joint readings for poses, with every joint effect of the model.
+"""Inverse kinematics of the robot as it is: joint positions for poses, with every joint effect of the model.
 
 An arm of six joints whose nominal axes allow it is solved in closed form first, on all branches; from there damped
 Newton steps go to the calibrated model. Any other arm, and any task that leaves part of the orientation free, is solved
@@ -35,7 +35,7 @@ ROTATION_TOLERANCE: Final = 1e-6
 #: Below this singular value [reach lengths, rad] a posture is called near-singular: there 0.1 mm may take 2 deg.
 NEAR_SINGULAR: Final = 5e-3
 #: Starts of an arm without closed form: around the seed [rad], then anywhere within the limits.
-_AROUND: Final = 0.3
+_SPREAD_AROUND_SEED: Final = 0.3
 _ROUNDS: Final = 4
 _STARTS_A_ROUND: Final = 4
 
@@ -51,7 +51,7 @@ def inverse(
     seed: ArrayLike | None = None,
     orientation: Orientation = "full",
 ) -> JointSolutions:
-    """Return joint readings that bring the flange, or a target, to poses.
+    """Return joint positions that bring the flange, or a target, to poses.
 
     The arm is at rest; what depends on the way it came, on temperature or on an external force is left out.
 
@@ -70,7 +70,7 @@ def inverse(
     branch
         A branch by name, ``all``, or None for the one nearest to the seed that lies within the limits.
     seed
-        Joint readings ``(joints,)`` or ``(n, joints)`` [rad or m] near which the answer shall lie; zero if None.
+        Joint positions ``(joints,)`` or ``(n, joints)`` [rad or m] near which the answer shall lie; zero if None.
     orientation
         ``full``; ``axis`` if only the direction of the z axis counts, as for an arm of five joints; ``free`` if only
         the position does.
@@ -99,7 +99,7 @@ def inverse(
         return _answer(task, pool, pool.every_branch() if branch == "all" else pool.best(number), number)
     if branch is not None:
         raise InputError(
-            "the branches have no names here",
+            "branches have no names for this robot or pose",
             parameter="branch",
             came=branch,
             allowed="no branch: the answer nearest to the seed is taken",
@@ -123,7 +123,7 @@ def _by_starts(task: PoseTask, seed: Array, turned: Array) -> JointSolutions:
         if number:
             starts = robot.random_configurations(len(missing), rng)
         else:
-            starts = turned[missing] + _AROUND * rng.standard_normal((len(missing), len(robot.joints)))
+            starts = turned[missing] + _SPREAD_AROUND_SEED * rng.standard_normal((len(missing), len(robot.joints)))
         pool.add(missing, starts)
     return _answer(task, pool, pool.best(None), None)
 
@@ -223,20 +223,20 @@ def _rotations(given: ArrayLike, count: int) -> Array:
         row = int(wrong[0])
         left = off[row] <= ROTATION_TOLERANCE
         raise InputError(
-            "the matrix mirrors, it does not turn"
+            "the matrix is a reflection, not a rotation"
             if left
-            else "the matrix is no rotation: its columns are not orthonormal",
+            else "the matrix is not a rotation: its columns are not orthonormal",
             parameter="rotations",
             where=f"rotations, row {row}",
             came=f"determinant {np.linalg.det(R[row]):.6g}" if left else f"R'R off from 1 by {off[row]:.3g}",
             allowed="determinant 1" if left else f"within {ROTATION_TOLERANCE:g}",
-            cure="Check rows against columns, and that all digits were passed on.",
+            cure="Check rows against columns, and that no digits were lost.",
         )
     return rotation_from_quaternion(quaternion_from_rotation(R))
 
 
 def _seed(robot: Robot, seed: ArrayLike | None, count: int) -> tuple[Array, Array]:
-    """Return readings, and what they turn the joints by [rad or m], ``(n, joints)`` each."""
+    """Return joint positions, and what they turn the joints by [rad or m], ``(n, joints)`` each."""
     joints = len(robot.joints)
     values = checked_joints(robot, np.zeros(joints) if seed is None else seed, "seed")
     if len(values) not in (1, count):

@@ -31,14 +31,14 @@ ORIENTATIONS: Final = ("full", "axis", "free")
 #: Where a pose counts as met and the steps end [reach lengths, rad].
 CONVERGED: Final = 1e-12
 #: A gradient this small beside the error is that of a nearest pose.
-_LEVEL: Final = 1e-6
+_LEVEL_GRADIENT: Final = 1e-6
 #: Largest change of a joint in one step [rad, reach lengths].
 _LONGEST_STEP: Final = 0.5
 #: Keeps the normal matrix of a singular arm invertible; what it takes from a step is far below a tenth.
 _FLOOR: Final = 1e-15
 _MOST_STEPS: Final = 60
 #: Steps before the change of tilts is foreseen; without tilts nearly all poses are met by then.
-_PATIENCE: Final = 8
+_STEPS_WITHOUT_TILTS: Final = 8
 #: Of joints, to find how the tilts follow them [rad, m].
 _DIFFERENCE: Final = 1e-6
 _DAMPING: Final = (1e-6, 1e12)
@@ -184,7 +184,9 @@ def solve(task: PoseTask, starts: Array, *, bold: bool = False) -> Solved:
     for number in range(_MOST_STEPS):
         size = np.linalg.norm(e, axis=1)
         gradient = np.linalg.norm((jacobian * e[:, :, None]).sum(1), axis=1)
-        going = (size > CONVERGED) & (gradient > _LEVEL * size * np.minimum(size, 1.0)) & (damping < _DAMPING[1])
+        going = (
+            (size > CONVERGED) & (gradient > _LEVEL_GRADIENT * size * np.minimum(size, 1.0)) & (damping < _DAMPING[1])
+        )
         if not going.all():
             active, now, e, jacobian = active[going], now[:, going], e[going], jacobian[going]
             damping, size, part = damping[going], size[going], part.of(np.flatnonzero(going))
@@ -196,7 +198,7 @@ def solve(task: PoseTask, starts: Array, *, bold: bool = False) -> Solved:
         better = (np.linalg.norm(tried_error, axis=1) < size) | bold
         damping = np.where(better, np.maximum(damping / 5, _DAMPING[0]), damping * 10)
         now, e = np.where(better, tried, now), np.where(better[:, None], tried_error, e)
-        tilting = part.tilting(tried) if number >= _PATIENCE else None
+        tilting = part.tilting(tried) if number >= _STEPS_WITHOUT_TILTS else None
         jacobian = np.where(better[:, None, None], part.jacobian(kinematics, tilting), jacobian)
         found[:, active], error[active] = now, e
     return Solved(found, error)

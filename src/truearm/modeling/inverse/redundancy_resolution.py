@@ -1,9 +1,9 @@
-"""Joint readings, velocities and accelerations that a motion of the tip asks for.
+"""Joint positions, velocities and accelerations that a motion of the tip asks for.
 
 A task is ``A(q) dq/dt = S t``: rows ``A = S J`` of the geometric Jacobian, chosen by a constant matrix ``S``, follow
-the tip's twist ``t``. An arm with as many joints as rows has no choice. An arm with more takes, of all readings that
-give the pose, those nearest to a reference posture ``q0``: it returns to the same readings when the tip returns, which
-steps of least norm (``J^T (J J^T)^-1``) alone do not. With multipliers ``l`` that is
+the tip's twist ``t``. An arm with as many joints as rows has no choice. An arm with more takes, of all joint positions
+that give the pose, those nearest to a reference posture ``q0``: it returns to the same joint positions when the tip
+returns, which steps of least norm (``J^T (J J^T)^-1``) alone do not. With multipliers ``l`` that is
 
     q - q0 = A^T l
 
@@ -67,7 +67,7 @@ def jacobian_rates(turning: Array, columns: Array) -> Array:
 
 
 def step(S: Array, J: Array, away: Array, error: Array) -> Array:
-    """Return Newton's step towards the pose, and to the reference posture among the readings that give it.
+    """Return Newton's step towards the pose, and to the reference posture among the joint positions that give it.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def step(S: Array, J: Array, away: Array, error: Array) -> Array:
     J
         Geometric Jacobian, ``(n, 6, joints)``.
     away
-        Readings less reference posture, ``(n, joints)``.
+        Joint positions less reference posture, ``(n, joints)``.
     error
         What is missing of the pose, ``(n, rows)``.
     """

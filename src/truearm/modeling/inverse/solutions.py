@@ -1,4 +1,4 @@
-"""What inverse kinematics answers: joint readings for poses, and how far each answer can be trusted."""
+"""What inverse kinematics answers: joint positions for poses, and how far each answer can be trusted."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ class PoseStatus(Enum):
             PoseStatus.REACHED: "The joints give the pose.",
             PoseStatus.NEAR_SINGULAR: "The joints give the pose, but near a singular posture, where a small change "
             "of the pose takes a large motion of the joints: go there by joint motion, or move the pose.",
-            PoseStatus.BEYOND_LIMIT: "The joints give the pose, but the robot cannot turn so far: take another branch, "
+            PoseStatus.BEYOND_LIMIT: "The joints give the pose, but a joint is beyond its limits: take another branch, "
             "or move the pose.",
             PoseStatus.BRANCH_LOST: "The pose is reached on another branch, whose joints are given, and not on the one "
             "asked for: take that one, or move the pose.",
-            PoseStatus.UNREACHABLE: "No joints give the pose; those given come as near as was found: move the pose, "
-            "and check its frame, its units and the target.",
+            PoseStatus.UNREACHABLE: "No joints give the pose; the joints given are the nearest that were found: move "
+            "the pose, and check its frame, its units and the target.",
         }[self]
 
 
@@ -69,7 +69,7 @@ class JointSolutions:
     orientation_error
         Angle from it [rad], ``(rows,)``; between the z axes where only those count, NaN where no orientation does.
     beyond
-        Which readings are beyond their limits, ``(rows, joints)``.
+        Which joint positions are beyond their limits, ``(rows, joints)``.
     singular_value
         How little the pose moves with a joint motion of norm 1, positions in reach lengths, ``(rows,)``. It is 0 in a
         singular posture.

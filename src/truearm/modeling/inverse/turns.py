@@ -1,4 +1,4 @@
-"""Turns: which of the readings a whole turn apart a joint shall have."""
+"""Turns: which of the joint positions a whole turn apart a joint shall have."""
 
 from __future__ import annotations
 
@@ -11,26 +11,26 @@ from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 
 _TURN: Final = 2 * np.pi
-#: A reading this far beyond a limit still lies on it [rad or m].
+#: A joint this far beyond a limit still lies on it [rad or m].
 _ON_LIMIT: Final = 1e-9
 
 
 def limits(robot: Robot) -> tuple[Array, Array]:
-    """Return lowest and highest reading of each joint, ``(joints,)`` each; infinite where not known."""
+    """Return lowest and highest position of each joint, ``(joints,)`` each; infinite where not known."""
     pairs = [joint.limits or (-np.inf, np.inf) for joint in robot.joints]
     low, high = np.array(pairs, float).T
     return low, high
 
 
 def beyond_limits(robot: Robot, joints: Array, slack: float = _ON_LIMIT) -> NDArray[np.bool_]:
-    """Return which readings ``(..., joints)`` lie beyond the limits by more than `slack` [rad or m]."""
+    """Return which joint positions ``(..., joints)`` lie beyond the limits by more than `slack` [rad or m]."""
     low, high = limits(robot)
     beyond: NDArray[np.bool_] = (joints < low - slack) | (joints > high + slack)
     return beyond
 
 
 def nearest_turns(robot: Robot, joints: Array, seed: Array) -> Array:
-    """Return the readings ``(n, joints)`` with every turning joint in the turn nearest to the seed within its limits.
+    """Return the joint positions ``(n, joints)`` with every joint in the turn nearest to the seed within its limits.
 
     Where no turn lies within the limits, the one that passes them least is taken.
 

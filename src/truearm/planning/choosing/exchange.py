@@ -25,8 +25,8 @@ N = TypeVar("N", bound=np.floating[Any])
 #: What the search for a number begins with (Nubiola, section 2.5.2).
 FIRST: Final = 11
 _ROUNDS: Final = 20
-_PROMISING: Final = 8
-_GAIN: Final = 1e-9  # of the logarithm of the objective
+_CANDIDATES_TRIED: Final = 8
+_LEAST_GAIN: Final = 1e-9  # of the logarithm of the objective
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +81,7 @@ class Candidates:
         return np.asarray(self.packed @ turned.astype(np.float32).T)
 
 
-def most_telling(rows: Array, count: int, known: Array, objective: Objective) -> list[int]:
+def most_informative(rows: Array, count: int, known: Array, objective: Objective) -> list[int]:
     """Return the indices of `count` measurements that together tell most.
 
     Parameters
@@ -105,7 +105,7 @@ def most_telling(rows: Array, count: int, known: Array, objective: Objective) ->
     return _chosen(Candidates.of(rows, known, count), count, objective)
 
 
-def most_telling_number(rows: Array, known: Array) -> list[int]:
+def most_informative_number(rows: Array, known: Array) -> list[int]:
     """Return the indices of as many measurements as make O1 largest, beginning with 11.
 
     One is added, taken away or exchanged as long as the index rises (Nubiola, section 2.5.2).
@@ -113,7 +113,7 @@ def most_telling_number(rows: Array, known: Array) -> list[int]:
     Parameters
     ----------
     rows, known
-        As for :func:`most_telling`.
+        As for :func:`most_informative`.
 
     Raises
     ------
@@ -140,10 +140,10 @@ def most_telling_number(rows: Array, known: Array) -> list[int]:
             left = objective.value(total - candidates.information(np.array(chosen)))
             weakest = int(np.argmax(left))
             tried.append(chosen[:weakest] + chosen[weakest + 1 :])
-        better = next((choice for choice in tried if index(choice) > best + _GAIN), None)
+        better = next((choice for choice in tried if index(choice) > best + _LEAST_GAIN), None)
         if better is None:
             better = exchanged(candidates, chosen, objective)
-            if index(better) <= best + _GAIN:
+            if index(better) <= best + _LEAST_GAIN:
                 return chosen
         chosen, best = better, index(better)
 
@@ -151,7 +151,7 @@ def most_telling_number(rows: Array, known: Array) -> list[int]:
 def _refuse_too_many(count: int, candidates: int) -> None:
     if not 0 <= count <= candidates:
         raise InputError(
-            "there are not so many measurements to choose from",
+            "there are too few measurements to choose from",
             where="number of measurements",
             came=count,
             allowed=f"0 to {candidates}",
@@ -186,7 +186,7 @@ def exchanged(candidates: Candidates, chosen: list[int], objective: Objective) -
             others = chosen[:place] + chosen[place + 1 :]
             best, information = _best(candidates, without, objective, promise[:, place], others)
             gain = objective.value(without + information) - objective.value(total)
-            if best != old and gain > _GAIN:
+            if best != old and gain > _LEAST_GAIN:
                 chosen[place], total, changed = best, without + information, True
         if not changed:
             break
@@ -199,7 +199,7 @@ def _best(
     """Return the candidate that adds most to `total`, and its information."""
     promise = promise.copy()
     promise[taken] = -np.inf
-    several = min(_PROMISING, len(promise) - len(taken))
+    several = min(_CANDIDATES_TRIED, len(promise) - len(taken))
     few = np.argpartition(promise, len(promise) - several)[len(promise) - several :]
     information = candidates.information(few)
     best = int(np.argmax(objective.value(total + information)))

@@ -23,7 +23,7 @@ from truearm.measurement.inclinometer import Pairs
 from truearm.modeling.chain import Array
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
-from truearm.planning.choosing.exchange import most_telling
+from truearm.planning.choosing.exchange import most_informative
 from truearm.planning.choosing.observability import OfInterest
 
 _CANDIDATES: Final = 1500
@@ -70,8 +70,8 @@ def plan_tilting(
     force
         Of a string or weight on the flange [N], along or against x, y or z of the base; 0 leaves gravity alone.
     move
-        How far joints move within a pair at most [rad]; 0 keeps the joint readings and changes the load only. Poses are
-        always compared at the same joint readings.
+        How far joints move within a pair at most [rad]; 0 keeps the joint positions and changes the load only. Poses
+        are always compared at the same joint positions.
     deviation
         Standard deviation of a change of inclination [rad].
     pose_deviation
@@ -80,11 +80,11 @@ def plan_tilting(
     Raises
     ------
     InputError
-        If nothing may differ within a pair, or hardly any posture decides to which side the joints lean.
+        If nothing may differ within a pair, or too few postures decide to which side the joints tilt.
     """
     if not (force >= 0.0 and move >= 0.0 and (move > 0.0 or force > 0.0)):
         raise InputError(
-            "nothing differs within a pair of postures",
+            "the two postures of a pair do not differ",
             where="force and move",
             came=f"{force:g} N and {math.degrees(move):g} deg",
             allowed="0 or more, one of them more than 0",
@@ -95,7 +95,7 @@ def plan_tilting(
             where="force",
             came="0 N",
             allowed="more than 0",
-            cure="Give a force, or choose no pairs of poses; then joints about a vertical axis stay unknown.",
+            cure="Give a force, or choose no pairs of poses; then joints about a vertical axis stay unobservable.",
         )
     model = robot.with_effects(TILTING)
     effects, nuisance = tilting_parameters(model)
@@ -120,19 +120,19 @@ def plan_tilting(
 
 
 def _chosen(candidates: Pairs, rows: Array, count: int, known: Array, interest: int) -> tuple[Pairs, Array]:
-    """Return the most telling candidates, and what is known once they are measured."""
-    telling = np.flatnonzero(rows.any(axis=(1, 2)))
-    if len(telling) < count:
+    """Return the most useful candidates, and what is known once they are measured."""
+    useful = np.flatnonzero(rows.any(axis=(1, 2)))
+    if len(useful) < count:
         raise InputError(
-            "hardly any posture decides to which side the joints lean",
+            "too few postures decide to which side the joints tilt",
             where="postures to compare",
-            came=f"{len(telling)} of {len(rows)} pairs that can be used",
+            came=f"{len(useful)} of {len(rows)} pairs that can be used",
             allowed=f"{DECIDING_MOMENTS}, in {count} pairs",
             cure="Give a larger force, or a payload beside the last axis.",
         )
-    chosen = telling[most_telling(rows[telling], count, known, OfInterest(interest))]
-    told = rows[chosen].reshape(-1, rows.shape[2])
-    return candidates.at(chosen), known + told.T @ told
+    chosen = useful[most_informative(rows[useful], count, known, OfInterest(interest))]
+    measured = rows[chosen].reshape(-1, rows.shape[2])
+    return candidates.at(chosen), known + measured.T @ measured
 
 
 def _candidates(robot: Robot, rng: np.random.Generator, force: float, move: float) -> Pairs:

@@ -20,18 +20,18 @@ from truearm.modeling.chain import Array
 from truearm.modeling.parts import NO_PAYLOAD, Payload
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
-from truearm.planning.choosing.exchange import FIRST, most_telling, most_telling_number
+from truearm.planning.choosing.exchange import FIRST, most_informative, most_informative_number
 from truearm.planning.choosing.observability import INDICES, observability
 from truearm.planning.choosing.ordering import short_order
 from truearm.planning.choosing.prediction import Prediction, predict
 from truearm.planning.choosing.sensitivity import sensitivity, sensitivity_of_readings
 from truearm.planning.constraints.constraints import Constraints, allowed
-from truearm.simulation.devices import Device, stationed_for
+from truearm.simulation.devices import Device, in_view_of
 from truearm.simulation.truths import DEFAULT_TOOL
 
 #: How far before a configuration each joint stops, to come to it moving forward [rad; m for sliding joints].
 APPROACH: Final = {"revolute": np.deg2rad(2.0), "prismatic": 5e-3}
-_ELSEWHERE: Final = 500
+_PREDICTED_CONFIGURATIONS: Final = 500
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +139,7 @@ def device_candidates(
     The robot where the device has it stand, with its tool; what the device would read of it without noise; and the
     postures, each joint coming to them moving forward.
     """
-    seen = stationed_for(device, robot)
+    seen = in_view_of(device, robot)
     readings = device.campaign(seen, _AsSaid(seen.rigid), count, 0.0, rng)
     at = Postures(readings.joints, approach=np.ones_like(readings.joints), number=np.zeros(count))
     return seen, readings, at
@@ -204,7 +204,7 @@ def plan_measurements(
         )
     if poses is None and objective != "O1":
         raise InputError(
-            "only O1 weighs the number of poses",
+            "only O1 can choose the number of poses",
             parameter="poses",
             came=f"auto, and the objective {objective}",
             cure="Name a number of poses, or use `objective=O1`.",
@@ -216,14 +216,14 @@ def plan_measurements(
     _refuse_too_few(FIRST if poses is None else poses, len(usable), len(candidates), rejected)
     if readings is None:
         free = model.free(seen)
-        trusted: tuple[str, ...] = ()
-        told = sensitivity(seen, candidates.at(usable), free, noise)
+        gauge: tuple[str, ...] = ()
+        derivatives = sensitivity(seen, candidates.at(usable), free, noise)
     else:
         seen = with_fixtures_of(seen, readings)
-        free, trusted = unanchored(model.free(seen), readings), gauge_freedoms(readings)
-        told = sensitivity_of_readings(seen, readings.of_configurations(usable), free, noise)
-    among = told.told_apart(FIRST if poses is None else poses)
-    rows, known = np.ascontiguousarray(told.rows[..., among]), told.known[np.ix_(among, among)]
+        free, gauge = unanchored(model.free(seen), readings), gauge_freedoms(readings)
+        derivatives = sensitivity_of_readings(seen, readings.of_configurations(usable), free, noise)
+    among = derivatives.identifiable(FIRST if poses is None else poses)
+    rows, known = np.ascontiguousarray(derivatives.rows[..., among]), derivatives.known[np.ix_(among, among)]
     if poses is not None and poses * rows.shape[1] < len(among):
         raise InputError(
             "there are fewer equations than parameters",
@@ -232,14 +232,18 @@ def plan_measurements(
             allowed=f"{-(-len(among) // rows.shape[1])} or more for the model {model.name}, or auto",
         )
     started = time.process_time()
-    found = most_telling_number(rows, known) if poses is None else most_telling(rows, poses, known, INDICES[objective])
+    found = (
+        most_informative_number(rows, known)
+        if poses is None
+        else most_informative(rows, poses, known, INDICES[objective])
+    )
     seconds = time.process_time() - started
     order = np.array(found, dtype=np.intp)
     order = order[short_order(candidates.joints[usable[order]])]
     chosen = usable[order]
     joints = candidates.joints[chosen]
-    elsewhere = random_candidates(seen, _ELSEWHERE, rng)
-    predicted = sensitivity(seen, elsewhere, free, noise, trusted)
+    elsewhere = random_candidates(seen, _PREDICTED_CONFIGURATIONS, rng)
+    predicted = sensitivity(seen, elsewhere, free, noise, gauge)
     chosen_rows = rows[order].reshape(-1, len(among))
     at_fixtures = {}
     for fixture in seen.fixtures if readings is not None else ():
@@ -259,9 +263,9 @@ def plan_measurements(
         candidates=len(candidates),
         rejected=rejected,
         usable=len(usable),
-        left_out=tuple(name for k, name in enumerate(told.free.names) if k not in among),
+        left_out=tuple(name for k, name in enumerate(derivatives.free.names) if k not in among),
         seconds=seconds,
-        prediction=predict(seen, told, order, predicted, elsewhere.joints, noise, rng),
+        prediction=predict(seen, derivatives, order, predicted, elsewhere.joints, noise, rng),
     )
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
-from truearm.planning.choosing.exchange import most_telling
+from truearm.planning.choosing.exchange import most_informative
 from truearm.planning.choosing.observability import O1
 from truearm.planning.choosing.sensitivity import Sensitivity
 
@@ -28,7 +28,7 @@ NUMBERS: Final = (8, 10, 12, 15, 18, 20, 25, 30, 35, 40, 50, 60, 80, 100, 150, 2
 NEAR: Final = 1.1
 _POOL: Final = 500
 #: Share of a reading's variance that all targets of a pose have in common (irb120-faro, docs/guide/planning.md).
-_COMMON: Final = 0.75
+_COMMON_SHARE: Final = 0.75
 _DRAWS: Final = 5
 #: Mean length of a vector of three normal coordinates, per deviation.
 _MEAN_LENGTH: Final = math.sqrt(8.0 / math.pi)
@@ -47,7 +47,7 @@ class Prediction:
     numbers
         Numbers of poses.
     chosen, random
-        Error after as many poses, chosen by O1 and drawn by chance, ``(numbers,)``.
+        Error after as many poses, chosen by O1 and drawn at random, ``(numbers,)``.
     places
         Where the flange is at random configurations, in the world, ``(k, 3)``.
     error
@@ -63,7 +63,7 @@ class Prediction:
     error: Array
 
     @property
-    def enough(self) -> int | None:
+    def sufficient_number(self) -> int | None:
         """The smallest of the numbers with an error at most 10 % above the floor; None if all are too small."""
         near = self.numbers[self.chosen <= NEAR * self.floor]
         return int(near[0]) if len(near) else None
@@ -98,9 +98,9 @@ def predict(
         rows = candidates.rows[measured]
         together = rows.reshape(len(rows), -1, 3, len(known)).sum(axis=1).reshape(-1, len(known))
         rows = rows.reshape(-1, len(known))
-        told = rows.T @ rows
-        spread = (1.0 - _COMMON) * told + _COMMON * (together.T @ together) + known
-        moved = elsewhere.rows @ np.linalg.solve(known + told, np.linalg.cholesky(spread))
+        information = rows.T @ rows
+        spread = (1.0 - _COMMON_SHARE) * information + _COMMON_SHARE * (together.T @ together) + known
+        moved = elsewhere.rows @ np.linalg.solve(known + information, np.linalg.cholesky(spread))
         return np.asarray(np.mean(np.sum(moved**2, axis=2), axis=1))
 
     def mean_error(measured: NDArray[np.intp]) -> float:
@@ -108,11 +108,11 @@ def predict(
 
     count = len(candidates.rows)
     pool = rng.permutation(count)[:_POOL]
-    told = candidates.told_apart(max(NUMBERS))
-    least = len(told) / candidates.rows.shape[1]
+    kept = candidates.identifiable(max(NUMBERS))
+    least = len(kept) / candidates.rows.shape[1]
     numbers = np.array([n for n in NUMBERS if least <= n <= len(pool)], dtype=np.intp)
-    rows, of_told = candidates.rows[pool][..., told], known[np.ix_(told, told)]
-    by_choice = [mean_error(pool[most_telling(rows, int(n), of_told, O1())]) for n in numbers]
+    rows, known_of_kept = candidates.rows[pool][..., kept], known[np.ix_(kept, kept)]
+    by_choice = [mean_error(pool[most_informative(rows, int(n), known_of_kept, O1())]) for n in numbers]
     orders = [rng.permutation(count) for _ in range(_DRAWS)]
     by_chance = [float(np.mean([mean_error(order[:n]) for order in orders])) for n in numbers]
     return Prediction(

@@ -53,15 +53,15 @@ class Sensitivity:
         priors = np.diag((self.size / self.free.prior) ** 2)
         return priors if self.beside is None else priors + self.beside
 
-    def told_apart(self, count: int) -> NDArray[np.intp]:
-        """Return the indices of parameters that `count` average configurations tell from all others."""
+    def identifiable(self, count: int) -> NDArray[np.intp]:
+        """Return the indices of parameters that `count` average configurations can tell from all others."""
         R = np.linalg.qr(self.rows.reshape(-1, self.rows.shape[2]), mode="r")
         share = np.sqrt(count / len(self.rows))
         return np.array(sorted(independent_columns(share * R, range(len(self.size)), self.free)), dtype=np.intp)
 
 
 def sensitivity(
-    robot: Robot, postures: Postures, free: FreeParameters, noise: float, trusted: Sequence[str] = ()
+    robot: Robot, postures: Postures, free: FreeParameters, noise: float, gauge: Sequence[str] = ()
 ) -> Sensitivity:
     """Return what the positions of all targets would tell.
 
@@ -75,7 +75,7 @@ def sensitivity(
         Which parameters are asked about.
     noise
         Standard deviation of a coordinate about a well identified model [m].
-    trusted
+    gauge
         What does not count: where the base is, the size of everything
         (:func:`truearm.identification.solving.redundancy.gauge_freedoms`).
 
@@ -90,8 +90,8 @@ def sensitivity(
     for target in robot.targets:
         kinematics = robot.forward_kinematics(loaded, target.name)
         moves = robot.position_jacobian(kinematics, loaded, free.names)
-        if trusted:
-            (flat,) = gauge_motion_removed(trusted, robot, kinematics, [moves.reshape(len(moves), -1).T])
+        if gauge:
+            (flat,) = gauge_motion_removed(gauge, robot, kinematics, [moves.reshape(len(moves), -1).T])
             moves = flat.T.reshape(moves.shape)
         by_target.append(moves)
     size = _size(free)
@@ -142,7 +142,7 @@ def check_known(robot: Robot, postures: Postures) -> None:
     for effect in robot.effects:
         if effect.warmed and postures.temperature is None:
             raise InputError(
-                f"the effect {effect.name} needs the temperature of the arm, which no plan knows",
+                f"the effect {effect.name} needs the temperature of the arm, which a plan does not have",
                 where=robot.name,
                 cure="Choose another model.",
             )

@@ -85,7 +85,7 @@ class Constraints(BaseModel):
     Attributes
     ----------
     limits
-        Lowest and highest reading by joint number, within the robot's own limits.
+        Lowest and highest joint position by joint number, within the robot's own limits.
     moments
         Sign of the moment of the load about a joint's axis, by joint number.
     box
@@ -154,7 +154,7 @@ def allowed(
     if constraints.moments:
         if not robot.masses and not robot.payload.mass:
             raise InputError(
-                "the robot has no masses, so nothing loads its joints",
+                "the robot has no masses, so its joints carry no loads",
                 where=f"{where}, moments",
                 cure="Give the masses of its links in the robot file, or a payload.",
             )
@@ -192,7 +192,7 @@ def _joint(robot: Robot, number: int, where: str) -> int:
 def _range(given: tuple[float, float], unit: str, where: str) -> tuple[float, float]:
     low, high = (sized_si(value, unit, where) for value in given)
     if low > high:
-        raise InputError("the range leaves no value", where=where, cure="The lower one comes first.")
+        raise InputError("the range is empty", where=where, cure="The lower one comes first.")
     return low, high
 
 
@@ -220,7 +220,7 @@ def _visible(
         instrument = origin
     else:
         raise InputError(
-            "nobody knows where the instrument stands",
+            "the position of the instrument is not known",
             where=where,
             cure="Add instrument: [x, y, z] in the robot's base frame, or take a calibrated robot.",
         )

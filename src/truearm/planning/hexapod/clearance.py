@@ -39,7 +39,7 @@ def clearance(robot: Robot, joints: Array, starts: Array, ends: Array, arm_radiu
     robot
         The arm; its world is the frame of the bars.
     joints
-        Readings ``(n, joints)`` [rad or m].
+        Joint positions ``(n, joints)`` [rad or m].
     starts, ends
         Both ends of every bar at each configuration [m], ``(bars, 3, n)``.
     arm_radius

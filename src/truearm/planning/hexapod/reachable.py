@@ -116,7 +116,7 @@ def reachable(
     left_out = Counter(reasons[~kept].tolist())
     if not kept.any():
         raise InputError(
-            f"{robot.name} can take none of the {len(wanted)} poses with the fixture at this place",
+            f"{robot.name} can reach none of the {len(wanted)} poses with the fixture at this place",
             parameter="fixture",
             came=", ".join(f"{count} {reason}" for reason, count in left_out.items()),
             cure="Move the fixture; it is given in the robot's base frame.",

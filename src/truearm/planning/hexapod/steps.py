@@ -24,11 +24,11 @@ def steps_text(plan: Reachable, robot: Robot, device: Device = DEVICE) -> str:
         "",
     ]
     for row, room in zip(plan.rows, plan.clearance.tolist(), strict=True):
-        readings = " ".join(
+        positions = " ".join(
             f"{from_si(value, 'deg' if joint.kind == 'revolute' else 'mm'):.3f}"
             for joint, value in zip(robot.joints, row.joints.tolist(), strict=True)
         )
         lines.append(f"Configuration {row.configuration}  (pose {row.pose}, {row.branch}, {room * 1e3:.0f} mm of room)")
-        lines.append(f"   joints {readings}")
+        lines.append(f"   joints {positions}")
         lines += [f"   [ ] Attach the bar between {' and '.join(name.split('-'))}." for name in row.design.leg_names]
     return "\n".join(lines) + "\n"

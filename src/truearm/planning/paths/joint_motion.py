@@ -1,9 +1,9 @@
 """From the motion of the tip to the motion of the joints.
 
-The readings follow the path sample by sample with Newton's steps, on the branch on which they begin. Where the arm has
-more joints than the task has rows, they stay as near to the starting posture as the path lets them
-(:mod:`truearm.modeling.inverse.redundancy_resolution`), so that a closed path ends with the readings it began with.
-Velocities and accelerations are exact derivatives of the readings, not differences of samples.
+The joint positions follow the path sample by sample with Newton's steps, on the branch on which they begin. Where the
+arm has more joints than the task has rows, they stay as near to the starting posture as the path lets them
+(:mod:`truearm.modeling.inverse.redundancy_resolution`), so that a closed path ends with the joint positions it began
+with. Velocities and accelerations are exact derivatives of the joint positions, not differences of samples.
 
 The robot's geometry counts, its joint effects do not: the motion is what is commanded, and what effects make of it is
 for :mod:`truearm.compensation.trajectories` to correct.
@@ -42,7 +42,7 @@ _JUMP: Final = 0.3
 
 @dataclass(frozen=True, eq=False)
 class JointMotion:
-    """Joint readings over time.
+    """Joint positions over time.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class JointMotion:
     joint_names: tuple[str, ...]
 
     def postures(self, joints: Array | None = None) -> Postures:
-        """Return what a robot is asked with: this motion, or other readings ``(n, joints)`` with the same rates."""
+        """Return the postures of this motion, or of other joint positions ``(n, joints)`` with the same rates."""
         approach = approach_of(self.joints, np.arange(len(self.time)))
         return Postures(self.joints if joints is None else joints, self.velocity, self.acceleration, approach)
 
@@ -95,12 +95,12 @@ def joint_motion(
     rotation
         The orientation to keep, in the base frame, ``(3, 3)``; not needed where it is free.
     seed
-        Joint readings ``(joints,)`` [rad or m] near which the motion shall begin; zero if None.
+        Joint positions ``(joints,)`` [rad or m] near which the motion shall begin; zero if None.
 
     Raises
     ------
     InputError
-        If the motion cannot begin, leaves the reach or the limits, or comes to a singular posture: with the place on
+        If the motion cannot start, leaves the reach or the limits, or comes to a singular posture: with the place on
         the path, the time, and the joint.
     """
     return _Follower(robot, trajectory, target, orientation, rotation).motion(seed)
@@ -129,7 +129,7 @@ class _Follower:
                 "the arm has too few joints to keep this orientation along a path",
                 where=robot.name,
                 came=f"{counted(len(robot.joints), 'joint')}, orientation '{orientation}'",
-                cure="Let the orientation be free, or keep the axis alone.",
+                cure="Leave the orientation free, or keep the axis alone.",
             )
 
     def motion(self, seed: ArrayLike | None) -> JointMotion:
@@ -148,7 +148,7 @@ class _Follower:
         )
 
     def _start(self, seed: ArrayLike | None) -> Array:
-        """Return readings for the first sample."""
+        """Return joint positions for the first sample."""
         found = inverse(
             self._robot,
             self._path.position[:1],
@@ -159,15 +159,17 @@ class _Follower:
         )
         if found.status[0] in (PoseStatus.UNREACHABLE, PoseStatus.BEYOND_LIMIT):
             raise InputError(
-                "the motion cannot begin",
+                "the motion cannot start",
                 where=self._place(0),
                 came=found.advice(0).rstrip("."),
-                cure=None if self._orientation == "free" else "A free orientation asks less of the arm.",
+                cure=None
+                if self._orientation == "free"
+                else "With a free orientation the arm has fewer conditions to meet.",
             )
         return np.asarray(found.joints[0])
 
     def _followed(self, start: Array) -> Array:
-        """Return readings for every sample, or refuse the first one that has none."""
+        """Return joint positions for every sample, or refuse the first one that has none."""
         scaled = np.empty((len(self._path.time), len(start)))
         scaled[0] = start / self._scale
         side = 0.0
@@ -179,11 +181,11 @@ class _Follower:
             found = self._solved(k, guess, scaled[0])
             if found is None:
                 raise InputError(
-                    "the arm cannot follow the path any further: it leaves the reach, or comes to a singular posture"
+                    "the arm cannot follow the path any further: it comes to the end of its workspace, or is singular"
                     + (", or, with joints to spare, to the end of the postures near the first" if self._spare else ""),
                     where=self._place(k),
                     came=f"orientation '{self._orientation}'",
-                    cure="Move the path towards the arm, begin elsewhere (seed), or ask less of the orientation.",
+                    cure="Move the path towards the arm, start elsewhere (seed), or free more of the orientation.",
                 )
             scaled[k], A = found
             self._check_limits(k, scaled[k] * self._scale)
@@ -199,7 +201,7 @@ class _Follower:
         return np.asarray(scaled * self._scale)
 
     def _solved(self, k: int, guess: Array, posture: Array) -> tuple[Array, Array] | None:
-        """Return scaled readings for a sample, and the rows of its Jacobian; None if the steps do not end."""
+        """Return scaled joint positions for a sample, and the rows of its Jacobian; None if the steps do not end."""
         q = guess.copy()
         for _ in range(_MOST_STEPS):
             state = self._tip.at((q * self._scale)[None])
@@ -232,7 +234,7 @@ class _Follower:
             where=self._place(k),
             came=f"{joint.name} at {from_si(float(joints[beyond[0]]), unit):.5g} {unit}",
             allowed=f"{low:g} to {high:g} {unit}",
-            cure="Begin on another branch (seed), or move the path.",
+            cure="Start on another branch (seed), or move the path.",
         )
 
     def _check_regular(self, k: int, A: Array, side: float) -> float:
@@ -246,7 +248,7 @@ class _Follower:
             "the path passes a singular posture",
             where=self._place(k),
             came=f"{self._names[fastest]} would have to move fastest",
-            cure="Move the path, begin on another branch (seed), or ask less of the orientation.",
+            cure="Move the path, start on another branch (seed), or free more of the orientation.",
         )
 
     def _place(self, k: int) -> str:
@@ -261,7 +263,7 @@ def _checked(trajectory: Trajectory) -> Trajectory:
         values = getattr(trajectory, name)
         if values.shape != (count, 3) or not np.isfinite(values).all():
             raise InputError(
-                "a trajectory has three finite coordinates for every time",
+                "a trajectory needs three finite coordinates for every time",
                 where=f"trajectory, {name}",
                 came=f"an array of shape {values.shape}" if values.shape != (count, 3) else "NaN or infinity",
                 allowed=f"({count}, 3)",
@@ -278,7 +280,7 @@ def _orientation_to_keep(orientation: Orientation, rotation: ArrayLike | None) -
                 "no orientation is given to keep",
                 where="rotation",
                 allowed="a rotation matrix, (3, 3)",
-                cure="Give it, or let the orientation be free.",
+                cure="Give it, or leave the orientation free.",
             )
         return np.eye(3)
     R = np.asarray(rotation, float)

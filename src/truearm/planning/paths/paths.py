@@ -17,7 +17,7 @@ from truearm.modeling.chain import Array
 from truearm.planning.paths.trajectory import Trajectory, sample_times
 
 #: Points nearer than this are one point [m].
-_SAME: Final = 1e-9
+_SAME_POINT: Final = 1e-9
 #: A path whose speed over its parameter falls below this share of its mean has a cusp.
 _CUSP: Final = 1e-4
 #: A section is integrated over so many pieces, each with Gauss' points.
@@ -54,7 +54,7 @@ class Line:
     def __init__(self, start: ArrayLike, end: ArrayLike) -> None:
         self.start, self.end = point("start of the line", start), point("end of the line", end)
         self.length = float(np.linalg.norm(self.end - self.start))
-        if self.length < _SAME:
+        if self.length < _SAME_POINT:
             raise InputError("the line has no length", where="line", came=_shown(self.start), cure="Move one end.")
 
     def at(self, distance: Array) -> tuple[Array, Array, Array]:
@@ -81,8 +81,8 @@ class Circle:
         axis = point("normal of the circle", normal)
         self._x, size = first - self.centre, float(np.linalg.norm(axis))
         self.radius = float(np.linalg.norm(self._x))
-        if self.radius < _SAME or size < _SAME:
-            raise InputError("radius and normal of a circle are not zero", where="circle", came=_shown(first))
+        if self.radius < _SAME_POINT or size < _SAME_POINT:
+            raise InputError("radius and normal of a circle must not be zero", where="circle", came=_shown(first))
         self.normal = axis / size
         if abs(self._x @ self.normal) > 1e-6 * self.radius:
             raise InputError(
@@ -101,7 +101,9 @@ class Circle:
         u, v = b - a, c - a
         n = np.cross(u, v)
         if np.linalg.norm(n) <= 1e-9 * max(u @ u, v @ v):
-            raise InputError("three points on a line have no circle", where="circle", came=_shown(np.stack([a, b, c])))
+            raise InputError(
+                "three points on a line define no circle", where="circle", came=_shown(np.stack([a, b, c]))
+            )
         centre = a + (v @ v * np.cross(n, u) - u @ u * np.cross(n, v)) / (2 * n @ n)
         return cls(centre, a, n)
 
@@ -164,7 +166,7 @@ class Hermite:
                 )
         for name, values in checked.items():
             if not np.isfinite(values).all():
-                raise InputError("NaN and infinity are no place to go", where=name)
+                raise InputError("a waypoint cannot be NaN or infinite", where=name)
         self.velocities = checked["velocities"] if "velocities" in checked else _natural(self.knots, self.waypoints)
 
     @property
@@ -244,7 +246,7 @@ def point(name: str, given: ArrayLike) -> Array:
     """Return three finite coordinates [m], or refuse what was given."""
     values = np.asarray(given, float)
     if values.shape != (3,) or not np.isfinite(values).all():
-        raise InputError("a point has three finite coordinates", where=name, came=str(values))
+        raise InputError("a point needs three finite coordinates", where=name, came=str(values))
     return values
 
 

@@ -40,7 +40,7 @@ class TimeLaw:
         for name in ("length", "speed", "acceleration"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0):
-                raise InputError("it has to be a positive number", where=name, came=value, allowed="above 0")
+                raise InputError("it must be a positive number", where=name, came=value, allowed="above 0")
 
     @property
     def peak_speed(self) -> float:

@@ -42,7 +42,7 @@ class Trajectory:
 def sample_times(duration: float, step: float) -> Array:
     """Return times from 0 to `duration` [s], evenly apart by `step` or a little less."""
     if not (math.isfinite(step) and step > 0):
-        raise InputError("it has to be a positive number", where="step", came=step, allowed="above 0 s")
+        raise InputError("it must be a positive number", where="step", came=step, allowed="above 0 s")
     if duration / step > _MOST_SAMPLES:
         raise InputError(
             "there would be too many samples",

@@ -125,7 +125,9 @@ class Cube:
 
     def __init__(self, centre: ArrayLike | Sequence[float], side: float) -> None:
         if not (math.isfinite(side) and side > 0):
-            raise InputError("a cube has a positive side", where="side of the cube", came=side, allowed="above 0")
+            raise InputError(
+                "the side of a cube must be positive", where="side of the cube", came=side, allowed="above 0"
+            )
         object.__setattr__(self, "centre", point("centre of the cube", centre))
         object.__setattr__(self, "side", float(side))
 

@@ -28,7 +28,7 @@ DIRECTIONS: Final = ("+x", "-x", "+y", "-y")
 
 _SAMPLES: Final = 50_000
 #: A point is near to a sample within this [reach lengths].
-_NEAR: Final = 0.06
+_NEAR_SAMPLE: Final = 0.06
 #: Spacing of the lattice of centres and sides [reach lengths].
 _LATTICE: Final = 1 / 12
 #: The search goes from the first step to the second, and for the best from there to the third [reach lengths].
@@ -44,7 +44,7 @@ _CORNERS: Final = np.array([-1.0, 1.0])
 _SEEDS: Final = 4
 _MOST_STEPS: Final = 12
 _DAMPING: Final = 1e-3
-_MET: Final = 1e-6
+_REACHED: Final = 1e-6
 
 
 def largest_cube(
@@ -72,13 +72,13 @@ def largest_cube(
     Raises
     ------
     InputError
-        If the arm reaches no cube there.
+        If the arm reaches no cube in this direction.
     """
     if ahead not in DIRECTIONS:
         raise InputError("there is no such direction", where="ahead", came=ahead, allowed=", ".join(DIRECTIONS))
     for name, bound in (("nearest", nearest), ("floor", floor)):
         if not math.isfinite(bound):
-            raise InputError("a bound of the cube is a finite number", where=name, came=bound)
+            raise InputError("a bound of the cube must be a finite number", where=name, came=bound)
     return _Search(robot, target, ahead, nearest, floor).largest()
 
 
@@ -102,7 +102,7 @@ class _Search:
             places = self._grown(places[best], *_STEPS[1:])
         if not len(places):
             raise InputError(
-                "the arm reaches no cube there",
+                "the arm reaches no cube in this direction",
                 where=self._robot.name,
                 came=f"from {self._nearest * 1e3:g} mm ahead and {self._floor * 1e3:g} mm up",
                 cure="Choose another direction or floor, or give centre and side of the cube.",
@@ -117,7 +117,7 @@ class _Search:
             lattice = product(np.arange(0, 13) * step, np.arange(-12, 13) * step, [side])
             places = np.array(list(lattice))
             places = places[self._allowed(places)]
-            distance, _ = self._tree.query(self._points(places), distance_upper_bound=_NEAR * self._length)
+            distance, _ = self._tree.query(self._points(places), distance_upper_bound=_NEAR_SAMPLE * self._length)
             near = [*places[np.isfinite(distance).all(axis=1)], *near]
         starts: list[Array] = []
         for place in near:
@@ -163,13 +163,13 @@ class _Search:
         return np.asarray(~lost.reshape(points.shape[:2]).any(axis=1))
 
     def _met(self, wanted: Array, q: Array) -> NDArray[np.bool_]:
-        """Return which points ``(n, 3)`` damped Newton's steps reach from readings `q`, held within the limits."""
+        """Return which points ``(n, 3)`` damped Newton's steps reach from the joints `q`, held within the limits."""
         met = np.zeros(len(wanted), dtype=bool)
         going = np.arange(len(wanted))
         for _ in range(_MOST_STEPS):
             state = self._tip.at(q)
             error = wanted[going] - state.position
-            left = np.linalg.norm(error, axis=1) > _MET * self._length
+            left = np.linalg.norm(error, axis=1) > _REACHED * self._length
             met[going[~left]] = True
             going, q, error, J = going[left], q[left], error[left], state.jacobian[left, :3]
             normal = J @ J.swapaxes(1, 2) + (_DAMPING * self._length) ** 2 * np.eye(3)

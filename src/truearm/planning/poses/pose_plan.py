@@ -1,4 +1,4 @@
-"""Poses to measure in the cube of ISO 9283: points on its diagonal planes, readings that reach them, and their order.
+"""Poses to measure in the cube of ISO 9283: points on its diagonal planes, joints that reach them, and their order.
 
 The points are shared evenly among the four diagonal planes and fill each of them from edge to edge
 (:meth:`~truearm.planning.poses.iso9283.DiagonalPlane.spread`). The corners of the largest cube lie on the boundary
@@ -50,7 +50,7 @@ class PosePlan:
     plane
         Name of the diagonal plane of each point.
     joints
-        Readings that reach the points [rad or m], ``(n, joints)``.
+        Joint positions that reach the points [rad or m], ``(n, joints)``.
     target
         Name of the target that goes there; the flange if None.
     """
@@ -102,18 +102,18 @@ def plan_poses(
     if isinstance(count, bool) or count < 1:
         raise InputError("at least one pose is needed", where="count", came=count, allowed="1 or more")
     if not (math.isfinite(least_move) and least_move >= 0):
-        raise InputError("a move is not negative", where="least move", came=least_move, allowed="0 or more")
+        raise InputError("a move must not be negative", where="least move", came=least_move, allowed="0 or more")
     shares = [count // 4 + (plane < count % 4) for plane in range(4)]
     points = np.concatenate([plane.spread(share) for plane, share in zip(cube.planes, shares, strict=True)])
     names = np.repeat([plane.name for plane in cube.planes], shares)
     rng = np.random.default_rng(seed)
-    joints = _readings(robot, points, target, rng)
+    joints = _joints_at(robot, points, target, rng)
     for _ in range(_ORDERS):
         order = all_moving_order(joints, least_move)
         stuck = order[1:][smallest_moves(joints[order]) < least_move]
         if not len(stuck):
             break
-        joints[stuck] = _readings(robot, points[stuck], target, rng)
+        joints[stuck] = _joints_at(robot, points[stuck], target, rng)
     else:
         raise InputError(
             "no order of the poses was found in which all joints move",
@@ -125,8 +125,8 @@ def plan_poses(
     return PosePlan(cube, points[order], approach, tuple(names[order].tolist()), joints[order], target)
 
 
-def _readings(robot: Robot, points: Array, target: str | None, rng: np.random.Generator) -> Array:
-    """Return readings within the limits that reach points, well away from singular postures where possible."""
+def _joints_at(robot: Robot, points: Array, target: str | None, rng: np.random.Generator) -> Array:
+    """Return joint positions within the limits that reach points, well away from singular postures where possible."""
     joints = np.zeros((len(points), len(robot.joints)))
     regular, reached = np.zeros((2, len(points)), dtype=bool)
     turning = [joint.kind == "revolute" for joint in robot.joints]

@@ -49,7 +49,7 @@ class Tip:
         self._rotation, self._origin = base.rotation, np.array(base.translation)
 
     def at(self, q: Array | Postures) -> TipState:
-        """Return where the tip is with readings ``(n, joints)`` [rad or m], or in postures."""
+        """Return where the tip is with joint positions ``(n, joints)`` [rad or m], or in postures."""
         kinematics = self.robot.forward_kinematics(q, self.target)
         linear, angular = kinematics.jacobians(self.robot.moving[: len(self.robot.joints)])  # (joints, 3, n)
         to_base = self._rotation.T

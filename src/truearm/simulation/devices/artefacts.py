@@ -58,7 +58,7 @@ class Artefact(Device):
         return self.read(nominal, arm, joints, sigma, rng)
 
     def read(self, nominal: Robot, arm: Arm, joints: Array, sigma: float, rng: np.random.Generator) -> Dataset:
-        """Return the pose of the artefact at joint readings ``(n, joints)``."""
+        """Return the pose of the artefact at joint positions ``(n, joints)``."""
         count = len(joints)
         frames = arm.frames(joints)[nominal.targets[0].name]
         place = frames[:, :3, 3] + sigma * rng.standard_normal((count, 3))

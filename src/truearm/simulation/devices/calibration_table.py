@@ -24,9 +24,9 @@ from truearm.simulation.twin import Conditions, Twin, directions
 #: The ball joint of the document's table turns no further about the roll axis; about the pitch axis it is free [rad].
 ROLL_LIMIT: Final = math.radians(20.0)
 #: On the point [m]. A twin comes to rest to 1e-13 rad.
-_TOUCHES: Final = 1e-10
+_REACHED: Final = 1e-10
 _STEPS: Final = 60
-_LONGEST: Final = 0.2  # step of one joint [rad or m]: jogging, not leaping to another branch
+_LONGEST_STEP: Final = 0.2  # step of one joint [rad or m]: jogging, not leaping to another branch
 _SINGULAR: Final = 1e-6  # share of the largest singular value below which the arm cannot move
 
 
@@ -54,7 +54,7 @@ class CalibrationTable:
                 allowed="(n, 3), n at least 1",
             )
         if not np.isfinite(self.points).all():
-            raise InputError("NaN and infinity are no place on a table", where="calibration table")
+            raise InputError("a point on a table cannot be NaN or infinite", where="calibration table")
 
     @property
     def in_world(self) -> Array:
@@ -97,14 +97,15 @@ class CalibrationTable:
         source: str = "calibration table",
         **conditions: Unpack[Conditions],
     ) -> Dataset:
-        """Return the joint readings at which a twin's tip is on each point, with the known points as positions.
+        """Return the joint positions at which a twin's tip is on each point, with the known points as positions.
 
         Parameters
         ----------
         twin
             With one target, its tip.
         start
-            Readings from which the tip is jogged onto every point ``(joints,)`` [rad or m]: they choose the elbow.
+            Joint positions from which the tip is jogged onto every point ``(joints,)`` [rad or m]: they choose the
+            elbow.
         noise
             Standard deviation of each coordinate of the tip about the known point [m]: play in the hole, and how well
             the points are known. Declared in the data unless it is zero.
@@ -172,7 +173,7 @@ def rectangular_grid(columns: int, rows: int, spacing: float) -> Array:
 
 
 def _jogged(twin: Twin, wanted: Array, start: Array, conditions: Conditions) -> Array:
-    """Return readings ``(n, joints)`` with the tip where it is wanted ``(n, 3)`` [m], by least-norm Newton steps.
+    """Return joints ``(n, joints)`` with the tip where it is wanted ``(n, 3)`` [m], by least-norm Newton steps.
 
     The Jacobian is that of the arm without its joints' imperfections: steps need not be exact, their end is. Most of
     the way that arm is followed too, since all its configurations are computed at once.
@@ -186,15 +187,15 @@ def _jogged(twin: Twin, wanted: Array, start: Array, conditions: Conditions) -> 
                 tip = twin.robot.world_poses(q, name)[0]
             missing = wanted - tip
             apart = np.linalg.norm(missing, axis=1)
-            if (apart < _TOUCHES).all():
+            if (apart < _REACHED).all():
                 if imperfect:
                     return q
                 break
             jacobian = twin.robot.joint_jacobian(q, name)[:, :3]
             step = (np.linalg.pinv(jacobian, rcond=_SINGULAR) @ missing[:, :, None])[:, :, 0]
             longest = np.abs(step).max(axis=1, keepdims=True)
-            q = q + step * np.minimum(1.0, _LONGEST / np.maximum(longest, _LONGEST))
-    worst = int(np.argmax(apart >= _TOUCHES))
+            q = q + step * np.minimum(1.0, _LONGEST_STEP / np.maximum(longest, _LONGEST_STEP))
+    worst = int(np.argmax(apart >= _REACHED))
     raise InputError(
         "the tip does not come to rest on a point of the table",
         where=f"calibration table, point {worst + 1}",
@@ -205,14 +206,14 @@ def _jogged(twin: Twin, wanted: Array, start: Array, conditions: Conditions) -> 
 
 def _check_limits(robot: Robot, joints: Array) -> None:
     for i, row in enumerate(joints):
-        for joint, reading in zip(robot.joints, row.tolist(), strict=True):
-            if joint.limits is None or joint.limits[0] <= reading <= joint.limits[1]:
+        for joint, position in zip(robot.joints, row.tolist(), strict=True):
+            if joint.limits is None or joint.limits[0] <= position <= joint.limits[1]:
                 continue
             scale, unit = (180 / math.pi, "deg") if joint.kind == "revolute" else (1e3, "mm")
             raise InputError(
                 "a joint would leave its limits to touch a point",
                 where=f"calibration table, point {i + 1}",
-                came=f"{joint.name} at {reading * scale:.4g} {unit}",
+                came=f"{joint.name} at {position * scale:.4g} {unit}",
                 allowed=f"{joint.limits[0] * scale:g} to {joint.limits[1] * scale:g} {unit}",
                 cure="Move the table, tilt it less, or start from another posture.",
             )

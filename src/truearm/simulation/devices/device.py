@@ -17,7 +17,7 @@ from truearm.modeling.parts import Tool
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform, rigid_motion
 from truearm.notices import counted
-from truearm.simulation.truths import DEFAULT_TOOL, stationed
+from truearm.simulation.truths import DEFAULT_TOOL, at_station
 from truearm.simulation.twin import Twin, directions
 
 IntArray = NDArray[np.intp]
@@ -121,7 +121,7 @@ def measured_with(
     """
     if count < 1 or (sigma is not None and sigma < 0.0):
         raise InputError(
-            "a campaign needs configurations, and a deviation is not negative",
+            "a campaign needs a configuration or more, and no negative deviation",
             where=device.name,
             came=f"{counted(count, 'configuration')}, deviation {sigma}",
             allowed="1 configuration or more, deviation 0 or more",
@@ -131,17 +131,17 @@ def measured_with(
         twin = replace(twin, robot=carrying)
     values = twin.robot.values
     places = {t.name: [values[t.parameter(axis)] for axis in "xyz"] for t in twin.robot.targets}
-    standing = nominal.with_frames(_where_it_stands(nominal, twin.robot), places)
-    return device.campaign(standing, _InOrder(twin), count, device.sigma if sigma is None else sigma, rng)
+    placed = nominal.with_frames(_true_base(nominal, twin.robot), places)
+    return device.campaign(placed, _InOrder(twin), count, device.sigma if sigma is None else sigma, rng)
 
 
-def stationed_for(device: Device, robot: Robot) -> Robot:
+def in_view_of(device: Device, robot: Robot) -> Robot:
     """Return a robot where a simulated instrument sees it, with the device's tool or, if that needs none, its own."""
     tool = device.tool or next(iter(robot.tools.values()), DEFAULT_TOOL)
-    return stationed(robot, tool)
+    return at_station(robot, tool)
 
 
-def _where_it_stands(nominal: Robot, true: Robot) -> Transform:
+def _true_base(nominal: Robot, true: Robot) -> Transform:
     q = nominal.random_configurations(_TRIED, np.random.default_rng(0))
     at_origin = nominal.with_frames(Transform(), {})
     return Transform.from_matrix(*rigid_motion(at_origin.world_poses(q)[0], true.world_poses(q)[0]))
@@ -169,7 +169,7 @@ def recorded(
     Parameters
     ----------
     joints
-        Readings ``(n, joints)``.
+        Joint positions ``(n, joints)``.
     configuration, target
         Of each reading.
     position, quaternion, distance, height, fixtures, fixture, setup
@@ -214,14 +214,14 @@ def shown(
     Parameters
     ----------
     visible
-        Tells which targets of a robot are seen at joint readings ``(n, joints)``, ``(n, targets)``; a configuration
+        Tells which targets of a robot are seen at joint positions ``(n, joints)``, ``(n, targets)``; a configuration
         that shows none of them is passed over.
     what
         Who looks, for messages.
 
     Returns
     -------
-    Joint readings ``(count, joints)``, and which targets are seen ``(count, targets)``.
+    Joint positions ``(count, joints)``, and which targets are seen ``(count, targets)``.
     """
     found, seen = [], []
     for _ in range(_DRAWS):
@@ -245,4 +245,4 @@ class Visible(Protocol):
     """Tells which targets of a robot are seen."""
 
     def __call__(self, robot: Robot, joints: Array) -> NDArray[np.bool_]:
-        """Return ``(n, targets)`` for joint readings ``(n, joints)``."""
+        """Return ``(n, targets)`` for joint positions ``(n, joints)``."""

@@ -21,15 +21,15 @@ from truearm.simulation.devices.device import Arm, Device, IntArray, recorded
 from truearm.simulation.devices.jogging import SPARE, site
 
 #: Where the fixture is put: shares of the way out to the middle of the reach, and how much lower than that [m].
-_OUT: Final = (0.6, 0.8, 1.0)
-_LOWER: Final = 0.2
+_FIXTURE_DISTANCES: Final = (0.6, 0.8, 1.0)
+_FIXTURE_DROP: Final = 0.2
 #: How far a pose is jogged beside its nominal place, within the range of the bar [m].
-_ASIDE: Final = 4e-4
+_JOG_RANGE: Final = 4e-4
 #: Declared deviation of a coordinate of a cup, in deviations of a length: the root mean square over Table 3.1, worked
 #: out anew, is 1.6, and nine coordinates of a pose weigh no more than its six lengths.
-_CUP: Final = 2.0
+_CUP_DEVIATION: Final = 2.0
 _STEPS: Final = 20
-_STILL: Final = 1e-9
+_SETTLED: Final = 1e-9
 
 
 @dataclass(frozen=True)
@@ -48,18 +48,18 @@ class HexapodPoses(Device):
         order = rng.permutation(len(joints))[: SPARE * count]
         names = [target.name for target in nominal.targets]
         base, turned = nominal.base, nominal.base.rotation
-        aside = rng.uniform(-1.0, 1.0, (len(order), 1, 3)) * _ASIDE
+        aside = rng.uniform(-1.0, 1.0, (len(order), 1, 3)) * _JOG_RANGE
         goals = np.array([wanted[k].cups for k in pose_of[order]]) + aside + origins[place_of[order]][:, None]
         goals = goals @ turned.T + np.array(base.translation)
         at = _jogged(nominal, arm, names, joints[order], goals)
         frames = arm.frames(at)
         seen = np.stack([frames[name][:, :3, 3] for name in names], axis=1)
         low, high = np.array([joint.limits or (-np.inf, np.inf) for joint in nominal.joints]).T
-        there = np.linalg.norm(seen - goals, axis=2).max(axis=1) < _ASIDE
+        there = np.linalg.norm(seen - goals, axis=2).max(axis=1) < _JOG_RANGE
         kept = np.flatnonzero(there & ((at >= low) & (at <= high)).all(axis=1))[:count]
         if len(kept) < count:
             raise InputError(
-                f"{nominal.name} can take too few poses of the device",
+                f"{nominal.name} reaches too few poses of the device",
                 where=self.name,
                 came=f"{len(kept)} of {len(order)} tried, at {len(origins)} places of the fixture",
                 allowed=f"{count} or more",
@@ -70,7 +70,7 @@ class HexapodPoses(Device):
         seen = np.stack([frames[name][:, :3, 3] for name in names], axis=1)
         pose = [wanted[k] for k in pose_of[order][kept]]
         cups = (seen - np.array(base.translation)) @ turned - origins[place][:, None]
-        feet, bar = triangle([DEVICE.base] * 3, "B"), sigma / _CUP * rng.standard_normal((count, 6))
+        feet, bar = triangle([DEVICE.base] * 3, "B"), sigma / _CUP_DEVIATION * rng.standard_normal((count, 6))
         read = []
         for one, there, noise in zip(pose, cups, bar, strict=True):
             lengths = leg_lengths(one.design, feet, there) + noise
@@ -91,7 +91,7 @@ class HexapodPoses(Device):
         """Return the places of the fixture, and place, pose and joints of all configurations there."""
         if branch_rule(nominal) is None:
             raise InputError(
-                f"{nominal.name} cannot take the poses of the device",
+                f"{nominal.name} cannot reach the poses of the device",
                 where=self.name,
                 allowed="a robot with six turning joints whose branches have names",
                 cure="Take another device.",
@@ -100,7 +100,9 @@ class HexapodPoses(Device):
         position, rotation = np.array([p.position for p in wanted]), np.array([p.rotation for p in wanted])
         middle = triangle([DEVICE.base] * 3, "B").mean(axis=0)
         centre = (site(nominal) - np.array(nominal.base.translation)) @ nominal.base.rotation
-        origins = np.array([centre * (out, out, 1.0) - (0.0, 0.0, _LOWER) - middle for out in _OUT])
+        origins = np.array(
+            [centre * (out, out, 1.0) - (0.0, 0.0, _FIXTURE_DROP) - middle for out in _FIXTURE_DISTANCES]
+        )
         place, pose, joints = [], [], []
         for k, origin in enumerate(origins):
             found = inverse(nominal, position + origin, rotation, branch="all")
@@ -112,7 +114,7 @@ class HexapodPoses(Device):
 
 
 def _jogged(nominal: Robot, arm: Arm, names: list[str], joints: Array, goals: Array) -> Array:
-    """Return joint readings at which the arm's cups are as near to their goals ``(n, 3, 3)`` as a rigid tool can be."""
+    """Return joint positions with the arm's cups as near to their goals ``(n, 3, 3)`` as a rigid tool can be."""
     joints = joints.copy()
     for _ in range(_STEPS):
         frames = arm.frames(joints)
@@ -120,7 +122,7 @@ def _jogged(nominal: Robot, arm: Arm, names: list[str], joints: Array, goals: Ar
         J = np.concatenate([nominal.joint_jacobian(joints, name)[:, :3] for name in names], axis=1)
         step = np.linalg.pinv(J, rcond=1e-4) @ missing.reshape(len(joints), -1, 1)
         joints += step[..., 0]
-        if float(np.abs(step).max()) < _STILL:
+        if float(np.abs(step).max()) < _SETTLED:
             break
     return joints
 
@@ -129,6 +131,6 @@ HEXAPOD: Final = HexapodPoses(
     "hexapod",
     "places of three cups from six lengths of a ballbar, the base fixture at three places",
     "Nubiola, chapter 3: 72 poses, a cup within 3 um in 95 of 100 readings",
-    sigma=_CUP * DEVICE.sigma,
+    sigma=_CUP_DEVIATION * DEVICE.sigma,
     tool=Tool({f"cup_{k + 1}": (float(x), float(y), float(z)) for k, (x, y, z) in enumerate(CUPS)}),
 )

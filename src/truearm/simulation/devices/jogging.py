@@ -14,8 +14,8 @@ from truearm.modeling.robot import Robot
 from truearm.simulation.devices.device import Arm
 
 _STEPS: Final = 40
-_STRIDE: Final = 0.3  # rad or m at most in a step
-_THERE: Final = 1e-10  # m
+_LONGEST_STEP: Final = 0.3  # rad or m at most in a step
+_REACHED: Final = 1e-10  # m
 _STARTS: Final = 24
 _TOGETHER: Final = 4000
 _MOST: Final = 0.8
@@ -31,7 +31,7 @@ Gap = Callable[[Array], Array]
 
 
 def jogged(nominal: Robot, arm: Arm, target: str, joints: Array, gap: Gap) -> Array:
-    """Return joint readings at which a target of the arm is where it shall be.
+    """Return joint positions at which a target of the arm is where it shall be.
 
     The nominal robot says how to move; the arm itself says how far it still is. What the two differ by is a few
     thousandths of a move, so that a few moves do.
@@ -52,19 +52,19 @@ def jogged(nominal: Robot, arm: Arm, target: str, joints: Array, gap: Gap) -> Ar
     joints = joints.copy()
     for _ in range(_STEPS):
         missing = gap(arm.frames(joints)[target][:, :3, 3])
-        if float(np.abs(missing).max()) < _THERE:
+        if float(np.abs(missing).max()) < _REACHED:
             beyond = int(((joints < low) | (joints > high)).any(axis=1).sum())
             if beyond == 0:
                 return joints
             raise InputError(
-                "the tool can be jogged to where it is measured only beyond the limits of the joints",
+                "the tool reaches the place of measurement only beyond the joint limits",
                 where=nominal.name,
                 came=f"{beyond} of {len(joints)} postures beyond them",
                 cure="The truth is too far from the nominal robot: take another seed, or another truth.",
             )
         joints += _least(nominal.joint_jacobian(joints, target)[:, :3], missing)
     raise InputError(
-        "the tool cannot be jogged to where it is measured",
+        "the tool cannot be jogged to the place of measurement",
         where=nominal.name,
         came=f"{float(np.abs(missing).max()) * 1e3:.3g} mm missing",
         cure="The truth is too far from the nominal robot, or the postures are singular: take another seed.",
@@ -97,7 +97,7 @@ def postures_at(
 
     Returns
     -------
-    Indices of the places ``(count,)``, and joint readings ``(count, joints)`` within the limits.
+    Indices of the places ``(count,)``, and joint positions ``(count, joints)`` within the limits.
 
     Raises
     ------
@@ -132,7 +132,7 @@ def postures_at(
     if len(reached) == count:
         return reached, found[reached]
     raise InputError(
-        f"{nominal.name} does not reach what it is to be measured against",
+        f"{nominal.name} does not reach enough places of the device",
         where=what,
         came=f"{len(reached)} of {len(goals)} places within reach",
         allowed=f"{count} or more",
@@ -152,7 +152,7 @@ def followed(nominal: Robot, target: str, joints: Array, places: Array) -> tuple
 
     Returns
     -------
-    Joint readings ``(steps, n, joints)``, and which of the paths were followed to the end within the limits ``(n,)``.
+    Joint positions ``(steps, n, joints)``, and which of the paths were followed to the end within the limits ``(n,)``.
     """
     low, high = np.array([joint.limits or (-np.inf, np.inf) for joint in nominal.joints]).T
     q, went, whole = joints, [], np.ones(len(joints), dtype=bool)
@@ -160,10 +160,10 @@ def followed(nominal: Robot, target: str, joints: Array, places: Array) -> tuple
         for _ in range(_STEPS):
             missing = goal - nominal.world_poses(q, target)[0]
             far = np.abs(missing).max(axis=1)
-            if float(far.max(where=whole, initial=0.0)) < _THERE:
+            if float(far.max(where=whole, initial=0.0)) < _REACHED:
                 break
             q = q + _least(nominal.joint_jacobian(q, target)[:, :3], missing)
-        whole = whole & (far < _THERE) & ((q > low + _MARGIN) & (q < high - _MARGIN)).all(axis=1)
+        whole = whole & (far < _REACHED) & ((q > low + _MARGIN) & (q < high - _MARGIN)).all(axis=1)
         went.append(q)
     return np.array(went), whole
 
@@ -180,7 +180,7 @@ def site(nominal: Robot) -> Array:
 
 
 def _limits(robot: Robot) -> tuple[Array, Array]:
-    """Return the lowest and the highest reading of each joint, ``(joints,)``, infinite where there is none."""
+    """Return the lowest and the highest position of each joint, ``(joints,)``, infinite where there is none."""
     low, high = np.array([joint.limits or (-np.inf, np.inf) for joint in robot.joints]).T
     return low, high
 
@@ -192,4 +192,4 @@ def _least(J: Array, missing: Array) -> Array:
     square = square + _DAMPING * np.trace(square, axis1=1, axis2=2)[:, None, None] * np.eye(3)
     step = (Jt @ np.linalg.solve(square, missing[..., None]))[..., 0]
     longest = np.abs(step).max(axis=1, keepdims=True)
-    return np.asarray(step * np.minimum(1.0, _STRIDE / np.maximum(longest, 1e-300)))
+    return np.asarray(step * np.minimum(1.0, _LONGEST_STEP / np.maximum(longest, 1e-300)))

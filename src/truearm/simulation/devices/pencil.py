@@ -16,17 +16,17 @@ from truearm.simulation.devices.device import Arm, Device, recorded
 from truearm.simulation.devices.jogging import followed, postures_at, site
 
 #: Points that the arm goes through on its way round, at least.
-_ROUND: Final = 48
+_LEAST_POINTS_ROUND: Final = 48
 #: Postures that a circle is begun in until one goes all the way round.
-_BEGUN: Final = 6
+_MOST_STARTS: Final = 6
 _ROUNDS: Final = 8
 #: How far the pencil leans at the start, and anywhere.
-_LEANS: Final = np.deg2rad(60.0)
-_SLIPS: Final = np.deg2rad(75.0)
+_LARGEST_LEAN_AT_START: Final = np.deg2rad(60.0)
+_LARGEST_LEAN: Final = np.deg2rad(75.0)
 #: Points of a circle, at least, before another is drawn.
-_FEWEST: Final = 12
+_LEAST_POINTS: Final = 12
 #: The middle of a circle lies in its page [m].
-_FLAT: Final = 1e-5
+_PAPER_DEVIATION: Final = 1e-5
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class PencilCircle(Device):
         middle = site(nominal) if self.centre is None else base.rotation @ np.array(self.centre) + base.translation
         out = (middle - base.translation) @ base.rotation
         pages = np.array([base.rotation @ _page(slope, out) for slope in self.slopes])
-        drawn = max(1, min(len(pages) * self.circles, count // _FEWEST))
+        drawn = max(1, min(len(pages) * self.circles, count // _LEAST_POINTS))
         pages = pages[:drawn]
         each = -(-count // drawn)
         page = np.arange(drawn) % len(pages)
@@ -95,37 +95,44 @@ class PencilCircle(Device):
                 height=np.zeros(drawn),
                 fixtures=fixtures,
                 fixture=drawn + np.arange(drawn) % len(pages),
-                sigma=_FLAT,
+                sigma=_PAPER_DEVIATION,
             ),
             sigma=sigma,
         )
 
     def _drawn(self, nominal: Robot, middle: Array, pages: Array, each: int, rng: np.random.Generator) -> Array:
-        """Return the joint readings ``(circles, each, joints)`` of circles on given pages ``(circles, 3, 3)``."""
+        """Return the joint positions ``(circles, each, joints)`` of circles on given pages ``(circles, 3, 3)``."""
         name = nominal.targets[0].name
-        fine = -(-_ROUND // each)
+        fine = -(-_LEAST_POINTS_ROUND // each)
         around = 2 * np.pi * np.arange(each * fine) / (each * fine)
         path = self.radius * np.column_stack([np.cos(around), np.sin(around), np.zeros(len(around))])
         places = middle + np.einsum("pij,nj->pni", pages, path)
         found = np.full((len(pages), each, len(nominal.joints)), np.nan)
         for _ in range(_ROUNDS):
             missing = np.flatnonzero(np.isnan(found[:, 0, 0]))
-            begun = np.tile(missing, 2 * _BEGUN)
+            begun = np.tile(missing, 2 * _MOST_STARTS)
             facing = -pages[begun, :, 2]
             starts = places[begun, 0]
             reached, q = postures_at(
-                nominal, name, starts, _BEGUN * len(missing), rng, self.name, facing=facing, within=_LEANS
+                nominal,
+                name,
+                starts,
+                _MOST_STARTS * len(missing),
+                rng,
+                self.name,
+                facing=facing,
+                within=_LARGEST_LEAN_AT_START,
             )
             begun, facing = begun[reached], facing[reached]
             q, whole = followed(nominal, name, q, np.moveaxis(places[begun], 0, 1))
             pencil = np.array([nominal.world_poses(at)[1][:, :, 2] for at in q])
-            whole &= (np.einsum("kni,ni->kn", pencil, facing) > np.cos(_SLIPS)).all(axis=0)
+            whole &= (np.einsum("kni,ni->kn", pencil, facing) > np.cos(_LARGEST_LEAN)).all(axis=0)
             for k in np.flatnonzero(whole).tolist():
                 found[begun[k]] = q[::fine, k]
             if np.isfinite(found).all():
                 return found
         raise InputError(
-            f"{nominal.name} does not come round the circle",
+            f"{nominal.name} cannot follow the whole circle",
             where=self.name,
             came=f"{int(np.isfinite(found[:, 0, 0]).sum())} of {len(pages)} circles drawn",
             cure="Take a smaller circle, pages that are less steep, or another device.",

@@ -45,7 +45,7 @@ def set_up(twin: Twin, touches: Array, bar: Ballbar, approach: Array | None = No
     twin
         Its targets are the three cups of the tool.
     touches
-        Joint readings at the base cups [rad or m], ``(3, joints)``.
+        Joint positions at the base cups [rad or m], ``(3, joints)``.
     bar
         The ballbar; it is initialised for each fixture.
     approach
@@ -87,7 +87,7 @@ def measure_poses(
     rows
         What to measure, in order.
     joints
-        Readings to drive to [rad or m], ``(rows, joints)``; those of the rows, or corrected ones.
+        Joint positions to drive to [rad or m], ``(rows, joints)``; those of the rows, or corrected ones.
     bar
         The ballbar.
     approach
@@ -104,11 +104,11 @@ def measure_poses(
     """
     directions = np.zeros(joints.shape) if approach is None else approach
     found = np.full((len(rows), 3, 3), np.nan)
-    for number, (row, reading, direction) in enumerate(zip(rows, joints, directions, strict=True)):
+    for number, (row, q, direction) in enumerate(zip(rows, joints, directions, strict=True)):
         if initialise:
             bar.initialise()
-        standing = twin if changer is None else changer.attached(twin)
-        legs = measured_legs(bar, row.design, fixtures.base_cups, _cups(standing, reading, direction))
+        attached = twin if changer is None else changer.attached(twin)
+        legs = measured_legs(bar, row.design, fixtures.base_cups, _cups(attached, q, direction))
         if len(legs) == len(row.design.legs):
             lengths = np.array([legs[name] for name in row.design.leg_names])
             found[number] = tool_cups(row.design, row.solution, fixtures.base, fixtures.tool, lengths)
@@ -116,7 +116,7 @@ def measure_poses(
 
 
 def cups_dataset(robot: Robot, labels: Sequence[str], joints: Array, cups: Array) -> Dataset:
-    """Return cups ``(n, 3, 3)`` [m], measured at joint readings ``(n, joints)``, as positions of a robot's targets."""
+    """Return cups ``(n, 3, 3)`` [m], measured at joint positions ``(n, joints)``, as positions of a robot's targets."""
     n = len(labels)
     return Dataset(
         source="hexapod",
@@ -171,8 +171,8 @@ def joined(a: Dataset, b: Dataset) -> Dataset:
     )
 
 
-def _cups(twin: Twin, reading: Array, direction: Array) -> Array:
-    frames = twin.postures(reading[None], approach=direction[None])[0].targets
+def _cups(twin: Twin, q: Array, direction: Array) -> Array:
+    frames = twin.postures(q[None], approach=direction[None])[0].targets
     return np.array([frames[target.name][:3, 3] for target in twin.robot.targets])
 
 

@@ -16,7 +16,7 @@ from truearm.modeling.chain import Array
 from truearm.modeling.parts import Payload
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
-from truearm.planning.choosing.exchange import most_telling, most_telling_number
+from truearm.planning.choosing.exchange import most_informative, most_informative_number
 from truearm.planning.choosing.observability import O1
 from truearm.planning.choosing.sensitivity import sensitivity
 from truearm.simulation.devices.artefacts import PLANAR_ARTEFACT, SPATIAL_ARTEFACT, Artefact
@@ -196,7 +196,7 @@ def calibrate(
     """
     joints, seen = visible_configurations(setup, candidates, rng)
     rows, known = _rows(setup, joints, seen)
-    kept = most_telling(rows, setup.configurations, known, O1()) if chosen else list(range(setup.configurations))
+    kept = most_informative(rows, setup.configurations, known, O1()) if chosen else list(range(setup.configurations))
     data = _read(setup, twin, joints[kept], seen[kept], rng)
     robot = without_beta(driven()).with_payload(setup.payload)
     return Calibrated(setup, identify(robot, data, model).robot, joints[kept])
@@ -211,7 +211,7 @@ def number_by_o1(setup: Setup, candidates: int, rng: np.random.Generator, *, too
         Whether the nests were measured on the tool beforehand, as in the document, or are found with the robot.
     """
     joints, seen = visible_configurations(setup, candidates, rng)
-    return len(most_telling_number(*_rows(setup, joints, seen, tool_known=tool_known)))
+    return len(most_informative_number(*_rows(setup, joints, seen, tool_known=tool_known)))
 
 
 def sphere_test(robot: Calibrated, twin: Twin, nest: str, points: int, rng: np.random.Generator) -> Array:
@@ -250,7 +250,7 @@ def _rows(setup: Setup, joints: Array, seen: NDArray[np.bool_], *, tool_known: b
     counted = np.repeat(np.broadcast_to(seen, (len(joints), len(setup.nests))), 3, axis=1)
     rows = replace(rows, rows=rows.rows * counted[..., None])
     free = rows.free.parameters
-    among = [k for k in rows.told_apart(setup.configurations) if not (tool_known and free[k].group == "target")]
+    among = [k for k in rows.identifiable(setup.configurations) if not (tool_known and free[k].group == "target")]
     return np.ascontiguousarray(rows.rows[..., among]), rows.known[np.ix_(among, among)]
 
 

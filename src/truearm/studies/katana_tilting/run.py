@@ -133,7 +133,7 @@ def _one(seed: Seed, cube: Cube, count: int, unseen: int) -> Outcome:
         "base free": least_squares(nominal, data, (*NAMES, *_BASE), TIP),
         "two-stage": least_squares(fit.robot, data, NAMES, TIP),
         "at once": least_squares(nominal.with_effects(EFFECTS), data, everything, TIP),
-        "at once, inclinometers": least_squares(fit.believed, data, everything, TIP),
+        "at once, inclinometers": least_squares(fit.with_priors, data, everything, TIP),
         "tilting known": least_squares(with_tilting(nominal, TILTING), data, NAMES, TIP),
         "minimum norm": minimum_norm(fit.robot, data, NAMES, TIP, units=UNITS).robot,
         "influence": influence_based(fit.robot, data, NAMES, TIP, units=UNITS, perturbations=PERTURBATIONS).robot,

@@ -116,7 +116,7 @@ def read(sources: Sequence[Source]) -> Program:
     Raises
     ------
     InputError
-        If a section is missing, a position is not complete or is there twice, or a number is out of all proportion.
+        If a section is missing, a position is not complete or appears twice, or a number is out of all proportion.
     """
     targets: list[ProgramTarget] = []
     moves: list[Move] = []

@@ -12,7 +12,7 @@ bends from the upper arm, whether the wrist is before or behind: an arm that lea
 The three numbers are turns of J1, J4 and J6: 0 from -179 to 179 deg, 1 from 180 to 539, -1 from -539 to -180. Which
 joints they count is a system variable ($TURN_AXIS), and J4, J5 and J6 are read of too. But in taught programs the first
 is off zero where the arm points backwards, and the second is -1, which J5 cannot reach. Where a controller counts
-others, no posture has the readings asked for, and the target is not corrected.
+others, no posture lies within the ranges asked for, and the target is not corrected.
 
 All this holds for arms of six axes with a wrist in line. An L or R is not looked at.
 
@@ -45,10 +45,10 @@ def configuration(text: str) -> Configuration | None:
     elbow: Literal["up", "down"] | None = None
     if shoulder is not None and ("U" in letters or "D" in letters):
         elbow = "up" if ("U" in letters) == (shoulder == "front") else "down"
-    readings: list[tuple[int, float, float]] = []
+    ranges: list[tuple[int, float, float]] = []
     if "N" in letters or "F" in letters:
-        readings.append((5, -math.pi, 0.0) if "N" in letters else (5, 0.0, math.pi))
+        ranges.append((5, -math.pi, 0.0) if "N" in letters else (5, 0.0, math.pi))
         if len(turns) == 3:
             for joint, turn in zip((1, 4, 6), map(int, turns), strict=True):
-                readings.append((joint, (2 * turn - 1) * math.pi, (2 * turn + 1) * math.pi))
-    return Configuration(shoulder, elbow, readings=tuple(sorted(readings)), literal=bool(readings))
+                ranges.append((joint, (2 * turn - 1) * math.pi, (2 * turn + 1) * math.pi))
+    return Configuration(shoulder, elbow, ranges=tuple(sorted(ranges)), literal=bool(ranges))

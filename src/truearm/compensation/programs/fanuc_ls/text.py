@@ -168,7 +168,7 @@ class LsFile:
         place, stop = self.positions
         while position := self._position(place, stop):
             if position.number in seen:
-                raise InputError(f"P[{position.number}] is there twice", where=self.where(position.start))
+                raise InputError(f"P[{position.number}] appears twice", where=self.where(position.start))
             seen.add(position.number)
             yield position
             place = position.stop

@@ -193,7 +193,7 @@ def _configuration(text: str) -> Configuration:
     return Configuration(
         shoulder="back" if rear else "front",
         elbow=None if rear else "down" if lower else "up",
-        readings=tuple(inside),
+        ranges=tuple(inside),
         outside=tuple(outside),
     )
 

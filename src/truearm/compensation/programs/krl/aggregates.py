@@ -4,15 +4,15 @@
 bit  of Status                                              posture
 ==== ====================================================== ===================================================
 0    the wrist stands behind axis 1 (overhead area)         back, else front
-1    axis 3 is bent to the side of its positive readings    elbow up in front and down at the back; the other
+1    axis 3 is bent to the side of its positive angles      elbow up in front and down at the back; the other
      from where the arm is stretched                        way round if the bit is not set
-2    axis 5 reads less than zero                            the reading itself
+2    axis 5 is less than zero                               the angle itself
 ==== ====================================================== ===================================================
 
 Bit i of Turn is set if axis i + 1 reads less than zero. Higher bits of Status (4: taught with an absolutely accurate
 robot) say nothing about the posture. Sources: KUKA System Software 8.3, Operating and Programming Instructions for
 System Integrators, "Status and Turn"; KUKA, Expert Programming, KSS 5.2, "Motion programming", where bit 2 is given by
-the reading of axis 5; the same bits, as Siemens runs these arms, in SINUMERIK ONE, Programming Manual NC programming
+the angle of axis 5; the same bits, as Siemens runs these arms, in SINUMERIK ONE, Programming Manual NC programming
 (12/2019), "Transformations", address STAT.
 """
 
@@ -126,7 +126,7 @@ def _items(text: Text, start: int, stop: int) -> tuple[dict[str, Item], str | No
         at = item.end()
         name = item[1].upper()
         if name in items:
-            problem = problem or f"{name} is there twice"
+            problem = problem or f"{name} appears twice"
         rest = item[3]
         if item[2] is not None and (not rest or rest.isspace()):
             value = float(item[2])
@@ -162,11 +162,11 @@ def _whole(items: dict[str, Item], name: str) -> int | None:
 def _posture(status: int | None, turn: int | None) -> Configuration:
     signs = () if turn is None else tuple((i + 1, -inf, 0.0) if turn >> i & 1 else (i + 1, 0.0, inf) for i in range(6))
     if status is None:
-        return Configuration(readings=signs)
+        return Configuration(ranges=signs)
     back, bent = bool(status & 1), bool(status & 2)
     wrist = (5, -pi, 0.0) if status & 4 else (5, 0.0, pi)
     return Configuration(
-        shoulder="back" if back else "front", elbow="up" if bent != back else "down", readings=(wrist, *signs)
+        shoulder="back" if back else "front", elbow="up" if bent != back else "down", ranges=(wrist, *signs)
     )
 
 

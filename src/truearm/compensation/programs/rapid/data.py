@@ -83,15 +83,15 @@ _NAMES: Final = re.compile(r"[^\W\d]\w*")
 @cache
 def configuration(cf1: str, cf4: str, cf6: str, cfx: str) -> Configuration:
     """Return the postures that confdata allow, each number as it is written."""
-    readings = []
+    ranges = []
     for joint, written in ((1, cf1), (4, cf4), (6, cf6)):
         quadrant = float(written)
         if quadrant in _QUADRANTS:
-            readings.append((joint, quadrant * pi / 2, (quadrant + 1) * pi / 2))
+            ranges.append((joint, quadrant * pi / 2, (quadrant + 1) * pi / 2))
     elbow: Literal["up", "down"] | None = None
     if float(cfx) in range(8):
         elbow = "up" if int(float(cfx)) in (0, 1, 6, 7) else "down"
-    return Configuration(elbow=elbow, readings=tuple(readings))
+    return Configuration(elbow=elbow, ranges=tuple(ranges))
 
 
 def why_no_target(text: str) -> str:

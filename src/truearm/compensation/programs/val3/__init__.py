@@ -51,10 +51,10 @@ _JOINTS: Final = ("jointRx", "jointRs")
 _POSTURES: Final[dict[str, Configuration]] = {
     "lefty": Configuration(shoulder="front"),
     "righty": Configuration(shoulder="back"),
-    "epositive": Configuration(readings=((3, 0.0, inf),)),
-    "enegative": Configuration(readings=((3, -inf, 0.0),)),
-    "wpositive": Configuration(readings=((5, 0.0, inf),)),
-    "wnegative": Configuration(readings=((5, -inf, 0.0),)),
+    "epositive": Configuration(ranges=((3, 0.0, inf),)),
+    "enegative": Configuration(ranges=((3, -inf, 0.0),)),
+    "wpositive": Configuration(ranges=((5, 0.0, inf),)),
+    "wnegative": Configuration(ranges=((5, -inf, 0.0),)),
 }
 
 #: An element by its variable and its key.
@@ -330,7 +330,7 @@ def _configuration(words: tuple[str, ...]) -> Configuration:
     said = [_POSTURES.get(word, ANY_POSTURE) for word in words]
     return Configuration(
         shoulder=next((part.shoulder for part in said if part.shoulder is not None), None),
-        readings=tuple(reading for part in said for reading in part.readings),
+        ranges=tuple(reading for part in said for reading in part.ranges),
     )
 
 

@@ -26,7 +26,7 @@ def _of_a_body(inertia: Inertia) -> Inertia:
     if small + middle < large * (1.0 - 1e-6):  # small < 0 included; files round a flat or thin body
         raise ValueError(
             f"no body has these moments of inertia (xx, yy, zz, xy, xz, yz): the principal ones are {small:.6g}, "
-            f"{middle:.6g} and {large:.6g} kg m^2, but none can be negative or exceed the sum of the two others"
+            f"{middle:.6g} and {large:.6g} kg m^2, and none may be negative or exceed the sum of the two others"
         )
     return inertia
 
@@ -107,7 +107,7 @@ class PayloadEntry(_Entry):
 def _falls(gravity: tuple[float, float, float]) -> tuple[float, float, float]:
     if not 0.1 <= math.hypot(*gravity) <= 100.0:
         raise InputError(
-            f"free fall of 0.1 to 100 m/s^2 belongs here, this one has {math.hypot(*gravity):.6g}", came=list(gravity)
+            f"free fall must be 0.1 to 100 m/s^2, this one is {math.hypot(*gravity):.6g}", came=list(gravity)
         )
     return gravity
 

@@ -213,6 +213,8 @@ def name_argument(value: object, parameter: str) -> str:
 
 def command_argument(command: object) -> str | None:
     """Return how the caller would run a job again; None if it was not said."""
+    if isinstance(command, str) and not command:
+        raise InputError("the command is empty", parameter="command", came=command)
     return None if command is None else _text(command, "command", "how to run it again")
 
 

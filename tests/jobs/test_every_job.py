@@ -8,7 +8,7 @@ import math
 import pkgutil
 import re
 import typing
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields, is_dataclass
 from functools import cache
 from importlib import import_module
@@ -165,6 +165,18 @@ def test_the_result_is_frozen_and_speaks_for_itself(job: str, folder: Path) -> N
         assert repr(result) == "\n".join(result.lines())[: len(repr(result))] or repr(result).endswith("...")
         assert result._repr_html_().startswith("<pre>")
         assert json.loads(json.dumps(result.summary(), allow_nan=False))
+    if hasattr(result, "save"):
+        refuses_bad_places(result.save)
+
+
+def refuses_bad_places(save: Callable[[Any], object]) -> None:
+    (parameter, *_) = inspect.signature(save).parameters
+    assert parameter in ("folder", "file")
+    for place in (None, 5, b"x", "", "a\0b", "\ud800", "/dev/null/x", "/proc/x"):
+        with pytest.raises(InputError) as refusal:
+            save(place)
+        assert refusal.value.parameter == parameter
+        assert ".truearm." not in str(refusal.value)
 
 
 def cases() -> list[tuple[str, str]]:

@@ -82,7 +82,12 @@ def check_fit(fit: Fit) -> list[Notice]:
             Notice(
                 "redundant",
                 f"Redundant parameters are held at their nominal values: {combinations}. The readings do not observe "
-                "the combinations in brackets." + ("" if fit.unobservable else " Predictions are not affected."),
+                "the combinations in brackets."
+                + (
+                    ""
+                    if fit.unobservable
+                    else " At configurations like the measured ones predictions hardly depend on them."
+                ),
             )
         )
     far = [

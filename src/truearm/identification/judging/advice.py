@@ -81,7 +81,7 @@ def check_fit(fit: Fit) -> list[Notice]:
         found.append(
             Notice(
                 "redundant",
-                f"Redundant parameters are held at their nominal values: {combinations}. The readings do not observe "
+                f"Redundant parameters are held at their nominal values: {combinations}. The readings hardly observe "
                 "the combinations in brackets."
                 + (
                     ""

@@ -147,7 +147,7 @@ def test_another_deviation_is_read_and_declared(name: str) -> None:
 def refuse_poses_of_five_joints(name: str, robot: str) -> None:
     """The hexapod asks for whole poses, which five joints cannot take."""
     if (name, robot) == ("hexapod", "katana450"):
-        with pytest.raises(InputError, match=r"katana450 cannot take the poses.*six turning joints"):
+        with pytest.raises(InputError, match=r"katana450 cannot reach the poses.*six turning joints"):
             read_by(name, robot)
         pytest.skip("refused, as it should be")
 

@@ -298,8 +298,8 @@ again avoids that.
 |---|---|---|---|
 {nl.join(fits)}
 
-Most of what the solver takes is the fixed cost of NumPy calls again: it computes the three targets one after the
-other, though they share all but their last three slides.
+Most of what the solver takes is the fixed cost of NumPy calls again: it computes the forward kinematics of the three
+targets one after the other, though they share all but their last three slides.
 
 Medians over five campaigns. FIGAROH's fit starts at its own closed-form frames, as truearm's solver does at its
 own; its evaluation and report are in no figure. Simulated: true robots drawn from the priors, 0.05 mm noise, judged

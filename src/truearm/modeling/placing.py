@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from truearm.modeling.fixtures import Fixture, FixtureKind
 from truearm.modeling.parts import Target
+from truearm.modeling.robot_data import ARM, STRUCTURE
 from truearm.modeling.transform import Transform
 
 if TYPE_CHECKING:
@@ -25,6 +26,7 @@ def placed(robot: Robot, base: Transform, targets: Mapping[str, Transform | Sequ
         places |= {target.parameter(a): float(v) for a, v in zip("xyz", position, strict=True)}  # type: ignore[arg-type]
         made.append(target)
     moved = replace(robot, base_quaternion=base.quaternion, targets=tuple(made), known=kept)
+    robot.share(moved, ARM)
     return moved.with_parameters(moved.parameters[n].restarted(v) for n, v in places.items())
 
 
@@ -33,5 +35,6 @@ def fixtures_placed(robot: Robot, places: Mapping[str, tuple[FixtureKind, Transf
     kept = {n: p for n, p in robot.known.items() if p.group != "fixture"}
     made = tuple(Fixture(name, kind, place.quaternion) for name, (kind, place) in places.items())
     beside = replace(robot, fixtures=made, known=kept)
+    robot.share(beside, STRUCTURE)
     values = {n: v for f, (_, place) in zip(made, places.values(), strict=True) for n, v in f.values_at(place).items()}
     return beside.with_parameters(beside.parameters[n].restarted(v) for n, v in values.items())

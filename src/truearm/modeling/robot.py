@@ -48,7 +48,7 @@ class Robot(RobotData):
         self._refuse_unknown(changed, "parameters")
         other = replace(self, known={**self.known, **changed})
         # A solver asks for hundreds of such copies: they share what does not depend on values.
-        other.__dict__.update({name: self.__dict__[name] for name in STRUCTURE if name in self.__dict__})
+        self.share(other, STRUCTURE)
         other.__dict__["parameters"] = {**self.parameters, **changed}
         return other
 

@@ -295,4 +295,4 @@ def test_messages_count_in_words() -> None:
     (repeated,) = told(copied)
     assert repeated.startswith("1 reading repeats another one to the last digit (target at configurations): 2 at 2 and")
     with pytest.raises(InputError, match="got '1 joint column'; allowed: 6"):
-        told(replace(data, joints=data.joints[:, :1], joint_kinds=("revolute",)), "irb120")
+        told(replace(data, joints=data.joints[:, :1], joint_kinds=("revolute",), approach=None), "irb120")

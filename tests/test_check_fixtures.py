@@ -118,7 +118,7 @@ def test_a_robot_of_a_closed_loop_does_not_know_where_an_instrument_stands() -> 
     calibrated = calibrate(ROBOT, data, train=45).robot
     assert validate(calibrated, data).length is not None
     frames = replace(data, distance=None, fixture=None, fixtures=(), position=np.zeros((len(data.target), 3)))
-    with pytest.raises(InputError, match=r"calibrated without any instrument's frame.*`model=frames`"):
+    with pytest.raises(InputError, match=r"calibrated without the frame of an instrument.*`model=frames`"):
         validate(calibrated, frames)
 
 

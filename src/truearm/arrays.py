@@ -105,6 +105,8 @@ def finite_number(
     allowed: str | None = None,
 ) -> float:
     """Return a finite number, `lowest` or more; `allowed` says what belongs here if not that."""
+    if type(value) is float and math.isfinite(value) and value >= lowest:  # nearly all of them, and they are many
+        return value
     if allowed is None:
         allowed = "a finite number" if lowest == -math.inf else f"a finite number, {lowest:g} or more"
     if isinstance(value, bool | np.bool_) or not isinstance(value, Real):

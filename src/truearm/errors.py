@@ -66,7 +66,7 @@ def wrong_kind(what: str, came: object, parameter: str, allowed: str, *, where: 
     if isinstance(came, bytes | int | float | None):
         came = repr(came)
     elif not isinstance(came, str):
-        size = f" of {len(came)}" if isinstance(came, Sized) and getattr(came, "ndim", 1) else ""
+        size = f" of {len(came)}" if isinstance(came, Sized) and getattr(came, "ndim", True) else ""
         came = f"an object of type {kind_of(came)}{size}"
     return InputError(what, parameter=parameter, where=where, came=came, allowed=allowed)
 

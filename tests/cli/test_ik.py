@@ -83,7 +83,7 @@ def test_seed_target_frame_and_free_orientation(truearm: Truearm, poses: Path, t
     assert truearm("ik", "irb120", poses, "--axis-only", "--out", out).code == 0
     run = truearm("ik", "irb120", plain, "--out", out)
     assert run.code == 2
-    assert "Add them, or say --position-only." in run.err
+    assert "Add them, or use --position-only." in run.err
 
 
 def test_what_is_not_reached_is_explained_and_ends_with_3(truearm: Truearm, tmp_path: Path) -> None:
@@ -128,4 +128,4 @@ def test_an_arm_of_five_joints(truearm: Truearm, tmp_path: Path) -> None:
     assert truearm("ik", "katana450", poses, "--axis-only", "--out", out).code == 0
     run = truearm("ik", "katana450", poses, "--branch", "all", "--out", out)
     assert run.code == 2
-    assert "no names here" in run.err
+    assert "have no names" in run.err

@@ -208,7 +208,7 @@ def test_what_is_simulated_has_the_effects_of_its_robot(truearm: Truearm, elasti
         ("--payload", "heavy,0mm,0mm,0mm", "--payload: a number with its unit belongs here; got 'heavy'"),
         ("--payload", "nankg,0mm,0mm,0mm", "--payload: a number with its unit belongs here; got 'nankg'"),
         ("--payload", "-1kg,0mm,0mm,0mm", "--payload: a mass cannot be negative; got '-1kg'"),
-        ("--payload", "1e300kg,0mm,0mm,0mm", "--payload: the number is too large to be meant; got '1e300kg'"),
+        ("--payload", "1e300kg,0mm,0mm,0mm", "--payload: the number is too large to be plausible; got '1e300kg'"),
         (
             "--gravity",
             "0,0,0",

@@ -9,8 +9,9 @@ from tests.simulated import campaign, more_of
 
 from truearm.errors import InputError
 from truearm.identification.solving.bounds import Bounds
-from truearm.identification.solving.fit import Fit, Redundant, Status, identify
+from truearm.identification.solving.fit import Fit, Status, identify
 from truearm.identification.solving.models import MODELS
+from truearm.identification.solving.rounds import Redundant
 from truearm.library import library, load_robot
 from truearm.measurement.statistics import errors_of
 

@@ -115,9 +115,9 @@ SIDES, JOINTS = (0.3, 0.3, 0.3), np.zeros((3, 6))
         (lambda: truearm.hexapod_solve(pose=7, legs=LEGS, reach=-1.0), "reach", "the length is out of range"),
         (lambda: truearm.hexapod_solve(pose=7, legs=LEGS, out="a.csv"), "out", "is no data file"),
         (lambda: truearm.hexapod_plan("irb120", (1.0, 2.0)), "fixture", "4 or 7 numbers"),
-        (lambda: truearm.hexapod_plan("irb120", "here"), "fixture", "an array of numbers"),  # type: ignore[arg-type]
+        (lambda: truearm.hexapod_plan("irb120", "here"), "fixture", "numbers belong here"),  # type: ignore[arg-type]
         (lambda: truearm.hexapod_plan("irb120", (0, 0, np.nan, 0)), "fixture", "NaN and infinity"),
-        (lambda: truearm.hexapod_plan("irb120", (0, 0, 0, 1, 1, 0, 0)), "fixture", "has not length 1"),
+        (lambda: truearm.hexapod_plan("irb120", (0, 0, 0, 1, 1, 0, 0)), "fixture", "does not have length 1"),
         (lambda: truearm.hexapod_plan("irb120", (9.0, 0, 0, 0)), "fixture", "can reach none of the 72 poses"),
         (lambda: truearm.hexapod_plan("irb120", FIXTURE, branches="front-up"), "branches", "a sequence of names"),
         (lambda: truearm.hexapod_plan("irb120", FIXTURE, branches=["front-upp"]), "branches", "no such branch"),
@@ -125,8 +125,8 @@ SIDES, JOINTS = (0.3, 0.3, 0.3), np.zeros((3, 6))
         (lambda: truearm.hexapod_plan("irb120", FIXTURE, tool=["a"]), "tool", "a name belongs here"),  # type: ignore[arg-type]
         (lambda: truearm.hexapod_plan("irb120", FIXTURE, distinct=1), "distinct", "yes or no"),  # type: ignore[arg-type]
         (lambda: truearm.hexapod_plan("irb120", FIXTURE, arm_radius=-0.1), "arm_radius", "out of range"),
-        (lambda: truearm.hexapod_plan("irb120", FIXTURE, out="a", steps="a"), "steps", "cannot be one file"),
-        (lambda: truearm.hexapod_world_frame("irb120", JOINTS[:2], SIDES), "touches", "got 'shape (2, 6)'"),
+        (lambda: truearm.hexapod_plan("irb120", FIXTURE, out="a", steps="a"), "steps", "must be different files"),
+        (lambda: truearm.hexapod_world_frame("irb120", JOINTS[:2], SIDES), "touches", "got '(2, 6)'"),
         (lambda: truearm.hexapod_world_frame("irb120", "missing.csv", SIDES), "touches", "there is no such file"),
         (lambda: truearm.hexapod_world_frame("irb120", JOINTS, SIDES[:2]), "base", "3 numbers belong here"),
         (lambda: truearm.hexapod_world_frame("irb120", JOINTS, (0.3, 0.302, 0.3)), "base", "the length B2-B3"),

@@ -49,7 +49,7 @@ def test_orientations_come_from_one_place(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"the poses have no orientation.*`orientation=free`") as refusal:
         truearm.inverse("irb120", p)
     assert refusal.value.parameter == "rotations"
-    with pytest.raises(InputError, match="rotations, row 1: the matrix mirrors") as refusal:
+    with pytest.raises(InputError, match="rotations, row 1: the matrix is a reflection") as refusal:
         truearm.inverse("irb120", p, R * [[[1.0]], [[-1.0]]])
     assert refusal.value.parameter == "rotations"
     file = tmp_path / "poses.csv"

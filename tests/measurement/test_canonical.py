@@ -216,7 +216,7 @@ Q = ",qw,qx,qy,qz"
             f"{HEADER},sigma_rot [mrad]\na,1,2,t,1,2,3,1\n",
             ["sigma_rot", "no orientation", "remove sigma_rot"],
         ),
-        (PLAIN + "P3,1\n", ["line 5", "not as many cells", "2 cells", "allowed: 7 cells", "missing cell"]),
+        (PLAIN + "P3,1\n", ["line 5", "as many cells", "2 cells", "allowed: 7 cells", "missing cell"]),
         (PLAIN + "P3,1,2,tcp,1,5,2,3\n", ["line 5", "8 cells", "decimal commas"]),
         (
             PLAIN.replace(",2,3", ',"2,5",3'),
@@ -337,7 +337,7 @@ def test_writing_refuses_units_and_configurations_without_readings(write: WriteF
     with pytest.raises(InputError, match=r"angle unit: .*'grad'; allowed: deg, rad"):
         csv_text(data, angle_unit="grad")
     unseen = Dataset(**(vars(data) | {"configuration": np.zeros(3, dtype=np.intp)}))
-    with pytest.raises(InputError, match=r"configuration P2: .*no reading.* missing readings"):
+    with pytest.raises(InputError, match=r"configuration P2: .*without a reading.* missing readings"):
         csv_text(unseen)
 
 

@@ -297,7 +297,7 @@ def test_images_of_other_kinds_are_refused(tmp_path: Path) -> None:
     Image.fromarray(brightness).save(tmp_path / "page.gif")
     assert "no image that can be read" in refused(tmp_path / "page.gif")
     saved(tmp_path / "page.tif", brightness.astype(np.float32))
-    assert "no plain brightness; got 'mode F'" in refused(tmp_path / "page.tif")
+    assert "no brightness that can be read; got 'mode F'" in refused(tmp_path / "page.tif")
 
 
 def test_several_pages_in_a_file_are_refused(tmp_path: Path) -> None:
@@ -422,7 +422,7 @@ def test_a_configuration_beside_a_gap_has_no_radius() -> None:
         (np.zeros(3), np.zeros(3), np.zeros(3), "do not belong together"),
         (np.zeros(0), np.zeros((0, 5)), np.zeros(0), "do not belong together"),
         (np.zeros(3), np.zeros((3, 0)), np.zeros(3), "do not belong together"),
-        (np.zeros(3), np.zeros((2, 5)), np.zeros(3), "joints: there are not as many joint readings as angles; got 2"),
+        (np.zeros(3), np.zeros((2, 5)), np.zeros(3), "joints: there are not as many joint positions as angles; got 2"),
         (np.array([0, math.nan]), np.zeros((2, 5)), np.zeros(2), "angle, row 1: a number is missing"),
         (np.zeros(2), np.full((2, 5), math.inf), np.zeros(2), "joints, row 0: a number is missing"),
         (np.zeros(2), np.zeros((2, 5)), np.array([0, math.nan]), "height, row 1: a number is missing"),

@@ -122,7 +122,7 @@ def test_the_tripod_finds_a_known_point_on_either_side() -> None:
 def test_cups_on_a_line_and_legs_that_do_not_meet_are_refused_by_name() -> None:
     with pytest.raises(InputError, match=r"B3-B1: the cups B1, B2, B3 lie on one line"):
         triangle([0.3, 0.3, 0.6], "B")
-    with pytest.raises(InputError, match=r"T2-T3: the cups T1, T2, T3 lie on one line, or cannot"):
+    with pytest.raises(InputError, match=r"T2-T3: the cups T1, T2, T3 lie on one line, or no triangle"):
         triangle([0.15, 0.4, 0.15], "T")
     with pytest.raises(InputError, match=r"B1-T1, B2-T1, B3-T1: legs of these lengths do not meet; got 'B1-T1 100.000"):
         tool_cups(Design((0, 1, 2), (0, 1, 2)), 1, [0.3] * 3, [0.15] * 3, np.array([0.1] * 3 + [0.3] * 3))

@@ -98,7 +98,7 @@ def test_bad_cells(tmp_path: Path, filled: list[dict[str, str]], words: str, row
         ("column B1-T1 appears twice", "B1-T2 [mm]", "B1-T1 [mm]"),
         ("Did you mean solution", "solution", "solutions"),
         ("the column is not known", "T1-T2 [mm]", "T1-T4 [mm]"),
-        ("joint readings", "joint", ""),
+        ("joint positions", "joint", ""),
     ],
 )
 def test_bad_headers(tmp_path: Path, filled: list[dict[str, str]], words: str, before: str, after: str) -> None:
@@ -133,10 +133,10 @@ def test_touches_in_any_order(tmp_path: Path) -> None:
     ("words", "text"),
     [
         ("every base cup is touched once", f"{HEAD}B1,0,0,0,0,0,0\nB1,0,0,0,0,0,0\nB2,0,0,0,0,0,0\n"),
-        ("not known, or there twice", f"{HEAD.replace('cup', 'cups')}B1,0,0,0,0,0,0\n"),
-        ("not known, or there twice", f"{HEAD.replace('joint_6', 'joint_7')}B1,0,0,0,0,0,0\n"),
+        ("not known, or appears twice", f"{HEAD.replace('cup', 'cups')}B1,0,0,0,0,0,0\n"),
+        ("not known, or appears twice", f"{HEAD.replace('joint_6', 'joint_7')}B1,0,0,0,0,0,0\n"),
         ("column joint_6 is missing", f"{HEAD.replace(',joint_6 [deg]', '')}B1,0,0,0,0,0\n"),
-        ("not one that fits", f"{HEAD.replace('joint_6 [deg]', 'joint_6 [mm]')}B1,0,0,0,0,0,0\n"),
+        ("does not fit here", f"{HEAD.replace('joint_6 [deg]', 'joint_6 [mm]')}B1,0,0,0,0,0,0\n"),
     ],
 )
 def test_bad_touches(tmp_path: Path, words: str, text: str) -> None:

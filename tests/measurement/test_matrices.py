@@ -59,7 +59,7 @@ def test_units_are_taken_as_given(tmp_path: Path) -> None:
         (
             JOINTS,
             "1 2 3\n",
-            ["a.txt", "not as many rows as", "q.txt", "1 row'", "allowed: 3 rows", "zeros or NaN"],
+            ["a.txt", "as many rows as", "q.txt", "1 row'", "allowed: 3 rows", "zeros or NaN"],
         ),
         (JOINTS, "1 2 3\n1 2\n1 2 3", ["a.txt, line 2", "three numbers", "2 numbers", "allowed: 3 numbers"]),
         (

@@ -143,10 +143,10 @@ def test_unknown_pulses_are_refused(pulses: tuple[float | None, ...], missing: s
         ("{joint: slide, pulses_per_degree: 5}", ["is prismatic", "allowed: pulses_per_mm"]),
         ("{joint: first, sgn: -1}", ["joints[1].sgn", "not known here"]),
         ("{sign: -1}", ["joints[1].joint", "missing"]),
-        ("{joint: first}, {joint: first, sign: -1}", ["joints[2]", "stands here twice", "got 'first'"]),
+        ("{joint: first}, {joint: first, sign: -1}", ["joints[2]", "appears twice", "got 'first'"]),
         (
             "{joint: first, coupling: {second: 1}}, {joint: second, coupling: {first: 1}}",
-            ["controller.joints", "cannot be undone", "first counts second; second counts first"],
+            ["controller.joints", "cannot be inverted", "first counts second; second counts first"],
         ),
     ],
 )

@@ -194,7 +194,7 @@ def test_branches_that_have_no_names() -> None:
     for robot in (load_robot("katana450"), seven_axes()):
         assert branch_rule(robot) is None
         p, R = robot.world_poses(np.zeros((1, len(robot.joints))))
-        with pytest.raises(InputError, match="no names here"):
+        with pytest.raises(InputError, match="have no names"):
             inverse(robot, p, R, branch="front-up-noflip")
 
 
@@ -482,7 +482,7 @@ NAN = float("nan")
     ("words", "p", "r", "options"),
     [
         ("not orthonormal", P, 1.001 * R, {}),
-        ("it does not turn", P, -R, {}),
+        ("not a rotation", P, -R, {}),
         ("wrong shape", P, np.eye(4), {}),
         ("wrong shape", P[:, :2], R, {}),
         ("not as many rotations", P, np.vstack([R, R]), {}),
@@ -496,7 +496,7 @@ NAN = float("nan")
         ("no frame of this name", P, R, {"frame": "tool"}),
         ("no such choice", P, R, {"orientation": "half"}),
         ("no target of this name", P, R, {"target": "gripper"}),
-        ("no names here", P, R, {"branch": "all", "orientation": "free"}),
+        ("have no names", P, R, {"branch": "all", "orientation": "free"}),
     ],
 )
 def test_refusals(words: str, p: Array, r: Array | None, options: dict[str, Any]) -> None:

@@ -130,9 +130,9 @@ def with_effect(effect: str, name: str, unit: str, nominal: float = 0.0, value: 
             )
             for moments, parts in (
                 ("[1, 2, 3.1, 0, 0, 0]", ["no body", "1, 2 and 3.1 kg m^2", "sum of the two"]),
-                ("[-1, 1, 1, 0, 0, 0]", ["no body", "-1, 1 and 1 kg m^2", "none can be negative"]),
+                ("[-1, 1, 1, 0, 0, 0]", ["no body", "-1, 1 and 1 kg m^2", "none may be negative"]),
                 ("[1, 1, 1, 1.5, 0, 0]", ["no body", "-0.5, 1 and 2.5 kg m^2", "xy, xz, yz"]),
-                ("[-1, -1, -1, 0, 0, 0]", ["no body", "none can be negative"]),
+                ("[-1, -1, -1, 0, 0, 0]", ["no body", "none may be negative"]),
                 ("[1e99, 1e99, 1e99, 0, 0, 0]", ["too large"]),
                 ("[1, 1, .nan, 0, 0, 0]", ["finite", "got nan"]),
                 ("[1, 1, 1]", ["masses[1].inertia: there are too few entries", "got 3", "allowed: 6"]),
@@ -220,7 +220,7 @@ def with_effect(effect: str, name: str, unit: str, nominal: float = 0.0, value: 
         ),
         pytest.param(PLAIN + "payload: {cog: [1, 2, 3]}\n", ["payload.mass", "missing"], id="payload of no mass"),
         pytest.param(PLAIN + "payload: {mass: 1, cog: [1, 2]}\n", ["payload.cog"], id="flat payload"),
-        pytest.param(PLAIN + "gravity: [0, 0, 0]\n", ["gravity", "this one has 0"], id="no gravity"),
+        pytest.param(PLAIN + "gravity: [0, 0, 0]\n", ["gravity", "this one is 0"], id="no gravity"),
         pytest.param(PLAIN + "gravity: [0, -9.81]\n", ["gravity"], id="gravity of two numbers"),
         pytest.param(PLAIN + "gravity: [0, 0, -9810]\n", ["gravity", "0.1 to 100 m/s^2"], id="gravity in mm"),
         *(

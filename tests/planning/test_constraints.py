@@ -123,9 +123,9 @@ def test_distances_of_links_by_brute_force(arm: Robot) -> None:
     ("entries", "words"),
     [
         ({"limits": {7: [0, 1]}}, "no such joint.*1 to 6"),
-        ({"limits": {2: [10, 0]}}, "leaves no value"),
+        ({"limits": {2: [10, 0]}}, "the range is empty"),
         ({"moments": {9: "positive"}}, "no such joint"),
-        ({"box": {"of": "flange", "x": [1, 0]}}, "leaves no value"),
+        ({"box": {"of": "flange", "x": [1, 0]}}, "the range is empty"),
         ({"visibility": {"within": 30, "targets": {"4": [0, 0, 1]}}}, "no target of this name"),
     ],
 )

@@ -78,10 +78,10 @@ def test_chosen_pairs_tell_more_than_twice_as_many_at_random(monkeypatch: pytest
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        ({"force": 0.0, "posed": 0}, "nothing differs"),
-        ({"force": -1.0, "move": 0.1}, "nothing differs"),
+        ({"force": 0.0, "posed": 0}, "do not differ"),
+        ({"force": -1.0, "move": 0.1}, "do not differ"),
         ({"force": 0.0, "move": 0.1}, "under two loads"),
-        ({"inclined": 5000}, "hardly any posture"),
+        ({"inclined": 5000}, "too few postures"),
     ],
 )
 def test_refusals(options: dict[str, Any], says: str) -> None:

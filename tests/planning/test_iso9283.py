@@ -121,7 +121,7 @@ def test_inverse_kinematics_reaches_the_largest_cube_and_not_one_around_it() -> 
         ("no such direction", lambda: largest_cube(ball(1), ahead="up")),  # type: ignore[arg-type]
         ("floor: a bound of the cube", lambda: largest_cube(ball(1), floor=np.nan)),
         ("no target of this name", lambda: largest_cube(ball(1), target="gripper")),
-        ("reaches no cube there", lambda: largest_cube(ball(0.5), floor=2.0)),
+        ("reaches no cube in this", lambda: largest_cube(ball(0.5), floor=2.0)),
     ],
 )
 def test_refusals(words: str, make: Callable[[], object]) -> None:

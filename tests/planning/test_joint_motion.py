@@ -197,7 +197,7 @@ def test_a_path_that_leaves_the_reach_says_where() -> None:
     travelled = float(str(refused.value).split(" mm along")[0])
     reached = np.linalg.norm([0.3 + travelled / 1e3, 0.1, 0.3])
     assert 0.4 < reached < 1.2
-    with pytest.raises(InputError, match=r"cannot begin.*are missing"):
+    with pytest.raises(InputError, match=r"cannot start.*are missing"):
         joint_motion(load_robot("li3"), line((1.2, 0.1, 0.3), (0.3, 0.1, 0.3)))
 
 
@@ -257,7 +257,7 @@ NAN = np.full((3, 3), np.nan)
         ("no target of this name", lambda: joint_motion(katana(), changed(), target="gripper")),
         ("times do not rise", lambda: joint_motion(katana(), changed(time=np.zeros(0)))),
         ("times do not rise", lambda: joint_motion(katana(), changed(time=-changed().time))),
-        ("trajectory, velocity: a trajectory has three", lambda: joint_motion(katana(), changed(velocity=NAN))),
+        ("trajectory, velocity: a trajectory needs three", lambda: joint_motion(katana(), changed(velocity=NAN))),
         ("NaN or infinity", lambda: joint_motion(katana(), changed(position=np.nan * changed().position))),
         ("wrong shape", lambda: joint_motion(katana(), changed(), seed=[0.0, 1.0])),
     ],

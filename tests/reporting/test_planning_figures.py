@@ -51,5 +51,5 @@ def test_joint_trajectories_show_degrees_over_time() -> None:
         assert drawn == pytest.approx(np.degrees(values), rel=1e-5, abs=1e-6)
         assert curves[0]["x"] == pytest.approx(motion.time, rel=1e-5)
     titles = [shown["layout"][axis]["title"]["text"] for axis in ("yaxis", "yaxis2", "yaxis3")]
-    assert titles == ["reading [deg]", "velocity [deg/s]", "acceleration [deg/s²]"]
+    assert titles == ["position [deg]", "velocity [deg/s]", "acceleration [deg/s²]"]
     json.dumps(shown, allow_nan=False)

@@ -14,9 +14,10 @@ from typing import Any, Final
 import numpy as np
 import pytest
 
-from truearm.identification.solving.fit import Redundant, identify, place
+from truearm.identification.solving.fit import identify, place
 from truearm.identification.solving.losses import Loss
 from truearm.identification.solving.models import MODELS
+from truearm.identification.solving.rounds import Redundant
 from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of

@@ -16,13 +16,16 @@ from truearm.errors import InputError
 from truearm.library import library, load_robot
 from truearm.measurement import inclinometer
 from truearm.modeling.chain import Array
+from truearm.modeling.effects import EFFECTS, Effect
+from truearm.modeling.effects.gain import Gain
+from truearm.modeling.parameters import Parameter
 from truearm.modeling.parts import GRAVITY, Joint, LinkMass, Payload
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 from truearm.simulation import twin as twin_module
 from truearm.simulation import twin_body, twin_joint
 from truearm.simulation.devices import measured_with, named_device
-from truearm.simulation.truths import truth_twin
+from truearm.simulation.truths import joint_truths, truth_twin
 from truearm.simulation.twin import Posture, Twin, directions, measure
 from truearm.simulation.twin_joint import Contact, JointTruth
 
@@ -412,7 +415,7 @@ def test_conditions_of_another_shape_are_refused(name: str) -> None:
 
 
 def test_readings_of_another_shape_are_refused() -> None:
-    with pytest.raises(InputError, match=r"joint readings; got 'an array of shape \(3, 1\)'; allowed: \(3, 2\)"):
+    with pytest.raises(InputError, match=r"joint positions; got 'an array of shape \(3, 1\)'; allowed: \(3, 2\)"):
         measure(Twin(planar(0.5, 0.4)), np.zeros((3, 1)), 0.0, RNG(0))
 
 
@@ -453,3 +456,21 @@ def test_devices_measure_in_order(device: str) -> None:
         read.append(measured_with(instrument, nominal, truth_twin(arm, "nominal", rng), 12, rng, 0.0))
     plain, warm = (data.position if device == "tracker" else data.joints for data in read)  # the others are jogged
     assert np.abs(warm[:3] - plain[:3]).max() > 1e-4
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
+def test_the_twin_computes_every_effect(effect: type[Effect]) -> None:
+    assert joint_truths(load_robot("irb120").with_effects([effect.name]))
+
+
+def test_an_effect_that_the_twin_does_not_compute_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Wobble(Gain):
+        name = "wobble"
+
+        @property
+        def parameters(self) -> tuple[Parameter, ...]:
+            return (self.parameter("wobble_1", "rad", 1e-3),)
+
+    monkeypatch.setattr("truearm.modeling.robot_data.EFFECTS", (Wobble,))
+    with pytest.raises(InputError, match=r"does not compute this joint effect; got 'wobble_1'"):
+        joint_truths(replace(load_robot("irb120"), effect_names=("wobble",)))

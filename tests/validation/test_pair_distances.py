@@ -63,7 +63,7 @@ def test_memory_is_bounded() -> None:
 
 def test_refusals() -> None:
     predicted, measured = points(5, 5)
-    with pytest.raises(InputError, match="not the same twice"):
+    with pytest.raises(InputError, match="different shapes"):
         pair_distances(predicted[:4], measured)
     with pytest.raises(InputError, match="two configurations"):
         pair_distances(predicted, measured, np.zeros(5))

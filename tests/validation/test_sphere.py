@@ -94,7 +94,7 @@ def test_pose_errors_are_those_that_were_put_in() -> None:
     assert found.orientation == pytest.approx(angles, abs=1e-12)
     assert found.position == pytest.approx(np.linalg.norm(shifts, axis=1), abs=1e-14)
     assert found.points == pytest.approx(np.linalg.norm(reached - wanted, axis=2))
-    with pytest.raises(InputError, match="poses are not the same twice"):
+    with pytest.raises(InputError, match="poses have different shapes"):
         pose_errors(points, wanted, reached[:4])
 
 

@@ -10,7 +10,10 @@ from truearm.cli.output import Json, print_json, print_record, progress
 
 
 def check(
-    robot: Annotated[str, typer.Argument(metavar="[ROBOT]", help="A library id, a robot file or a URDF.")],
+    robot: Annotated[
+        str | None,
+        typer.Argument(metavar="[ROBOT]", help="A library id, a robot file or a URDF.", show_default=False),
+    ] = None,
     data: Annotated[
         str | None,
         typer.Argument(metavar="DATA.csv", help="Measurements in the canonical CSV.", show_default=False),

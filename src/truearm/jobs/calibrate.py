@@ -17,9 +17,10 @@ from truearm.identification.judging.advice import check_fit
 from truearm.identification.judging.arrival_lag import check_arrival_lag
 from truearm.identification.judging.transmission import check_transmission
 from truearm.identification.solving.bounds import Bounds, read_bounds
-from truearm.identification.solving.fit import Redundant, identify, place
+from truearm.identification.solving.fit import identify, place
 from truearm.identification.solving.losses import LOSSES, Loss
 from truearm.identification.solving.models import FRAMES, MODELS, Model
+from truearm.identification.solving.rounds import Redundant
 from truearm.jobs.arguments import (
     choice_argument,
     choices_argument,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Final
@@ -17,6 +18,7 @@ _BEGINNING: Final = 4096
 _URDF: Final = re.compile(r".*\.(?:urdf|xml|xacro)", re.I | re.S)
 
 
+@cache
 def library() -> tuple[str, ...]:
     """Return the ids of the library's robots."""
     return tuple(sorted(p.name.removesuffix(".yaml") for p in files(__package__).iterdir() if p.name.endswith(".yaml")))
@@ -55,7 +57,7 @@ def load_robot(robot: str | Path) -> Robot:
     if not text.strip():
         raise InputError("no robot is given", parameter="robot", came=text, allowed=choice)
     if text in library():
-        return read_robot(Path(str(files(__package__) / f"{text}.yaml")))
+        return _of_library(text)
     source = urdf_source(robot)
     if source is not None:
         from truearm.modeling.formats.urdf import read_urdf
@@ -72,6 +74,12 @@ def load_robot(robot: str | Path) -> Robot:
         allowed=choice,
         cure=f"Did you mean {' or '.join(near)}?" if near else "Run 'truearm robots' for the library.",
     )
+
+
+@cache
+def _of_library(name: str) -> Robot:
+    """Return a robot of the library. Its file does not change and is read once: that takes longer than a small fit."""
+    return read_robot(Path(str(files(__package__) / f"{name}.yaml")))
 
 
 def is_robot(name: str | Path) -> bool:

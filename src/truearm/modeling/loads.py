@@ -14,7 +14,7 @@ the frame at hand. At rest that is one vector forward and two backward.
 
 from __future__ import annotations
 
-from itertools import accumulate, chain
+from itertools import accumulate
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -22,7 +22,6 @@ import numpy as np
 from truearm.errors import InputError
 from truearm.modeling.chain import (
     Array,
-    Chain,
     Coordinates,
     Direction,
     Number,
@@ -91,8 +90,8 @@ def joint_loads(
                 came=f"an array of shape {np.shape(given)}",
                 allowed=f"({rows}, {size}): one column for each configuration",
             )
-    elements = (*chain.from_iterable(robot.moved_links), *robot.flange_elements)
-    moves = Chain(elements).forward_kinematics(variables, robot.values).moves
+    elements = robot.arm.elements
+    moves = robot.arm.forward_kinematics(variables, robot.values).moves
     ends = [0, *accumulate(len(link) for link in robot.moved_links)]
     bodies = [(ends[link.joint], link.mass, link.cog, link.inertia) for link in robot.masses]
     bodies.append((len(elements), robot.payload.mass, robot.payload.cog, POINT_MASS))

@@ -22,8 +22,8 @@ from truearm.modeling.parameters import Parameter
 from truearm.modeling.parts import Payload, checked_gravity
 from truearm.modeling.placing import fixtures_placed, placed
 from truearm.modeling.postures import Postures
-from truearm.modeling.robot_data import RobotData
-from truearm.modeling.robot_parameters import by_parameters
+from truearm.modeling.robot_data import STRUCTURE, RobotData
+from truearm.modeling.robot_parameters import by_parameters, effect_rates
 from truearm.modeling.transform import Transform
 
 if TYPE_CHECKING:
@@ -54,7 +54,11 @@ class Robot(RobotData):
                 raise wrong_kind("a parameter belongs here", parameter, "parameters", allowed)
         changed = {p.name: p for p in given}
         self._refuse_unknown(changed, "parameters")
-        return replace(self, known={**self.known, **changed})
+        other = replace(self, known={**self.known, **changed})
+        # A solver asks for hundreds of such copies: they share what does not depend on values.
+        other.__dict__.update({name: self.__dict__[name] for name in STRUCTURE if name in self.__dict__})
+        other.__dict__["parameters"] = {**self.parameters, **changed}
+        return other
 
     def with_values(self, values: Mapping[str, float]) -> Robot:
         """Return the robot with some parameter values replaced [SI].
@@ -365,7 +369,8 @@ class Robot(RobotData):
             ``(len(names), 3, ..., n)`` in the world; zero for parameters of other targets.
         """
         values = self.values if values is None else values
-        return by_parameters(self, kinematics, kinematics.position_jacobian, q, names, values)
+        rates = effect_rates(self, q, names, values)
+        return by_parameters(self, kinematics, kinematics.position_jacobian, names, rates)
 
     def orientation_jacobian(
         self, kinematics: ForwardKinematics, q: Array | Postures, names: Sequence[str], values: Values | None = None
@@ -375,14 +380,17 @@ class Robot(RobotData):
         Parameters and the shape of what is returned are as for :meth:`position_jacobian`.
         """
         values = self.values if values is None else values
-        return by_parameters(self, kinematics, kinematics.orientation_jacobian, q, names, values)
+        rates = effect_rates(self, q, names, values)
+        return by_parameters(self, kinematics, kinematics.orientation_jacobian, names, rates)
 
     def jacobians(
         self, kinematics: ForwardKinematics, q: Array | Postures, names: Sequence[str], values: Values | None = None
     ) -> tuple[Array, Array]:
         """Return :meth:`position_jacobian` and :meth:`orientation_jacobian`."""
-        return self.position_jacobian(kinematics, q, names, values), self.orientation_jacobian(
-            kinematics, q, names, values
+        rates = effect_rates(self, q, names, self.values if values is None else values)
+        return (
+            by_parameters(self, kinematics, kinematics.position_jacobian, names, rates),
+            by_parameters(self, kinematics, kinematics.orientation_jacobian, names, rates),
         )
 
     def random_configurations(self, count: int, rng: np.random.Generator) -> Array:

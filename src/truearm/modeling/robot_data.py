@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Self, TypeVar
+from itertools import chain
+from typing import Final, Self, TypeVar
 
 import numpy as np
 
@@ -33,6 +34,19 @@ from truearm.modeling.transform import IDENTITY, Transform, fixed_rotation
 from truearm.shown import as_html, counted, listed, short_text
 
 Part = TypeVar("Part", Target, Fixture)
+
+#: What is cached of a robot and does not depend on the values of its parameters.
+STRUCTURE: Final = (
+    "base_elements",
+    "link_elements",
+    "flange_elements",
+    "moved_links",
+    "arm",
+    "trunk",
+    "layout",
+    "effects",
+    "moving",
+)
 
 
 @dataclass(frozen=True, repr=False)
@@ -149,8 +163,12 @@ class RobotData:
     @cached_property
     def trunk(self) -> Chain:
         """The chain from the world to the flange, with what joint effects tilt and stretch."""
-        links = (element for link in self.moved_links for element in link)
-        return Chain((*self.base_elements, *links, *self.flange_elements))
+        return Chain((*self.base_elements, *self.arm.elements))
+
+    @cached_property
+    def arm(self) -> Chain:
+        """The chain from the base to the flange, as :attr:`trunk`."""
+        return Chain((*chain.from_iterable(self.moved_links), *self.flange_elements))
 
     @cached_property
     def rigid(self) -> Self:

@@ -57,13 +57,24 @@ def all_parameters(robot: RobotData) -> Mapping[str, Parameter]:
     return found
 
 
+def effect_rates(
+    robot: Robot, q: Array | Postures, names: Sequence[str], values: Mapping[str, float | Array]
+) -> dict[str, Mapping[int, Array]]:
+    """Return the derivative of the chain's variables by those of some parameters that belong to joint effects."""
+    asked = set(names)
+    effects = [effect for effect in robot.effects if not asked.isdisjoint(p.name for p in effect.parameters)]
+    if not effects:
+        return {}
+    at = robot.loaded(q)
+    return {n: rate for effect in effects for n, rate in effect.derivative(at, values).items() if n in asked}
+
+
 def by_parameters(
-    robot: Robot,
+    robot: RobotData,
     kinematics: ForwardKinematics,
     by_elements: Callable[[Sequence[int | None]], Array],
-    q: Array | Postures,
     names: Sequence[str],
-    values: Mapping[str, float | Array],
+    rates: Mapping[str, Mapping[int, Array]],
 ) -> Array:
     """Return a derivative by parameters, from that by the elements of a chain.
 
@@ -71,12 +82,11 @@ def by_parameters(
     ----------
     by_elements
         The derivative by the elements with these indices, zero for None: the Jacobian of position or orientation.
+    rates
+        From :func:`effect_rates`.
     """
-    places = [kinematics.places.get(name) for name in names]
-    derivative = by_elements(places)
-    if robot.effects and None in places:
-        at = robot.loaded(q)
-        rates = {n: r for effect in robot.effects for n, r in effect.derivative(at, values).items() if n in names}
+    derivative = by_elements([kinematics.places.get(name) for name in names])
+    if rates:
         needed = sorted({variable for rate in rates.values() for variable in rate})
         by_variable = dict(zip(needed, by_elements([robot.moving[v] for v in needed]), strict=True))
         for i, name in enumerate(names):

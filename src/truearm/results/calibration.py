@@ -127,7 +127,9 @@ class Calibration(Record):
             text.append(f"Chosen model: {self.fit.model.summary}")
         if self.fit.model.name == "frames":
             text += self._target_lines()
-        text.append(f"Status: {self.status.value}. {self.status.advice}")
+        converged = self.status is Status.CONVERGED and self.validation is None
+        advice = "Hold configurations out to judge the fit." if converged else self.status.advice
+        text.append(f"Status: {self.status.value}. {advice}")
         return text + notice_lines(self.warnings)
 
     def residuals(self) -> Residuals:

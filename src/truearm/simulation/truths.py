@@ -100,10 +100,20 @@ def joint_truths(robot: Robot) -> dict[int, JointTruth]:
 
     The twin computes every effect a second time, on a path of its own, so that one can be held against the other. What
     it knows is therefore named here parameter by parameter, and not taken from the effects.
+
+    Raises
+    ------
+    InputError
+        If the robot has an effect that the twin does not compute.
     """
     values = robot.values
+    known = {
+        "warm_up_rate",
+        *(f"gain_{number}" for number in range(1, len(robot.joints) + 1)),
+    }  # read by the twin itself
 
     def of(name: str, number: int) -> float:
+        known.add(f"{name}_{number}")
         return values.get(f"{name}_{number}", 0.0)
 
     def sines(number: int) -> tuple[tuple[int, float, float], ...]:
@@ -112,7 +122,7 @@ def joint_truths(robot: Robot) -> dict[int, JointTruth]:
         gear = (periods or 0, of("transmission_sin", number), of("transmission_cos", number))
         return tuple((k, math.hypot(s, c), math.atan2(c, s)) for k, s, c in (*parts, gear) if s or c)
 
-    return {
+    made = {
         number: JointTruth(
             compliance=of("compliance", number),
             quadratic=of("compliance_quadratic", number),
@@ -127,6 +137,16 @@ def joint_truths(robot: Robot) -> dict[int, JointTruth]:
         )
         for number in range(1, len(robot.joints) + 1)
     }
+    unknown = [p.name for effect in robot.effects for p in effect.parameters if p.name not in known]
+    if unknown:
+        raise InputError(
+            "the digital twin does not compute this joint effect",
+            parameter="truth",
+            where=robot.name,
+            came=unknown[0],
+            cure="Take it out of the robot file; a simulation would leave it out without a word.",
+        )
+    return made
 
 
 def _contact(robot: Robot) -> Contact:

@@ -199,7 +199,8 @@ class Twin:
         acceleration: Array,
     ) -> Posture:
         gravity = np.array(self.robot.gravity)
-        T = np.stack([np.eye(4), np.zeros((4, 4)), np.zeros((4, 4))])
+        moving = velocity.any() or acceleration.any()
+        T = np.stack([np.eye(4), np.zeros((4, 4)), np.zeros((4, 4))]) if moving else np.eye(4)[None]
         axes, frames, weights = [], [], []
         for link, q, (alpha, beta, gamma), qd, qdd in zip(
             links, geared, deflection, velocity, acceleration, strict=True

@@ -13,14 +13,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
 from truearm.modeling.chain import Array, Element
 from truearm.modeling.parts import LinkMass
 
-#: A frame with its first and second derivative by time, (3, 4, 4).
+#: A frame with its first and second derivative by time, (3, 4, 4); of an arm at rest the frame alone, (1, 4, 4).
 Moving = Array
+_IDENTITY: Final = np.eye(4)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,8 +99,8 @@ def generator(element: Element) -> Array:
 def exponential(S: Array, amount: float, turns: bool) -> Array:
     """Return the matrix of a turn or a slide by its generator."""
     if turns:
-        return np.eye(4) + math.sin(amount) * S + (1 - math.cos(amount)) * S @ S
-    return np.eye(4) + amount * S
+        return _IDENTITY + math.sin(amount) * S + (1 - math.cos(amount)) * S @ S
+    return _IDENTITY + amount * S
 
 
 def second_moments(
@@ -117,6 +119,8 @@ def moved(T: Moving, link: Link, variable: float, velocity: float, acceleration:
     """Return the frame right behind a link's joint."""
     S = link.generator
     A = exponential(S, link.zero + variable, link.turns)
+    if len(T) == 1:
+        return np.asarray(T @ link.before @ A)
     A1 = velocity * A @ S
     A2 = acceleration * A @ S + velocity * A1 @ S
     at, rate, change = T @ link.before
@@ -125,7 +129,7 @@ def moved(T: Moving, link: Link, variable: float, velocity: float, acceleration:
 
 def weight(body: Array, T: Moving, gravity: Array) -> Array:
     """Return weight and inertial forces on a body: the sum of ``p f^T`` over its points ``(4, 4)``."""
-    pull = -T[2]
+    pull = -T[2] if len(T) > 1 else np.zeros((4, 4))
     pull[:3, 3] += gravity
     return np.asarray(T[0] @ body @ pull.T)
 

@@ -138,5 +138,5 @@ def test_other_robots_draw_it(name: str) -> None:
 def test_a_circle_that_no_arm_comes_round_is_refused() -> None:
     robot = Twin(katana())
     device = replace(DRAWN_CIRCLE, radius=0.45, circles=1)
-    with pytest.raises(InputError, match=r"katana450 does not (come round|reach)"):
+    with pytest.raises(InputError, match=r"katana450 (cannot follow|does not reach)"):
         measured_with(device, katana(), robot, 3, np.random.default_rng(0))

@@ -18,9 +18,9 @@ import numpy as np
 
 from truearm.errors import InputError
 from truearm.identification.solving.bounds import Bounds
-from truearm.identification.solving.fit import Redundant, identify
 from truearm.identification.solving.losses import Loss
 from truearm.identification.solving.models import MODELS, Model
+from truearm.identification.solving.rounds import Redundant, find_parameters
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of
 from truearm.modeling.chain import Array
@@ -129,7 +129,7 @@ def select(
         model = _model(effects, candidates)
         errors = []
         for training, held_out in folds:
-            fit = identify(
+            found = find_parameters(
                 robot,
                 training,
                 model,
@@ -139,7 +139,7 @@ def select(
                 bounds_file=bounds_file,
                 small=_FOLD_TOLERANCE,
             )
-            judged = errors_of(fit.robot, held_out)
+            judged = errors_of(found.robot, held_out)
             spread = judged.position or judged.length
             errors.append(np.nan if spread is None else spread.mean)
         return np.array(errors)

@@ -6,7 +6,7 @@ one more row, (value - nominal) / deviation.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
@@ -22,6 +22,7 @@ from truearm.modeling.chain import Array, ForwardKinematics
 from truearm.modeling.parameters import FreeParameters
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
+from truearm.modeling.robot_parameters import by_parameters, effect_rates
 
 #: What the residuals of readings of the fixtures themselves are called.
 SETUP: Final = "setup"
@@ -248,11 +249,15 @@ class Evaluation:
         known = self._velocities
         if (block.target, moves) not in known:
             known.clear()  # blocks come target by target: more would only fill memory
-            derivative = problem.robot.position_jacobian if moves == "linear" else problem.robot.orientation_jacobian
-            known[block.target, moves] = derivative(
-                self._kinematics[block.target], problem.postures, names, self._values
-            )
+            kinematics = self._kinematics[block.target]
+            derivative = kinematics.position_jacobian if moves == "linear" else kinematics.orientation_jacobian
+            known[block.target, moves] = by_parameters(problem.robot, kinematics, derivative, names, self._rates)
         return known[block.target, moves]
+
+    @cached_property
+    def _rates(self) -> dict[str, Mapping[int, Array]]:
+        problem = self.problem
+        return effect_rates(problem.robot, problem.postures, problem.free.names, self._values)
 
     @cached_property
     def _velocities(self) -> dict[tuple[str, str], Array]:

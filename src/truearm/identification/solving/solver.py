@@ -118,9 +118,9 @@ def solve(
     scale: float | None = None
     steps, converged = 0, False
     for steps in range(1, _STEPS[loss] + 1):
-        norms = _norms(here)
+        norms = _norms(here, loss)
         scale = _next_scale(loss, norms, problem.components, scale, steps)
-        w = weights(loss, norms, scale)
+        w = np.repeat(weights(loss, norms, scale), problem.components)
         R, c = _triangle(here, w)
         cost = _cost(here, w)
         accepted = False
@@ -141,11 +141,10 @@ def solve(
             _CREEPING_FACTOR if loss == "l1" else 1.0
         )
         if last or predicted <= 1e-24 * max(cost, 1.0):
-            converged = loss != "l1" or scale <= _L1_FLOOR * float(np.median(_norms(here)) + 1e-300)
+            converged = loss != "l1" or scale <= _L1_FLOOR * float(np.median(_norms(here, loss)) + 1e-300)
             if converged:
                 break
-    norms = _norms(here)
-    final = np.ones_like(norms) if loss == "linear" else weights(loss, norms, scale or 1.0)
+    final = weights(loss, _norms(here, loss), scale or 1.0)
     return Solution(here.vector, converged, steps, here.residual, here.jacobian, final)
 
 
@@ -163,19 +162,26 @@ def _next_scale(loss: Loss, norms: Array, components: NDArray[np.intp], scale: f
     return scale
 
 
-def _norms(here: Evaluated) -> Array:
-    return norms_of(here.residual, here.problem.components)
+def _norms(here: Evaluated, loss: Loss) -> Array:
+    """Return the norm of each whitened reading; ones for the linear loss, which does not ask."""
+    components = here.problem.components
+    return np.ones(len(components)) if loss == "linear" else norms_of(here.residual, components)
 
 
 def _cost(here: Evaluated, w: Array) -> float:
     prior, _ = here.problem.prior_rows(here.vector)
-    return float(np.sum(np.repeat(w, here.problem.components) * here.residual**2)) + float(prior @ prior)
+    return float(np.sum(w * here.residual**2)) + float(prior @ prior)
 
 
 def _triangle(here: Evaluated, w: Array) -> tuple[Array, Array]:
-    """Return R and c with |R s + c|^2 equal to the linearised cost of a step s, up to a constant."""
-    root = np.repeat(np.sqrt(w), here.problem.components)
-    stacked = np.column_stack([here.jacobian, here.residual]) * root[:, None]
+    """Return R and c with |R s + c|^2 equal to the linearised cost of a step s, up to a constant.
+
+    Parameters
+    ----------
+    w
+        Weight of every row's square, ``(rows,)``.
+    """
+    stacked = np.column_stack([here.jacobian, here.residual]) * np.sqrt(w)[:, None]
     if here.problem.priors:
         prior, weight = here.problem.prior_rows(here.vector)
         stacked = np.concatenate([stacked, np.column_stack([np.diag(weight), prior])])

@@ -122,25 +122,27 @@ def _nearest_rotation(G: Array, g: Array) -> Array:
     """Minimise r' G r - 2 g' r over the rotations, r = vec(R) row by row."""
     candidates = _even_rotations(1500)
     best = candidates[np.argsort(_cost(G, g, candidates))[:24]]
+    costs = _cost(G, g, best)
     for _ in range(50):
         # R exp(w): the columns of d vec(R) / dw are vec(R [e_k]x)
-        D = np.stack([(best @ generator).reshape(-1, 9) for generator in _GENERATORS], axis=2)
-        r = best.reshape(-1, 9)
+        D = np.ascontiguousarray((best[:, None] @ _GENERATORS).reshape(-1, 3, 9).swapaxes(1, 2))
         Dt = D.swapaxes(1, 2)
-        gradient = (Dt @ (r @ G - g)[:, :, None])[:, :, 0]
+        gradient = (Dt @ (best.reshape(-1, 9) @ G - g)[:, :, None])[:, :, 0]
         hessian = Dt @ (G @ D)
-        damping = 1e-9 * np.trace(hessian, axis1=1, axis2=2)[:, None, None] * np.eye(3) + 1e-300 * np.eye(3)
+        damping = 1e-9 * np.trace(hessian, axis1=1, axis2=2)[:, None, None] * _IDENTITY + 1e-300 * _IDENTITY
         step = -np.linalg.solve(hessian + damping, gradient[:, :, None])[:, :, 0]
         size = np.linalg.norm(step, axis=1, keepdims=True)
         step *= np.minimum(1.0, 0.5 / np.maximum(size, 1e-300))
         moved = best @ _rotations(step)
-        better = _cost(G, g, moved) <= _cost(G, g, best)
-        best = np.where(better[:, None, None], moved, best)
+        moved_costs = _cost(G, g, moved)
+        better = moved_costs <= costs
+        best, costs = np.where(better[:, None, None], moved, best), np.where(better, moved_costs, costs)
         if not better.any() or size[better].max() < 1e-12:
             break
-    return np.asarray(best[np.argmin(_cost(G, g, best))])
+    return np.asarray(best[np.argmin(costs)])
 
 
+_IDENTITY = np.eye(3)
 _GENERATORS = np.array(
     [
         [[0.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]],

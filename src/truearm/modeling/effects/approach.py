@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar, Final
 
 from truearm.modeling.effects.effect import LinearEffect, Rates
@@ -20,7 +21,7 @@ class Approach(LinearEffect):
     name: ClassVar[str] = "approach"
     ordered: ClassVar[bool] = True
 
-    @property
+    @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         """One a joint."""
         return tuple(

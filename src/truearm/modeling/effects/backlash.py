@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar, Final
 
 import numpy as np
@@ -30,7 +31,7 @@ class Backlash(LinearEffect):
     non_negative: ClassVar[bool] = True
     exportable: ClassVar[bool] = True
 
-    @property
+    @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         """One play a turning joint."""
         return tuple(self.parameter(f"backlash_{i + 1}", "rad", _PRIOR) for i in self.layout.turning)

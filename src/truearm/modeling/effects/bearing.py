@@ -7,6 +7,7 @@ those of :mod:`truearm.modeling.effects.clearance`, right behind the joint's own
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar
 
 from truearm.modeling.effects.effect import LinearEffect, Rates
@@ -24,7 +25,7 @@ class BearingCompliance(LinearEffect):
     non_negative: ClassVar[bool] = True
     exportable: ClassVar[bool] = True
 
-    @property
+    @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         """One a turning joint."""
         return tuple(self.parameter(f"bearing_compliance_{i + 1}", "rad/(N m)", 1e-4) for i in self.layout.turning)

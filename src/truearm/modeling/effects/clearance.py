@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar, Final
 
 import numpy as np
@@ -36,7 +37,7 @@ class Clearance(Effect):
     non_negative: ClassVar[bool] = True
     exportable: ClassVar[bool] = True
 
-    @property
+    @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         """One angle a turning joint."""
         return tuple(self.parameter(f"clearance_{i + 1}", "rad", _PRIOR) for i in self.layout.turning)

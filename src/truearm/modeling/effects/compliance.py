@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar
 
 from truearm.modeling.effects.effect import LinearEffect, Rates, effort
@@ -19,7 +20,7 @@ class Compliance(LinearEffect):
     non_negative: ClassVar[bool] = True
     exportable: ClassVar[bool] = True
 
-    @property
+    @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         """One compliance a joint."""
         return tuple(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -132,16 +133,20 @@ class Effect(ABC):
 class LinearEffect(Effect):
     """An effect whose deflection is a sum of parameters times shapes that depend on the posture alone."""
 
+    @cached_property
+    def _nothing(self) -> Mapping[str, float]:
+        """The value of each parameter at which it does nothing."""
+        return {p.name: p.nominal for p in self.parameters}
+
     @abstractmethod
     def shapes(self, at: Postures) -> Rates:
         """Return what one unit of each parameter does to the variables it moves, each ``(n,)``."""
 
     def deflection(self, at: Postures, values: Mapping[str, float | Array]) -> Mapping[int, Array]:
         """Return the sum of parameters, counted from where they do nothing, times shapes."""
-        nothing = {p.name: p.nominal for p in self.parameters}
         moved: dict[int, Array] = {}
         for name, shape in self.shapes(at).items():
-            amount = np.asarray(values[name]) - nothing[name]
+            amount = np.asarray(values[name]) - self._nothing[name]
             for variable, part in shape.items():
                 moved[variable] = moved[variable] + amount * part if variable in moved else amount * part
         return moved

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar, Final
 
 import numpy as np
@@ -26,7 +27,7 @@ class Fourier(LinearEffect):
     name: ClassVar[str] = "fourier"
     exportable: ClassVar[bool] = True
 
-    @property
+    @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         """Sine and cosine of each harmonic of each turning joint."""
         return tuple(

@@ -6,6 +6,7 @@ The offset k0 is no effect: it is the value of the joint's own element, ``theta_
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar
 
 from truearm.modeling.effects.effect import LinearEffect, Rates
@@ -22,7 +23,7 @@ class Gain(LinearEffect):
     selectable: ClassVar[bool] = False
     exportable: ClassVar[bool] = True
 
-    @property
+    @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         """One gain a joint, believed to be good for 1 in 1000."""
         return tuple(self.parameter(f"gain_{i + 1}", "1", 1e-3, nominal=1.0) for i in self.layout.joints)

@@ -7,6 +7,7 @@ hardens.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -24,7 +25,7 @@ class Hardening(LinearEffect):
     loaded: ClassVar[bool] = True
     exportable: ClassVar[bool] = True
 
-    @property
+    @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         """Two a turning joint."""
         return tuple(

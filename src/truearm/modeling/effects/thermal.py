@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar, Final
 
 from truearm.modeling.chain import Array
@@ -21,7 +22,7 @@ class ThermalGrowth(LinearEffect):
     warmed: ClassVar[bool] = True
     stretches: ClassVar[bool] = True
 
-    @property
+    @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         """One a link that has a length."""
         links = dict.fromkeys(joint for joint, _ in self.layout.lengths)

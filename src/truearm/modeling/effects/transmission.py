@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar, Final
 
 import numpy as np
@@ -28,7 +29,7 @@ class TransmissionError(LinearEffect):
     name: ClassVar[str] = "transmission-error"
     exportable: ClassVar[bool] = True
 
-    @property
+    @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         """Sine and cosine of each joint with known periods."""
         return tuple(

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar, Final
 
 import numpy as np
@@ -34,7 +35,7 @@ class WarmUp(Effect):
     ordered: ClassVar[bool] = True
     stretches: ClassVar[bool] = True
 
-    @property
+    @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         """One growth a link that has a length, and the rate of all."""
         links = dict.fromkeys(joint for joint, _ in self.layout.lengths)

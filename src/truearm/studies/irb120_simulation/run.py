@@ -10,7 +10,8 @@ from typing import Final
 import numpy as np
 
 from truearm.identification.solving.bounds import Bounds
-from truearm.identification.solving.fit import Redundant, identify
+from truearm.identification.solving.fit import identify
+from truearm.identification.solving.rounds import Redundant
 from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import Spread, errors_of

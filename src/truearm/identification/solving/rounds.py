@@ -1,0 +1,222 @@
+"""From a nominal robot and training data to the values of its free parameters, in rounds.
+
+Each round solves the whitened problem; then the deviations of the readings, the loads at every joint and, without
+priors, the choice of the parameters that are held are found anew at the solution, until they agree with it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Final, Literal
+
+import numpy as np
+
+from truearm.errors import InputError
+from truearm.identification.solving.bounds import Bounds, bound_vectors
+from truearm.identification.solving.losses import Loss, norms_of, robust_scale
+from truearm.identification.solving.models import Model
+from truearm.identification.solving.problem import SETUP, Problem, check_circumstances, check_solvable
+from truearm.identification.solving.redundancy import Redundancy, find_redundancies
+from truearm.identification.solving.solver import SMALL, Solution, solve
+from truearm.identification.start_values.from_readings import start_from_readings, unanchored
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.observations import OBSERVATIONS
+from truearm.modeling.chain import Array
+from truearm.modeling.parameters import FreeParameters
+from truearm.modeling.robot import Robot
+
+Redundant = Literal["prior", "drop"]
+
+#: Noise assumed for readings that declare none, until their own residuals say better [m, rad].
+_FIRST_NOISE: Final = {observation.name: 1e-4 for observation in OBSERVATIONS}
+_NOISE_FLOOR: Final = 1e-9
+#: Rounds until deviations and loads agree with the solution; each leaves a hundredth of the loads' error or less.
+_ROUNDS: Final = 6
+_LOADS_AGREE: Final = 1e-4  # of the last step, in the joints' deflections [rad or m]
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """The values that the data give to the free parameters, before anything is said about their worth.
+
+    Attributes
+    ----------
+    start
+        The robot before: frames in closed form, nominal parameters.
+    problem
+        The problem of the last round, at whose deviations and loads the solution is one.
+    solution
+        Its solution, with the steps of all rounds.
+    redundancies
+        Parameters held because the data cannot tell them apart.
+    limits
+        Lowest and highest value of every free parameter [SI], where there are bounds.
+    """
+
+    start: Robot
+    problem: Problem
+    solution: Solution
+    redundancies: tuple[Redundancy, ...]
+    limits: tuple[Array, Array] | None
+
+    @property
+    def robot(self) -> Robot:
+        """The robot with the values found."""
+        return self.start.with_values(dict(zip(self.problem.free.names, self.solution.vector.tolist(), strict=True)))
+
+
+def find_parameters(
+    robot: Robot,
+    data: Dataset,
+    model: Model,
+    *,
+    loss: Loss = "linear",
+    redundancy: Redundant = "prior",
+    bounds: Bounds | None = None,
+    bounds_file: str = "bounds",
+    small: float = SMALL,
+) -> Solved:
+    """Find the free parameters of a robot from training data.
+
+    It is what :func:`truearm.identification.solving.fit.identify` does first, with the same parameters and refusals.
+    """
+    start = start_from_readings(model.prepared(robot), data)
+    check_circumstances(start, data)
+    free = unanchored(model.free(start), data)
+    check_bounds = None
+    if bounds is not None:
+        tried = start.with_effects(model.tried).parameters.values()
+        check_bounds = bound_vectors(bounds, free, bounds_file, tried)
+    problem = Problem(start, data, free, dict(_FIRST_NOISE), priors=redundancy == "prior")
+    check_solvable(problem)
+    dropped: tuple[Redundancy, ...] = ()
+    if redundancy == "drop":
+        dropped = find_redundancies(problem, free.start)
+    steps = 0
+    for _ in range(6):
+        held = [r.dropped for r in dropped]
+        if check_bounds is not None:
+            _check_held(held, free, check_bounds, bounds_file)
+        kept = problem.free.without(held)
+        limits = None if check_bounds is None else _limits_of(check_bounds, free, kept)
+        solution, reduced = _solve_with_noise(replace(problem, free=kept), loss, limits, small)
+        steps += solution.steps
+        if redundancy == "prior":
+            break
+        # What is redundant at the nominal robot need not be at the real one: look again there.
+        found = dict(zip(kept.names, solution.vector, strict=True))
+        there = FreeParameters(tuple(replace(p, value=float(found.get(p.name, p.nominal))) for p in free.parameters))
+        problem = replace(problem, free=there, noise=reduced.noise)
+        dropped = find_redundancies(problem, there.start, held)
+        if [r.dropped for r in dropped] == held:
+            break
+    else:
+        solution = replace(solution, converged=False)
+        dropped = tuple(r for r in dropped if r.dropped in held)
+    return Solved(start, reduced, replace(solution, steps=steps), dropped, limits)
+
+
+def _check_held(held: list[str], free: FreeParameters, limits: tuple[Array, Array], where: str) -> None:
+    for name, p, low, high in zip(free.names, free.parameters, *limits, strict=True):
+        if name in held and not low <= p.nominal <= high:
+            raise InputError(
+                "the bounds exclude the nominal value of a redundant parameter, at which `redundancy=drop` holds it",
+                where=f"{where}, {name}",
+                cure="Leave this bound out, or use `redundancy=prior`.",
+            )
+
+
+def _limits_of(limits: tuple[Array, Array], free: FreeParameters, kept: FreeParameters) -> tuple[Array, Array]:
+    places = [free.names.index(name) for name in kept.names]
+    return limits[0][places], limits[1][places]
+
+
+def _solve_with_noise(
+    problem: Problem, loss: Loss, limits: tuple[Array, Array] | None, small: float
+) -> tuple[Solution, Problem]:
+    """Solve; then again with what the solution says of deviations and of the loads at every joint.
+
+    Deviations are estimated where they are not declared. Declared ones are widened by what the residuals say where
+    there is no anchor: believed to the letter, readings of a closed loop that the model cannot follow would overrule
+    every prior, for the sake of directions that they hardly observe.
+    """
+    solution = solve(problem, loss, limits, small)
+    undeclared = {problem.kind(b) for b in problem.blocks if not b.declared}
+    steps = solution.steps
+    settled = False
+    for _ in range(_ROUNDS):
+        noise = {**problem.noise}
+        found_noise = noise_found(problem, solution, loss)
+        known = {name: found_noise[name] for name in found_noise if name not in undeclared}
+        wider = excess_of(known) if known and not problem.data.anchored else 1.0
+        for name, (estimate, _) in found_noise.items():
+            if name in undeclared:
+                noise[name] = max(estimate * noise[name], _NOISE_FLOOR)
+        change = max((abs(np.log(noise[n] / problem.noise[n])) for n in undeclared), default=0.0)
+        found = dict(zip(problem.free.names, map(float, solution.vector), strict=True))
+        started = FreeParameters(tuple(replace(p, value=found[p.name]) for p in problem.free.parameters))
+        there = replace(
+            problem,
+            robot=problem.robot.with_values(found),
+            noise=noise,
+            free=started,
+            widened=problem.widened * wider,
+        )
+        shift = _load_shift(problem, there)
+        if (settled and shift < _LOADS_AGREE * small) or (not undeclared and shift == 0.0 and wider == 1.0):
+            break
+        settled = change < 0.02 and wider < 1.02
+        problem = there
+        solution = solve(problem, loss, limits, small)
+        steps += solution.steps
+    return replace(solution, steps=steps), problem
+
+
+def _load_shift(before: Problem, after: Problem) -> float:
+    """Return how far joint variables move if the loads are those of another solution [rad or m]."""
+    if before.postures.loads is None:
+        return 0.0
+    values = after.robot.values
+    moved = after.robot.variables(after.postures, values) - after.robot.variables(before.postures, values)
+    return float(np.abs(moved).max())
+
+
+def noise_found(problem: Problem, solution: Solution, loss: Loss) -> dict[str, tuple[float, float]]:
+    """Return for each observation the deviation of its whitened residuals, and the degrees of freedom behind it."""
+    kinds = np.concatenate([[problem.kind(b)] * b.rows for b in problem.blocks])
+    of_readings = np.concatenate([[problem.kind(b)] * len(b.readings) for b in problem.blocks])
+    norms = norms_of(solution.residual, problem.components)
+    spent = _informed_rows(problem, solution)
+    found = {}
+    for name in dict.fromkeys(kinds.tolist()):
+        if name == SETUP:
+            continue
+        mine = solution.residual[kinds == name]
+        freedom = len(mine) * max(1.0 - spent / problem.rows, 1e-3)
+        if loss == "linear":
+            found[name] = (float(np.sqrt(np.sum(mine**2) / freedom)), freedom)
+        else:
+            of_name = of_readings == name
+            found[name] = (robust_scale(norms[of_name], problem.components[of_name]), freedom)
+    return found
+
+
+def _informed_rows(problem: Problem, solution: Solution) -> float:
+    """Return how many parameters' worth of residual the fit used up."""
+    prior = problem.free.prior
+    s2 = np.linalg.svd(np.linalg.qr(solution.jacobian * prior, mode="r"), compute_uv=False) ** 2
+    if not problem.priors:
+        return float(len(prior))
+    return float(np.sum(s2 / (s2 + 1.0)))
+
+
+def excess_of(noise: dict[str, tuple[float, float]]) -> float:
+    """Return the ratio of residuals to declared deviations if it is too large for chance (1 in 1000), else 1.
+
+    The quantile of chi squared is Wilson and Hilferty's (1931).
+    """
+    freedom = sum(dof for _, dof in noise.values())
+    ratio = sum(deviation**2 * dof for deviation, dof in noise.values()) / freedom
+    k = 2.0 / (9.0 * freedom)
+    allowed = (1.0 - k + 3.09 * np.sqrt(k)) ** 3
+    return float(np.sqrt(ratio)) if ratio > allowed else 1.0

@@ -44,12 +44,12 @@ def number_array(
         values = _without_mask(given)
     except (ValueError, TypeError):
         raise InputError("the rows are not of one length", parameter=parameter, allowed=allowed) from None
+    if values.dtype.kind not in "iuf":
+        raise wrong_kind("numbers belong here", given, parameter, allowed)
     if isinstance(values, np.ma.MaskedArray):
         if not missing:
             raise InputError("masked numbers cannot be used here", parameter=parameter, allowed=allowed)
-        values = values.astype(float).filled(np.nan)
-    if values.dtype.kind not in "iuf":
-        raise wrong_kind("numbers belong here", given, parameter, allowed)
+        values = np.ma.filled(values.astype(float), np.nan)
     fits = values.ndim == len(shape) and all(
         isinstance(length, str) or length == there for length, there in zip(shape, values.shape, strict=True)
     )

@@ -169,7 +169,10 @@ def test_masked_positions_and_quaternions_are_missing() -> None:
     p, turned = positions(), np.tile([1.0, 0.0, 0.0, 0.0], (N, 2, 1))
     hidden = np.zeros(p.shape, dtype=bool)
     hidden[1, 0, 2] = True
-    masked = [np.ma.array(p, mask=hidden), [np.ma.array(row, mask=off) for row, off in zip(p, hidden, strict=True)]]
+    masked: list[Any] = [
+        np.ma.array(p, mask=hidden),
+        [np.ma.array(row, mask=off) for row, off in zip(p, hidden, strict=True)],
+    ]
     expected = np.where(hidden.any(axis=2, keepdims=True), NAN, p).reshape(-1, 3)
     for given in masked:
         assert_array_equal(Dataset.of(joints(), given).position, expected)
@@ -182,14 +185,18 @@ def test_masked_positions_and_quaternions_are_missing() -> None:
 
 @pytest.mark.parametrize("parameter", ["joints", "sigma", "temperature", "order"])
 def test_masked_numbers_are_refused_elsewhere(parameter: str) -> None:
-    given = {"joints": joints(), "positions": positions(), "sigma": np.ones(N), "temperature": np.ones(N)}
-    given["order"] = np.arange(N)
+    given: dict[str, Any] = {"joints": joints(), "positions": positions(), "order": np.arange(N)}
+    given |= {"sigma": np.ones(N), "temperature": np.ones(N)}
     values = given[parameter]
     refused(parameter, Dataset.of, **given | {parameter: np.ma.array(values, mask=values == values.flat[0])})
 
 
 def test_a_dataset_keeps_its_own_arrays() -> None:
-    given = {"joints": joints(), "positions": positions(), "quaternions": np.tile([1.0, 0.0, 0.0, 0.0], (N, 2, 1))}
+    given: dict[str, Any] = {
+        "joints": joints(),
+        "positions": positions(),
+        "quaternions": np.tile([1.0, 0.0, 0.0, 0.0], (N, 2, 1)),
+    }
     data, before = Dataset.of(**given), Dataset.of(**{name: values.copy() for name, values in given.items()})
     for values in given.values():
         values[:] = NAN
@@ -227,7 +234,8 @@ def test_numbers_out_of_all_proportion_are_refused(parameter: str, changed: dict
 
 def test_times_may_say_the_order() -> None:
     data = Dataset.of(joints(), positions(), order=1_700_000_000 + np.arange(N))
-    assert_array_equal(np.diff(data.number), np.ones(N - 1))  # type: ignore[arg-type]
+    assert data.number is not None
+    assert_array_equal(np.diff(data.number), np.ones(N - 1))
 
 
 # -- checks of its own ------------------------------------------------------------------------------------

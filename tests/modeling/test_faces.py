@@ -227,7 +227,7 @@ WRONG_JOINTS: list[Any] = [
     np.zeros((2, 6), dtype=complex),
     slice(None),
     {"joint_1": 0.0},
-    np.ma.array(np.zeros(6), mask=[1, 0, 0, 0, 0, 0]),
+    np.ma.array(np.zeros(6), mask=np.eye(6, dtype=bool)[0]),
     np.full(6, 1e200),
 ]
 

@@ -107,7 +107,7 @@ def checked_selection(chosen: object, count: int, parameter: str, things: str) -
         return np.asarray(np.flatnonzero(values), dtype=np.intp)
     if not values.size:
         return np.zeros(0, dtype=np.intp)
-    mixed = not isinstance(chosen, np.ndarray | range) and any(isinstance(v, bool | np.bool_) for v in chosen)
+    mixed = isinstance(chosen, list | tuple) and any(isinstance(v, bool | np.bool_) for v in chosen)
     if mixed or values.dtype.kind not in "iu":
         came = "True or False among numbers" if mixed else str(values[0])
         raise InputError("indices must be whole numbers", parameter=parameter, came=came, allowed=span)

@@ -232,7 +232,7 @@ class RobotData:
 
     def _named(self, name: str, kind: str, parts: Sequence[Part]) -> Part:
         for part in parts:
-            if part.name == name:
+            if isinstance(name, str) and part.name == name:
                 return part
         known = [part.name for part in parts]
         raise InputError(

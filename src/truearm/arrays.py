@@ -111,7 +111,14 @@ def finite_number(
         allowed = "a finite number" if lowest == -math.inf else f"a finite number, {lowest:g} or more"
     if isinstance(value, bool | np.bool_) or not isinstance(value, Real):
         raise wrong_kind("a number belongs here", value, parameter, allowed, where=where)
-    number = float(value)
+    if where is not None:
+        where = f"{where}, {parameter}"
+    try:
+        number = float(value)
+    except OverflowError:
+        raise InputError(
+            "the number is too large", parameter=parameter, where=where, came=value, allowed=allowed
+        ) from None
     if not math.isfinite(number) or number < lowest:
         raise InputError(
             "the number cannot be used", parameter=parameter, where=where, came=f"{number:g}", allowed=allowed

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Callable, Iterable, Sized
+from collections.abc import Callable, Iterable, Iterator, Sized
+from contextlib import contextmanager
+from numbers import Rational
 from typing import Final
 
 #: A parameter that a text names, with a value or without: `seed`, `train=all`.
@@ -63,12 +65,30 @@ class InputError(ValueError):
 
 def wrong_kind(what: str, came: object, parameter: str, allowed: str, *, where: str | None = None) -> InputError:
     """Return the refusal of a value of another kind than belongs here."""
-    if isinstance(came, bytes | int | float | None):
-        came = repr(came)
-    elif not isinstance(came, str):
-        size = f" of {len(came)}" if isinstance(came, Sized) and getattr(came, "ndim", True) else ""
-        came = f"an object of type {kind_of(came)}{size}"
+    if came is None:
+        came = _Words("None")
+    elif not isinstance(came, str | bytes | int | float):
+        size = f" of {len(came)}" if isinstance(came, Sized) and getattr(came, "ndim", None) != 0 else ""
+        held = f" that holds {came.dtype}" if hasattr(came, "dtype") else ""
+        came = _Words(f"an object of type {kind_of(came)}{size}{held}")
     return InputError(what, parameter=parameter, where=where, came=came, allowed=allowed)
+
+
+@contextmanager
+def refusals_of(parameter: str) -> Iterator[None]:
+    """Let refusals of what a parameter holds name it, beside the file or the place that they name."""
+    try:
+        yield
+    except InputError as error:
+        if error.parameter is None:
+            name_parameter(error, parameter)
+        raise
+
+
+def name_parameter(error: InputError, parameter: str) -> None:
+    """Let a refusal name a parameter."""
+    error.parameter = parameter
+    error.args = (error.message(str),)
 
 
 def kind_of(came: object) -> str:
@@ -81,10 +101,17 @@ def with_parameters(text: str, spelled: Callable[[str, str | None], str]) -> str
     return _NAMED.sub(lambda found: spelled(found["name"], found["value"]), text)
 
 
+class _Words(str):
+    """What is said of a value instead of the value itself: shown without quotes."""
+
+    __slots__ = ()
+
+
 def _shown(came: object) -> str:
-    if isinstance(came, int) and came.bit_length() > 300:  # Python may refuse to write it out
-        return "a number of very many digits"
-    text = repr(came) if isinstance(came, str) else str(came)
+    if isinstance(came, Rational) and max(abs(int(came.numerator)), int(came.denominator)) >> 300:
+        return "a number of very many digits"  # Python may refuse to write it out
+    quoted = isinstance(came, str) and not isinstance(came, _Words)
+    text = repr(str(came)) if quoted else str(came)
     return text if len(text) <= 500 else f"{text[:497]}..."
 
 

@@ -14,7 +14,7 @@ from truearm.errors import InputError
 def test_the_old_order_is_refused_with_the_new_line(truearm: Truearm, small: Path) -> None:
     done = truearm("check", small / "data.csv", "irb120")
     assert done.code == 2
-    assert f"Write 'truearm check irb120 {small / 'data.csv'}'." in done.err
+    assert "Exchange them: irb120 is the robot." in done.err
     assert truearm("check", "irb120", small / "data.csv").code == 0
 
 

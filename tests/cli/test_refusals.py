@@ -223,16 +223,16 @@ def test_a_failure_while_writing_leaves_the_earlier_result(
     out = tmp_path / "out"
     truearm("calibrate", "irb120", small / "data.csv", "--out", out)
     before = {p.name: p.read_bytes() for p in out.iterdir()}
-    opened = os.fdopen
+    opened = Path.open
 
-    def full(handle: int, *words: object, **named: object) -> object:
-        stream = opened(handle, *words, **named)  # type: ignore[call-overload]
-        if sum(1 for _ in out.iterdir()) > 5:
+    def full(path: Path, *words: object, **named: object) -> object:
+        stream = opened(path, *words, **named)  # type: ignore[call-overload]
+        if path.parent == out and sum(1 for _ in out.iterdir()) > 5:
             stream.close()
-            raise OSError(28, "No space left on device", str(out))
+            raise OSError(28, "No space left on device", str(path))
         return stream
 
-    monkeypatch.setattr(os, "fdopen", full)
+    monkeypatch.setattr(Path, "open", full)
     message = refused(truearm, "calibrate", "irb120", small / "data.csv", "--model", "offsets", "--out", out)
     assert "cannot be written (No space left on device)" in message
     assert {p.name: p.read_bytes() for p in out.iterdir()} == before

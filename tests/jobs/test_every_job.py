@@ -8,7 +8,7 @@ import math
 import pkgutil
 import re
 import typing
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields, is_dataclass
 from functools import cache
 from importlib import import_module
@@ -32,8 +32,8 @@ from truearm.results.record import Record
 from truearm.simulation.devices import DEVICES
 
 ROOT = Path(__file__).parents[2]
-#: Called by the job or only shown: a function, and how the caller would run it again.
-UNCHECKED = ("progress", "command")
+#: Jobs that take numbers, and are fast.
+COUNTING = ("calibrate", "plan", "simulate", "lines", "tolerance", "hexapod_uncertainty", "hexapod_solve", "compensate")
 
 
 class Odd:
@@ -51,7 +51,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @cache
 def parameters(job: str) -> dict[str, inspect.Parameter]:
-    return {n: p for n, p in inspect.signature(function(job)).parameters.items() if n not in UNCHECKED}
+    return dict(inspect.signature(function(job)).parameters)
 
 
 def kinds(job: str, name: str) -> set[Any]:
@@ -93,16 +93,29 @@ def bad_values(job: str, name: str, good: Any) -> Iterator[tuple[str, Any]]:
             yield text, float(text)
         if name == "seed":
             yield "negative", -1
+        if float in takes or name != "seed":  # a seed may have any number of digits
+            yield "beyond floats", 10**400
         if float not in takes:
             yield "a fraction", 1.5
+            if name != "seed":
+                yield "beyond memory", 10**13
     elif bool in takes:
         yield "1", 1
     else:
         yield "a number", 12.5
     if str in takes and isinstance(good, str) and re.fullmatch(r"[a-zA-Z][-a-z0-9]*", good):
         yield "misspelt", misspelt(good)
+    yield "a dict", {0: 1.0, 1: 2.0, 2: 3.0}
+    yield "a set", {0.0, 1.0, -9.81}
+    yield "a zero-dimensional array", np.array(1.0)
+    yield "an array of objects", np.full(3, None)
+    if not takes & {np.ndarray, Sequence}:
+        yield "an array", np.array([1.0, 2.0, 3.0])
     if texts:
         yield "empty", ""
+    if Path in takes:
+        yield "half a character", "\ud800"
+        yield "a zero byte", "a\0b"
     if np.ndarray in takes:
         for number in (math.nan, math.inf):
             yield f"holds {number}", np.full(np.shape(good) if isinstance(good, np.ndarray) else (3, 6), number)
@@ -152,6 +165,18 @@ def test_the_result_is_frozen_and_speaks_for_itself(job: str, folder: Path) -> N
         assert repr(result) == "\n".join(result.lines())[: len(repr(result))] or repr(result).endswith("...")
         assert result._repr_html_().startswith("<pre>")
         assert json.loads(json.dumps(result.summary(), allow_nan=False))
+    if hasattr(result, "save"):
+        refuses_bad_places(result.save)
+
+
+def refuses_bad_places(save: Callable[[Any], object]) -> None:
+    (parameter, *_) = inspect.signature(save).parameters
+    assert parameter in ("folder", "file")
+    for place in (None, 5, b"x", "", "a\0b", "\ud800", "/dev/null/x", "/proc/x"):
+        with pytest.raises(InputError) as refusal:
+            save(place)
+        assert refusal.value.parameter == parameter
+        assert ".truearm." not in str(refusal.value)
 
 
 def cases() -> list[tuple[str, str]]:
@@ -172,6 +197,23 @@ def test_what_cannot_be_used_is_refused_naming_the_parameter(job: str, name: str
             assert "Did you mean" in str(refusal.value)
         tried += 1
     assert tried >= 2
+
+
+def as_numpy(value: Any) -> Any:
+    if isinstance(value, list | tuple):
+        return type(value)(map(as_numpy, value))
+    kind = {bool: np.bool_, int: np.int64, float: np.float64, str: np.str_}.get(type(value))
+    return value if kind is None else kind(value)
+
+
+@pytest.mark.parametrize("job", COUNTING)
+def test_numbers_and_names_of_numpy_are_as_good(job: str, folder: Path) -> None:
+    good = EXAMPLES[job](folder)
+    plain, given = function(job)(**good), {name: as_numpy(value) for name, value in good.items()}
+    result = function(job)(**given)
+    assert result.lines() == plain.lines()
+    if hasattr(result, "command"):
+        assert result.command == plain.command
 
 
 def test_no_text_outside_the_command_names_an_option() -> None:

@@ -90,7 +90,7 @@ SIDES, JOINTS = (0.3, 0.3, 0.3), np.zeros((3, 6))
 @pytest.mark.parametrize(
     ("call", "parameter", "words"),
     [
-        (lambda: truearm.hexapod_uncertainty(trials=1), "trials", "allowed: 2 or more"),
+        (lambda: truearm.hexapod_uncertainty(trials=1), "trials", "allowed: 2 to 1000000"),
         (lambda: truearm.hexapod_uncertainty(seed=-1), "seed", "allowed: 0 or more"),
         (lambda: truearm.hexapod_solve(), "sheet, pose, legs", "a sheet, or a pose and its six legs"),
         (lambda: truearm.hexapod_solve("a.csv", pose=7, legs=LEGS), "sheet, pose, legs", "a sheet, or a pose"),

@@ -131,7 +131,7 @@ def test_auto_takes_eleven_or_more() -> None:
         ({"poses": 301}, "too few.*300 of 300.*301 or more"),
         ({"poses": 2}, "fewer equations.*4 or more"),
         ({"objective": "O6"}, "no objective of this name.*O1, O2"),
-        ({"objective": "O3", "poses": None}, "only O1 weighs"),
+        ({"objective": "O3", "poses": None}, "only O1 can choose"),
     ],
 )
 def test_what_cannot_be_planned_is_refused(options: dict[str, object], words: str) -> None:

@@ -85,11 +85,15 @@ def program_files(paths: Sequence[Path], *, again: bool = False) -> tuple[Progra
     every = [*paths]
     for path in paths:
         every += [near for near in _companions(path) if not any(_same(near, other) for other in every)]
-    for number, path in enumerate(every):
-        if any(_same(path, other) for other in every[:number]):
-            raise InputError("this program is given twice", where=str(path))
+    _refuse_twice(every)
     names = _names(every)
     return tuple(ProgramFile(path, name, _original(path, again)) for path, name in zip(every, names, strict=True))
+
+
+def _refuse_twice(paths: Sequence[Path]) -> None:
+    for number, path in enumerate(paths):
+        if any(_same(path, other) for other in paths[:number]):
+            raise InputError("this program is given twice", where=str(path))
 
 
 def restored(paths: Sequence[Path]) -> tuple[ProgramFile, ...]:
@@ -98,8 +102,9 @@ def restored(paths: Sequence[Path]) -> tuple[ProgramFile, ...]:
     Raises
     ------
     InputError
-        If a program has no record, or was changed after it was written.
+        If a program has no record, was changed after it was written, or is given twice.
     """
+    _refuse_twice(paths)
     made = []
     for path, name in zip(paths, _names(paths), strict=True):
         record = _record(path)

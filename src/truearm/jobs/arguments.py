@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from numbers import Integral, Real
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Final, TypeGuard, TypeVar
 
 import numpy as np
 
 from truearm.arrays import finite_number, number_array
-from truearm.errors import InputError, did_you_mean, wrong_kind
-from truearm.files import new_file, refuse_overwriting, writable_file, writable_folder
+from truearm.errors import InputError, did_you_mean, name_parameter, refusals_of, wrong_kind
+from truearm.files import new_file, output_file, output_folder, path_argument
 from truearm.library import is_robot, load_robot, urdf_source
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.readers.canonical import read_csv
@@ -27,22 +26,8 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-
-@contextmanager
-def refusals_of(parameter: str) -> Iterator[None]:
-    """Let refusals of what a parameter holds name it, beside the file or the place that they name."""
-    try:
-        yield
-    except InputError as error:
-        if error.parameter is None:
-            _name(error, parameter)
-        raise
-
-
-def _name(error: InputError, parameter: str) -> None:
-    """Let a refusal name a parameter."""
-    error.parameter = parameter
-    error.args = (error.message(str),)
+#: Most poses, candidates, trials or repetitions: each takes some kB of memory, and so many fit 24 GB.
+MOST: Final = 1_000_000
 
 
 def robot_argument(robot: object, parameter: str = "robot") -> Robot:
@@ -53,9 +38,23 @@ def robot_argument(robot: object, parameter: str = "robot") -> Robot:
         try:
             return load_robot(robot)
         except InputError as error:  # the library calls whatever it is given the robot
-            _name(error, parameter)
+            name_parameter(error, parameter)
             raise
     raise wrong_kind("a robot belongs here", robot, parameter, "a Robot, a library id, a robot file or a URDF")
+
+
+def refuse_swapped(robot: object, data: object) -> None:
+    """Refuse a robot where measurements belong, and measurements in its place."""
+    if not (isinstance(robot, str | Path) and isinstance(data, str | Path)):
+        return
+    if is_robot(data) and not is_robot(robot):
+        raise InputError(
+            "the robot comes first, then the measurements",
+            parameter="robot",
+            came=str(robot),
+            allowed="a library id, a robot file or a URDF",
+            cure=f"Exchange them: {data} is the robot.",
+        )
 
 
 def data_argument(data: object, parameter: str = "data") -> Dataset:
@@ -77,17 +76,6 @@ def data_argument(data: object, parameter: str = "data") -> Dataset:
     raise wrong_kind("measurements belong here", data, parameter, "a Dataset, or a canonical CSV file")
 
 
-def path_argument(path: object, parameter: str) -> Path:
-    """Return a path that was given as a text or a path."""
-    if isinstance(path, str | Path) and "\0" not in str(path):
-        if str(path):
-            return Path(path)
-        raise InputError("no file is given", parameter=parameter, came=str(path))
-    raise wrong_kind(
-        "a path belongs here", path, parameter, "the path of a file or folder, as a text or a pathlib.Path"
-    )
-
-
 def folder_for(names: Iterable[str], out: object, *read: object, parameter: str = "out") -> Path:
     """Return the folder for files of some names, or refuse one that cannot be written to, before any long work.
 
@@ -96,21 +84,12 @@ def folder_for(names: Iterable[str], out: object, *read: object, parameter: str 
     read
         What the job was given: none of these, as far as they are files, may be overwritten.
     """
-    folder = path_argument(out, parameter)
-    with refusals_of(parameter):
-        writable_folder(folder)
-        for name in names:
-            refuse_overwriting(folder / name, _files_of(read))
-    return folder
+    return output_folder(out, names, files_of(*read), parameter)
 
 
 def file_for(out: object, *read: object, parameter: str = "out") -> Path:
     """Return where a file shall be written, or refuse a place that cannot be; `read` as for :func:`folder_for`."""
-    path = path_argument(out, parameter)
-    with refusals_of(parameter):
-        writable_file(path)
-        refuse_overwriting(path, _files_of(read))
-    return path
+    return output_file(out, files_of(*read), parameter)
 
 
 def new_file_for(out: object, parameter: str = "out") -> Path:
@@ -119,9 +98,10 @@ def new_file_for(out: object, parameter: str = "out") -> Path:
         return new_file(path_argument(out, parameter))
 
 
-def _files_of(given: Iterable[object]) -> list[Path]:
+def files_of(*given: object) -> tuple[Path, ...]:
+    """Return which files a job was given."""
     named = [value for value in given if isinstance(value, str | Path)]
-    return [(urdf_source(value) or (Path(value), None))[0] for value in named]
+    return tuple((urdf_source(value) or (Path(value), None))[0].absolute() for value in named)
 
 
 def files_argument(files: object, parameter: str) -> dict[str, Path]:
@@ -149,12 +129,19 @@ def gravity_argument(gravity: object, parameter: str = "gravity") -> tuple[float
 
 def numbers_argument(values: object, parameter: str, count: int, allowed: str) -> tuple[float, ...]:
     """Return `count` finite numbers."""
-    if isinstance(values, str | bytes) or not isinstance(values, Iterable):
+    if not _is_sequence(values):
         raise wrong_kind(f"{count} numbers belong here", values, parameter, allowed)
     found = [*values]
     if len(found) != count:
         raise InputError(f"{count} numbers belong here", parameter=parameter, came=len(found), allowed=allowed)
     return tuple(finite_number(value, parameter) for value in found)
+
+
+def _is_sequence(values: object) -> TypeGuard[Sequence[object]]:
+    """Return whether these are values in an order: a list, a tuple, an array of one axis."""
+    if isinstance(values, Sequence):
+        return not isinstance(values, str | bytes | bytearray | memoryview)
+    return getattr(values, "ndim", 0) == 1 and isinstance(values, Iterable)
 
 
 def whole_argument(value: object, parameter: str, lowest: int = 0, highest: int | None = None) -> int:
@@ -166,6 +153,11 @@ def whole_argument(value: object, parameter: str, lowest: int = 0, highest: int 
     if number < lowest or (highest is not None and number > highest):
         raise InputError("the number is out of range", parameter=parameter, came=number, allowed=span)
     return number
+
+
+def count_argument(value: object, parameter: str, lowest: int = 1) -> int:
+    """Return how many of something there shall be, no more than memory holds."""
+    return whole_argument(value, parameter, lowest, MOST)
 
 
 def length_argument(value: object, parameter: str, lowest: float = -math.inf) -> float:
@@ -216,9 +208,26 @@ def flag_argument(value: object, parameter: str) -> bool:
 
 def name_argument(value: object, parameter: str) -> str:
     """Return a name."""
+    return _text(value, parameter, "a name")
+
+
+def command_argument(command: object) -> str | None:
+    """Return how the caller would run a job again; None if it was not said."""
+    if isinstance(command, str) and not command:
+        raise InputError("the command is empty", parameter="command", came=command)
+    return None if command is None else _text(command, "command", "how to run it again")
+
+
+def _text(value: object, parameter: str, what: str) -> str:
     if isinstance(value, str):
         return value
-    raise wrong_kind("a name belongs here", value, parameter, "a text")
+    raise wrong_kind(f"{what} belongs here", value, parameter, "a text")
+
+
+def progress_argument(progress: object) -> None:
+    """Refuse what cannot be called with a few words."""
+    if not callable(progress):
+        raise wrong_kind("a function belongs here", progress, "progress", "a function that takes a text")
 
 
 def choice_argument(value: object, parameter: str, known: Mapping[str, T], what: str | None = None) -> T:
@@ -233,6 +242,8 @@ def choice_argument(value: object, parameter: str, known: Mapping[str, T], what:
         raise wrong_kind("a name belongs here", value, parameter, ", ".join(known))
     if value in known:
         return known[value]
+    if not known:
+        raise InputError(f"there is no {what or parameter}", parameter=parameter, came=value)
     raise InputError(
         f"there is no {what or parameter} of this name",
         parameter=parameter,
@@ -243,10 +254,11 @@ def choice_argument(value: object, parameter: str, known: Mapping[str, T], what:
 
 
 def choices_argument(values: object, parameter: str, known: Collection[str], what: str) -> tuple[str, ...]:
-    """Return a sequence of names of those that are known."""
-    if isinstance(values, str | bytes) or not isinstance(values, Sequence):
+    """Return names of those that are known, each once."""
+    if not _is_sequence(values):
         raise wrong_kind("a sequence of names belongs here", values, parameter, ", ".join(known))
-    return tuple(choice_argument(value, parameter, {name: name for name in known}, what) for value in values)
+    named = [choice_argument(value, parameter, {name: name for name in known}, what) for value in values]
+    return tuple(dict.fromkeys(named))
 
 
 def device_argument(device: object, parameter: str = "device") -> Device:
@@ -258,9 +270,9 @@ def device_argument(device: object, parameter: str = "device") -> Device:
 
 def paths_argument(paths: object, parameter: str, what: str) -> list[Path]:
     """Return a sequence of at least one path; `what` one path is, for the message."""
-    if isinstance(paths, str | bytes) or not isinstance(paths, Sequence):
+    if not _is_sequence(paths):
         raise wrong_kind(f"a sequence of {what}s belongs here", paths, parameter, "a list of paths")
-    if not paths:
+    if not len(paths):
         raise InputError(f"no {what} is given", parameter=parameter, came="nothing", allowed="one or more")
     return [path_argument(path, parameter) for path in paths]
 
@@ -273,6 +285,8 @@ def python_call(job: str, /, *given: object, **keywords: object) -> str:
 
 
 def _written(value: object) -> str:
+    if isinstance(value, np.generic):
+        value = value.item()
     if isinstance(value, Path):
         return repr(str(value))
     if isinstance(value, Payload):

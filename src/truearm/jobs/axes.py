@@ -6,8 +6,17 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final, Literal
 
+from truearm.errors import refusals_of
 from truearm.identification.axes.analysis import analyse
-from truearm.jobs.arguments import choice_argument, data_argument, folder_for, refusals_of, robot_argument
+from truearm.jobs.arguments import (
+    choice_argument,
+    data_argument,
+    files_of,
+    folder_for,
+    progress_argument,
+    refuse_swapped,
+    robot_argument,
+)
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.robot import Robot
 from truearm.results.axis_calibration import AXIS_FILES, AxisCalibration
@@ -45,12 +54,14 @@ def axes(
     InputError
         If the robot or the data cannot be used, a joint has no run, or its axis cannot be found.
     """
+    progress_argument(progress)
     in_robot_frame = choice_argument(frame, "frame", _FRAMES)
+    refuse_swapped(robot, data)
     folder = None if out is None else folder_for(AXIS_FILES, out, robot, data)
     nominal, readings = robot_argument(robot), data_argument(data)
     progress("fitting circles and axes")
     with refusals_of("data"):
-        found = AxisCalibration(analyse(nominal, readings, in_robot_frame=in_robot_frame))
+        found = AxisCalibration(analyse(nominal, readings, in_robot_frame=in_robot_frame), files_of(robot, data))
     if folder is not None:
         progress("writing the files")
         found.save(folder)

@@ -10,8 +10,8 @@ from typing import Final, Literal, get_args
 
 import numpy as np
 
-from truearm.errors import InputError, kind_of, nearest_names
-from truearm.files import read_bytes, refuse_overwriting, writable_folder
+from truearm.errors import InputError, nearest_names, refusals_of, wrong_kind
+from truearm.files import path_argument, read_bytes
 from truearm.identification.choosing.selection import AUTO, select
 from truearm.identification.judging.advice import check_fit
 from truearm.identification.judging.arrival_lag import check_arrival_lag
@@ -24,11 +24,15 @@ from truearm.identification.solving.rounds import Redundant
 from truearm.jobs.arguments import (
     choice_argument,
     choices_argument,
+    command_argument,
     data_argument,
+    files_of,
+    folder_for,
     gravity_argument,
-    path_argument,
     payload_argument,
+    progress_argument,
     python_call,
+    refuse_swapped,
     robot_argument,
     whole_argument,
 )
@@ -110,6 +114,7 @@ def calibrate(
     InputError
         For anything that cannot be used, with a message that says what to do.
     """
+    progress_argument(progress)
     named = choice_argument(model, "model", _MODELS)
     effects = choices_argument(effects, "effects", [effect.name for effect in EFFECTS], "effect")
     if effects and named is None:
@@ -123,7 +128,7 @@ def calibrate(
     choice_argument(redundancy, "redundancy", {name: name for name in get_args(Redundant)})
     seed = whole_argument(seed, "seed")
     payload, fall = payload_argument(payload), gravity_argument(gravity)
-    call = command or python_call(
+    call = command_argument(command) or python_call(
         "calibrate",
         robot,
         data,
@@ -137,11 +142,17 @@ def calibrate(
         payload=payload,
         gravity=fall,
     )
-    folder = None if out is None else _folder(path_argument(out, "out"), robot, data, bounds)
+    refuse_swapped(robot, data)
+    inputs = files_of(robot, data, bounds)
+    folder = None if out is None else folder_for(RESULT_FILES, out, robot, data, bounds)
     progress("reading the robot")
     source = urdf_source(robot) if isinstance(robot, str | Path) else None
     urdf = None if source is None else read_bytes(source[0])
     nominal_robot = robot_argument(robot).with_payload(payload, fall)
+    if effects and named is not None:
+        with refusals_of("effects"):
+            asked = named.also(effects)
+            asked.free(asked.prepared(nominal_robot))
     progress("reading the data")
     readings = data_argument(data)
     digest = ""
@@ -149,42 +160,48 @@ def calibrate(
         digest = f" (sha256 {hashlib.sha256(read_bytes(path_argument(data, 'data'))).hexdigest()[:12]})"
     bounds_file = str(bounds) if isinstance(bounds, str | Path) else "bounds"
     if bounds is not None and not isinstance(bounds, Bounds):
-        bounds = read_bounds(path_argument(bounds, "bounds"))
-    check_joints(nominal_robot, readings)
-    n = readings.configurations
-    count = _train_count(train, n, readings.source)
-    order = np.random.default_rng(seed).permutation(n)
-    training, held_out = order[:count], order[count:]
-    if not readings.has_reading.any():
-        raise InputError("there is no reading", where=readings.source, cure="Fill in x, y and z, or distance.")
-    if readings.fixture is None and not readings.has_position.any():
-        raise InputError("there is no position reading", where=readings.source, cure="Fill in x, y and z.")
-    _check_split(readings.of_configurations(training), readings.of_configurations(held_out))
+        with refusals_of("bounds"):
+            bounds = read_bounds(path_argument(bounds, "bounds"))
+    with refusals_of("data"):
+        check_joints(nominal_robot, readings)
+        n = readings.configurations
+        count = _train_count(train, n, readings.source)
+        order = np.random.default_rng(seed).permutation(n)
+        training, held_out = order[:count], order[count:]
+        if not readings.has_reading.any():
+            raise InputError(
+                "there is no reading", parameter="data", where=readings.source, cure="Fill in x, y and z, or distance."
+            )
+        if readings.fixture is None and not readings.has_position.any():
+            raise InputError(
+                "there is no position reading", parameter="data", where=readings.source, cure="Fill in x, y and z."
+            )
+        _check_split(readings.of_configurations(training), readings.of_configurations(held_out))
 
-    progress("checking the data")
-    noticed = notices_of(readings, nominal_robot)
-    readings = without_table_motion(readings)
-    first = readings.of_configurations(training)
-    second = readings.of_configurations(held_out) if len(held_out) else None
-    selection = None
-    if named is None:
-        selection = select(
-            nominal_robot,
-            first,
-            loss=loss,
-            redundancy=redundancy,
-            bounds=bounds,
-            bounds_file=bounds_file,
-            seed=seed,
-            progress=progress,
+        progress("checking the data")
+        noticed = notices_of(readings, nominal_robot)
+        readings = without_table_motion(readings)
+        first = readings.of_configurations(training)
+        second = readings.of_configurations(held_out) if len(held_out) else None
+        selection = None
+        if named is None:
+            selection = select(
+                nominal_robot,
+                first,
+                loss=loss,
+                redundancy=redundancy,
+                bounds=bounds,
+                bounds_file=bounds_file,
+                seed=seed,
+                progress=progress,
+            )
+        chosen: Model = selection.model if named is None and selection is not None else named.also(effects)  # type: ignore[union-attr]
+        progress("placing the nominal robot")
+        nominal = place(nominal_robot, first, loss)
+        progress(f"identifying the {chosen.name} model on {count} configurations")
+        fit = identify(
+            nominal_robot, first, chosen, loss=loss, redundancy=redundancy, bounds=bounds, bounds_file=bounds_file
         )
-    chosen: Model = selection.model if named is None and selection is not None else named.also(effects)  # type: ignore[union-attr]
-    progress("placing the nominal robot")
-    nominal = place(nominal_robot, first, loss)
-    progress(f"identifying the {chosen.name} model on {count} configurations")
-    fit = identify(
-        nominal_robot, first, chosen, loss=loss, redundancy=redundancy, bounds=bounds, bounds_file=bounds_file
-    )
     progress("judging it")
     judged = first if second is None else second
     validation = None if second is None else errors_of(fit.robot, second)
@@ -213,23 +230,12 @@ def calibrate(
         command=call,
         history=history,
         urdf=urdf,
+        inputs=inputs,
         selection=selection,
     )
     if folder is not None:
         calibration.save(folder, progress)
     return calibration
-
-
-def _folder(out: Path, robot: object, data: object, bounds: object) -> Path:
-    """Make sure that results can be written and overwrite nothing that is read, before any long work."""
-    writable_folder(out)
-    inputs = [Path(given) for given in (data, bounds) if isinstance(given, str | Path)]
-    if isinstance(robot, str | Path):
-        source = urdf_source(robot)
-        inputs.append(Path(robot) if source is None else source[0])
-    for name in RESULT_FILES:
-        refuse_overwriting(out / name, inputs)
-    return out
 
 
 def _check_split(training: Dataset, held_out: Dataset) -> None:
@@ -265,23 +271,19 @@ def _check_split(training: Dataset, held_out: Dataset) -> None:
 
 
 def _train_count(train: object, n: int, where: str) -> int:
-    if train == "all":
+    if isinstance(train, str) and train == "all":
         return n
     if n < 2:
         raise InputError(
             "one configuration cannot be split into training and held-out parts",
+            parameter="data",
             where=where,
             cure="Measure more, or use `train=all`.",
         )
     if train is None:
         return round(0.7 * n)
     if isinstance(train, bool) or not isinstance(train, Integral):
-        raise InputError(
-            "a number of configurations belongs here",
-            parameter="train",
-            came=train if isinstance(train, str | float | bool) else kind_of(train),
-            allowed="a whole number, or all",
-        )
+        raise wrong_kind("a number of configurations belongs here", train, "train", "a whole number, or all")
     if not 1 <= int(train) < n:
         raise InputError(
             "the number of training configurations must leave some held out",

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from truearm.errors import InputError
+from truearm.errors import refusals_of
 from truearm.identification.judging.plausibility import check_against
-from truearm.jobs.arguments import data_argument, device_argument, robot_argument
-from truearm.library import is_robot
+from truearm.jobs.arguments import data_argument, device_argument, refuse_swapped, robot_argument
 from truearm.measurement.checks import check_data, check_joints, check_range
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.table_motion import without_table_motion
@@ -38,14 +37,7 @@ def check(
     """
     if data is None:
         robot, data = None, robot
-    if isinstance(data, str | Path) and is_robot(data) and isinstance(robot, str | Path) and not is_robot(robot):
-        raise InputError(
-            "the robot comes first, then the measurements",
-            parameter="robot",
-            came=str(robot),
-            allowed="a library id, a robot file or a URDF",
-            cure=f"Write 'truearm check {data} {robot}'.",
-        )
+    refuse_swapped(robot, data)
     measured = data_argument(data)
     parts = [measured] if measured.references is None else [measured, measured.references]
     if not any(part.has_reading.any() for part in parts):
@@ -62,6 +54,7 @@ def notices_of(data: Dataset, robot: Robot | None = None, device: str | None = N
         ranged = tuple(check_range(data, device_argument(device)))
     if robot is None:
         return (*ranged, *check_data(data))
-    check_joints(robot, data)
+    with refusals_of("data"):
+        check_joints(robot, data)
     against, suspects = check_against(robot, without_table_motion(data))
     return (*ranged, *check_data(data, suspects), *against)

@@ -14,15 +14,16 @@ from truearm.compensation.program_correction import CorrectedPrograms, Correctio
 from truearm.compensation.program_files import edited, language_called, program_files, read_programs
 from truearm.compensation.programs.program import Edit
 from truearm.compensation.split import ProgramSplit, check_tolerance, split_program
-from truearm.errors import InputError
+from truearm.errors import InputError, refusals_of
+from truearm.files import path_argument
 from truearm.jobs.arguments import (
+    command_argument,
     flag_argument,
     folder_for,
-    path_argument,
     paths_argument,
     payload_argument,
+    progress_argument,
     python_call,
-    refusals_of,
     robot_argument,
 )
 from truearm.modeling.parts import Payload
@@ -77,6 +78,7 @@ def compensate(
         If a program cannot be read or was corrected already, the robot is not calibrated, a tool or frame is not
         defined, or with `strict` a target cannot be corrected.
     """
+    progress_argument(progress)
     paths = paths_argument(programs, "programs", "program")
     tool_file = None if tools is None else path_argument(tools, "tools")
     frame_file = None if frames is None else path_argument(frames, "frames")
@@ -86,7 +88,7 @@ def compensate(
         split = finite_number(split, "split")
         check_tolerance(split)
     folder = None if out is None else folder_for((), out)
-    invocation = command or python_call(
+    invocation = command_argument(command) or python_call(
         "compensate",
         robot,
         paths,

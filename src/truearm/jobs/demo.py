@@ -16,7 +16,7 @@ from truearm.compensation.program_correction import commanded
 from truearm.errors import InputError
 from truearm.files import exists, read_bytes, write_files
 from truearm.identification.solving.fit import Status
-from truearm.jobs.arguments import folder_for
+from truearm.jobs.arguments import folder_for, progress_argument
 from truearm.jobs.calibrate import calibrate
 from truearm.jobs.compensate import compensate
 from truearm.library import load_robot
@@ -54,6 +54,7 @@ def demo(out: str | Path = "truearm-demo", *, progress: Callable[[str], None] = 
     InputError
         If the folder holds other measurements or another program: they are not overwritten.
     """
+    progress_argument(progress)
     folder = folder_for((), out)
     rng = np.random.default_rng(20240)
     robot = load_robot("irb120")

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from truearm.jobs.arguments import data_argument, refusals_of
+from truearm.errors import refusals_of
+from truearm.jobs.arguments import data_argument, refuse_swapped
 from truearm.jobs.validate import as_measured
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of
@@ -39,6 +40,7 @@ def distances(
     InputError
         If the robot has no targets, the data name others, or there are positions at one configuration only.
     """
+    refuse_swapped(robot, data)
     readings = data_argument(data)
     predicted = errors_of(as_measured(robot, readings, payload, gravity), readings).position_errors
     seen = readings.has_position

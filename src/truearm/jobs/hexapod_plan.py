@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from truearm.errors import InputError, wrong_kind
-from truearm.files import write_text
+from truearm.errors import InputError, refusals_of, wrong_kind
+from truearm.files import same_place, write_files
 from truearm.jobs.arguments import (
     array_argument,
     file_for,
@@ -17,7 +17,6 @@ from truearm.jobs.arguments import (
     length_argument,
     lengths_argument,
     name_argument,
-    refusals_of,
     robot_argument,
 )
 from truearm.measurement.hexapod.poses import distinct as distinct_poses
@@ -76,7 +75,7 @@ def hexapod_plan(
     only_distinct = flag_argument(distinct, "distinct")
     sheet = None if out is None else file_for(out, robot)
     text = None if steps is None else file_for(steps, robot, parameter="steps")
-    if sheet is not None and sheet == text:
+    if sheet is not None and text is not None and same_place(sheet, text):
         raise InputError("the sheet and the steps must be different files", parameter="steps", came=str(text))
     name = None if tool is None else name_argument(tool, "tool")
     loaded = robot_argument(robot)
@@ -92,15 +91,14 @@ def hexapod_plan(
             branches=wanted_branches,
         )
     plan = HexapodPlan(arm, found)
-    if sheet is not None:
-        write_text(sheet, plan.sheet_text())
-    if text is not None:
-        write_text(text, plan.steps_text())
+    files = {sheet: plan.sheet_text(), text: plan.steps_text()}
+    write_files(Path(), {str(file): content for file, content in files.items() if file is not None})
     return plan
 
 
 def _fixture_argument(fixture: object) -> Transform:
     if isinstance(fixture, Transform):
+        _fixture_argument([*fixture.translation, *fixture.quaternion])
         return fixture
     allowed = "x, y, z and a turn about z, or x, y, z and a quaternion w, x, y, z"
     numbers = array_argument(fixture, "fixture", ("n",), allowed).tolist()

@@ -8,15 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from truearm.errors import InputError
-from truearm.jobs.arguments import (
-    file_for,
-    length_argument,
-    lengths_argument,
-    path_argument,
-    refusals_of,
-    whole_argument,
-)
+from truearm.errors import InputError, refusals_of
+from truearm.files import path_argument
+from truearm.jobs.arguments import file_for, files_of, length_argument, lengths_argument, whole_argument
 from truearm.measurement.hexapod.geometry import DEVICE, Device, side_names, triangle
 from truearm.measurement.hexapod.kinematics import tool_cups
 from truearm.measurement.hexapod.poses import poses
@@ -69,7 +63,8 @@ def hexapod_solve(
                 cure="Use a sheet, or leave it out.",
             )
         return HexapodSolution((_one_pose(pose, legs, base, tool, device),), (), None)
-    path = None if out is None else file_for(out, sheet)
+    inputs = files_of(sheet)
+    path = None if out is None else file_for(out, *inputs)
     if not isinstance(sheet, Sheet):
         with refusals_of("sheet"):
             sheet = read_sheet(path_argument(sheet, "sheet"), device)
@@ -81,6 +76,7 @@ def hexapod_solve(
         tuple(SolvedPose(sheet.labels[r], sheet.designs[r], sheet.solutions[r], cups[r]) for r in measured),
         tuple(label for row, label in enumerate(sheet.labels) if row not in measured),
         data,
+        inputs,
     )
     if path is not None:
         found.save(path)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from truearm.jobs.arguments import whole_argument
+from truearm.jobs.arguments import count_argument, whole_argument
 from truearm.measurement.hexapod.uncertainty import all_solutions, cup_monte_carlo
 from truearm.results.hexapod import HexapodUncertainty
 
@@ -22,7 +22,7 @@ def hexapod_uncertainty(*, trials: int = 100_000, seed: int = 0) -> HexapodUncer
     InputError
         If one of them is no such number.
     """
-    trials, rng = whole_argument(trials, "trials", 2), np.random.default_rng(whole_argument(seed, "seed"))
+    trials, rng = count_argument(trials, "trials", 2), np.random.default_rng(whole_argument(seed, "seed"))
     solutions = all_solutions()
     drawn = tuple(cup_monte_carlo(number, trials, rng) for number in solutions)
     return HexapodUncertainty(tuple(solutions.values()), drawn)

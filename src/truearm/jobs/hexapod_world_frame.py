@@ -9,15 +9,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from truearm.jobs.arguments import (
-    array_argument,
-    length_argument,
-    lengths_argument,
-    name_argument,
-    path_argument,
-    refusals_of,
-    robot_argument,
-)
+from truearm.errors import refusals_of
+from truearm.files import path_argument
+from truearm.jobs.arguments import array_argument, length_argument, lengths_argument, name_argument, robot_argument
 from truearm.measurement.hexapod.geometry import DEVICE, side_names
 from truearm.measurement.hexapod.touches import read_touches
 from truearm.measurement.hexapod.world_frame import world_frame

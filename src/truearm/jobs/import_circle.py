@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from truearm.arrays import finite_number
-from truearm.errors import InputError
+from truearm.errors import InputError, refusals_of
 from truearm.files import write_text
-from truearm.jobs.arguments import deviation_argument, file_for, files_argument, numbers_argument, refusals_of
+from truearm.jobs.arguments import deviation_argument, file_for, files_argument, numbers_argument
 from truearm.measurement.readers.canonical import csv_text
 from truearm.measurement.readers.drawn_circles import Page, read_drawn_circles
 from truearm.results.imported import ImportedCircles

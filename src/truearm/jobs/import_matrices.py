@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from truearm.files import write_text
-from truearm.jobs.arguments import file_for, files_argument, name_argument, path_argument, refusals_of
+from truearm.errors import refusals_of
+from truearm.files import path_argument, write_text
+from truearm.jobs.arguments import file_for, files_argument, name_argument
 from truearm.measurement.readers.canonical import csv_text
 from truearm.measurement.readers.matrices import read_matrices
 from truearm.results.imported import Imported

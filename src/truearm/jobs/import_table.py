@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from truearm.files import write_text
-from truearm.jobs.arguments import file_for, path_argument, refusals_of
+from truearm.errors import refusals_of
+from truearm.files import path_argument, write_text
+from truearm.jobs.arguments import file_for
 from truearm.measurement.readers.canonical import csv_text
 from truearm.measurement.readers.table import files_read, read_table
 from truearm.results.imported import Imported

@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from truearm.errors import InputError, wrong_kind
-from truearm.files import write_text
+from truearm.arrays import axes
+from truearm.errors import InputError, refusals_of, wrong_kind
+from truearm.files import path_argument, write_text
 from truearm.jobs.arguments import (
     array_argument,
     choice_argument,
     file_for,
     gravity_argument,
-    path_argument,
     payload_argument,
-    refusals_of,
     robot_argument,
 )
 from truearm.measurement.readers.poses import read_poses
@@ -97,8 +96,8 @@ def inverse(
         )
     near = None
     if seed is not None:
-        many = isinstance(seed, Sequence) or getattr(seed, "ndim", 1) == 1
-        shape = (len(arm.joints),) if many else (len(positions), len(arm.joints))
+        one = axes(seed) != 2
+        shape = (len(arm.joints),) if one else (len(positions), len(arm.joints))
         near = array_argument(seed, "seed", shape, f"{len(arm.joints)} numbers, one for each joint of {arm.name}")
     with refusals_of("robot"):
         solutions = inverse_kinematics(

@@ -8,15 +8,16 @@ from pathlib import Path
 import numpy as np
 
 from truearm.compensation.inverse_errors import design, fake_targets
-from truearm.errors import InputError
+from truearm.errors import InputError, refusals_of
+from truearm.files import path_argument
 from truearm.identification.solving.fit import place
 from truearm.jobs.arguments import (
+    count_argument,
     data_argument,
     file_for,
+    files_of,
     length_argument,
     lengths_argument,
-    path_argument,
-    refusals_of,
     robot_argument,
     whole_argument,
 )
@@ -72,11 +73,12 @@ def lines(
         If the robot cannot go to a pose, joint errors or data are of another robot, or both truth and data are given.
     """
     middle, sides = lengths_argument(centre, "centre", 3), lengths_argument(size, "size", 3)
-    scatter, repeats = length_argument(noise, "noise", 0.0), whole_argument(repeats, "repeats", 1)
+    scatter, repeats = length_argument(noise, "noise", 0.0), count_argument(repeats, "repeats")
     seed = whole_argument(seed, "seed")
     if truth is not None and data is not None:
         raise InputError("only one of them can be compared", parameter="truth, data", cure="Leave one out.")
-    path = None if out is None else file_for(out, robot, joint_errors, truth, data)
+    inputs = files_of(robot, joint_errors, truth, data)
+    path = None if out is None else file_for(out, *inputs)
     nominal = robot_argument(robot)
     errors = None if joint_errors is None else robot_argument(joint_errors, "joint_errors")
     with refusals_of("size"):
@@ -101,7 +103,7 @@ def lines(
         with refusals_of("data"):
             check_joints(nominal, measured)
             before = from_data(poses, _placed(nominal, errors, measured), measured)
-    found = LineTest(nominal, poses, commanded, errors is not None, before, after)
+    found = LineTest(nominal, poses, commanded, errors is not None, before, after, inputs)
     if path is not None:
         found.save(path)
     return found

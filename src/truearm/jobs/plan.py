@@ -4,23 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Final, Literal
+from typing import Literal
 
 import numpy as np
 
-from truearm.errors import InputError, kind_of
+from truearm.errors import InputError, kind_of, refusals_of
+from truearm.files import path_argument
 from truearm.identification.solving.models import MODELS
 from truearm.jobs.arguments import (
     choice_argument,
+    command_argument,
+    count_argument,
     data_argument,
     deviation_argument,
     device_argument,
     file_for,
+    files_of,
     gravity_argument,
-    path_argument,
     payload_argument,
+    progress_argument,
     python_call,
-    refusals_of,
     robot_argument,
     whole_argument,
 )
@@ -36,9 +39,7 @@ from truearm.planning.choosing.measurement_plan import (
 )
 from truearm.planning.choosing.observability import INDICES
 from truearm.planning.constraints.constraints import Constraints, read_constraints
-from truearm.results.plan import Plan
-
-_PAGE: Final = ".html"
+from truearm.results.plan import PAGE, Plan
 
 
 def plan(
@@ -99,7 +100,25 @@ def plan(
     InputError
         For anything that cannot be used, with a message that says what to do.
     """
-    call = command or python_call(
+    progress_argument(progress)
+    table = None if out is None else _files(out, robot, candidates_from, constraints)
+    count = _count(poses)
+    choice_argument(objective, "objective", {name: name for name in INDICES})
+    wanted = choice_argument(model, "model", {m.name: m for m in MODELS})
+    deviation = deviation_argument(noise, "noise")
+    number = count_argument(candidates, "candidates")
+    rng = np.random.default_rng(whole_argument(seed, "seed"))
+    if device is not None and candidates_from is not None:
+        raise InputError(
+            "a device finds its own configurations to choose from",
+            parameter="device, candidates_from",
+            came=f"{device} and {_named(candidates_from)}",
+            cure="Leave one of them out; `constraints` narrows the choice.",
+        )
+    instrument = None if device is None else device_argument(device)
+    rules = _rules(constraints)
+    carried, fall = payload_argument(payload), gravity_argument(gravity)
+    call = command_argument(command) or python_call(
         "plan",
         robot,
         poses=poses,
@@ -111,27 +130,11 @@ def plan(
         constraints=constraints,
         noise=noise,
         seed=seed,
-        payload=payload,
-        gravity=gravity,
+        payload=carried,
+        gravity=fall,
     )
-    table = None if out is None else _files(out, robot, candidates_from, constraints)
-    count = _count(poses)
-    choice_argument(objective, "objective", {name: name for name in INDICES})
-    wanted = choice_argument(model, "model", {m.name: m for m in MODELS})
-    deviation = deviation_argument(noise, "noise")
-    number = whole_argument(candidates, "candidates", 1)
-    rng = np.random.default_rng(whole_argument(seed, "seed"))
-    if device is not None and candidates_from is not None:
-        raise InputError(
-            "a device finds its own configurations to choose from",
-            parameter="device, candidates_from",
-            came=f"{device} and {_named(candidates_from)}",
-            cure="Leave one of them out; `constraints` narrows the choice.",
-        )
-    instrument = None if device is None else device_argument(device)
-    rules = _rules(constraints)
     progress("reading the robot")
-    carrying = robot_argument(robot).with_payload(payload_argument(payload), gravity_argument(gravity))
+    carrying = robot_argument(robot).with_payload(carried, fall)
     labels, readings, own = None, None, bool(carrying.targets)
     if instrument is not None:
         seen, readings, choice = device_candidates(carrying, instrument, number, rng)
@@ -141,7 +144,8 @@ def plan(
         choice = random_candidates(seen, number, rng)
     else:
         data = data_argument(candidates_from, "candidates_from")
-        check_joints(carrying, data)
+        with refusals_of("candidates_from"):
+            check_joints(carrying, data)
         seen, choice, labels = with_targets(carrying, data), data.postures, data.labels
         own = own or bool(data.has_position.any())
     progress(f"choosing among {len(choice)} configurations")
@@ -159,7 +163,7 @@ def plan(
         seen_from_the_origin=own,
         readings=readings,
     )
-    planned = Plan(made, call)
+    planned = Plan(made, call, files_of(robot, candidates_from, constraints))
     if table is not None:
         progress("writing the files")
         planned.save(table)
@@ -169,9 +173,9 @@ def plan(
 def _files(out: object, *read: object) -> Path:
     """Return where the plan shall be written, with room for its page beside it."""
     table = file_for(out, *read)
-    if table.suffix == _PAGE:
+    if table.suffix == PAGE:
         raise InputError("the plan is a CSV file", parameter="out", came=table.name, allowed="PLAN.csv")
-    file_for(table.with_suffix(_PAGE), *read)
+    file_for(table.with_suffix(PAGE), *read)
     return table
 
 
@@ -183,13 +187,13 @@ def _rules(constraints: object) -> Constraints | None:
 
 
 def _count(poses: object) -> int | None:
-    if poses == "auto":
-        return None
     if isinstance(poses, str):
+        if poses == "auto":
+            return None
         raise InputError(
             "a number of poses belongs here", parameter="poses", came=poses, allowed="a whole number, or auto"
         )
-    return whole_argument(poses, "poses", 1)
+    return count_argument(poses, "poses")
 
 
 def _named(data: object) -> str:

@@ -7,7 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from truearm.compensation.program_files import restored
-from truearm.jobs.arguments import folder_for, paths_argument, refusals_of
+from truearm.errors import refusals_of
+from truearm.jobs.arguments import folder_for, paths_argument
 from truearm.results.restored_programs import RestoredPrograms
 
 

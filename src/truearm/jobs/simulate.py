@@ -9,16 +9,16 @@ from pathlib import Path
 import numpy as np
 
 from truearm.arrays import finite_number
-from truearm.errors import InputError, wrong_kind
-from truearm.files import write_text
+from truearm.errors import InputError, refusals_of, wrong_kind
+from truearm.files import path_argument, write_text
 from truearm.jobs.arguments import (
+    count_argument,
     deviation_argument,
     device_argument,
     file_for,
     gravity_argument,
-    path_argument,
     payload_argument,
-    refusals_of,
+    progress_argument,
     robot_argument,
     whole_argument,
 )
@@ -77,13 +77,14 @@ def simulate(
     InputError
         For anything that cannot be used, with a message that says what to do.
     """
+    progress_argument(progress)
     if noise is None and device is None:
         raise InputError("no noise is given", parameter="noise", cure="Give `noise`, or a `device`.")
     instrument = None if device is None else device_argument(device)
     sigma = 0.0 if instrument is None else instrument.sigma
     if noise is not None:
         sigma = deviation_argument(noise, "noise") if finite_number(noise, "noise", lowest=0.0) else 0.0
-    count = whole_argument(poses, "poses", 1)
+    count = count_argument(poses, "poses")
     if not isinstance(truth, Robot):
         if not isinstance(truth, str | Path):
             raise wrong_kind("a truth belongs here", truth, "truth", "nominal, random, a truth's name, or a robot")

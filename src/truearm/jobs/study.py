@@ -6,7 +6,16 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from truearm.jobs.arguments import choice_argument, folder_for, path_argument, python_call, refusals_of, whole_argument
+from truearm.errors import refusals_of
+from truearm.files import path_argument
+from truearm.jobs.arguments import (
+    choice_argument,
+    command_argument,
+    count_argument,
+    folder_for,
+    progress_argument,
+    python_call,
+)
 from truearm.studies import STUDIES, run_study
 from truearm.studies.study import Study
 
@@ -42,11 +51,12 @@ def study(
     InputError
         If there is no such study, or its data are missing, or it needs none.
     """
+    progress_argument(progress)
     choice_argument(name, "name", {entry.name: entry for entry in STUDIES}, "study")
-    seeds = whole_argument(seeds, "seeds", 1)
+    seeds = count_argument(seeds, "seeds")
     source = None if data is None else path_argument(data, "data")
     folder = None if out is None else folder_for((), out)
-    invocation = command or python_call("study", name, seeds=seeds, data=data)
+    invocation = command_argument(command) or python_call("study", name, seeds=seeds, data=data)
     with refusals_of("data"):
         finished = replace(run_study(name, seeds, source, progress), command=invocation)
     if folder is not None:

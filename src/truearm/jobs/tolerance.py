@@ -9,7 +9,8 @@ from typing import Final
 import numpy as np
 
 from truearm.compensation.inverse_errors import CONVENTION, design
-from truearm.jobs.arguments import lengths_argument, refusals_of, robot_argument
+from truearm.errors import refusals_of
+from truearm.jobs.arguments import lengths_argument, robot_argument
 from truearm.modeling.conversion import converted
 from truearm.modeling.robot import Robot
 from truearm.results.tolerances import AllowedErrors, UsedTolerances

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from truearm.errors import InputError
-from truearm.jobs.arguments import data_argument, gravity_argument, payload_argument, robot_argument
+from truearm.errors import InputError, refusals_of
+from truearm.jobs.arguments import data_argument, gravity_argument, payload_argument, refuse_swapped, robot_argument
 from truearm.measurement.checks import check_joints
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of
@@ -39,12 +39,14 @@ def validate(
     InputError
         If the robot has no targets, or the data name others.
     """
+    refuse_swapped(robot, data)
     data = data_argument(data)
     robot = as_measured(robot, data, payload, gravity)
     identified = {p.group for p in robot.parameters.values() if p.deviation is not None}
     if data.anchored and robot.fixtures and identified and "base" not in identified:
         raise InputError(
             "the robot was calibrated without the frame of an instrument, so the place of this instrument is unknown",
+            parameter="data",
             where=data.source,
             cure="Place it first: calibrate the calibrated robot with `model=frames`, or compare distances with "
             "'truearm distances'.",
@@ -58,21 +60,27 @@ def as_measured(robot: object, data: Dataset, payload: object, gravity: object) 
     if not robot.targets:
         raise InputError(
             "the robot has no targets, so its positions cannot be compared with the readings",
+            parameter="robot",
             where=robot.name,
             cure="Use the calibrated.yaml that 'truearm calibrate' wrote: it holds base and targets.",
         )
-    check_joints(robot, data)
+    with refusals_of("data"):
+        check_joints(robot, data)
     robot = robot.with_payload(payload_argument(payload), gravity_argument(gravity))
     if data.temperature is None and any(effect.warmed for effect in robot.effects):
         raise InputError(
             "the robot was calibrated with its temperature, and the data hold no temperature",
+            parameter="data",
             where=data.source,
             cure="Add the column temperature [degC].",
         )
-    for name in data.targets:
-        robot.target(name)
-    for name in data.fixtures:
-        robot.fixture(name)
+    with refusals_of("data"):
+        for name in data.targets:
+            robot.target(name)
+        for name in data.fixtures:
+            robot.fixture(name)
     if not data.has_reading.any():
-        raise InputError("there is no reading", where=data.source, cure="Fill in x, y and z, or distance.")
+        raise InputError(
+            "there is no reading", parameter="data", where=data.source, cure="Fill in x, y and z, or distance."
+        )
     return robot

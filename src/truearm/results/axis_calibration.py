@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from truearm.errors import InputError
-from truearm.files import writable_folder, write_files
+from truearm.files import output_folder, write_files
 from truearm.identification.axes.analysis import TABLES, AxisAnalysis
 from truearm.identification.axes.circles import AxisCircle
 from truearm.identification.axes.fit import NORMAL_95, AxisFit
@@ -39,9 +39,12 @@ class AxisCalibration(Record):
     ----------
     analysis
         Circles, axes and the fits of the robot's parameters.
+    inputs
+        The files that were read: none of them is overwritten.
     """
 
     analysis: AxisAnalysis
+    inputs: tuple[Path, ...] = ()
 
     @property
     def robot(self) -> Robot:
@@ -113,7 +116,7 @@ class AxisCalibration(Record):
         -------
         The files written.
         """
-        folder = writable_folder(Path(folder))
+        folder = output_folder(folder, AXIS_FILES, self.inputs)
         files = {
             "calibrated.yaml": robot_text(self.robot),
             "joint-errors.yaml": robot_text(self.robot_with_errors),

@@ -13,14 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.errors import InputError, did_you_mean
-from truearm.files import writable_folder, write_files
+from truearm.files import output_folder, write_files
 from truearm.identification.choosing.selection import Selection
 from truearm.identification.solving.fit import Fit, Status
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import Errors
 from truearm.modeling.formats.robot_file import robot_text
 from truearm.modeling.robot import Robot
-from truearm.notices import Notice
+from truearm.notices import Notice, counted
 from truearm.results.record import Record, notice_lines
 from truearm.results.residuals import Part, Residuals, residuals_of
 from truearm.results.summaries import error_line, errors_summary, selection_summary
@@ -59,6 +59,8 @@ class Calibration(Record):
         The user's own URDF, if that is where the robot came from.
     selection
         How the model was chosen; None if it was named.
+    inputs
+        The files that were read: none of them is overwritten.
     """
 
     fit: Fit
@@ -73,6 +75,7 @@ class Calibration(Record):
     history: str
     urdf: bytes | None = None
     selection: Selection | None = None
+    inputs: tuple[Path, ...] = ()
 
     @cached_property
     def robot(self) -> Robot:
@@ -115,12 +118,12 @@ class Calibration(Record):
         """Return the figures people look for, the held-out error first."""
         text = []
         if self.validation is not None:
-            text.append(f"On {self.validation.configurations} configurations the fit has not seen:")
+            text.append(f"On {counted(self.validation.configurations, 'configuration')} the fit has not seen:")
             text.append(f"  nominal     {error_line(self.nominal)}")
             text.append(f"  calibrated  {error_line(self.validation)}")
-            text.append(f"On the {self.train.configurations} training configurations:")
+            text.append(f"On the {counted(self.train.configurations, 'training configuration')}:")
         else:
-            text.append(f"Nothing was held out; on the {self.train.configurations} training configurations:")
+            text.append(f"Nothing was held out; on the {counted(self.train.configurations, 'training configuration')}:")
             text.append(f"  nominal     {error_line(self.nominal)}")
         text.append(f"  calibrated  {error_line(self.train)}")
         if self.selection is not None:
@@ -210,7 +213,7 @@ class Calibration(Record):
         from truearm.modeling.formats.urdf_writing import urdf_text
         from truearm.reporting.report import report_html
 
-        folder = writable_folder(Path(folder))
+        folder = output_folder(folder, RESULT_FILES, self.inputs)
         progress("drawing the report")
         urdf = calibrated_urdf(self.urdf, self.robot)[0] if self.urdf else urdf_text(self.robot)[0]
         files: dict[str, str | bytes] = {

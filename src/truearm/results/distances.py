@@ -53,7 +53,7 @@ class Distances(Record):
         """Return the statistics and a histogram."""
         found, edges = self.errors, self._edges()
         text = [
-            f"{counted(found.pairs, 'distance')} between points of {self.configurations} configurations of "
+            f"{counted(found.pairs, 'distance')} between points of {counted(self.configurations, 'configuration')} of "
             f"{self.source}:",
             f"  mean {found.mean * 1e3:.3f}  deviation {found.deviation * 1e3:.3f}  max {found.maximum * 1e3:.3f} mm",
             f"  {100 * found.positive:.0f} % of the predicted distances are too long",

@@ -8,7 +8,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from truearm.files import write_text
+from truearm.errors import InputError
+from truearm.files import output_file, write_text
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.hexapod.geometry import Design, side_names
 from truearm.measurement.hexapod.poses import HexapodPose
@@ -137,11 +138,14 @@ class HexapodSolution(Record):
         Labels of the configurations of which a leg is missing.
     data
         The cups as measurements of the robot; None without joint positions.
+    inputs
+        The files that were read: none of them is overwritten.
     """
 
     poses: tuple[SolvedPose, ...]
     left_out: tuple[str, ...]
     data: Dataset | None
+    inputs: tuple[Path, ...] = ()
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it, in mm."""
@@ -168,11 +172,11 @@ class HexapodSolution(Record):
             text.append(f"Left out, not all legs measured: {', '.join(self.left_out)}")
         return text
 
-    def save(self, path: str | Path) -> None:
+    def save(self, file: str | Path) -> None:
         """Write the cups as a canonical CSV file, for ``truearm.calibrate``."""
         if self.data is None:
-            raise ValueError("there are no joint positions, so this is no data")
-        write_text(Path(path), csv_text(self.data))
+            raise InputError("there are no joint positions, so this is no data", parameter="file")
+        write_text(output_file(file, self.inputs), csv_text(self.data))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from truearm.files import write_text
+from truearm.files import output_file, write_text
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.planning.poses.seven_lines import DIRECTIONS, SevenLines
@@ -33,6 +33,8 @@ class LineTest(Record):
         Errors without compensation; None where nothing was measured and no truth was named.
     after
         Errors with compensation; None where it was not tried.
+    inputs
+        The files that were read: none of them is overwritten.
     """
 
     robot: Robot
@@ -41,6 +43,7 @@ class LineTest(Record):
     compensated: bool
     before: LineErrors | None
     after: LineErrors | None
+    inputs: tuple[Path, ...] = ()
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it, in mm."""
@@ -71,9 +74,9 @@ class LineTest(Record):
         ]
         return "\n".join(",".join(row) for row in [heading, *rows]) + "\n"
 
-    def save(self, path: str | Path) -> None:
+    def save(self, file: str | Path) -> None:
         """Write the plan as a CSV file."""
-        write_text(Path(path), self.csv_text())
+        write_text(output_file(file, self.inputs), self.csv_text())
 
     def _errors(self) -> list[dict[str, Any]]:
         if self.before is None:

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
-from truearm.files import write_files
+from truearm.errors import InputError
+from truearm.files import output_file, write_files
 from truearm.modeling.chain import Array
 from truearm.planning.choosing.measurement_plan import MeasurementPlan
 from truearm.planning.choosing.plan_table import plan_csv
 from truearm.results.record import Record
+
+#: What the page beside a plan ends with.
+PAGE: Final = ".html"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -23,10 +27,13 @@ class Plan(Record):
         What was chosen, among what, and how accurate the calibration will be.
     command
         How to run it again.
+    inputs
+        The files that were read: none of them is overwritten.
     """
 
     made: MeasurementPlan
     command: str
+    inputs: tuple[Path, ...] = ()
 
     @property
     def joints(self) -> Array:
@@ -98,7 +105,9 @@ class Plan(Record):
         """
         from truearm.reporting.plan_report import plan_html
 
-        table = Path(file)
-        page = table.with_suffix(".html")
+        table = output_file(file, self.inputs)
+        if table.suffix == PAGE:
+            raise InputError("the plan is a CSV file", parameter="file", came=table.name, allowed="PLAN.csv")
+        page = output_file(table.with_suffix(PAGE), self.inputs)
         write_files(table.parent, {table.name: plan_csv(self.made), page.name: plan_html(self)})
         return table, page

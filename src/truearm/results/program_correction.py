@@ -17,7 +17,7 @@ from truearm.compensation.program_correction import CorrectedPrograms, Correctio
 from truearm.compensation.program_files import ProgramFile, language_called, recorded, write_programs
 from truearm.compensation.programs.program import Program, Skipped, Source
 from truearm.compensation.split import ProgramSplit
-from truearm.files import writable_folder
+from truearm.files import output_folder
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
@@ -246,7 +246,7 @@ class ProgramCorrection(Record):
         """
         from truearm.reporting.program_report import program_html
 
-        folder = writable_folder(Path(folder))
+        folder = output_folder(folder)
         progress("drawing the report")
         files: dict[str, str | bytes] = {}
         for one in self.files:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from truearm.compensation.program_files import ProgramFile, write_programs
-from truearm.files import writable_folder
+from truearm.files import output_folder
 from truearm.results.record import Record
 
 
@@ -51,6 +51,6 @@ class RestoredPrograms(Record):
         InputError
             If a file would be overwritten that was read, or that truearm has not written.
         """
-        folder = writable_folder(Path(folder))
+        folder = output_folder(folder)
         write_programs(folder, [file.path for file in self.files], {file.name: file.original for file in self.files})
         return tuple(folder / file.name for file in self.files)

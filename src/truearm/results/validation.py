@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from truearm.measurement.statistics import Errors, Spread
+from truearm.notices import counted
 from truearm.results.record import Record
 from truearm.results.summaries import error_line, errors_summary
 
@@ -46,4 +47,7 @@ class Validation(Record):
 
     def lines(self) -> list[str]:
         """Return what the command prints."""
-        return [f"On {self.errors.configurations} configurations of {self.source}:", f"  {error_line(self.errors)}"]
+        return [
+            f"On {counted(self.errors.configurations, 'configuration')} of {self.source}:",
+            f"  {error_line(self.errors)}",
+        ]

@@ -9,7 +9,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any, Literal
 
-from truearm.files import write_files
+from truearm.files import output_folder, write_files
 from truearm.reporting.drawing import Figure
 from truearm.reporting.page import page
 from truearm.results.record import Record
@@ -212,7 +212,7 @@ class Study(Record):
         -------
         The files written.
         """
-        folder = Path(folder)
+        folder = output_folder(folder)
         text = json.dumps(self.summary(), indent=2, allow_nan=False) + "\n"
         write_files(folder, dict(zip(STUDY_FILES, (self.html(), text), strict=True)))
         return tuple(folder / name for name in STUDY_FILES)

@@ -78,7 +78,10 @@ def bound_vectors(
             low[i], high[i] = max(low[i], to_si(lowest, unit)), min(high[i], to_si(highest, unit))
     for i in np.flatnonzero(low > high).tolist():
         raise InputError(
-            "the bounds leave no value", where=f"{where}, {free.names[i]}", cure="The lower one must not be higher."
+            "the bounds leave no value",
+            parameter="bounds",
+            where=f"{where}, {free.names[i]}",
+            cure="The lower one must not be higher.",
         )
     return low, high
 
@@ -91,6 +94,7 @@ def _places(name: str, free: FreeParameters, others: Iterable[Parameter], where:
     near = nearest_names(name, known)
     raise InputError(
         "no free parameter of this model has this name",
+        parameter="bounds",
         where=where,
         came=name,
         allowed=", ".join(known),

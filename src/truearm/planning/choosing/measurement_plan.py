@@ -213,7 +213,9 @@ def plan_measurements(
     kept = allowed(seen, candidates, constraints, where, seen_from_the_origin=seen_from_the_origin)
     rejected = {name: int(np.sum(~keeps)) for name, keeps in kept.items()}
     usable = np.flatnonzero(np.all(list(kept.values()), axis=0))
-    _refuse_too_few(FIRST if poses is None else poses, len(usable), len(candidates), rejected)
+    given = "candidates" if labels is None else "candidates_from"
+    count = FIRST if poses is None else poses
+    _refuse_too_few(count, len(usable), len(candidates), rejected, given)
     if readings is None:
         free = model.free(seen)
         gauge: tuple[str, ...] = ()
@@ -222,14 +224,26 @@ def plan_measurements(
         seen = with_fixtures_of(seen, readings)
         free, gauge = unanchored(model.free(seen), readings), gauge_freedoms(readings)
         derivatives = sensitivity_of_readings(seen, readings.of_configurations(usable), free, noise)
-    among = derivatives.identifiable(FIRST if poses is None else poses)
+    among = derivatives.identifiable(count)
     rows, known = np.ascontiguousarray(derivatives.rows[..., among]), derivatives.known[np.ix_(among, among)]
-    if poses is not None and poses * rows.shape[1] < len(among):
+    if not len(among):
+        raise InputError(
+            "with so much noise nothing can be identified",
+            parameter="noise",
+            came=f"{noise:g} m",
+            cure="Lower `noise`.",
+        )
+    elsewhere = random_candidates(seen, _PREDICTED_CONFIGURATIONS, rng)
+    predicted = sensitivity(seen, elsewhere, free, noise, gauge)
+    needed = len(among)
+    if readings is None:  # few candidates show less than there is to identify
+        needed = max(needed, len(predicted.identifiable(count)))
+    if poses is not None and poses * rows.shape[1] < needed:
         raise InputError(
             "there are fewer equations than parameters",
             parameter="poses",
             came=poses,
-            allowed=f"{-(-len(among) // rows.shape[1])} or more for the model {model.name}, or auto",
+            allowed=f"{-(-needed // rows.shape[1])} or more for the model {model.name}, or auto",
         )
     started = time.process_time()
     found = (
@@ -242,8 +256,6 @@ def plan_measurements(
     order = order[short_order(candidates.joints[usable[order]])]
     chosen = usable[order]
     joints = candidates.joints[chosen]
-    elsewhere = random_candidates(seen, _PREDICTED_CONFIGURATIONS, rng)
-    predicted = sensitivity(seen, elsewhere, free, noise, gauge)
     chosen_rows = rows[order].reshape(-1, len(among))
     at_fixtures = {}
     for fixture in seen.fixtures if readings is not None else ():
@@ -290,14 +302,14 @@ def _before(robot: Robot, joints: Array) -> Array:
     return np.asarray(np.maximum(joints - [APPROACH[joint.kind] for joint in robot.joints], low))
 
 
-def _refuse_too_few(needed: int, usable: int, candidates: int, rejected: Mapping[str, int]) -> None:
+def _refuse_too_few(needed: int, usable: int, candidates: int, rejected: Mapping[str, int], given: str) -> None:
     if needed < 1:
         raise InputError("at least one pose is needed", parameter="poses", came=needed, allowed="1 or more, or auto")
     if usable < needed:
         cost = ", ".join(f"{name} {count}" for name, count in rejected.items() if count)
         raise InputError(
             "too few configurations are left to choose from",
-            parameter="candidates",
+            parameter=given,
             came=f"{usable} of {candidates} usable" + (f"; rejected by {cost}" if cost else ""),
             allowed=f"{needed} or more",
             cure="Widen the constraint that costs most, or give more candidates." if cost else "Give more candidates.",

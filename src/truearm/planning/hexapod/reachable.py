@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.errors import InputError
+from truearm.errors import InputError, did_you_mean
 from truearm.measurement.hexapod.geometry import DEVICE, SIDES, Device, triangle
 from truearm.measurement.hexapod.poses import HexapodPose
 from truearm.measurement.hexapod.sheet import PlannedRow
@@ -94,7 +94,13 @@ def reachable(
     """
     for begin in branches:
         if not any(branch.startswith(begin) for branch in BRANCHES):
-            raise InputError("there is no such branch", parameter="branches", came=begin, allowed=", ".join(BRANCHES))
+            raise InputError(
+                "there is no such branch",
+                parameter="branches",
+                came=begin,
+                allowed=", ".join(BRANCHES),
+                cure=did_you_mean(begin, [*BRANCHES, *(name.split("-")[0] for name in BRANCHES)]),
+            )
     turned = fixture.rotation
     position = np.array([turned @ pose.position for pose in wanted]) + np.array(fixture.translation)
     rotation = np.array([turned @ pose.rotation for pose in wanted])
@@ -117,7 +123,7 @@ def reachable(
     if not kept.any():
         raise InputError(
             f"{robot.name} can reach none of the {len(wanted)} poses with the fixture at this place",
-            parameter="fixture",
+            parameter="fixture" if arm_radius == ARM_RADIUS else "fixture, arm_radius",
             came=", ".join(f"{count} {reason}" for reason, count in left_out.items()),
             cure="Move the fixture; it is given in the robot's base frame.",
         )

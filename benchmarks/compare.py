@@ -289,7 +289,7 @@ the cache takes {fill}. truearm takes {bound:.2g} times the former. What is betw
 operands of a few kilobytes: about half of it is their fixed cost (the time for one configuration), the other half
 arithmetic whose every operand passes through the cache. A compiled kernel that keeps a configuration's frame in
 registers would avoid most of both; NumPy alone cannot. At 100 000 configurations most of the time goes to the operating
-system, which hands out the memory of the Jacobian page by page; sweeping in portions into an array that is used
+system, which hands out the memory of the Jacobian page by page; computing in portions into an array that is used
 again avoids that.
 
 ## Geometric fit of the IRB 120: 50 configurations, 3 targets, position
@@ -298,8 +298,8 @@ again avoids that.
 |---|---|---|---|
 {nl.join(fits)}
 
-Most of what the solver takes is the fixed cost of NumPy calls again: it sweeps the three targets one after the
-other, though they share all but their last three slides.
+Most of what the solver takes is the fixed cost of NumPy calls again: it computes the forward kinematics of the three
+targets one after the other, though they share all but their last three slides.
 
 Medians over five campaigns. FIGAROH's fit starts at its own closed-form frames, as truearm's solver does at its
 own; its evaluation and report are in no figure. Simulated: true robots drawn from the priors, 0.05 mm noise, judged

@@ -18,6 +18,15 @@ def measured_data() -> Path:
     return folder
 
 
+#: Files whose tests, or what they share, take seconds each: begun first, no process is left alone with them at the end.
+SLOW = ("tests/test_documents.py", "tests/test_measured.py", "tests/simulation/devices/", "tests/studies/")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put the slow files first; the order within a file stays, as what its tests share is made once."""
+    items.sort(key=lambda item: not item.nodeid.startswith(SLOW))
+
+
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """Say loudly that tests on measured data did not run: without them no figure on a real robot was checked."""
     skipped = [r for r in terminalreporter.stats.get("skipped", []) if "no measured data" in str(r.longrepr)]

@@ -5,15 +5,26 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from numbers import Real
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truearm.errors import InputError, wrong_kind
+from truearm.units import accepted_range
+
+#: No number that is meant is larger: the limit of every file holds for arrays too [SI].
+LARGEST: Final = accepted_range("1")[1]
 
 
 def number_array(
-    given: object, parameter: str, shape: tuple[int | str, ...], *, missing: bool = False, allowed: str | None = None
+    given: object,
+    parameter: str,
+    shape: tuple[int | str, ...],
+    *,
+    missing: bool = False,
+    allowed: str | None = None,
+    largest: float = LARGEST,
 ) -> NDArray[np.float64]:
     """Return numbers as an array of floats, refusing what has another shape or holds anything else.
 
@@ -22,17 +33,23 @@ def number_array(
     shape
         Length of each axis; a letter for one that may have any length.
     missing
-        Whether NaN may stand for numbers that are missing.
+        Whether NaN may stand for numbers that are missing; what an array masks is missing.
     allowed
         What belongs here, for the message; numbers of that shape if None.
+    largest
+        Size that no number may exceed.
     """
     allowed = allowed or f"numbers, {shape_text(shape)}"
     try:
-        values = np.asarray(given)
+        values = _without_mask(given)
     except (ValueError, TypeError):
         raise InputError("the rows are not of one length", parameter=parameter, allowed=allowed) from None
     if values.dtype.kind not in "iuf":
         raise wrong_kind("numbers belong here", given, parameter, allowed)
+    if isinstance(values, np.ma.MaskedArray):
+        if not missing:
+            raise InputError("masked numbers cannot be used here", parameter=parameter, allowed=allowed)
+        values = np.ma.filled(values.astype(float), np.nan)
     fits = values.ndim == len(shape) and all(
         isinstance(length, str) or length == there for length, there in zip(shape, values.shape, strict=True)
     )
@@ -41,9 +58,18 @@ def number_array(
             "the array has the wrong shape", parameter=parameter, came=shape_text(values.shape), allowed=allowed
         )
     numbers = np.asarray(values, float)
-    wrong = np.isinf(numbers) if missing else ~np.isfinite(numbers)
+    size = np.abs(numbers)
+    wrong = size > largest if missing else ~(size <= largest)
     if wrong.any():
         place = tuple(np.argwhere(wrong)[0].tolist())
+        if np.isfinite(numbers[place]):
+            raise InputError(
+                "the number is too large to be plausible",
+                parameter=parameter,
+                came=f"{numbers[place]:g}{f' at {list(place)}' if place else ''}",
+                allowed=f"{-largest:g} to {largest:g}, in SI units",
+                cure="Correct the number, or its unit.",
+            )
         raise InputError(
             "infinity cannot be used here" if missing else "NaN and infinity cannot be used here",
             parameter=parameter,
@@ -51,6 +77,15 @@ def number_array(
             allowed="finite numbers, NaN where one is missing" if missing else "finite numbers",
         )
     return numbers
+
+
+def _without_mask(given: object) -> NDArray[np.generic]:
+    """Return an array, without its mask if that hides nothing."""
+    rows = given if isinstance(given, list | tuple) else [given]
+    if not any(isinstance(row, np.ma.MaskedArray) for row in rows):
+        return np.asarray(given)
+    found: np.ma.MaskedArray[tuple[int, ...], np.dtype[np.generic]] = np.ma.array(given)
+    return found if np.ma.is_masked(found) else np.asarray(found.data)
 
 
 def axes(given: object) -> int:

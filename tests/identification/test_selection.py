@@ -117,7 +117,7 @@ def test_what_needs_loads_is_not_tried_on_an_arm_that_nothing_loads() -> None:
 
 def test_every_selectable_effect_is_tried_where_the_data_tell_it() -> None:
     geared = replace(arm(), joints=tuple(replace(joint, transmission_periods=100) for joint in arm().joints))
-    data = seen(twin_of(), 40, 13, warming=5.0)
+    data = seen(twin_of(), 16, 13, warming=5.0)
     for robot, left_out in ((geared, set[str]()), (arm(), {"transmission-error"})):
         first = {attempt.effect for attempt in select(robot, data).attempts if attempt.round == 1}
         assert first == {effect.name for effect in EFFECTS if effect.selectable} - {"compliance"} - left_out

@@ -132,6 +132,7 @@ def test_arrays_can_be_calibrated() -> None:
         ("positions", {"positions": positions()[:, :, :2]}),
         ("positions", {"positions": positions()[:, 0, 0]}),
         ("positions", {"positions": np.full((N, 3), INFINITY)}),
+        ("positions", {"positions": np.zeros((N, 0, 3))}),
         ("positions", {"positions": [[0.0] * 3, [0.0] * 2]}),
         ("positions", {"positions": None}),
         ("targets", {"targets": ["a"]}),
@@ -162,6 +163,79 @@ def test_arrays_can_be_calibrated() -> None:
 )
 def test_arrays_that_do_not_fit_are_refused(parameter: str, changed: dict[str, Any]) -> None:
     refused(parameter, Dataset.of, **{"joints": joints(), "positions": positions()} | changed)
+
+
+def test_masked_positions_and_quaternions_are_missing() -> None:
+    p, turned = positions(), np.tile([1.0, 0.0, 0.0, 0.0], (N, 2, 1))
+    hidden = np.zeros(p.shape, dtype=bool)
+    hidden[1, 0, 2] = True
+    masked: list[Any] = [
+        np.ma.array(p, mask=hidden),
+        [np.ma.array(row, mask=off) for row, off in zip(p, hidden, strict=True)],
+    ]
+    expected = np.where(hidden.any(axis=2, keepdims=True), NAN, p).reshape(-1, 3)
+    for given in masked:
+        assert_array_equal(Dataset.of(joints(), given).position, expected)
+    whole = np.ma.array((1e3 * p).astype(int), mask=hidden)
+    assert Dataset.of(joints(), whole).has_reading.sum() == 2 * N - 1
+    quaternions = np.ma.array(turned, mask=turned < 2.0)
+    assert not Dataset.of(joints(), p, quaternions=quaternions).has_orientation.any()
+    assert_array_equal(Dataset.of(np.ma.array(joints()), p).joints, joints())
+
+
+@pytest.mark.parametrize("parameter", ["joints", "sigma", "temperature", "order"])
+def test_masked_numbers_are_refused_elsewhere(parameter: str) -> None:
+    given: dict[str, Any] = {"joints": joints(), "positions": positions(), "order": np.arange(N)}
+    given |= {"sigma": np.ones(N), "temperature": np.ones(N)}
+    values = given[parameter]
+    refused(parameter, Dataset.of, **given | {parameter: np.ma.array(values, mask=values == values.flat[0])})
+
+
+def test_a_dataset_keeps_its_own_arrays() -> None:
+    given: dict[str, Any] = {
+        "joints": joints(),
+        "positions": positions(),
+        "quaternions": np.tile([1.0, 0.0, 0.0, 0.0], (N, 2, 1)),
+    }
+    data, before = Dataset.of(**given), Dataset.of(**{name: values.copy() for name, values in given.items()})
+    for values in given.values():
+        values[:] = NAN
+    same(data, before)
+
+
+@pytest.mark.parametrize("name", ["", " ", "a\nb", "a\x00", "\ud800", "\u2028"], ids=ascii)
+def test_names_that_no_file_can_hold_are_refused(name: str) -> None:
+    p = positions(1, 1)
+    refused("targets", Dataset.of, joints(1), p, targets=[name])
+    refused("configurations", Dataset.of, joints(1), p, configurations=[name])
+    for field in ("targets", "labels", "fixtures"):
+        if (field, name) != ("labels", ""):  # what is known of fixtures belongs to no configuration
+            refused(field, replace, Dataset.of(joints(1), p), **{field: (name,)})
+    assert Dataset.of(joints(1), p, targets=["Kugel\u00a01 \u00fc"]).targets == ("Kugel\u00a01 \u00fc",)
+
+
+@pytest.mark.parametrize(
+    ("parameter", "changed"),
+    [
+        ("joints", {"joints": 1e7 * np.ones((N, 6))}),
+        ("positions", {"positions": 1e200 * positions()}),
+        ("sigma", {"sigma": 1e-200}),
+        ("sigma", {"sigma": 2e3}),
+        ("sigma_rot", {"sigma_rot": 11.0}),
+        ("temperature", {"temperature": 1e7}),
+        ("order", {"order": 1e200 * np.arange(N)}),
+    ],
+)
+def test_numbers_out_of_all_proportion_are_refused(parameter: str, changed: dict[str, Any]) -> None:
+    """They ended in LinAlgError and OverflowError far from here; a file is refused for them too."""
+    said = refused(parameter, Dataset.of, **{"joints": joints(), "positions": positions()} | changed)
+    assert "plausible" in said
+
+
+def test_times_may_say_the_order() -> None:
+    data = Dataset.of(joints(), positions(), order=1_700_000_000 + np.arange(N))
+    assert data.number is not None
+    assert_array_equal(np.diff(data.number), np.ones(N - 1))
 
 
 # -- checks of its own ------------------------------------------------------------------------------------
@@ -196,12 +270,37 @@ def test_arrays_that_do_not_fit_are_refused(parameter: str, changed: dict[str, A
         ("temperature", np.full(N, NAN)),
         ("wrench", np.full((N, 6), NAN)),
         ("references", Dataset.of(joints(2), positions(2))),
+        ("references", "p"),
+        ("setup", 5),
+        ("source", None),
+        ("labels", None),
+        ("labels", "abcdef"),
+        ("labels", [1, 2, 3, 4, 5, 6]),
+        ("labels", (1, 2, 3, 4, 5, 6)),
+        ("targets", None),
+        ("targets", (1, 2)),
+        ("fixtures", 5),
+        ("joint_kinds", ("revolute",) * 5 + (None,)),
+        ("target", np.array(0)),
+        ("target", None),
+        ("configuration", None),
+        ("position", None),
+        ("position", np.ma.array(np.zeros((2 * N, 3)))),
+        ("position", np.full((2 * N, 3), 1e7)),
+        ("distance", np.full(2 * N, 1e200)),
+        ("approach", np.full((N, 6), 7.0)),
+        ("approach", np.full((N, 6), 0.5)),
     ],
 )
 def test_a_dataset_checks_itself(field: str, value: Any) -> None:
     data = sound()
     wrong = replace(data, references=None) if field in ("labels", "joints", "joint_kinds") else data
     refused("joints" if field == "joint_kinds" and len(value) < 6 else field, replace, wrong, **{field: value})
+
+
+@pytest.mark.parametrize("kinds", [5, None, ["revolute"] * 6])
+def test_kinds_of_joints_are_a_tuple(kinds: Any) -> None:
+    refused("joint_kinds", replace, sound(), joint_kinds=kinds)
 
 
 def test_wrong_arrays_are_refused_before_a_job_starts() -> None:
@@ -280,6 +379,33 @@ def test_a_bootstrap_is_the_fit_with_weights() -> None:
     assert np.abs(twice - plain).max() > 1e-6
 
 
+def test_copies_that_the_fit_has_seen_prove_nothing() -> None:
+    rng, true = np.random.default_rng(4), off_nominal()
+    q = true.random_configurations(40, rng)
+    data = Dataset.of(q, true.forward(q, frame="world", target="1")[0] + rng.normal(0.0, 1e-5, (40, 3)))
+    drawn = calibrate("irb120", data.of_configurations(rng.integers(0, 40, 40)))
+    origins = np.array([label.partition("#")[0] for label in drawn.data.labels])
+    (said,) = [w.message for w in drawn.warnings if w.code == "held-out-seen"]
+    assert said.startswith("Of 12 held-out configurations ")
+    assert {*origins[drawn.training]} & {*origins[drawn.held_out]}
+    assert "held-out-seen" not in [w.code for w in calibrate("irb120", data).warnings]
+    alone = calibrate("irb120", data.of_configurations([*range(40), 0]), train=40, seed=2)
+    assert ("held-out-seen" in [w.code for w in alone.warnings]) is bool({0, 40} & {*alone.held_out.tolist()})
+
+
+def test_a_bootstrap_is_not_told_to_remove_its_copies() -> None:
+    data = Dataset.of(joints(3), positions(3)[[0, 1, 0]], configurations=["7", "8", "9"])
+    assert "2 readings repeat" in repr(check(data))
+    assert "1 at 7 and 9" in repr(check(data.of_configurations([0, 0, 2])))
+    assert "7#2" not in repr(check(data.of_configurations([0, 0, 2])))
+    assert "repeat" not in repr(check(data.of_configurations([1, 1, 1]).of_configurations([0, 2, 2])))
+
+
+def test_a_check_of_nothing_is_refused() -> None:
+    refused("data", check, sound().of_configurations([]))
+    refused("data", check, load_robot("irb120"), Dataset.of(joints(), positions() * NAN))
+
+
 def test_readings_by_mask_by_index_and_twice() -> None:
     data = sound()
     mask = data.target == 1
@@ -300,7 +426,23 @@ def test_nothing_chosen_is_nothing() -> None:
 
 @pytest.mark.parametrize(
     "chosen",
-    [[N], [-1], [0.0, 1.0], [NAN], [True] * (N - 1), np.ones(2 * N + 1, dtype=bool), [[0, 1]], 3, "1", None, ["1"]],
+    [
+        [N],
+        [-1],
+        [0.0, 1.0],
+        [NAN],
+        [True] * (N - 1),
+        np.ones(2 * N + 1, dtype=bool),
+        [[0, 1]],
+        3,
+        "1",
+        None,
+        ["1"],
+        [True, 2],
+        (2, False),
+        np.array(0),
+        np.ma.array([0, 1], mask=[False, True]),
+    ],
     ids=repr,
 )
 def test_what_chooses_nothing_that_is_there_is_refused(chosen: Any) -> None:
@@ -316,8 +458,10 @@ def test_a_dataset_is_short() -> None:
         "arrays: 6 configurations of 6 joints\n"
         "2 targets: ball, cup\n"
         "readings: 12 positions, 12 orientations, 0 distances, 12 heights\n"
-        "with: order of measurement, standard deviations, temperature, external forces, reference points"
+        "with: order of measurement, standard deviations, temperature, external forces, fixtures, reference points"
     )
+    turned = Dataset.of(joints(), positions(), sigma_rot=1e-4)
+    assert repr(turned).endswith("with: standard deviations")
     many = Dataset.of(joints(1), positions(1, 3000), targets=[f"<{i}>" for i in range(3000)])
     assert len(repr(many)) < 300
     assert repr(many).splitlines()[1] == "3000 targets: <0>, <1>, <2>, <3>, <4>, <5>, <6> and 2993 more"

@@ -150,14 +150,15 @@ def vee(matrices: Array) -> Array:
 
 def check_derivatives(robot: Robot, rng: np.random.Generator) -> None:
     q = robot.random_configurations(CONFIGURATIONS, rng)
+    loaded = robot.loaded(q)  # loads are held, and found once
     names = list(robot.parameters)
     h = 1e-5  # truncation and rounding are both of the order of 1e-11 here
     for target in ("tip", "point"):
         kinematics = robot.forward_kinematics(q, target)
         linear, angular = robot.jacobians(kinematics, q, names)
         for i, name in enumerate(names):
-            ahead = robot.forward_kinematics(q, target, {**robot.values, name: robot.values[name] + h})
-            behind = robot.forward_kinematics(q, target, {**robot.values, name: robot.values[name] - h})
+            ahead = robot.forward_kinematics(loaded, target, {**robot.values, name: robot.values[name] + h})
+            behind = robot.forward_kinematics(loaded, target, {**robot.values, name: robot.values[name] - h})
             turn = (ahead.matrix() - behind.matrix()) @ np.swapaxes(kinematics.matrix(), 1, 2)
             assert_allclose(linear[i], (ahead.position - behind.position) / (2 * h), rtol=0, atol=1e-9, err_msg=name)
             assert_allclose(angular[i], vee(turn) / (2 * h), rtol=0, atol=1e-9, err_msg=name)

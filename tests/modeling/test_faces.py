@@ -14,6 +14,7 @@ from truearm.errors import InputError
 from truearm.library import library, load_robot
 from truearm.modeling.chain import Array
 from truearm.modeling.effects import EFFECTS
+from truearm.modeling.frames import FRAMES
 from truearm.modeling.inverse.solutions import PoseStatus
 from truearm.modeling.parameters import Parameter
 from truearm.modeling.parts import Joint, LinkMass, Payload
@@ -131,6 +132,11 @@ def test_one_configuration_a_list_and_none_at_all() -> None:
     assert_allclose(robot.inverse(p[0], R[0], seed=q).joints, [q], rtol=0, atol=1e-10)
     assert robot.forward(np.zeros((0, 6)))[0].shape == (0, 3)
     assert robot.jacobian(q).shape == (1, 6, 6)
+    none = np.zeros((0, 3))
+    for arm in (robot, robot.with_effects(["gain", "compliance"])):
+        for frame in FRAMES:
+            assert arm.jacobian(np.zeros((0, 6)), frame=frame).shape == (0, 6, 6)  # type: ignore[arg-type]
+        assert arm.inverse(none, np.zeros((0, 3, 3))).joints.shape == (0, 6)
 
 
 def test_forward_takes_what_is_known_of_the_postures() -> None:
@@ -151,6 +157,20 @@ def test_a_pose_out_of_reach_has_no_joints() -> None:
     assert np.isnan(found.joints[1]).all()
     assert repr(found).startswith("1 of 2 poses can be reached (1 reached, 1 unreachable)\npose 1: ")
     assert "<pre>1 of 2 poses" in found._repr_html_()
+
+
+@pytest.mark.parametrize("gain", [-1.0, 0.0, 0.0015, 0.1, 1.9])
+def test_what_is_said_to_be_reached_is_where_the_arm_goes(gain: float) -> None:
+    """The solver turns joints; a gain near zero leaves no joint positions that turn them so."""
+    plain = load_robot("li3")
+    arm = plain.with_effects(["gain"]).with_values({f"gain_{i}": gain for i in range(1, 4)})
+    poses = plain.forward(np.random.default_rng(0).uniform(-0.3, 0.3, (8, 3)))
+    found = arm.inverse(*poses)
+    usable = found.usable
+    assert usable.any() is np.bool_(gain > 1.0)
+    assert_allclose(arm.forward(found.joints[usable])[0], poses[0][usable], rtol=0, atol=1e-9)
+    assert (found.position_error[usable] <= 1e-9).all()
+    assert ((found.position_error > 1e-9) | (found.orientation_error > 1e-9))[~usable].all()
 
 
 # -- the Jacobian -----------------------------------------------------------------------------------------
@@ -207,6 +227,8 @@ WRONG_JOINTS: list[Any] = [
     np.zeros((2, 6), dtype=complex),
     slice(None),
     {"joint_1": 0.0},
+    np.ma.array(np.zeros(6), mask=np.eye(6, dtype=bool)[0]),
+    np.full(6, 1e200),
 ]
 
 
@@ -238,6 +260,8 @@ def test_postures_of_another_robot_are_refused() -> None:
         ("positions", P * NAN, R, {}),
         ("positions", "here", R, {}),
         ("positions", None, R, {}),
+        ("positions", 1e160 * P, R, {}),
+        ("positions", np.ma.array(P, mask=P == 0.0), R, {}),
         ("rotations", P, np.full((1, 3, 3), INFINITY), {}),
         ("rotations", P, 1.01 * R, {}),
         ("rotations", P, -R, {}),
@@ -248,7 +272,10 @@ def test_postures_of_another_robot_are_refused() -> None:
         ("frame", P, R, {"frame": None}),
         ("frame", P, R, {"frame": ["base"]}),
         ("target", P, R, {"target": "gripper"}),
+        ("frame", P, R, {"frame": np.array(["base", "world"])}),
         ("target", P, R, {"target": 3}),
+        ("target", P, R, {"target": np.array(["a", "b"])}),
+        ("orientation", P, R, {"orientation": np.array(["full", "free"])}),
         ("orientation", P, R, {"orientation": "ful"}),
         ("orientation", P, R, {"orientation": None}),
     ],
@@ -283,9 +310,51 @@ def test_values_that_are_none_are_refused(value: Any) -> None:
 
 def test_values_without_names_are_refused() -> None:
     refused("values", load_robot("irb120").with_values, [("base_x", 0.0)])
+    known = load_robot("irb120").parameters["base_x"]
+    for none in (None, 5, [None], ["base_x"], known):
+        refused("parameters", load_robot("irb120").with_parameters, none)
     other = Parameter.plain("nowhere", "m", "base", 0.0, 1.0)
     refused("parameters", load_robot("irb120").with_parameters, [other])
     refused("prior", Parameter.plain, "base_x", "m", "base", 0.0, -1.0)
+
+
+@pytest.mark.parametrize(
+    ("parameter", "base", "targets"),
+    [
+        ("base", None, {}),
+        ("targets", BASE, None),
+        ("targets", BASE, [("a", (0.0, 0.0, 0.0))]),
+        ("targets", BASE, {"a": (1.0, 2.0)}),
+        ("targets", BASE, {"a": None}),
+        ("targets", BASE, {"a": "xyz"}),
+        ("targets", BASE, {"a": (0.0, 0.0, NAN)}),
+        ("targets", BASE, {1: (0.0, 0.0, 0.0)}),
+    ],
+)
+def test_places_that_are_none_are_refused(parameter: str, base: Any, targets: Any) -> None:
+    refused(parameter, load_robot("irb120").with_frames, base, targets)
+
+
+@pytest.mark.parametrize(
+    "places",
+    [None, {"a": None}, {"a": ("point", None)}, {"a": ("line", BASE)}, {1: ("point", BASE)}, {"a": ([], BASE)}],
+)
+def test_fixtures_that_are_none_are_refused(places: Any) -> None:
+    refused("places", load_robot("irb120").with_fixtures, places)
+
+
+@pytest.mark.parametrize("count", [-1, 1.5, None, True, "2"])
+def test_counts_that_are_none_are_refused(count: Any) -> None:
+    robot, rng = load_robot("irb120"), np.random.default_rng(0)
+    refused("count", robot.random_configurations, count, rng)
+    refused("rng", robot.random_configurations, 2, 0)
+    assert robot.random_configurations(0, rng).shape == (0, 6)
+
+
+def test_payloads_of_arrays_can_be_compared() -> None:
+    payload = Payload(1, np.zeros(3))  # type: ignore[arg-type]
+    assert payload == Payload(1.0, (0.0, 0.0, 0.0))
+    assert {payload, Payload(1, [0, 0, 0])} == {payload}  # type: ignore[arg-type]
 
 
 def test_a_payload_may_be_a_text() -> None:

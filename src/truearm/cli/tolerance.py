@@ -19,7 +19,9 @@ def tolerance(
     ] = None,
     position: Annotated[
         str | None,
-        typer.Option(metavar="MM[,MM..]", help="Radius about its place that a joint may have.", show_default=False),
+        typer.Option(
+            metavar="MM[,MM..]", help="Radius about its place, half the drawing's diameter.", show_default=False
+        ),
     ] = None,
     json: Json = False,
 ) -> None:

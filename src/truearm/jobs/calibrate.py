@@ -38,15 +38,16 @@ from truearm.jobs.arguments import (
 )
 from truearm.jobs.check import notices_of
 from truearm.library import urdf_source
-from truearm.measurement.checks import check_joints
-from truearm.measurement.dataset import Dataset
+from truearm.measurement.checks import check_joints, copies
+from truearm.measurement.dataset import Dataset, IntArray
 from truearm.measurement.statistics import Errors, errors_of
 from truearm.measurement.table_motion import without_table_motion
 from truearm.modeling.effects import EFFECTS
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
-from truearm.notices import Notice
+from truearm.notices import Notice, counted
 from truearm.results.calibration import RESULT_FILES, Calibration
+from truearm.shown import listed
 from truearm.version import __version__
 
 Train = int | Literal["all"] | None
@@ -217,6 +218,7 @@ def calibrate(
         validation=validation,
         warnings=(
             *_check_proof(before, validation),
+            *_check_copies(readings, training, held_out),
             *check_fit(fit),
             *noticed,
             *check_arrival_lag(fit, readings),
@@ -290,6 +292,22 @@ def _train_count(train: object, n: int, where: str) -> int:
             allowed=f"1 to {n - 1}, or all ({where} has {n} configurations)",
         )
     return int(train)
+
+
+def _check_copies(data: Dataset, training: IntArray, held_out: IntArray) -> list[Notice]:
+    """Say if the fit has seen copies of what was held out."""
+    seen = copies(data, held_out, training)
+    if not seen:
+        return []
+    one = len(seen) == 1
+    return [
+        Notice(
+            "held-out-seen",
+            f"Of {counted(len(held_out), 'held-out configuration')} {len(seen)} {'is a copy' if one else 'are copies'} "
+            f"of training ones ({listed(seen)}): the fit has seen them, and the errors flatter it. Leave "
+            "copies out; for a bootstrap, draw from the training configurations alone and use `train=all`.",
+        )
+    ]
 
 
 def _check_proof(before: Errors, after: Errors | None) -> list[Notice]:

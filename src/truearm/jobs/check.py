@@ -39,6 +39,11 @@ def check(
         robot, data = None, robot
     refuse_swapped(robot, data)
     measured = data_argument(data)
+    parts = [measured] if measured.references is None else [measured, measured.references]
+    if not any(part.has_reading.any() for part in parts):
+        raise InputError(
+            "there is no reading", parameter="data", where=measured.source, cure="Fill in x, y and z, or distance."
+        )
     return DataCheck(measured, notices_of(measured, None if robot is None else robot_argument(robot), device))
 
 

@@ -39,7 +39,8 @@ def tolerance(
     lean
         Perpendicularity or parallelism that is allowed [m], one number or one a joint.
     position
-        Radius about its place that a joint may have [m], one number or one a joint.
+        Radius about its place within which a joint may lie [m], half of the drawing's diameter: one number or one a
+        joint.
 
     Returns
     -------

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.errors import InputError
-from truearm.measurement.dataset import Dataset
+from truearm.measurement.dataset import Dataset, IntArray
+from truearm.measurement.dataset_fields import drawn_from
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice, counted
@@ -377,8 +378,9 @@ def _duplicates(data: Dataset) -> list[Notice]:
         for reading in np.flatnonzero(part.has_position).tolist():
             key = (int(part.target[reading]), part.position[reading].tobytes())
             other = first.setdefault(key, reading)
-            if other != reading:
-                a, b = (part.labels[part.configuration[r]] for r in (other, reading))
+            a, b = (part.labels[part.configuration[r]] for r in (other, reading))
+            # A configuration that was drawn twice for a bootstrap counts twice because it shall.
+            if other != reading and (a == b or drawn_from(a) != drawn_from(b)):
                 found.append(f"{part.targets[key[0]]} at {a} and {b}")
     if not found:
         return []
@@ -390,6 +392,21 @@ def _duplicates(data: Dataset) -> list[Notice]:
             f"{'it, it counts' if len(found) == 1 else 'them, they count'} twice.",
         )
     ]
+
+
+def copies(data: Dataset, some: IntArray, others: IntArray) -> list[str]:
+    """Return the labels of those of `some` configurations that are copies of one of the `others`.
+
+    Copies have the same joint positions and the same readings, all to the last digit.
+    """
+    values = [data.target[:, None], data.against[:, None], data.position]
+    values += [v.reshape(len(v), -1) for v in (data.quaternion, data.distance, data.height) if v is not None]
+    read: list[list[bytes]] = [[] for _ in data.labels]
+    for reading, row in zip(np.flatnonzero(data.has_reading), np.hstack(values)[data.has_reading], strict=True):
+        read[data.configuration[reading]].append(row.tobytes())
+    content = [(joints.tobytes(), *sorted(rows)) for joints, rows in zip(data.joints, read, strict=True)]
+    known = {content[c] for c in others if read[c]}
+    return [data.labels[c] for c in some if content[c] in known]
 
 
 def _are(things: Sequence[object]) -> str:

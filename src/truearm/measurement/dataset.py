@@ -127,9 +127,10 @@ class Dataset:
         ]
         known = {
             "order of measurement": self.number,
-            "standard deviations": self.sigma,
+            "standard deviations": self.sigma if self.sigma is not None else self.sigma_rot,
             "temperature": self.temperature,
             "external forces": self.wrench,
+            "fixtures": self.fixtures or None,
             "reference points": self.references,
         }
         return short_text(
@@ -195,18 +196,21 @@ class Dataset:
             If shapes do not fit together, joints are not finite, a deviation is not above zero or a quaternion not of
             length 1, or names are there twice.
         """
-        q = number_array(joints, "joints", ("n", "joints"))
+        q = np.array(number_array(joints, "joints", ("n", "joints")))
         n = len(q)
         if not n:
             raise InputError("there is no configuration", parameter="joints", allowed="one row or more")
         one = axes(positions) == 2
-        p = number_array(positions, "positions", (n, 3) if one else (n, "targets", 3), missing=True).reshape(n, -1, 3)
-        k = p.shape[1]
+        p = number_array(positions, "positions", (n, 3) if one else (n, "targets", 3), missing=True)
+        k = 1 if one else p.shape[1]
+        if not k:
+            raise InputError("there is no target", parameter="positions", allowed="one target or more")
+        p = p.reshape(n, k, 3)
         each = (n,) if one else (n, k)
         whole = np.isfinite(p).all(axis=2, keepdims=True)
         turned = None
         if quaternions is not None:
-            turned = number_array(quaternions, "quaternions", (*each, 4), missing=True).reshape(n * k, 4)
+            turned = np.array(number_array(quaternions, "quaternions", (*each, 4), missing=True)).reshape(n * k, 4)
             refuse_other_lengths(turned, "quaternions")
         names = checked_labels(targets, "targets", k)
         made = None if order is None else checked_order(order, n)

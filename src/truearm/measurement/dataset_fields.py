@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Sequence
 from numbers import Integral
@@ -10,9 +11,11 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truearm.arrays import axes, number_array, shape_text
+from truearm.arrays import LARGEST, axes, number_array, shape_text
 from truearm.errors import InputError, wrong_kind
+from truearm.files import is_one_line
 from truearm.modeling.chain import Array
+from truearm.units import accepted_range
 
 if TYPE_CHECKING:
     from truearm.measurement.dataset import Dataset
@@ -22,18 +25,34 @@ IntArray = NDArray[np.intp]
 #: The length of a quaternion may be off by this much, as by rounding.
 _UNIT: Final = 1e-6
 _KINDS: Final = ("revolute", "prismatic")
+#: Highest place in the order of measurement: whole numbers are exact up to here.
+_LAST: Final = 2.0**53
+#: What a label ends with that was there before: #2 or more, of a copy of a copy again.
+_REPEATED: Final = re.compile(r"(#([2-9]|[1-9][0-9]+))+$")
+#: Label of the configuration that says nothing, of what is known of fixtures.
+_NO_CONFIGURATION: Final = ("",)
+#: What names can be: those that files can hold.
+NAMES: Final = "one line of text without control characters, not blank"
+#: Lowest and highest standard deviation that is meant [m, rad].
+_DEVIATIONS: Final = {
+    "sigma": accepted_range("m", deviation=True),
+    "sigma_rot": accepted_range("rad", deviation=True),
+}
 
 
 def refuse_unsound(data: Dataset) -> None:
     """Refuse a dataset whose fields do not fit together, or hold numbers that cannot be."""
-    n, m = len(data.labels), len(data.target)
-    _distinct(data.labels, "labels")
-    _distinct(data.targets, "targets")
-    _distinct(data.fixtures, "fixtures")
-    _array(data.joints, "joints", (n, len(data.joint_kinds)))
+    if not isinstance(data.source, str):
+        raise wrong_kind("a text belongs here", data.source, "source", "what messages call the data")
+    for field in ("labels", "targets", "fixtures"):
+        _names(getattr(data, field), field)
+    if not isinstance(data.joint_kinds, tuple):
+        raise wrong_kind("a kind of each joint belongs here", data.joint_kinds, "joint_kinds", "a tuple of texts")
     checked_kinds(data.joint_kinds, len(data.joint_kinds))
+    _places(data.target, "target", "readings", len(data.targets))
+    n, m = len(data.labels), len(data.target)
+    _array(data.joints, "joints", (n, len(data.joint_kinds)))
     _places(data.configuration, "configuration", m, n)
-    _places(data.target, "target", m, len(data.targets))
     if data.fixture is not None:
         _places(data.fixture, "fixture", m, len(data.fixtures), lowest=-1)
     _array(data.position, "position", (m, 3), missing=True)
@@ -44,17 +63,26 @@ def refuse_unsound(data: Dataset) -> None:
         lengths: Array | None = getattr(data, field)
         if lengths is not None:
             _array(lengths, field, (m,), missing=True)
-    for field in ("sigma", "sigma_rot"):
+    for field, unit in (("sigma", "m"), ("sigma_rot", "rad")):
         deviation: Array | None = getattr(data, field)
         if deviation is not None:
             _array(deviation, field, (m,), missing=True)
             _refuse(deviation <= 0.0, deviation, field, "a standard deviation is not above zero", "above 0")
+            low, high = _DEVIATIONS[field]
+            off = (deviation < low) | (deviation > high)
+            _refuse(off, deviation, field, "the standard deviation is not plausible", f"{low:g} to {high:g} {unit}")
     if data.approach is not None:
         _array(data.approach, "approach", data.joints.shape)
+        signs = data.approach
+        _refuse(np.abs(np.abs(signs) - 0.5) != 0.5, signs, "approach", "this is no sign of a move", "1, -1 or 0")
     for field, shape in (("number", (n,)), ("temperature", (n,)), ("wrench", (n, 6))):
         values: Array | None = getattr(data, field)
         if values is not None:
             _array(values, field, shape)
+    for field in ("setup", "references"):
+        part = getattr(data, field)
+        if part is not None and not isinstance(part, type(data)):
+            raise wrong_kind("a dataset belongs here", part, field, "a Dataset, or None")
     if data.references is not None and data.references.labels != data.labels:
         raise InputError("the reference points belong to other configurations", parameter="references")
 
@@ -70,6 +98,8 @@ def checked_selection(chosen: object, count: int, parameter: str, things: str) -
     span = f"indices from 0 to {count - 1}, or a mask of {count} {things}" if count else "none: there are none"
     if axes(chosen) != 1 or isinstance(chosen, str | bytes):
         raise wrong_kind("indices or a mask belong here", chosen, parameter, span)
+    if np.ma.is_masked(chosen):
+        raise InputError("masked entries choose nothing", parameter=parameter, allowed=span)
     values = np.asarray(chosen)
     if values.dtype.kind == "b":
         if len(values) != count:
@@ -77,8 +107,10 @@ def checked_selection(chosen: object, count: int, parameter: str, things: str) -
         return np.asarray(np.flatnonzero(values), dtype=np.intp)
     if not values.size:
         return np.zeros(0, dtype=np.intp)
-    if values.dtype.kind not in "iu":
-        raise InputError("indices must be whole numbers", parameter=parameter, came=str(values[0]), allowed=span)
+    mixed = isinstance(chosen, list | tuple) and any(isinstance(v, bool | np.bool_) for v in chosen)
+    if mixed or values.dtype.kind not in "iu":
+        came = "True or False among numbers" if mixed else str(values[0])
+        raise InputError("indices must be whole numbers", parameter=parameter, came=came, allowed=span)
     outside = (values < 0) | (values >= count)
     _refuse(outside, values, parameter, "there is no such index", span)
     return np.asarray(values, dtype=np.intp)
@@ -94,7 +126,7 @@ def checked_labels(names: Sequence[str | int] | None, parameter: str, count: int
         if isinstance(name, bool) or not isinstance(name, str | Integral):
             raise wrong_kind("a name must be a text", name, parameter, "texts")
     made = tuple(str(name) for name in names)
-    _distinct(made, parameter)
+    _names(made, parameter)
     return made
 
 
@@ -112,6 +144,11 @@ def distinct_labels(labels: Sequence[str]) -> tuple[str, ...]:
     return tuple(made)
 
 
+def drawn_from(label: str) -> str:
+    """Return the label without the numbers that :func:`distinct_labels` adds to it."""
+    return _REPEATED.sub("", label)
+
+
 def checked_kinds(kinds: Sequence[str] | None, count: int) -> tuple[str, ...]:
     """Return the kind of each joint, revolute if None."""
     if kinds is None:
@@ -125,6 +162,8 @@ def checked_kinds(kinds: Sequence[str] | None, count: int) -> tuple[str, ...]:
 def checked_sigma(sigma: ArrayLike, parameter: str, shape: tuple[int, ...]) -> Array:
     """Return a standard deviation for each reading, from one for all, one a configuration or one for each."""
     given = axes(sigma)
+    if np.ma.is_masked(sigma):
+        raise InputError("masked numbers cannot be used here", parameter=parameter, allowed="numbers without a mask")
     found = number_array(sigma, parameter, shape[:given] if 0 <= given <= len(shape) else shape, missing=True)
     if given == 0 and np.isnan(found):
         raise InputError("NaN cannot be used here", parameter=parameter, allowed="above 0")
@@ -133,7 +172,7 @@ def checked_sigma(sigma: ArrayLike, parameter: str, shape: tuple[int, ...]) -> A
 
 def checked_order(order: ArrayLike, count: int) -> IntArray:
     """Return the place of each configuration in the order of measurement."""
-    places = number_array(order, "order", (count,))
+    places = number_array(order, "order", (count,), largest=_LAST)
     whole = np.asarray(np.round(places), dtype=np.intp)
     _refuse(
         (places != whole) | (places < 0), places, "order", "places must be whole numbers", "whole numbers, 0 or more"
@@ -144,18 +183,32 @@ def checked_order(order: ArrayLike, count: int) -> IntArray:
 
 
 def _array(values: object, field: str, shape: tuple[int | str, ...], *, missing: bool = False) -> None:
-    if not isinstance(values, np.ndarray):
-        raise wrong_kind("an array belongs here", values, field, shape_text(shape))
-    number_array(values, field, shape, missing=missing)
+    if not isinstance(values, np.ndarray) or isinstance(values, np.ma.MaskedArray):
+        raise wrong_kind("an array belongs here", values, field, f"an array without a mask, {shape_text(shape)}")
+    number_array(values, field, shape, missing=missing, largest=_LAST if field == "number" else LARGEST)
 
 
-def _places(values: object, field: str, count: int, end: int, lowest: int = 0) -> None:
+def _places(values: object, field: str, count: int | str, end: int, lowest: int = 0) -> None:
     _array(values, field, (count,))
     assert isinstance(values, np.ndarray)
     allowed = f"{lowest} to {end - 1}"
     if values.dtype.kind not in "iu":
         raise InputError("indices must be whole numbers", parameter=field, came=str(values.dtype), allowed=allowed)
     _refuse((values < lowest) | (values >= end), values, field, "there is no such index", allowed)
+
+
+def _names(names: object, field: str) -> None:
+    if not isinstance(names, tuple):
+        raise wrong_kind("names belong here", names, field, "a tuple of texts")
+    if field == "labels" and names == _NO_CONFIGURATION:
+        return
+    for name in names:
+        if not isinstance(name, str):
+            raise wrong_kind("a name must be a text", name, field, "a tuple of texts")
+        # What is printable is one line: asked first, because it is quick.
+        if not (name.isprintable() and name.strip()) and not is_one_line(name):
+            raise InputError("this cannot be a name", parameter=field, came=name, allowed=NAMES)
+    _distinct(names, field)
 
 
 def _distinct(names: Sequence[str], field: str) -> None:
@@ -166,5 +219,6 @@ def _distinct(names: Sequence[str], field: str) -> None:
 
 def _refuse(wrong: NDArray[np.bool_], values: NDArray[np.generic], field: str, what: str, allowed: str) -> None:
     if wrong.any():
-        place = int(np.flatnonzero(wrong)[0])
-        raise InputError(what, parameter=field, came=f"{values[place]:g} at index {place}", allowed=allowed)
+        place = tuple(np.argwhere(wrong)[0].tolist())
+        shown = place[0] if len(place) == 1 else list(place)
+        raise InputError(what, parameter=field, came=f"{values[place]:g} at index {shown}", allowed=allowed)

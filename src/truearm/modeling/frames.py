@@ -25,7 +25,7 @@ _DIFFERENCE: Final = 1e-5
 
 def checked_frame(frame: object) -> None:
     """Refuse what is no name of a frame."""
-    if frame in FRAMES:
+    if isinstance(frame, str) and frame in FRAMES:
         return
     raise InputError(
         "there is no frame of this name",
@@ -65,7 +65,7 @@ def jacobian(robot: Robot, joints: ArrayLike | Postures, frame: Frame, target: s
         found = np.einsum("vcn,vjn->ncj", by_variable, rates[moved])
     if frame == "world":
         return found
-    turned = robot.base.rotation.T @ found.reshape(len(found), 2, 3, -1)
+    turned = robot.base.rotation.T @ found.reshape(len(found), 2, 3, found.shape[2])
     return turned.reshape(found.shape)
 
 

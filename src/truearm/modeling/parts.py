@@ -89,9 +89,9 @@ class Payload:
     cog: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        """Refuse a mass below zero, and what is no number."""
-        finite_number(self.mass, "mass", lowest=0.0)
-        number_array(self.cog, "cog", (3,))
+        """Refuse a mass below zero, and what is no number; keep plain numbers, which can be compared."""
+        object.__setattr__(self, "mass", finite_number(self.mass, "mass", lowest=0.0))
+        object.__setattr__(self, "cog", tuple(number_array(self.cog, "cog", (3,)).tolist()))
 
     @property
     def text(self) -> str:

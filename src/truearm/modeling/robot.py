@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from numbers import Integral
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from truearm.arrays import finite_numbers
-from truearm.errors import InputError, did_you_mean
+from truearm.errors import InputError, did_you_mean, wrong_kind
 from truearm.modeling.chain import Array, ForwardKinematics
 from truearm.modeling.effects import checked_effects
 from truearm.modeling.equilibrium import joints_in_equilibrium, postures_in_equilibrium
@@ -44,11 +45,18 @@ class Robot(RobotData):
 
     def with_parameters(self, parameters: Iterable[Parameter]) -> Robot:
         """Return the robot with some parameters replaced."""
-        changed = {p.name: p for p in parameters}
+        allowed = "a sequence of Parameters"
+        if not isinstance(parameters, Iterable):
+            raise wrong_kind("parameters belong here", parameters, "parameters", allowed)
+        given = [*parameters]
+        for parameter in given:
+            if not isinstance(parameter, Parameter):
+                raise wrong_kind("a parameter belongs here", parameter, "parameters", allowed)
+        changed = {p.name: p for p in given}
         self._refuse_unknown(changed, "parameters")
         other = replace(self, known={**self.known, **changed})
         # A solver asks for hundreds of such copies: they share what does not depend on values.
-        other.__dict__.update({name: self.__dict__[name] for name in STRUCTURE if name in self.__dict__})
+        self.share(other, STRUCTURE)
         other.__dict__["parameters"] = {**self.parameters, **changed}
         return other
 
@@ -387,6 +395,10 @@ class Robot(RobotData):
 
     def random_configurations(self, count: int, rng: np.random.Generator) -> Array:
         """Return joint positions ``(count, joints)`` drawn evenly within the limits (or a turn, or 1 m)."""
+        if isinstance(count, bool) or not isinstance(count, Integral) or count < 0:
+            raise wrong_kind("a count belongs here", count, "count", "a whole number, 0 or more")
+        if not isinstance(rng, np.random.Generator):
+            raise wrong_kind("a random number generator belongs here", rng, "rng", "numpy.random.default_rng(seed)")
         default = {"revolute": (-np.pi, np.pi), "prismatic": (-0.5, 0.5)}
         low, high = np.array([j.limits or default[j.kind] for j in self.joints]).T
         return rng.uniform(low, high, (count, len(self.joints)))

@@ -35,18 +35,10 @@ from truearm.shown import as_html, counted, listed, short_text
 
 Part = TypeVar("Part", Target, Fixture)
 
-#: What is cached of a robot and does not depend on the values of its parameters.
-STRUCTURE: Final = (
-    "base_elements",
-    "link_elements",
-    "flange_elements",
-    "moved_links",
-    "arm",
-    "trunk",
-    "layout",
-    "effects",
-    "moving",
-)
+#: What is cached of a robot and does not depend on where it stands, its targets and the values of its parameters.
+ARM: Final = ("link_elements", "flange_elements", "moved_links", "arm", "layout", "effects")
+#: What does not depend on the values of its parameters.
+STRUCTURE: Final = (*ARM, "base_elements", "trunk", "moving")
 
 
 @dataclass(frozen=True, repr=False)
@@ -129,6 +121,10 @@ class RobotData:
 
     def _repr_html_(self) -> str:
         return as_html(repr(self))
+
+    def share(self, other: RobotData, names: Sequence[str]) -> None:
+        """Let another robot have what is cached of this one under some names, such as :data:`ARM`."""
+        other.__dict__.update({name: getattr(self, name) for name in names})
 
     @property
     def convention(self) -> Convention:
@@ -236,7 +232,7 @@ class RobotData:
 
     def _named(self, name: str, kind: str, parts: Sequence[Part]) -> Part:
         for part in parts:
-            if part.name == name:
+            if isinstance(name, str) and part.name == name:
                 return part
         known = [part.name for part in parts]
         raise InputError(

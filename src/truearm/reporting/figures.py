@@ -222,7 +222,7 @@ def residuals(
         y = logarithmic_axis("error [mm]", float(shown.min()), float(shown.max()))
     else:
         y["rangemode"] = "tozero"
-    return figure(traces, 360, xaxis=axis("configuration, in measuring order"), yaxis=y)
+    return figure(traces, 360, xaxis=axis("configuration"), yaxis=y)
 
 
 def correlation_map(fit: Fit) -> Figure:

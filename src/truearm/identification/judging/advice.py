@@ -81,8 +81,13 @@ def check_fit(fit: Fit) -> list[Notice]:
         found.append(
             Notice(
                 "redundant",
-                f"Redundant parameters are held at their nominal values: {combinations}. The readings do not observe "
-                "the combinations in brackets." + ("" if fit.unobservable else " Predictions are not affected."),
+                f"Redundant parameters are held at their nominal values: {combinations}. The readings hardly observe "
+                "the combinations in brackets."
+                + (
+                    ""
+                    if fit.unobservable
+                    else " At configurations like the measured ones predictions hardly depend on them."
+                ),
             )
         )
     far = [

@@ -135,11 +135,16 @@ def _answer(task: PoseTask, pool: Candidates, rows: NDArray[np.intp], wanted: in
     pose, joints = pool.pose[rows], pool.joints[rows]
     numbers, reached, beyond = pool.number[rows], pool.reached[rows], pool.beyond[rows]
     position_error, orientation_error = pool.position_error[rows], pool.orientation_error[rows]
-    if any(effect.loaded for effect in task.robot.effects):
-        # A joint that is all but balanced can come to rest on either side of its play, and the arm elsewhere.
+    if task.robot.effects:
+        # A joint that is all but balanced can come to rest on either side of its play, and the arm elsewhere; and no
+        # joint positions may turn the joints as the steps found, with a gain near zero for example.
         part, at_rest = task.of(pose), task.robot.variables(joints, task.robot.values)
-        position_error, orientation_error = part.distances(part.error(part.forward_kinematics(at_rest)))
-        reached = reached & (position_error <= REACHED) & (orientation_error <= REACHED)
+        position, angle = part.distances(part.error(part.forward_kinematics(at_rest)))
+        loaded = any(effect.loaded for effect in task.robot.effects)
+        meets = (position <= REACHED) & (angle <= REACHED)
+        position_error = np.where(meets & (not loaded), position_error, position)
+        orientation_error = np.where(meets & (not loaded), orientation_error, angle)
+        reached = reached & meets
     if task.orientation == "free":
         orientation_error = np.full(len(rows), np.nan)
     singular_value = smallest_singular_value(task.of(pose), pool.variables[:, rows])
@@ -178,7 +183,7 @@ def _task(
     if target is not None:
         robot.target(target)  # refuses an unknown one
     checked_frame(frame)
-    if orientation not in ORIENTATIONS:
+    if not isinstance(orientation, str) or orientation not in ORIENTATIONS:
         raise InputError(
             "there is no such choice",
             parameter="orientation",

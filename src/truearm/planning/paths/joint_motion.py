@@ -181,7 +181,7 @@ class _Follower:
             found = self._solved(k, guess, scaled[0])
             if found is None:
                 raise InputError(
-                    "the arm cannot follow the path any further: it leaves the workspace, or comes to a singular posture"
+                    "the arm cannot follow the path any further: it leaves the reach, or comes to a singular posture"
                     + (", or, with joints to spare, to the end of the postures near the first" if self._spare else ""),
                     where=self._place(k),
                     came=f"orientation '{self._orientation}'",

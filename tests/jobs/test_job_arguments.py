@@ -133,3 +133,9 @@ def test_what_came_is_shown_as_it_is(came: Any, shown: str) -> None:
     with pytest.raises(InputError) as refusal:
         truearm.calibrate(came, DATA)
     assert shown in str(refusal.value)
+
+
+def test_data_without_a_reading_are_not_checked() -> None:
+    with pytest.raises(InputError, match="there is no reading") as refusal:
+        truearm.check("irb120", EMPTY)
+    assert refusal.value.parameter == "data"

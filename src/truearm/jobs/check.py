@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from truearm.errors import refusals_of
+from truearm.errors import InputError, refusals_of
 from truearm.identification.judging.plausibility import check_against
 from truearm.jobs.arguments import data_argument, device_argument, refuse_swapped, robot_argument
 from truearm.measurement.checks import check_data, check_joints, check_range

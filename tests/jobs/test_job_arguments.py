@@ -123,7 +123,7 @@ def test_a_number_is_named_beside_what_it_belongs_to(wrong: dict[str, Any]) -> N
     [
         (None, "got None;"),
         (b"x", "got b'x';"),
-        (np.str_("world"), "got 'world';"),
+        (np.str_("irb12"), "got 'irb12';"),
         (object(), "got an object of type object;"),
         (np.array([1, 2]), "got an object of type ndarray of 2 that holds int64;"),
         (np.array(1), "got an object of type ndarray that holds int64;"),
@@ -131,5 +131,5 @@ def test_a_number_is_named_beside_what_it_belongs_to(wrong: dict[str, Any]) -> N
 )
 def test_what_came_is_shown_as_it_is(came: Any, shown: str) -> None:
     with pytest.raises(InputError) as refusal:
-        truearm.calibrate("irb120" if came is not None else came, DATA, train=came)
+        truearm.calibrate(came, DATA)
     assert shown in str(refusal.value)

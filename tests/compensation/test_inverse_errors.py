@@ -124,7 +124,7 @@ def test_twin_and_data_show_the_same_errors(lines: SevenLines) -> None:
     assert part.largest("x") == pytest.approx(expected[0:11:2].max())
     with pytest.raises(InputError, match=r"no pose of line xyz"):
         from_data(lines, stands, data.of_configurations(range(60)))
-    with pytest.raises(InputError, match=r"no pose of the line test; got 'lift'"):
+    with pytest.raises(InputError, match=r"not a pose of the line test; got 'lift'"):
         from_data(lines, stands, replace(data, labels=("lift", *data.labels[1:])))
 
 

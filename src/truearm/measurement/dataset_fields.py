@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from numbers import Integral
 from typing import TYPE_CHECKING, Final
 
@@ -202,11 +203,13 @@ def _names(names: object, field: str) -> None:
         raise wrong_kind("names belong here", names, field, "a tuple of texts")
     if field == "labels" and names == _NO_CONFIGURATION:
         return
-    for name in names:
+    quick = False
+    with suppress(TypeError):  # what is printable is one line, and quickly asked of all
+        quick = "".join(names).isprintable() and all(map(str.strip, names))
+    for name in () if quick else names:
         if not isinstance(name, str):
             raise wrong_kind("a name must be a text", name, field, "a tuple of texts")
-        # What is printable is one line: asked first, because it is quick.
-        if not (name.isprintable() and name.strip()) and not is_one_line(name):
+        if not is_one_line(name):
             raise InputError("this cannot be a name", parameter=field, came=name, allowed=NAMES)
     _distinct(names, field)
 

@@ -131,5 +131,5 @@ def test_a_number_is_named_beside_what_it_belongs_to(wrong: dict[str, Any]) -> N
 )
 def test_what_came_is_shown_as_it_is(came: Any, shown: str) -> None:
     with pytest.raises(InputError) as refusal:
-        truearm.calibrate("irb120", DATA, train=came) if came is not None else truearm.calibrate(came, DATA)
+        truearm.calibrate("irb120", DATA, train=came) if came is not None else truearm.calibrate(came, DATA)  # type: ignore[arg-type]
     assert shown in str(refusal.value)

@@ -86,7 +86,9 @@ def test_a_seed_is_an_array_or_rows() -> None:
 def test_robot_and_data_the_wrong_way_round(job: str, tmp_path: Path) -> None:
     file = tmp_path / "data.csv"
     file.write_text(csv_text(DATA))
-    with pytest.raises(InputError, match=r"the robot comes first.*Exchange them: irb120 is the robot") as refusal:
+    with pytest.raises(
+        InputError, match=r"robot and measurements are exchanged.*(Write 'truearm \w+ irb120|Exchange them)"
+    ) as refusal:
         getattr(truearm, job)(file, "irb120")
     assert refusal.value.parameter == "robot"
 

@@ -43,17 +43,23 @@ def robot_argument(robot: object, parameter: str = "robot") -> Robot:
     raise wrong_kind("a robot belongs here", robot, parameter, "a Robot, a library id, a robot file or a URDF")
 
 
-def refuse_swapped(robot: object, data: object) -> None:
-    """Refuse a robot where measurements belong, and measurements in its place."""
+def refuse_swapped(robot: object, data: object, job: str = "") -> None:
+    """Refuse a robot where measurements belong, and measurements in its place.
+
+    Parameters
+    ----------
+    job
+        Named with both in their order, where its command has the same order.
+    """
     if not (isinstance(robot, str | Path) and isinstance(data, str | Path)):
         return
     if is_robot(data) and not is_robot(robot):
         raise InputError(
-            "the robot comes first, then the measurements",
+            "robot and measurements are exchanged",
             parameter="robot",
             came=str(robot),
             allowed="a library id, a robot file or a URDF",
-            cure=f"Exchange them: {data} is the robot.",
+            cure=f"Write 'truearm {job} {data} {robot}'." if job else "Exchange them.",
         )
 
 
@@ -69,7 +75,7 @@ def data_argument(data: object, parameter: str = "data") -> Dataset:
                 parameter=parameter,
                 came=str(data),
                 allowed="a canonical CSV file",
-                cure="The robot comes first, then the measurements.",
+                cure="Exchange robot and measurements, or name the file of measurements.",
             )
         with refusals_of(parameter):
             return read_csv(path)

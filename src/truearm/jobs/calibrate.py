@@ -142,7 +142,7 @@ def calibrate(
         payload=payload,
         gravity=fall,
     )
-    refuse_swapped(robot, data)
+    refuse_swapped(robot, data, "calibrate")
     inputs = files_of(robot, data, bounds)
     folder = None if out is None else folder_for(RESULT_FILES, out, robot, data, bounds)
     progress("reading the robot")

@@ -37,7 +37,7 @@ def check(
     """
     if data is None:
         robot, data = None, robot
-    refuse_swapped(robot, data)
+    refuse_swapped(robot, data, "check")
     measured = data_argument(data)
     parts = [measured] if measured.references is None else [measured, measured.references]
     if not any(part.has_reading.any() for part in parts):

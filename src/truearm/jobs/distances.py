@@ -40,7 +40,7 @@ def distances(
     InputError
         If the robot has no targets, the data name others, or there are positions at one configuration only.
     """
-    refuse_swapped(robot, data)
+    refuse_swapped(robot, data, "distances")
     readings = data_argument(data)
     predicted = errors_of(as_measured(robot, readings, payload, gravity), readings).position_errors
     seen = readings.has_position

@@ -39,7 +39,7 @@ def validate(
     InputError
         If the robot has no targets, or the data name others.
     """
-    refuse_swapped(robot, data)
+    refuse_swapped(robot, data, "validate")
     data = data_argument(data)
     robot = as_measured(robot, data, payload, gravity)
     identified = {p.group for p in robot.parameters.values() if p.deviation is not None}

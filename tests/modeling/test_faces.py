@@ -418,3 +418,11 @@ def test_rotation_vectors_of_poses_are_those_of_the_axis() -> None:
     robot = load_robot("irb120")
     (_, first), (_, second) = robot.forward(np.zeros(6)), robot.forward([0.3, 0, 0, 0, 0, 0])
     assert_allclose(rotation_vector(second @ np.swapaxes(first, 1, 2)), [[0, 0, 0.3]], rtol=0, atol=1e-12)
+
+
+def test_a_pose_that_is_not_reached_has_no_joints_and_claims_none() -> None:
+    robot = load_robot("irb120")
+    found = robot.inverse([5.0, 0.0, 0.0], np.eye(3))
+    assert np.isnan(found.joints).all()
+    assert "No joints give the pose: move it" in found.advice(0)
+    assert "nearest" not in repr(found)

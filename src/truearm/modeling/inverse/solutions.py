@@ -128,7 +128,10 @@ class JointSolutions:
         if status is PoseStatus.UNREACHABLE:
             angle = self.orientation_error[row]
             turn = "" if math.isnan(angle) else f" and {math.degrees(angle):.4g} deg"
-            return f"{self.position_error[row] * 1e3:.4g} mm{turn} are missing. {status.advice}"
+            missing = f"{self.position_error[row] * 1e3:.4g} mm{turn} are missing."
+            if not np.isfinite(self.joints[row]).all():  # only answers that can be sent are given
+                return f"{missing} No joints give the pose: move it, and check its frame, its units and the target."
+            return f"{missing} {status.advice}"
         if status is PoseStatus.BEYOND_LIMIT:
             names = [name for name, beyond in zip(self.joint_names, self.beyond[row], strict=True) if beyond]
             return f"Beyond its limits: {', '.join(names)}. {status.advice}"

@@ -179,8 +179,9 @@ def calibrate(
         _check_split(readings.of_configurations(training), readings.of_configurations(held_out))
 
         progress("checking the data")
-        noticed = notices_of(readings, nominal_robot)
-        readings = without_table_motion(readings)
+        steady = without_table_motion(readings)
+        noticed = notices_of(readings, nominal_robot, steady=steady)
+        readings = steady
         first = readings.of_configurations(training)
         second = readings.of_configurations(held_out) if len(held_out) else None
         selection = None

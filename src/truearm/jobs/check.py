@@ -47,8 +47,16 @@ def check(
     return DataCheck(measured, notices_of(measured, None if robot is None else robot_argument(robot), device))
 
 
-def notices_of(data: Dataset, robot: Robot | None = None, device: str | None = None) -> tuple[Notice, ...]:
-    """Return one notice for each kind of fault; none for believable data."""
+def notices_of(
+    data: Dataset, robot: Robot | None = None, device: str | None = None, *, steady: Dataset | None = None
+) -> tuple[Notice, ...]:
+    """Return one notice for each kind of fault; none for believable data.
+
+    Parameters
+    ----------
+    steady
+        The same data without the motion of the table, where that has been removed already.
+    """
     ranged: tuple[Notice, ...] = ()
     if device is not None:
         ranged = tuple(check_range(data, device_argument(device)))
@@ -56,5 +64,5 @@ def notices_of(data: Dataset, robot: Robot | None = None, device: str | None = N
         return (*ranged, *check_data(data))
     with refusals_of("data"):
         check_joints(robot, data)
-    against, suspects = check_against(robot, without_table_motion(data))
+    against, suspects = check_against(robot, without_table_motion(data) if steady is None else steady)
     return (*ranged, *check_data(data, suspects), *against)

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
 from numbers import Integral
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -183,19 +183,19 @@ def checked_order(order: ArrayLike, count: int) -> IntArray:
     return whole
 
 
-def _array(values: object, field: str, shape: tuple[int | str, ...], *, missing: bool = False) -> None:
+def _array(values: object, field: str, shape: tuple[int | str, ...], *, missing: bool = False) -> NDArray[Any]:
     if not isinstance(values, np.ndarray) or isinstance(values, np.ma.MaskedArray):
         raise wrong_kind("an array belongs here", values, field, f"an array without a mask, {shape_text(shape)}")
     number_array(values, field, shape, missing=missing, largest=_LAST if field == "number" else LARGEST)
+    return values
 
 
 def _places(values: object, field: str, count: int | str, end: int, lowest: int = 0) -> None:
-    _array(values, field, (count,))
-    assert isinstance(values, np.ndarray)
+    indices = _array(values, field, (count,))
     allowed = f"{lowest} to {end - 1}"
-    if values.dtype.kind not in "iu":
-        raise InputError("indices must be whole numbers", parameter=field, came=str(values.dtype), allowed=allowed)
-    _refuse((values < lowest) | (values >= end), values, field, "there is no such index", allowed)
+    if indices.dtype.kind not in "iu":
+        raise InputError("indices must be whole numbers", parameter=field, came=str(indices.dtype), allowed=allowed)
+    _refuse((indices < lowest) | (indices >= end), indices, field, "there is no such index", allowed)
 
 
 def _names(names: object, field: str) -> None:

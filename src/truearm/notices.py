@@ -19,8 +19,3 @@ class Notice:
 
     code: str
     message: str
-
-
-def counted(number: int, noun: str) -> str:
-    """Return a number with its noun, for messages: ``1 reading``, ``2 readings``."""
-    return f"{number} {noun if number == 1 else f'{noun}s'}"

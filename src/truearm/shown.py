@@ -31,5 +31,5 @@ def listed(names: Sequence[str]) -> str:
 
 
 def counted(count: int, thing: str) -> str:
-    """Return a count with the thing in the singular or the plural."""
+    """Return a count with the thing in the singular or the plural: ``1 reading``, ``2 readings``."""
     return f"{count} {thing}" if count == 1 else f"{count} {thing}s"

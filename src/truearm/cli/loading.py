@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from truearm.errors import InputError
-
-if TYPE_CHECKING:
-    from truearm.modeling.parts import Payload
 
 PayloadText = Annotated[
     str | None,
@@ -29,13 +26,6 @@ GravityText = Annotated[
         show_default="as the robot file says",
     ),
 ]
-
-
-def read_payload(text: str | None) -> Payload | None:
-    """Return the payload that a text names, None for None."""
-    from truearm.modeling.parts import Payload
-
-    return None if text is None else Payload.of_text(text)
 
 
 def read_gravity(text: str | None) -> tuple[float, float, float] | None:

@@ -45,9 +45,9 @@ from truearm.measurement.table_motion import without_table_motion
 from truearm.modeling.effects import EFFECTS
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
-from truearm.notices import Notice, counted
+from truearm.notices import Notice
 from truearm.results.calibration import RESULT_FILES, Calibration
-from truearm.shown import listed
+from truearm.shown import counted, listed
 from truearm.version import __version__
 
 Train = int | Literal["all"] | None

@@ -9,14 +9,14 @@ from pathlib import Path
 from truearm.errors import refusals_of
 from truearm.files import path_argument
 from truearm.jobs.arguments import (
-    choice_argument,
     command_argument,
     count_argument,
     folder_for,
+    name_argument,
     progress_argument,
     python_call,
 )
-from truearm.studies import STUDIES, run_study
+from truearm.studies import run_study
 from truearm.studies.study import Study
 
 
@@ -52,7 +52,7 @@ def study(
         If there is no such study, or its data are missing, or it needs none.
     """
     progress_argument(progress)
-    choice_argument(name, "name", {entry.name: entry for entry in STUDIES}, "study")
+    name = name_argument(name, "name")
     seeds = count_argument(seeds, "seeds")
     source = None if data is None else path_argument(data, "data")
     folder = None if out is None else folder_for((), out)

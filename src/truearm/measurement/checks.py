@@ -19,7 +19,8 @@ from truearm.measurement.dataset import Dataset, IntArray
 from truearm.measurement.dataset_fields import drawn_from
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
-from truearm.notices import Notice, counted
+from truearm.notices import Notice
+from truearm.shown import counted
 
 Suspicion = Literal["outliers", "targets-swapped", "target-mistaken"]
 

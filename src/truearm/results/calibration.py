@@ -20,10 +20,11 @@ from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import Errors
 from truearm.modeling.formats.robot_file import robot_text
 from truearm.modeling.robot import Robot
-from truearm.notices import Notice, counted
+from truearm.notices import Notice
 from truearm.results.record import Record, notice_lines
 from truearm.results.residuals import Part, Residuals, residuals_of
 from truearm.results.summaries import error_line, errors_summary, selection_summary
+from truearm.shown import counted
 from truearm.units import SHOWN_AS, from_si
 
 #: What a calibration writes into its folder.

@@ -7,8 +7,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from truearm.notices import counted
 from truearm.results.record import Record
+from truearm.shown import counted
 from truearm.validation.pair_distances import PairDistances
 
 #: Bars of the histogram where a person reads, about, and signs in the longest.

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from truearm.measurement.dataset import Dataset
-from truearm.notices import counted
 from truearm.results.record import Record
+from truearm.shown import counted
 
 
 @dataclass(frozen=True, eq=False, repr=False)

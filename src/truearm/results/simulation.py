@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from truearm.measurement.dataset import Dataset
-from truearm.notices import counted
 from truearm.results.record import Record
+from truearm.shown import counted
 
 
 @dataclass(frozen=True, eq=False, repr=False)

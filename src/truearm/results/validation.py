@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from truearm.measurement.statistics import Errors, Spread
-from truearm.notices import counted
 from truearm.results.record import Record
 from truearm.results.summaries import error_line, errors_summary
+from truearm.shown import counted
 
 
 @dataclass(frozen=True, eq=False, repr=False)

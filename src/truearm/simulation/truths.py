@@ -17,7 +17,7 @@ from truearm.modeling.effects.linear_contact import LinearContactClearance
 from truearm.modeling.parts import NO_PAYLOAD, Payload, Tool
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform, rotation_from_quaternion
-from truearm.notices import counted
+from truearm.shown import counted
 from truearm.simulation.twin import Twin
 from truearm.simulation.twin_joint import PERFECT, Contact, JointTruth
 

@@ -12,7 +12,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, cast
 
-from truearm.errors import InputError, nearest_names
+from truearm.errors import InputError, did_you_mean
 
 if TYPE_CHECKING:
     from truearm.studies.study import Study
@@ -121,8 +121,6 @@ def run_study(name: str, seeds: int = 10, data: str | Path | None = None, progre
         If there is no such study, or its data are missing, or it needs none.
     """
     entry = _entry(name)
-    if seeds < 1:
-        raise InputError("at least one seed is needed", parameter="seeds", came=seeds, allowed="1 or more")
     study = import_module(entry.module).study
     if not entry.files:
         if data is not None:
@@ -138,13 +136,12 @@ def _entry(name: str) -> Entry:
         if entry.name == name:
             return entry
     names = [entry.name for entry in STUDIES]
-    near = nearest_names(name, names)
     raise InputError(
-        "there is no such study",
+        "there is no study of this name",
         parameter="name",
         came=name,
         allowed=", ".join(names),
-        cure=f"Did you mean {' or '.join(near)}?" if near else None,
+        cure=did_you_mean(name, names),
     )
 
 

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from truearm.errors import InputError, nearest_names
+from truearm.errors import InputError, did_you_mean
 from truearm.files import read_yaml
 from truearm.modeling.chain import Array
 from truearm.modeling.parameters import FreeParameters, Parameter
@@ -91,14 +91,13 @@ def _places(name: str, free: FreeParameters, others: Iterable[Parameter], where:
     if found or any(name in (p.name, _family(p)) for p in others):
         return found
     known = sorted({*free.names, *(_family(p) for p in free.parameters)})
-    near = nearest_names(name, known)
     raise InputError(
         "no free parameter of this model has this name",
         parameter="bounds",
         where=where,
         came=name,
         allowed=", ".join(known),
-        cure=f"Did you mean {' or '.join(near)}?" if near else None,
+        cure=did_you_mean(name, known),
     )
 
 

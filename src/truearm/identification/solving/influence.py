@@ -14,7 +14,7 @@ from typing import Final
 
 import numpy as np
 
-from truearm.errors import InputError, nearest_names
+from truearm.errors import InputError, did_you_mean
 from truearm.modeling.chain import Array
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
@@ -140,8 +140,7 @@ def sizes_of(
         raise InputError("no parameter is named", where=robot.name, cure="Name at least one.")
     for name in names:
         if name not in robot.parameters:
-            near = nearest_names(name, robot.parameters)
-            cure = f"Did you mean {' or '.join(near)}?" if near else None
+            cure = did_you_mean(name, robot.parameters)
             raise InputError("the robot has no such parameter", where=robot.name, came=name, cure=cure)
     twice = [name for i, name in enumerate(names) if name in names[:i]]
     if twice:

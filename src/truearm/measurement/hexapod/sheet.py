@@ -18,7 +18,7 @@ from typing import Final, TypeVar
 
 import numpy as np
 
-from truearm.errors import InputError, nearest_names
+from truearm.errors import InputError, did_you_mean, nearest_names
 from truearm.files import read_text
 from truearm.measurement.dataset import Dataset, IntArray
 from truearm.measurement.hexapod.geometry import DEVICE, Design, Device, designs, side_names
@@ -164,13 +164,12 @@ def read_sheet(path: Path, device: Device = DEVICE) -> Sheet:
 def _one_of(cells: Cells, row: int, column: int, choices: dict[str, Choice]) -> Choice:
     text = cells.columns[column][row]
     if text not in choices:
-        near = nearest_names(text, choices)
         raise InputError(
             f"there is no such {cells.names[column]}",
             where=cells.place(row, column),
             came=text,
             allowed=", ".join(choices) if len(choices) < 9 else "one of the 36 designs, as 112212331",
-            cure=f"Did you mean {' or '.join(near)}?" if near else None,
+            cure=did_you_mean(text, choices),
         )
     return choices[text]
 

@@ -12,7 +12,7 @@ from pydantic import field_validator as validator_of
 from truearm.errors import InputError
 from truearm.files import is_one_line
 from truearm.measurement.readers.cells import Layout
-from truearm.notices import counted
+from truearm.shown import counted
 
 _DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "whitespace": None}
 

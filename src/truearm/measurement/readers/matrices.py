@@ -13,7 +13,7 @@ from truearm.files import is_one_line, read_text
 from truearm.measurement.dataset import Dataset, IntArray
 from truearm.modeling.chain import Array
 from truearm.modeling.postures import approach_of
-from truearm.notices import counted
+from truearm.shown import counted
 from truearm.units import ANGLE_UNITS, LENGTH_UNITS, checked_unit, sized_si
 
 

@@ -24,7 +24,7 @@ from truearm.measurement.readers.mapping import (
 )
 from truearm.measurement.readers.rows import Configurations, Readings, dataset_of, found_configurations
 from truearm.modeling.chain import Array
-from truearm.notices import counted
+from truearm.shown import counted
 from truearm.units import sized_si
 
 

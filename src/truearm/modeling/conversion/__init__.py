@@ -14,7 +14,7 @@ from typing import Final
 
 import numpy as np
 
-from truearm.errors import InputError, nearest_names
+from truearm.errors import InputError, did_you_mean
 from truearm.modeling.chain import Array
 from truearm.modeling.conventions import convention
 from truearm.modeling.conversion.base_frame import exponentials, zero_reference
@@ -67,13 +67,12 @@ def converted(robot: Robot, convention_name: str) -> Robot:
         in a DH table or the S-model.
     """
     if convention_name not in CONVERSIONS:
-        near = nearest_names(convention_name, CONVERSIONS)
         raise InputError(
             "there is no such convention",
             where=robot.name,
             came=convention_name,
             allowed=", ".join(CONVERSIONS),
-            cure=f"Did you mean {' or '.join(near)}?" if near else None,
+            cure=did_you_mean(convention_name, CONVERSIONS),
         )
     base, flange = base_and_flange(robot)
     links = CONVERSIONS[convention_name](robot)

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import AfterValidator, BaseModel, Field
 
-from truearm.errors import InputError, nearest_names
+from truearm.errors import InputError, did_you_mean
 from truearm.modeling.controller import Controller
 from truearm.modeling.formats.entries import STRICT, Name, Number, Place, place_entry
 from truearm.modeling.parts import Joint
@@ -136,13 +136,12 @@ class ControllerEntry(BaseModel):
 def _number(name: str, numbers: dict[str, int], where: str) -> int:
     if name in numbers:
         return numbers[name]
-    near = nearest_names(name, numbers)
     raise InputError(
         "the robot has no joint of this name",
         where=where,
         came=name,
         allowed=", ".join(numbers),
-        cure=f"Did you mean {' or '.join(near)}?" if near else None,
+        cure=did_you_mean(name, numbers),
     )
 
 

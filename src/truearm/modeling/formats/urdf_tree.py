@@ -16,7 +16,7 @@ from xml.parsers import expat
 
 import numpy as np
 
-from truearm.errors import InputError, nearest_names
+from truearm.errors import InputError, did_you_mean
 from truearm.modeling.chain import Array, Chain, Element
 from truearm.modeling.conventions import JointKind, convention
 from truearm.units import as_number, sized_si
@@ -110,13 +110,12 @@ class Tree:
         """Return a link's name if there is such a link, else refuse it."""
         if link in self.links:
             return link
-        near = nearest_names(link, self.links)
         raise InputError(
             "there is no link of this name",
             where=where,
             came=link,
             allowed=", ".join(self.links) or "none: the file has no links",
-            cure=f"Did you mean {' or '.join(near)}?" if near else None,
+            cure=did_you_mean(link, self.links),
         )
 
 

@@ -11,7 +11,7 @@ from truearm.modeling.chain import Array
 from truearm.modeling.parts import NO_PAYLOAD, Payload
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY
-from truearm.notices import counted
+from truearm.shown import counted
 
 
 def with_cups(robot: Robot, tool: str | None = None) -> tuple[Robot, Array]:

@@ -28,9 +28,9 @@ from truearm.modeling.inverse.turns import beyond_limits
 from truearm.modeling.postures import Postures, approach_of
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import rotation_vector
-from truearm.notices import counted
 from truearm.planning.paths.trajectory import Trajectory
 from truearm.planning.poses.tip import Tip
+from truearm.shown import counted
 from truearm.units import SHOWN_AS, from_si
 
 #: The steps at one sample end when one is this short [rad, reach lengths]: the next would be its square.

@@ -18,7 +18,7 @@ from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY, Transform
-from truearm.notices import counted
+from truearm.shown import counted
 from truearm.simulation.twin import Conditions, Twin, directions
 
 #: The ball joint of the document's table turns no further about the roll axis; about the pitch axis it is free [rad].

@@ -16,7 +16,7 @@ from truearm.modeling.chain import Array
 from truearm.modeling.parts import Tool
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform, rigid_motion
-from truearm.notices import counted
+from truearm.shown import counted
 from truearm.simulation.truths import DEFAULT_TOOL, at_station
 from truearm.simulation.twin import Twin, directions
 

@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
-from truearm.errors import InputError, nearest_names
+from truearm.errors import InputError, did_you_mean
 from truearm.files import read_yaml, shown_entry
 from truearm.modeling.conventions import convention
 from truearm.modeling.effects import EFFECTS, NON_NEGATIVE
@@ -110,8 +110,7 @@ def _with_values(robot: Robot, content: RobotFile, where: str) -> Robot:
     def known(name: str, entry: str) -> Parameter:
         if name in robot.parameters:
             return robot.parameters[name]
-        near = nearest_names(name, robot.parameters)
-        cure = f"Did you mean {' or '.join(near)}?" if near else None
+        cure = did_you_mean(name, robot.parameters)
         for effect in EFFECTS:
             if name in [p.name for p in effect(robot.layout).parameters]:
                 cure = f"It belongs to the joint effect {effect.name}: add that to the entry effects."
@@ -173,13 +172,12 @@ def _joint(content: RobotFile, number: int, entry: JointEntry, where: str) -> Jo
             row |= _vector(column, value, shown[unit], f"{where}.{column}", direction=unit == "1")
             continue
         if column not in allowed:
-            near = nearest_names(column, allowed)
             raise InputError(
                 f"a joint of convention {content.convention} has no such entry",
                 where=where,
                 came=column,
                 allowed=", ".join(["name", "type", "limits", "transmission_periods", *allowed]),
-                cure=f"Did you mean {' or '.join(near)}?" if near else None,
+                cure=did_you_mean(column, allowed),
             )
         row[column] = sized_si(_number(value, f"{where}.{column}"), shown[units[column]], f"{where}.{column}")
     fault = table.fault(row, entry.type)

@@ -16,11 +16,11 @@ app = Commands(help="Turn measurement files into the canonical CSV.", no_args_is
 
 @app.command()
 def matrices(
-    joints: Annotated[Path, typer.Option(metavar="FILE", help="Joint readings, one configuration a row.")],
+    joints: Annotated[Path, typer.Option(metavar="FILE", help="Joint positions, one configuration a row.")],
     targets: Annotated[
         list[str], typer.Option("--target", metavar="NAME=FILE", help="Positions of a target; repeat for each.")
     ],
-    angle_unit: Annotated[str, typer.Option(metavar="deg|rad", help="Unit of the joint readings.")],
+    angle_unit: Annotated[str, typer.Option(metavar="deg|rad", help="Unit of the joint positions.")],
     length_unit: Annotated[str, typer.Option(metavar="mm|m", help="Unit of the positions.")],
     out: Annotated[Path, typer.Option("--out", metavar="DATA.csv", help="File to write.")],
     references: Annotated[

@@ -1,8 +1,8 @@
 """The chain of elementary transforms that every kinematic convention is a special case of.
 
 A chain is a product of rotations and translations along fixed axes. Every element has a value; some add a
-joint variable to it, and some values are named parameters that identification may change. A sweep goes over the
-elements twice, all configurations together. Backward, from the tip to the world, it carries one point: where the
+joint variable to it, and some values are named parameters that identification may change. Forward kinematics goes over
+the elements twice, all configurations together. Backward, from the tip to the world, it carries one point: where the
 tip is, seen from each element. Forward, from the world to the tip, it carries the axes of each element's frame.
 That is also all a derivative needs, because turning about an axis moves the tip by ``axis x (tip - origin)`` and
 sliding along it moves the tip by ``axis`` (Whitney 1972, "The mathematics of coordinated control of prosthetic
@@ -97,7 +97,7 @@ class ForwardKinematics:
     shape
         ``(n,)``, or ``(trials, n)`` with trial values.
     start
-        The sweep that this one goes on from, whose elements are its first.
+        The forward kinematics that this goes on from, whose elements are its first.
     """
 
     elements: tuple[Element, ...]
@@ -263,7 +263,7 @@ class Chain:
         values
             Parameter values that replace nominal ones, each a number or ``(trials, 1)`` [rad or m].
         start
-            A sweep to go on from, with the same `variables` and `values`.
+            Forward kinematics to go on from, with the same `variables` and `values`.
         """
         given = values or {}
         moves: list[Move] = []

@@ -78,7 +78,7 @@ class RobotDescription(Record):
             limits = "  limits {:g} to {:g}".format(*joint["limits"]) if joint["limits"] else ""
             text.append(f"  {joint['name']} ({joint['type']})  {row}{limits}")
         x, y, z = content["flange_at_zero_mm"]
-        text.append(f"Flange at zero readings, from the base: x {x:.3f}  y {y:.3f}  z {z:.3f} mm")
+        text.append(f"Flange at zero joint positions, from the base: x {x:.3f}  y {y:.3f}  z {z:.3f} mm")
         if content["masses_kg"]:
             text.append(f"Link masses: {', '.join(f'{k} {v:g} kg' for k, v in content['masses_kg'].items())}")
         payload = content["payload"]

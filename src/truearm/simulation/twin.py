@@ -1,7 +1,7 @@
 """The digital twin: a robot whose truth is known, seen only through its readings.
 
 It follows a path of its own: frames, motions and masses are 4x4 matrices, one configuration after the other, and the
-arm is let sag until moments and deflections agree. Nothing here calls the chain sweep, the loads or the joint effects
+arm is let sag until moments and deflections agree. Nothing here calls the chain, the loads or the joint effects
 of the models, so a mistake there cannot hide by appearing on both sides.
 """
 

@@ -1,7 +1,7 @@
 """How far each parameter moves the tip, configuration by configuration (Patel, section 3.5).
 
 Every parameter is really moved, one at a time, and the tip is where the chain then puts it: no derivative, so what
-bends is in it. The perturbations are the trials of one sweep over all configurations.
+bends is in it. The perturbations are the trials of one computation over all configurations.
 """
 
 from __future__ import annotations

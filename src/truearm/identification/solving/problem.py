@@ -154,7 +154,7 @@ class Problem:
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """A problem at one vector of its free parameters. The Jacobian goes on from the sweep of the residual.
+    """A problem at one vector of its free parameters. The Jacobian goes on from the forward kinematics of the residual.
 
     Attributes
     ----------
@@ -180,7 +180,7 @@ class Evaluation:
     def jacobian(self) -> Array:
         """Derivative of the residual, ``(rows, parameters)``."""
         names = self.problem.free.names
-        # Parameter by parameter in memory: as sweeps give it, and as QR decompositions take it.
+        # Parameter by parameter in memory: as forward kinematics gives it, and as QR decompositions take it.
         J = np.empty((*self.vector.shape[:-1], len(names), self.problem.rows))
         by_parameter = np.moveaxis(J, -2, 0)
         for block, rows in self._rows():
@@ -223,7 +223,7 @@ class Evaluation:
 
     @cached_property
     def _kinematics(self) -> dict[str, ForwardKinematics]:
-        """The sweep to each target; all go on from one to the flange."""
+        """Forward kinematics to each target; all go on from one to the flange."""
         robot = self.problem.robot
         variables = robot.variables(self.problem.postures, self._values)
         trunk = robot.trunk.forward_kinematics(variables, self._values)
@@ -232,7 +232,7 @@ class Evaluation:
 
     @cached_property
     def _fixtures(self) -> dict[str, ForwardKinematics]:
-        """The sweep to each fixture."""
+        """Forward kinematics to each fixture."""
         data = self.problem.data
         names = dict.fromkeys((*data.fixtures, *(() if data.setup is None else data.setup.targets)))
         return {name: self.problem.robot.fixture_kinematics(name, self._values) for name in names}

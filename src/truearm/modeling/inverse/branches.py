@@ -79,7 +79,7 @@ class Line:
 
 
 def joint_axes(kinematics: ForwardKinematics) -> list[Line]:
-    """Return the axes of the six joints as a sweep passed them."""
+    """Return the axes of the six joints as forward kinematics passed them."""
     places = {e.variable: i for i, e in enumerate(kinematics.elements) if e.variable is not None}
     return [Line(kinematics.axis(places[i]), kinematics.origin(places[i])) for i in range(6)]
 
@@ -99,7 +99,7 @@ class BranchRule:
     wrist: float
 
     def numbers(self, kinematics: ForwardKinematics) -> NDArray[np.intp]:
-        """Return the branch of each configuration of a sweep, as its place in :data:`BRANCHES`, ``(n,)``."""
+        """Return the branch of each configuration, as its place in :data:`BRANCHES`, ``(n,)``."""
         shoulder, elbow, wrist = _expressions(joint_axes(kinematics))
         back, down = self.shoulder * shoulder < 0, self.elbow * elbow * shoulder < 0
         number: NDArray[np.intp] = np.asarray(4 * back + 2 * down + (self.wrist * wrist < 0), dtype=np.intp)

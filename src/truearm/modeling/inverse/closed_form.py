@@ -93,7 +93,7 @@ class ClosedForm:
 
 
 def _end_frames(kinematics: ForwardKinematics) -> tuple[Array, Array]:
-    """Return the frames on the first two and on the last two axes of a sweep at one configuration, ``(4, 4)`` each."""
+    """Return the frames on the first two and on the last two axes at one configuration, ``(4, 4)`` each."""
     axes = joint_axes(kinematics)
     return _frame(axes[0], axes[1]), _frame(axes[5], axes[4])
 

@@ -18,7 +18,7 @@ def steps_text(plan: Reachable, robot: Robot, device: Device = DEVICE) -> str:
         "",
         f"1. Set the bar to {tool} on its calibrator. Measure {', '.join(side_names('T'))}.",
         "2. Loosen the base cups. Bring the setting ball in cup T1 to the three places of the base cups by programme,",
-        f"   {base} apart. Let each cup snap on and lock it. Note the joint readings.",
+        f"   {base} apart. Let each cup snap on and lock it. Note the joint positions.",
         f"3. Set the bar to {base} on its calibrator. Measure {', '.join(side_names('B'))}.",
         f"4. For every configuration below: move, set the bar to {leg} on its calibrator, then measure six legs.",
         "",

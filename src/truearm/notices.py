@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Final, Literal
+
+#: ``note``: good to know. ``warning``: a figure may not hold. ``error``: the result should not be used as it is.
+Level = Literal["note", "warning", "error"]
+LEVELS: Final[tuple[Level, ...]] = ("note", "warning", "error")
 
 
 @dataclass(frozen=True)
@@ -15,7 +21,24 @@ class Notice:
         Stable short name, for programs: ``redundant``, ``at-bound``.
     message
         What was noticed and what to do about it.
+    level
+        How bad it is.
     """
 
     code: str
     message: str
+    level: Level = "warning"
+
+    def summary(self) -> dict[str, str]:
+        """Return it as JSON holds it."""
+        return {"code": self.code, "level": self.level, "message": self.message}
+
+
+def worst_first(notices: Iterable[Notice]) -> tuple[Notice, ...]:
+    """Return notices with errors first and notes last, otherwise in their order."""
+    return tuple(sorted(notices, key=lambda notice: -LEVELS.index(notice.level)))
+
+
+def has_error(notices: Iterable[Notice]) -> bool:
+    """Return whether a notice says that the result should not be used as it is."""
+    return any(notice.level == "error" for notice in notices)

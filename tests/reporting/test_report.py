@@ -312,7 +312,7 @@ def test_bounds_and_rank_loss_are_marked() -> None:
 
 
 def test_warnings_or_none() -> None:
-    assert "Warnings None." in Page(report_html(replace(made(), warnings=()))).text
+    assert "Errors, warnings and notes None." in Page(report_html(replace(made(), warnings=()))).text
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from truearm.cli.output import Json, print_json, print_record, progress
+from truearm.cli.output import Json, end_on_error, print_json, print_record, progress
 
 
 def axes(
@@ -36,3 +36,4 @@ def axes(
     else:
         print_record(found)
         typer.echo(f"Written to {out}: calibrated.yaml, joint-errors.yaml, axes.json")
+    end_on_error(found.warnings)

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from truearm.cli.output import Json, print_json, print_record, progress
+from truearm.cli.output import Json, end_on_error, print_json, print_record, progress
 
 
 def check(
@@ -37,3 +37,4 @@ def check(
         print_json(checked.summary())
     else:
         print_record(checked)
+    end_on_error(checked.warnings)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,6 +12,7 @@ import typer
 from truearm.cli.options import spelled
 
 if TYPE_CHECKING:
+    from truearm.notices import Notice
     from truearm.results.record import Record
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output and nothing else there.")]
@@ -33,6 +34,14 @@ def progress() -> Iterator[Callable[[str], None]]:
         return
     with console.status("starting") as status:
         yield lambda words: status.update(words)
+
+
+def end_on_error(notices: Iterable[Notice]) -> None:
+    """End with exit code 3 if a notice says that the result should not be used as it is."""
+    from truearm.notices import has_error
+
+    if has_error(notices):
+        raise typer.Exit(3)
 
 
 def print_record(record: Record) -> None:

@@ -14,6 +14,7 @@ from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import Errors
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import GRAVITY
+from truearm.notices import worst_first
 from truearm.reporting.drawing import Figure
 from truearm.reporting.figures import correlation_map, histogram, residuals, workspace
 from truearm.reporting.page import page
@@ -125,6 +126,7 @@ def report_html(calibration: Calibration) -> str:
         report.figures(),
         report=report,
         run=calibration,
+        notices=worst_first(calibration.warnings),
         fit=fit,
         source=Path(calibration.data.source).name,
         robot_rows=[row for row in rows if row.group not in _FRAMES],

@@ -24,7 +24,7 @@ from truearm.modeling.parameters import FreeParameters
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 from truearm.notices import Notice
-from truearm.results.record import Record, notice_lines
+from truearm.results.record import Record, notice_lines, notice_summaries
 from truearm.units import SHOWN_AS, from_si
 
 #: What an axis-by-axis calibration writes into its folder.
@@ -79,7 +79,7 @@ class AxisCalibration(Record):
             "targets": {t.name: [self.robot.values[t.parameter(a)] * 1e3 for a in "xyz"] for t in self.robot.targets},
             "tables": {name: self._table(name) for name in TABLES},
             "joint_errors": joint_errors_summary(found.errors),
-            "warnings": [{"code": n.code, "message": n.message} for n in self.warnings],
+            "warnings": notice_summaries(self.warnings),
         }
 
     def summary(self) -> dict[str, Any]:

@@ -20,8 +20,8 @@ from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import Errors
 from truearm.modeling.formats.robot_file import robot_text
 from truearm.modeling.robot import Robot
-from truearm.notices import Notice
-from truearm.results.record import Record, notice_lines
+from truearm.notices import Notice, has_error
+from truearm.results.record import Record, notice_lines, notice_summaries
 from truearm.results.residuals import Part, Residuals, residuals_of
 from truearm.results.summaries import error_line, errors_summary, selection_summary
 from truearm.shown import counted
@@ -90,14 +90,14 @@ class Calibration(Record):
 
     @property
     def finished(self) -> bool:
-        """Whether the fit came to an end that its figures can be believed of: converged, or with a value at a bound."""
-        return self.status in (Status.CONVERGED, Status.AT_BOUND)
+        """Whether its figures can be believed: it converged or has a value at a bound, and no notice is an error."""
+        return self.status in (Status.CONVERGED, Status.AT_BOUND) and not has_error(self.warnings)
 
     def summary(self) -> dict[str, Any]:
         """Return the figures as ``result.json`` begins with them: errors in mm and mrad."""
         return {
             "status": self.status.value,
-            "warnings": [{"code": n.code, "message": n.message} for n in self.warnings],
+            "warnings": notice_summaries(self.warnings),
             "nominal": errors_summary(self.nominal),
             "train": errors_summary(self.train),
             "validation": None if self.validation is None else errors_summary(self.validation),

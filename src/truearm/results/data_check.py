@@ -7,7 +7,7 @@ from typing import Any
 
 from truearm.measurement.dataset import Dataset
 from truearm.notices import Notice
-from truearm.results.record import Record, notice_lines
+from truearm.results.record import Record, notice_lines, notice_summaries
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -30,7 +30,7 @@ class DataCheck(Record):
         return {
             "configurations": self.data.configurations,
             "targets": list(self.data.targets),
-            "warnings": [{"code": n.code, "message": n.message} for n in self.warnings],
+            "warnings": notice_summaries(self.warnings),
         }
 
     def lines(self) -> list[str]:

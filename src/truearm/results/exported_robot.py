@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from truearm.modeling.robot import Robot
-from truearm.results.record import Record
+from truearm.notices import Notice
+from truearm.results.record import Record, notice_summaries
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -43,7 +44,7 @@ class ExportedRobot(Record):
             "file": None if self.file is None else str(self.file),
             "format": self.format,
             "frames": self.frames,
-            "warnings": [{"code": "left-out", "message": message} for message in self.left_out],
+            "warnings": notice_summaries([Notice("left-out", message) for message in self.left_out]),
         }
 
     def lines(self) -> list[str]:

@@ -21,7 +21,7 @@ from truearm.files import output_folder
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
-from truearm.results.record import Record, notice_lines
+from truearm.results.record import Record, notice_lines, notice_summaries
 
 #: The report beside the corrected programs.
 REPORT: Final = "compensation.html"
@@ -180,7 +180,7 @@ class ProgramCorrection(Record):
         """Return it as JSON holds it, lengths in mm."""
         return {
             "programs": [file.summary() for file in self.files],
-            "warnings": [{"code": notice.code, "message": notice.message} for notice in self.warnings],
+            "warnings": notice_summaries(self.warnings),
         }
 
     def lines(self) -> list[str]:

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import Any
 
-from truearm.notices import Notice
+from truearm.notices import Notice, worst_first
 from truearm.shown import as_html, short_text
 
 
@@ -29,5 +29,10 @@ class Record(ABC):
 
 
 def notice_lines(notices: Sequence[Notice]) -> list[str]:
-    """Return what to know about a result, one line each."""
-    return [f"Warning ({notice.code}): {notice.message}" for notice in notices]
+    """Return what to know about a result, one line each, the worst first."""
+    return [f"{notice.level.capitalize()} ({notice.code}): {notice.message}" for notice in worst_first(notices)]
+
+
+def notice_summaries(notices: Sequence[Notice]) -> list[dict[str, str]]:
+    """Return what to know about a result as JSON holds it, the worst first."""
+    return [notice.summary() for notice in worst_first(notices)]

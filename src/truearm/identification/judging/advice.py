@@ -52,13 +52,14 @@ def check_fit(fit: Fit) -> list[Notice]:
                 )
             )
     if fit.status is Status.NOT_CONVERGED:
-        found.append(Notice("not-converged", f"The fit did not converge. {Status.NOT_CONVERGED.advice}"))
+        found.append(Notice("not-converged", f"The fit did not converge. {Status.NOT_CONVERGED.advice}", "error"))
     if fit.unobservable:
         found.append(
             Notice(
                 "rank-loss",
                 f"The training data do not determine {', '.join(fit.unobservable)}, and predictions elsewhere depend "
                 f"on them. {Status.RANK_LOSS.advice}",
+                "error",
             )
         )
     if fit.gauge_freedoms:
@@ -73,7 +74,7 @@ def check_fit(fit: Fit) -> list[Notice]:
         if fit.unobservable_combinations:
             held = "; ".join(fit.unobservable_combinations)
             words += f" Unobservable combinations of parameters, held at nominal values: {held}."
-        found.append(Notice("closed-loop", words))
+        found.append(Notice("closed-loop", words, "note"))
     if fit.at_bound:
         found.append(Notice("at-bound", f"Parameters at a bound: {', '.join(fit.at_bound)}. {Status.AT_BOUND.advice}"))
     if fit.redundancies:
@@ -88,6 +89,7 @@ def check_fit(fit: Fit) -> list[Notice]:
                     if fit.unobservable
                     else " At configurations like the measured ones predictions hardly depend on them."
                 ),
+                "note",
             )
         )
     far = [
@@ -123,6 +125,7 @@ def check_fit(fit: Fit) -> list[Notice]:
                 f"calibrated.urdf holds the geometry and the joint zeros only. A URDF cannot hold {effects} "
                 f"({', '.join(own[:6])}{', ..' if len(own) > 6 else ''}), nor the base "
                 "and the targets in the instrument's frame. calibrated.yaml holds everything.",
+                "note",
             )
         )
     return found

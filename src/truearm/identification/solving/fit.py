@@ -43,6 +43,7 @@ class Status(Enum):
     AT_BOUND = "at-bound"
     RANK_LOSS = "rank-loss"
     NOT_CONVERGED = "not-converged"
+    IMPLAUSIBLE = "implausible"
 
     @property
     def advice(self) -> str:
@@ -53,6 +54,8 @@ class Status(Enum):
             Status.RANK_LOSS: "The data are too few or too alike to determine everything that predictions "
             "depend on. Measure more configurations that move every joint, or free fewer parameters.",
             Status.NOT_CONVERGED: "The solver's steps did not become small. Check units, joint order and targets.",
+            Status.IMPLAUSIBLE: "What was fitted cannot be this robot. Check units, joint order, signs and targets "
+            "with 'truearm check', and that it is this robot.",
         }[self]
 
 
@@ -93,6 +96,9 @@ class Fit:
     excess
         How much larger the residuals are than the declared deviations allow; 1 if they agree or nothing was
         declared. The covariance contains it. Parameters at a bound are not uncertain in it.
+    joint_error
+        Standard deviation of the error of each joint that all readings of an arrival share, ``(joints,)`` [rad or m]:
+        repeatability plus what the model leaves. Zero where none was found.
     weight
         What the loss left of each reading, ``(readings,)``, in the order of the dataset; NaN where none was used.
         For ``l1``, which has no full weight, relative to the median reading.
@@ -114,6 +120,7 @@ class Fit:
     sigma: dict[str, float]
     declared: bool
     excess: float
+    joint_error: Array
     weight: Array
     steps: int
 
@@ -259,6 +266,7 @@ def _fit(solved: Solved, model: Model, loss: Loss) -> Fit:
         sigma=sigma,
         declared=declared == set(noise),
         excess=excess,
+        joint_error=np.zeros(len(robot.joints)),
         weight=weight,
         steps=solution.steps,
     )

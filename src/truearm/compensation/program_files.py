@@ -23,7 +23,8 @@ from truearm.compensation.programs import LANGUAGES
 from truearm.compensation.programs.lines import replaced
 from truearm.compensation.programs.program import Edit, Language, Program, Source
 from truearm.errors import InputError
-from truearm.files import exists, read_bytes, refuse_overwriting, validated, write_files
+from truearm.files import exists, read_bytes, validated
+from truearm.writing import refuse_overwriting, write_files
 
 SCHEMA: Final = "truearm-corrected/1"
 #: A text of this size [bytes] and all that is made of it fit into the memory of a small computer.

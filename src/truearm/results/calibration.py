@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.errors import InputError, did_you_mean
-from truearm.files import output_folder, write_files
 from truearm.identification.choosing.selection import Selection
 from truearm.identification.solving.fit import Fit, Status
 from truearm.measurement.dataset import Dataset
@@ -26,6 +25,7 @@ from truearm.results.residuals import Part, Residuals, residuals_of
 from truearm.results.summaries import error_line, errors_summary, selection_summary
 from truearm.shown import counted
 from truearm.units import SHOWN_AS, from_si
+from truearm.writing import output_folder, write_files
 
 #: What a calibration writes into its folder.
 RESULT_FILES: Final = ("calibrated.yaml", "result.json", "report.html", "calibrated.urdf")

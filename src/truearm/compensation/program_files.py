@@ -23,7 +23,8 @@ from truearm.compensation.programs import LANGUAGES
 from truearm.compensation.programs.lines import replaced
 from truearm.compensation.programs.program import Edit, Language, Program, Source
 from truearm.errors import InputError
-from truearm.files import exists, read_bytes, validated
+from truearm.files import exists, read_bytes
+from truearm.schemas import validated
 from truearm.writing import refuse_overwriting, write_files
 
 SCHEMA: Final = "truearm-corrected/1"

@@ -12,11 +12,12 @@ from pydantic import BaseModel
 from truearm.compensation.cell import CellFile
 from truearm.compensation.program_files import CorrectionRecord
 from truearm.errors import InputError
-from truearm.files import exists, is_one_line, read_bytes, read_yaml
+from truearm.files import exists, read_bytes, read_yaml
 from truearm.identification.solving.bounds import Bounds
 from truearm.measurement.readers.mapping import MappingFile
 from truearm.modeling.formats.robot_file import RobotFile
 from truearm.planning.constraints.constraints import Constraints
+from truearm.printable import is_one_line
 from truearm.schemas import validated
 from truearm.writing import write_text
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import unicodedata
 from pathlib import Path
 
 from truearm.errors import InputError, nearest_names, wrong_kind
@@ -57,11 +56,6 @@ def exists(path: Path) -> bool:
         return path.exists()
     except (OSError, ValueError):
         return False
-
-
-def is_one_line(text: str) -> bool:
-    """Return whether a text is one line that can be seen: not blank, without breaks and control characters."""
-    return bool(text.strip()) and not any(unicodedata.category(c) in ("Cc", "Cs", "Zl", "Zp") for c in text)
 
 
 def read_text(path: Path) -> str:

@@ -10,8 +10,8 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 from pydantic import field_validator as validator_of
 
 from truearm.errors import InputError
-from truearm.files import is_one_line
 from truearm.measurement.readers.cells import Layout
+from truearm.printable import is_one_line
 from truearm.shown import counted
 
 _DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "whitespace": None}

@@ -128,7 +128,7 @@ ALLOWED = {"truearm": "truearm-constraints/1", "units": {"length": "mm", "angle"
     [
         (Bounds, BOUNDS | {"units": 3}, "units: named entries belong here; got 3; allowed: NAME: VALUE"),
         (Bounds, BOUNDS | {"within": [1]}, "within: named entries belong here; got [1]; allowed: NAME: VALUE"),
-        (Bounds, BOUNDS | {"within": {"d_1": None}}, "within.d_1: a number belongs here; got 'nothing'"),
+        (Bounds, BOUNDS | {"within": {"d_1": None}}, "within.d_1: a number belongs here; got nothing"),
         (Bounds, BOUNDS | {"within": {"d_1": 10**400}}, "within.d_1: a number belongs here; got a number of very"),
         (Bounds, BOUNDS | {"within": {"d_1": float("inf")}}, "within.d_1: a finite number belongs here; got inf"),
         (
@@ -148,7 +148,7 @@ ALLOWED = {"truearm": "truearm-constraints/1", "units": {"length": "mm", "angle"
         (
             Bounds,
             BOUNDS | {"between": {"d_1": [1, [10**5000]]}},
-            "between.d_1[2]: a number belongs here; got 'a list of 1",
+            "between.d_1[2]: a number belongs here; got a list of 1 entries",
         ),
         (Bounds, BOUNDS | {5: 1}, "5: the name of an entry must be a text; got 5; allowed: a name"),
         (

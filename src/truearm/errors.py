@@ -71,11 +71,11 @@ class InputError(ValueError):
 def wrong_kind(what: str, came: object, parameter: str, allowed: str, *, where: str | None = None) -> InputError:
     """Return the refusal of a value of another kind than belongs here."""
     if came is None:
-        came = _Words("None")
+        came = Words("None")
     elif not isinstance(came, str | bytes | int | float):
         size = f" of {len(came)}" if isinstance(came, Sized) and getattr(came, "ndim", None) != 0 else ""
         held = f" that holds {came.dtype}" if hasattr(came, "dtype") else ""
-        came = _Words(f"an object of type {kind_of(came)}{size}{held}")
+        came = Words(f"an object of type {kind_of(came)}{size}{held}")
     return InputError(what, parameter=parameter, where=where, came=came, allowed=allowed)
 
 
@@ -106,7 +106,7 @@ def with_parameters(text: str, spelled: Callable[[str, str | None], str]) -> str
     return _NAMED.sub(lambda found: spelled(found["name"], found["value"]), text)
 
 
-class _Words(str):
+class Words(str):
     """What is said of a value instead of the value itself: shown without quotes."""
 
     __slots__ = ()
@@ -115,9 +115,9 @@ class _Words(str):
 def _shown(came: object) -> str:
     if isinstance(came, Rational) and max(abs(int(came.numerator)), int(came.denominator)) >> 300:
         return "a number of very many digits"  # Python may refuse to write it out
-    quoted = isinstance(came, str) and not isinstance(came, _Words)
+    quoted = isinstance(came, str) and not isinstance(came, Words)
     text = repr(shortened(str(came), _LONGEST_CAME)) if quoted else str(came)
-    return shortened(text, _LONGEST if isinstance(came, _Words) else _LONGEST_CAME)
+    return shortened(text, _LONGEST if isinstance(came, Words) else _LONGEST_CAME)
 
 
 def nearest_names(name: str, known: Iterable[str], count: int = 3, likeness: float = 0.5) -> list[str]:
@@ -133,6 +133,8 @@ def nearest_names(name: str, known: Iterable[str], count: int = 3, likeness: flo
     if len(name) > _LONGEST_CAME:  # nobody misspells that, and to compare it takes long
         return []
     by_folded = {candidate.lower(): candidate for candidate in known}
+    if name.lower() in by_folded:
+        return [by_folded[name.lower()]]
     return [by_folded[match] for match in difflib.get_close_matches(name.lower(), by_folded, count, likeness)]
 
 

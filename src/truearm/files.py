@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 from truearm.errors import InputError, nearest_names, wrong_kind
@@ -107,13 +106,13 @@ def path_argument(path: object, parameter: str) -> Path:
             return Path(path)
         raise InputError("no file is given", parameter=parameter, came=str(path))
     raise wrong_kind(
-        "a path belongs here", path, parameter, "the path of a file or folder, as a text or a pathlib.Path"
+        "a path belongs here", path, parameter, "the path of a file or folder, as a text in UTF-8 or a pathlib.Path"
     )
 
 
 def _can_be_path(text: str) -> bool:
     try:
-        os.fsencode(text)
+        text.encode()
     except UnicodeEncodeError:  # half a character
         return False
     return "\0" not in text

@@ -18,7 +18,7 @@ _DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "whitespace": None}
 
 
 def _number_as_text(value: object) -> object:
-    return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
+    return str(value) if type(value) is int and abs(value) < 10**18 else value
 
 
 def _none_as_null(value: object) -> object:

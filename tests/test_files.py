@@ -130,7 +130,7 @@ ALLOWED = {"truearm": "truearm-constraints/1", "units": {"length": "mm", "angle"
         (Bounds, BOUNDS | {"within": [1]}, "within: named entries belong here; got [1]; allowed: NAME: VALUE"),
         (Bounds, BOUNDS | {"within": {"d_1": None}}, "within.d_1: a number belongs here; got nothing"),
         (Bounds, BOUNDS | {"within": {"d_1": 10**400}}, "within.d_1: a number belongs here; got a number of very"),
-        (Bounds, BOUNDS | {"within": {"d_1": float("inf")}}, "within.d_1: a finite number belongs here; got inf"),
+        (Bounds, BOUNDS | {"within": {"d_1": float("inf")}}, "within.d_1: the number is not finite; got inf"),
         (
             Bounds,
             BOUNDS | {"within": {"d_1": -1.0}},

@@ -96,6 +96,22 @@ def name_parameter(error: InputError, parameter: str) -> None:
     error.args = (error.message(str),)
 
 
+def name_place(error: InputError, where: str) -> None:
+    """Let a refusal name the place in a file."""
+    error.where = where
+    error.args = (error.message(str),)
+
+
+@contextmanager
+def refusals_at(where: str) -> Iterator[None]:
+    """Let refusals name the place in a file where the value that they refuse stands."""
+    try:
+        yield
+    except InputError as error:
+        name_place(error, where)
+        raise
+
+
 def kind_of(came: object) -> str:
     """Return the name of an object's type, for messages."""
     return type(came).__name__

@@ -66,7 +66,7 @@ def test_text_that_the_output_cannot_hold(truearm: Truearm, tmp_path: Path) -> N
     (tmp_path / "r.yaml").write_text(text)
     run = truearm("show", tmp_path / "r.yaml")
     assert run.code == 2
-    assert "a text cannot be written" in run.err
+    assert "r.yaml, title: the text holds half a character; got 'half a character \\ud800'" in run.err
 
 
 def test_a_fault_of_the_program_is_not_hidden(truearm: Truearm, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -58,7 +58,7 @@ class LayoutEntry(_Entry):
     def _known(cls, name: str) -> str:
         try:
             return codecs.lookup(name).name
-        except LookupError:
+        except (LookupError, ValueError):  # ValueError: half a character, a zero byte
             raise InputError(
                 "there is no such encoding", came=name, allowed="utf-8, utf-16, cp1252, latin-1 and others of Python"
             ) from None
@@ -66,7 +66,11 @@ class LayoutEntry(_Entry):
     @model_validator(mode="after")
     def _header_first(self) -> LayoutEntry:
         if self.first_row is not None and self.first_row <= (self.header or 0):
-            raise ValueError("first_row must be below the header")
+            raise InputError(
+                "first_row must be below the header",
+                came=f"header {self.header}, first_row {self.first_row}",
+                allowed=f"{(self.header or 0) + 1} or more for first_row",
+            )
         return self
 
     @property
@@ -102,7 +106,11 @@ class NamesEntry(_Entry):
         try:
             groups = set(re.compile(pattern).groupindex)
         except (re.error, OverflowError, RecursionError) as error:
-            raise ValueError(f"this is not a regular expression ({error})") from None
+            raise InputError(
+                f"this is not a regular expression ({error})",
+                came=pattern,
+                allowed="such as (?P<target>[a-z]+)_(?P<configuration>[0-9]+)",
+            ) from None
         if not groups or groups - {"configuration", "target"}:
             raise InputError(
                 "the pattern has other named groups",
@@ -163,7 +171,11 @@ class JointsEntry(_Entry):
         if (self.unit is None) == (self.units is None):
             raise ValueError("give either unit: for all joints, or units: with one for each joint")
         if self.units is not None and len(self.units) != len(self.columns):
-            raise ValueError(f"there are {counted(len(self.columns), 'column')} and {counted(len(self.units), 'unit')}")
+            raise InputError(
+                f"there are {counted(len(self.columns), 'column')} and {counted(len(self.units), 'unit')}",
+                came=", ".join(self.units),
+                allowed="units with one for each column, or unit for all of them",
+            )
         if self.file is None and (self.key is not None or self.layout is not None):
             raise ValueError("key and layout belong to a second file; name it with file:")
         return self
@@ -237,5 +249,9 @@ class MappingFile(_Entry):
             first: dict[str, str] = {}
             for column, entry in group:
                 if column in first:
-                    raise ValueError(f"the column {column!r} is used twice, for {first[column]} and for {entry}")
+                    raise InputError(
+                        f"a column is used twice, for {first[column]} and for {entry}",
+                        came=column,
+                        cure="Name the right column for one of them.",
+                    )
                 first[column] = entry

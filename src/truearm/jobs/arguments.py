@@ -44,13 +44,13 @@ def robot_argument(robot: object, parameter: str = "robot") -> Robot:
     raise wrong_kind("a robot belongs here", robot, parameter, "a Robot, a library id, a robot file or a URDF")
 
 
-def refuse_swapped(robot: object, data: object, job: str = "") -> None:
+def refuse_swapped(robot: object, data: object, job: str) -> None:
     """Refuse a robot where measurements belong, and measurements in its place.
 
     Parameters
     ----------
     job
-        Named with both in their order, where its command has the same order.
+        Named with both in their order.
     """
     if not (isinstance(robot, str | Path) and isinstance(data, str | Path)):
         return
@@ -60,7 +60,7 @@ def refuse_swapped(robot: object, data: object, job: str = "") -> None:
             parameter="robot",
             came=str(robot),
             allowed="a library id, a robot file or a URDF",
-            cure=f"Write 'truearm {job} {data} {robot}'." if job else "Exchange them.",
+            cure=f"Write 'truearm {job} {data} {robot}'.",
         )
 
 

@@ -113,9 +113,12 @@ def shown_entry(value: object) -> object:
 def _name(part: object) -> str:
     """Return the name of an entry as messages show it."""
     try:
-        return shortened(str(part), _LONGEST_SHOWN)
+        text = _flow(part)
     except ValueError:
+        text = "<unprintable"
+    if text.startswith("<unprintable"):  # as pydantic calls it
         return "a number of very many digits"
+    return shortened(text, _LONGEST_SHOWN) or '""'
 
 
 def _flow(value: object) -> str:
@@ -136,6 +139,8 @@ def _refusal(error: ValidationError, content: Any, schema: type[BaseModel], wher
     is_name = place[-1:] == ("[key]",)  # what stands before the colon
     if is_name:
         place = place[:-1]
+    if is_name or kind == "invalid_key":  # pydantic says None, and not what the file has
+        place = (*place[:-1], first["input"])
     holder, entry, holders = content, "", ""
     for part in place:  # items of a list count from 1, keys stand as they are
         holders, holder = entry, content
@@ -227,6 +232,8 @@ def _field(schema: type[BaseModel], place: Sequence[int | str]) -> str | None:
         return ", ".join(map(str, get_args(annotation)))
     if get_origin(annotation) in (list, tuple):
         return _LIST[1]
+    if get_origin(annotation) is dict:
+        return "named entries"
     if table is not None:
         return f"named entries ({', '.join(table.model_fields)})"
     plain = {float: _NUMBER[1], int: _WHOLE[1], str: "a text"}

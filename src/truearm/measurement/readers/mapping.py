@@ -35,7 +35,7 @@ Text = Annotated[str, StringConstraints(min_length=1, strip_whitespace=True)]
 PointName = Annotated[Text, AfterValidator(_on_one_line)]
 #: A column by its name; by its number, counted from 1, where the file has no header.
 Column = Annotated[Text, BeforeValidator(_number_as_text)]
-Line = Annotated[int, Field(ge=1, strict=True)]
+Line = Annotated[int, Field(ge=1, le=10**9, strict=True)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=True)]
 
 

@@ -10,7 +10,8 @@ section 1.3), not one of an average over robots.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
@@ -19,7 +20,7 @@ import numpy as np
 
 from truearm.identification.solving.fit import Fit, Status
 from truearm.identification.solving.redundancy import gauge_motions
-from truearm.modeling.chain import Array
+from truearm.modeling.chain import Array, ForwardKinematics
 from truearm.modeling.parts import Payload
 from truearm.modeling.postures import Postures
 
@@ -28,8 +29,8 @@ _CONFIGURATIONS: Final = (60, 300)
 _DRAWS: Final = (100, 300)
 _POSITIONS: Final = 3_000
 _LENGTHS: Final = 3_000_000
-#: Configurations whose errors are computed together, so that a block of draws stays in the cache.
-_BLOCK: Final = 300
+#: Squared mean length of a normal vector over its variance, if that is the same along all three axes.
+_MEAN_LENGTH: Final = 8.0 / (3.0 * math.pi)
 #: Deviation of an angle from which the derivatives are compared with the kinematics themselves [rad].
 _LARGE_ANGLE: Final = 5e-3
 #: Share of the error by which the derivatives may be wrong, and what it is tried on.
@@ -38,6 +39,8 @@ _TRIED_DRAWS: Final = 12
 _TRIED_CONFIGURATIONS: Final = 40
 #: Share of the squared error from which what the model leaves makes the figure a lower bound.
 _REMAINDER: Final = 0.1
+#: Configurations of a map, however many targets there are.
+_LEAST_MAPPED: Final = 20
 _INTERVAL: Final = (5.0, 95.0)
 
 
@@ -136,25 +139,19 @@ class PositionErrors:
         rng = np.random.default_rng(self.seed)
         at = fit.robot.loaded(fit.robot.random_configurations(_TRIED_CONFIGURATIONS, rng))
         some = {name: error[:_TRIED_DRAWS] for name, error in self._errors.items()}
-        straight, bent = (_moves(fit, at, some, exact=exact) for exact in (False, True))
+        straight, bent = (np.stack([*_moves(fit, at, some, exact=exact)]) for exact in (False, True))
         return bool(np.linalg.norm(bent - straight, axis=2).mean() > _BENT * np.linalg.norm(straight, axis=2).mean())
 
     def at(self, joints: Array) -> Array:
         """Return the lengths of the errors at joint positions ``(n, joints)``: ``(draws, targets, n)`` [m]."""
-        parts = [joints[first : first + _BLOCK] for first in range(0, len(joints), _BLOCK)]
-        if self.fit.gauge_freedoms:
-            parts = [joints]  # one motion of everything, not one for every block
-        rng = np.random.default_rng((self.seed, 1))
-        return np.concatenate([self._lengths(part, rng) for part in parts], axis=2)
-
-    def _lengths(self, joints: Array, rng: np.random.Generator) -> Array:
-        fit = self.fit
-        at = fit.robot.loaded(joints)
-        moves = _moves(fit, at, self._errors, exact=self._bent)
-        if fit.joint_error.any():
-            shared = rng.standard_normal((self.draws, len(joints), len(fit.joint_error))) * fit.joint_error
-            moves += _arrivals(fit, at, shared)
-        return np.asarray(np.sqrt(np.einsum("dtxn,dtxn->dtn", moves, moves)))
+        fit, at = self.fit, self.fit.robot.loaded(joints)
+        shape = (self.draws, len(joints), len(fit.joint_error))
+        normal = np.random.default_rng((self.seed, 1)).standard_normal(shape) if fit.joint_error.any() else None
+        shared = None if normal is None else normal * fit.joint_error
+        moves: Iterable[Array] = _moves(fit, at, self._errors, shared, exact=self._bent)
+        if fit.gauge_freedoms:
+            moves = _without_gauge(fit, at, np.stack([*moves]))
+        return np.stack([np.sqrt(np.einsum("dxn,dxn->dn", move, move)) for move in moves], axis=1)
 
 
 def expected_error(fit: Fit, seed: int = 0) -> ExpectedError:
@@ -182,16 +179,22 @@ def expected_error(fit: Fit, seed: int = 0) -> ExpectedError:
     )
 
 
-def expected_map(fit: Fit, configurations: int, seed: int = 0) -> tuple[Array, Array]:
+def expected_map(fit: Fit, positions: int, seed: int = 0) -> tuple[Array, Array]:
     """Return where the targets are at random configurations and the mean error to expect there.
+
+    Parameters
+    ----------
+    positions
+        About how many, over all targets.
 
     Returns
     -------
     places, error
-        In the robot's base frame [m], ``(targets x configurations, 3)``, and [m], ``(targets x configurations,)``.
+        In the robot's base frame [m], ``(positions, 3)``, and [m], ``(positions,)``.
     """
     robot = fit.robot
-    joints = robot.random_configurations(configurations, np.random.default_rng((seed, 2)))
+    count = max(_LEAST_MAPPED, positions // max(len(robot.targets), 1))
+    joints = robot.random_configurations(count, np.random.default_rng((seed, 2)))
     error = PositionErrors(fit, _DRAWS[0], seed).at(joints).mean(axis=0)
     return np.concatenate([robot.forward(joints, target=target.name)[0] for target in robot.targets]), error.reshape(-1)
 
@@ -213,10 +216,9 @@ def _remainder(fit: Fit, joints: Array) -> float:
         return 0.0
     at = fit.robot.loaded(joints)
     lengths = []
-    for target in fit.robot.targets:
-        J = fit.robot.joint_jacobian(at, target.name)[:, :3] * fit.joint_error
-        # Mean length of a normal vector from its variances, to a percent for those of a robot.
-        lengths.append(np.sqrt(8.0 / (3.0 * np.pi) * np.sum(J**2, axis=(1, 2))))
+    for kinematics in _to_targets(fit, at):
+        J = _by_joints(fit, kinematics) * fit.joint_error[:, None, None]
+        lengths.append(np.sqrt(_MEAN_LENGTH * np.sum(J**2, axis=(0, 1))))
     return float(np.mean(lengths))
 
 
@@ -258,52 +260,60 @@ def _root(fit: Fit) -> tuple[tuple[str, ...], Array]:
     return names, size[:, None] * direction * np.sqrt(np.maximum(value, 0.0))
 
 
-def _moves(fit: Fit, at: Postures, errors: dict[str, Array], *, exact: bool) -> Array:
-    """Return how the targets move with the parameters' errors, without gauge motions, ``(draws, targets, 3, n)`` [m].
+def _moves(
+    fit: Fit, at: Postures, errors: Mapping[str, Array], shared: Array | None = None, *, exact: bool
+) -> Iterator[Array]:
+    """Go through the targets: how each moves with errors of the parameters and joints, ``(draws, 3, n)`` [m].
 
     Parameters
     ----------
+    errors
+        Of the parameters by name, ``(draws,)`` each.
+    shared
+        Of the joints, ``(draws, n, joints)``.
     exact
-        By the kinematics themselves; otherwise by their derivatives.
+        By the kinematics themselves with other parameters; otherwise by their derivatives.
     """
     robot = fit.robot
-    draws = len(next(iter(errors.values()))) if errors else 1
-    moves = np.zeros((draws, len(robot.targets), 3, len(at)))
-    for k, target in enumerate(robot.targets):
-        here = set(target.chain.parameters)
-        own = {
-            name: error
-            for name, error in errors.items()
-            if name in here or robot.parameters[name].group not in ("target", "fixture")
-        }
-        if exact:
-            values = {**robot.values, **{n: robot.values[n] + e[:, None] for n, e in own.items()}}
-            there = robot.forward_kinematics(at, target.name, values).position
-            moves[:, k] = np.moveaxis(there, 1, 0) - robot.forward_kinematics(at, target.name).position
-        elif own:
-            kinematics = robot.forward_kinematics(at, target.name)
-            J = robot.position_jacobian(kinematics, at, tuple(own)).reshape(len(own), -1)
-            moves[:, k] = (np.array([*own.values()]).T @ J).reshape(draws, 3, len(at))
-    return _without_gauge(fit, at, moves)
+    draws = len(next(iter(errors.values())))
+    others: dict[str, float | Array] = {**robot.values}
+    others.update({name: robot.values[name] + error[:, None] for name, error in errors.items()})
+    exactly = _to_targets(fit, at, others) if exact else None
+    for target, kinematics in zip(robot.targets, _to_targets(fit, at), strict=True):
+        if exactly is not None:
+            move = np.moveaxis(next(exactly).position, 1, 0) - kinematics.position
+        else:
+            here = set(target.chain.parameters)
+            own = [n for n in errors if n in here or robot.parameters[n].group not in ("target", "fixture")]
+            J = robot.position_jacobian(kinematics, at, own).reshape(len(own), -1)
+            move = (np.stack([errors[name] for name in own]).T @ J).reshape(draws, 3, len(at))
+        if shared is not None:
+            move += np.einsum("jxn,dnj->dxn", _by_joints(fit, kinematics), shared, optimize=True)
+        yield np.asarray(move)
 
 
-def _arrivals(fit: Fit, at: Postures, shared: Array) -> Array:
-    """Return how the targets move with errors of the joints ``(draws, n, joints)``, ``(draws, targets, 3, n)`` [m]."""
-    by_joints = np.stack([fit.robot.joint_jacobian(at, target.name)[:, :3] for target in fit.robot.targets])
-    return _without_gauge(fit, at, np.asarray(np.einsum("tnxj,dnj->dtxn", by_joints, shared, optimize=True)))
+def _to_targets(
+    fit: Fit, at: Postures, values: Mapping[str, float | Array] | None = None
+) -> Iterator[ForwardKinematics]:
+    """Go through the forward kinematics to the targets; all go on from one to the flange."""
+    robot = fit.robot
+    values = robot.values if values is None else values
+    variables = robot.variables(at, values)
+    trunk = robot.trunk.forward_kinematics(variables, values)
+    for target in robot.targets:
+        yield target.chain.forward_kinematics(variables, values, trunk)
+
+
+def _by_joints(fit: Fit, kinematics: ForwardKinematics) -> Array:
+    """Return the velocity of a target by the joints, ``(joints, 3, n)``."""
+    return kinematics.position_jacobian(fit.robot.moving[: len(fit.robot.joints)])
 
 
 def _without_gauge(fit: Fit, at: Postures, moves: Array) -> Array:
-    """Remove what a motion of everything explains, one for all targets of a draw."""
-    if not fit.gauge_freedoms:
-        return moves
-    robot = fit.robot
-    columns = np.concatenate(
-        [
-            gauge_motions(fit.gauge_freedoms, robot, robot.forward_kinematics(at, target.name))[0]
-            for target in robot.targets
-        ]
-    )
-    Q = np.linalg.qr(columns)[0]
-    flat = moves.reshape(len(moves), -1)
-    return np.asarray((flat - (flat @ Q) @ Q.T).reshape(moves.shape))
+    """Remove from moves ``(targets, draws, 3, n)`` what a motion of everything explains, one for all targets."""
+    motions = [gauge_motions(fit.gauge_freedoms, fit.robot, kinematics)[0] for kinematics in _to_targets(fit, at)]
+    Q = np.linalg.qr(np.concatenate(motions))[0]
+    targets, draws = moves.shape[:2]
+    flat = np.swapaxes(moves, 0, 1).reshape(draws, -1)
+    left = flat - (flat @ Q) @ Q.T
+    return np.swapaxes(left.reshape(draws, targets, *moves.shape[2:]), 0, 1)

@@ -1,4 +1,4 @@
-"""Is the workspace known much worse than the held-out error says?
+"""Notice a workspace that is known much worse than the held-out error says.
 
 Held-out configurations are like those that were measured. Where the joints moved little, the error there stays small
 and says nothing about the rest of the workspace: the expected error does.
@@ -18,7 +18,7 @@ from truearm.measurement.statistics import Errors
 from truearm.notices import Notice
 from truearm.units import SHOWN_AS, from_si
 
-#: Expected error over known error from which the result is an error, and end of the interval from which it is a warning.
+#: Expected over known error from which the result is an error, and end of the interval from which it is a warning.
 _ERROR: Final = 3.0
 _WARNING: Final = 3.0
 #: Below this no instrument sees a robot move, and simulated readings without noise would be doubted [m].

@@ -15,6 +15,8 @@ from truearm.files import path_argument, read_bytes
 from truearm.identification.choosing.selection import AUTO, select
 from truearm.identification.judging.advice import check_fit
 from truearm.identification.judging.arrival_lag import check_arrival_lag
+from truearm.identification.judging.expected_error import expected_error
+from truearm.identification.judging.narrow_data import check_narrow_data
 from truearm.identification.judging.transmission import check_transmission
 from truearm.identification.solving.bounds import Bounds, read_bounds
 from truearm.identification.solving.fit import identify, place
@@ -207,6 +209,8 @@ def calibrate(
     judged = first if second is None else second
     validation = None if second is None else errors_of(fit.robot, second)
     before = errors_of(nominal.robot, judged)
+    train_errors = errors_of(fit.robot, first)
+    expected = expected_error(fit)
     history = (
         f"calibrated by truearm {__version__}: model {' + '.join([chosen.name, *effects])},"
         f" {count} of {n} configurations of {Path(readings.source).name}{digest}, seed {seed}, loss {loss},"
@@ -215,12 +219,14 @@ def calibrate(
     calibration = Calibration(
         fit=fit,
         nominal=before,
-        train=errors_of(fit.robot, first),
+        train=train_errors,
         validation=validation,
+        expected=expected,
         warnings=(
             *_check_proof(before, validation),
             *_check_copies(readings, training, held_out),
-            *check_fit(fit),
+            *check_fit(fit, expected),
+            *check_narrow_data(fit, expected, first, validation or train_errors, held_out=validation is not None),
             *noticed,
             *check_arrival_lag(fit, readings),
             *check_transmission(fit, first),

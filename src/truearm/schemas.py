@@ -184,7 +184,11 @@ def refused_value(fault: Mapping[str, Any], where: str, *, is_name: bool = False
 
 def _missing(where: str, name: str, holder: object, known: Sequence[str], kind: str | None) -> InputError:
     """Return the refusal of a table without an entry that it needs; it may be there under another name."""
-    others = [other for other in holder if isinstance(other, str) and other not in known] if isinstance(holder, Mapping) else []
+    others = (
+        [other for other in holder if isinstance(other, str) and other not in known]
+        if isinstance(holder, Mapping)
+        else []
+    )
     near = nearest_names(name, others, count=1)
     cure = f"It may be the entry {near[0]}, which is not known here: rename it." if near else "Add it."
     return InputError("this entry is missing", where=where, allowed=kind, cure=cure)

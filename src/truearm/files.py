@@ -12,6 +12,7 @@ from typing import Any, Final, TypeVar, get_args
 from pydantic import BaseModel, ValidationError
 
 from truearm.errors import InputError, did_you_mean, nearest_names, wrong_kind
+from truearm.manifest import refuse_unfinished
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -21,6 +22,7 @@ def read_bytes(path: Path) -> bytes:
     try:
         if path.is_dir():
             raise InputError("this is a folder, a file is needed", where=str(path))
+        refuse_unfinished(path)
         return path.read_bytes()
     except FileNotFoundError as error:
         raise _missing(path) from error

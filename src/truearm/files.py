@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from truearm.errors import InputError, nearest_names, wrong_kind
 from truearm.limits import limit, refuse_beyond
+from truearm.manifest import refuse_unfinished
 from truearm.schemas import Model, validated
 
 #: What an entry of a YAML file cannot do without, unless it is the first: one of these stands before it.
@@ -36,6 +37,7 @@ def read_bytes(path: Path, most: str = "file_size") -> bytes:
         state = path.stat()
         if stat.S_ISDIR(state.st_mode):
             raise InputError("this is a folder, a file is needed", where=str(path))
+        refuse_unfinished(path)
         if not stat.S_ISREG(state.st_mode):
             raise InputError(
                 "this is no file",

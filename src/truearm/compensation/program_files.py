@@ -173,8 +173,13 @@ def recorded(file: ProgramFile, corrected: bytes, language: str, applied: Mappin
     return json.dumps(content.model_dump(), indent=1) + "\n"
 
 
-def write_programs(folder: Path, inputs: Sequence[Path], files: Mapping[str, str | bytes]) -> None:
+def write_programs(
+    folder: Path, inputs: Sequence[Path], files: Mapping[str, str | bytes], command: str | None = None
+) -> None:
     """Write results into a folder, all of them or none. Records and reports replace earlier ones.
+
+    Records are put in place first: there is never a corrected program whose record is missing, and which could be
+    corrected once more.
 
     Raises
     ------
@@ -204,7 +209,8 @@ def write_programs(folder: Path, inputs: Sequence[Path], files: Mapping[str, str
                 where=str(path),
                 cure="Choose another `out`.",
             )
-    write_files(folder, files)
+    order = sorted(files, key=lambda name: not name.endswith(".truearm.json"))
+    write_files(folder, {name: files[name] for name in order}, command)
 
 
 # -- reading ----------------------------------------------------------------------------------------------

@@ -236,5 +236,5 @@ class Calibration(Record):
             "calibrated.urdf": urdf,
         }
         progress("writing the files")
-        write_files(folder, files)
+        write_files(folder, files, self.command)
         return tuple(folder / name for name in files)

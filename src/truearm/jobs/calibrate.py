@@ -15,9 +15,10 @@ from truearm.files import path_argument, read_bytes
 from truearm.identification.choosing.selection import AUTO, select
 from truearm.identification.judging.advice import check_fit
 from truearm.identification.judging.arrival_lag import check_arrival_lag
+from truearm.identification.judging.implausible import check_plausible
 from truearm.identification.judging.transmission import check_transmission
 from truearm.identification.solving.bounds import Bounds, read_bounds
-from truearm.identification.solving.fit import identify, place
+from truearm.identification.solving.fit import Status, identify, place
 from truearm.identification.solving.losses import LOSSES, Loss
 from truearm.identification.solving.models import FRAMES, MODELS, Model
 from truearm.identification.solving.rounds import Redundant
@@ -45,7 +46,7 @@ from truearm.measurement.table_motion import without_table_motion
 from truearm.modeling.effects import EFFECTS
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
-from truearm.notices import Notice
+from truearm.notices import Notice, has_error
 from truearm.results.calibration import RESULT_FILES, Calibration
 from truearm.shown import counted, listed
 from truearm.version import __version__
@@ -207,6 +208,9 @@ def calibrate(
     judged = first if second is None else second
     validation = None if second is None else errors_of(fit.robot, second)
     before = errors_of(nominal.robot, judged)
+    # What the robust fit of the check could not explain, the fit itself may.
+    noticed = tuple(notice for notice in noticed if notice.code != Status.IMPLAUSIBLE.value)
+    unlike = check_plausible(fit, first, noticed)
     history = (
         f"calibrated by truearm {__version__}: model {' + '.join([chosen.name, *effects])},"
         f" {count} of {n} configurations of {Path(readings.source).name}{digest}, seed {seed}, loss {loss},"
@@ -218,10 +222,12 @@ def calibrate(
         train=errors_of(fit.robot, first),
         validation=validation,
         warnings=(
+            *(notice for notice in noticed if notice.level == "error"),
+            *unlike,
             *_check_proof(before, validation),
             *_check_copies(readings, training, held_out),
-            *check_fit(fit),
-            *noticed,
+            *check_fit(fit, doubted=has_error([*unlike, *noticed])),
+            *(notice for notice in noticed if notice.level != "error"),
             *check_arrival_lag(fit, readings),
             *check_transmission(fit, first),
         ),

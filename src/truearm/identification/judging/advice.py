@@ -28,8 +28,14 @@ _LARGEST_UNINFORMED_SHARE: Final = 0.05
 _CONFIGURATIONS: Final = 200
 
 
-def check_fit(fit: Fit) -> list[Notice]:
-    """Return what a fit says about its model, its data and its parameters."""
+def check_fit(fit: Fit, *, doubted: bool = False) -> list[Notice]:
+    """Return what a fit says about its model, its data and its parameters.
+
+    Parameters
+    ----------
+    doubted
+        Whether the data are known to be wrong: wider priors are no cure then.
+    """
     found = []
     robot = fit.robot
     if "joint zero" in fit.model.groups and "geometry" in fit.model.groups:
@@ -103,7 +109,7 @@ def check_fit(fit: Fit) -> list[Notice]:
                 "far-from-nominal",
                 f"{', '.join(far[:8])}{' and others' if len(far) > 8 else ''} moved by more than {_LARGEST_MOVE:g} "
                 "standard deviations of their priors. Check that it is this robot, in these units, with its joints in "
-                "this order. If it is, enter wider priors in the robot file.",
+                f"this order.{'' if doubted else ' If it is, enter wider priors in the robot file.'}",
             )
         )
     if fit.excess > 1.0:

@@ -95,8 +95,9 @@ class Calibration(Record):
 
     @property
     def status(self) -> Status:
-        """How the fit ended."""
-        return self.fit.status
+        """How the fit ended, or that what it found cannot be this robot."""
+        unlike = any(notice.code == Status.IMPLAUSIBLE.value for notice in self.warnings)
+        return Status.IMPLAUSIBLE if unlike else self.fit.status
 
     @property
     def finished(self) -> bool:

@@ -2,18 +2,57 @@
 
 from __future__ import annotations
 
+import re
+import stat
 from pathlib import Path
+from typing import Any, Final
 
 from truearm.errors import InputError, nearest_names, wrong_kind
+from truearm.limits import limit, refuse_beyond
+from truearm.manifest import refuse_unfinished
 from truearm.schemas import Model, validated
 
+#: What an entry of a YAML file cannot do without, unless it is the first: one of these stands before it.
+_BETWEEN_ENTRIES: Final = ("\n", ",", ":", "[", "{", "- ", "-\t", "? ")
+#: An entry that stands for another one, or what looks like it.
+_ALIAS: Final = re.compile(r"(?:^|[\s\[{,:])\*[^\s\[\]{},]")
+#: What is read but is no file, for messages. Whoever reads them may wait for ever, or never come to an end.
+_NO_FILES: Final = (
+    (stat.S_ISFIFO, "a named pipe"),
+    (stat.S_ISCHR, "a device"),
+    (stat.S_ISBLK, "a device"),
+    (stat.S_ISSOCK, "a socket"),
+)
 
-def read_bytes(path: Path) -> bytes:
-    """Return the content of a file, or refuse with the reason it cannot be read."""
+
+def read_bytes(path: Path, most: str = "file_size") -> bytes:
+    """Return the content of a file, or refuse with the reason it cannot be read.
+
+    Parameters
+    ----------
+    most
+        Name of the limit of its size, see :mod:`truearm.limits`.
+    """
     try:
-        if path.is_dir():
+        state = path.stat()
+        if stat.S_ISDIR(state.st_mode):
             raise InputError("this is a folder, a file is needed", where=str(path))
-        return path.read_bytes()
+        refuse_unfinished(path)
+        if not stat.S_ISREG(state.st_mode):
+            raise InputError(
+                "this is no file",
+                where=str(path),
+                came=next((kind for is_one, kind in _NO_FILES if is_one(state.st_mode)), None),
+                allowed="a file on disk",
+                cure="Write what it yields into a file first.",
+            )
+        refuse_beyond(most, state.st_size, where=str(path))
+        with path.open("rb") as stream:
+            content = stream.read(state.st_size + 1)
+            if len(content) > state.st_size:  # it grows, or its size is not known beforehand, as that of some of /proc
+                content += stream.read(limit(most) + 1)
+        refuse_beyond(most, len(content), where=str(path))
+        return content
     except FileNotFoundError as error:
         raise _missing(path) from error
     except InputError:
@@ -57,9 +96,9 @@ def exists(path: Path) -> bool:
         return False
 
 
-def read_text(path: Path) -> str:
-    """Return the text of a UTF-8 file without its byte order mark."""
-    content = read_bytes(path)
+def read_text(path: Path, most: str = "file_size") -> str:
+    """Return the text of a UTF-8 file without its byte order mark; `most` as for :func:`read_bytes`."""
+    content = read_bytes(path, most)
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -79,8 +118,11 @@ def read_yaml(path: Path, schema: type[Model]) -> Model:
     from ruamel.yaml import YAML
     from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
-    text = read_text(path)
+    text = read_text(path, "yaml_size")
+    refuse_beyond("entries", 1 + sum(map(text.count, _BETWEEN_ENTRIES)), where=str(path))
     try:
+        if _ALIAS.search(text):
+            _refuse_multiplied(YAML(typ="safe", pure=True).compose(text), path)
         content = YAML(typ="safe", pure=True).load(text)
     except MarkedYAMLError as error:
         mark = error.problem_mark
@@ -89,6 +131,8 @@ def read_yaml(path: Path, schema: type[Model]) -> Model:
         raise InputError(f"this is not valid YAML ({problem})", where=where) from error
     except YAMLError as error:
         raise InputError(f"this is not valid YAML ({' '.join(str(error).split())})", where=str(path)) from error
+    except InputError:
+        raise
     except RecursionError as error:
         raise InputError("the entries are nested too deep", where=str(path)) from error
     except Exception as error:  # the parser lets pass what its conversions raise: 30 February, 5000 digits
@@ -97,6 +141,27 @@ def read_yaml(path: Path, schema: type[Model]) -> Model:
             f"a value cannot be understood ({reason})", where=str(path), cure="Put text into quotes."
         ) from error
     return validated(content, schema, str(path))
+
+
+def _refuse_multiplied(root: Any, path: Path) -> None:
+    """Refuse a YAML document that holds too many entries once each alias is replaced by what it stands for."""
+    counts: dict[int, int] = {}
+    inside: set[int] = set()
+
+    def entries(node: Any) -> int:
+        """Return how many entries a node holds, itself included."""
+        if node is None or isinstance(node.value, str):
+            return 1
+        if id(node) not in counts:
+            if id(node) in inside:
+                raise InputError("an entry holds itself", where=f"{path}, line {node.start_mark.line + 1}")
+            inside.add(id(node))
+            held = [part for pair in node.value for part in (pair if isinstance(pair, tuple) else (pair,))]
+            counts[id(node)] = 1 + sum(map(entries, held))
+            inside.discard(id(node))
+        return counts[id(node)]
+
+    refuse_beyond("entries", entries(root), where=str(path))
 
 
 def path_argument(path: object, parameter: str) -> Path:

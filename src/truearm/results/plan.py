@@ -109,5 +109,5 @@ class Plan(Record):
         if table.suffix == PAGE:
             raise InputError("the plan is a CSV file", parameter="file", came=table.name, allowed="PLAN.csv")
         page = output_file(table.with_suffix(PAGE), self.inputs)
-        write_files(table.parent, {table.name: plan_csv(self.made), page.name: plan_html(self)})
+        write_files(table.parent, {table.name: plan_csv(self.made), page.name: plan_html(self)}, self.command)
         return table, page

@@ -254,5 +254,5 @@ class ProgramCorrection(Record):
             files[f"{one.name}.truearm.json"] = recorded(one.file, one.text, one.language, self.applied())
         files[REPORT] = program_html(self)
         progress("writing the files")
-        write_programs(folder, [one.file.path for one in self.files], files)
+        write_programs(folder, [one.file.path for one in self.files], files, self.command)
         return tuple(folder / name for name in files)

@@ -10,7 +10,6 @@ from pydantic import BaseModel
 
 from truearm.errors import InputError
 from truearm.files import exists, read_bytes, read_yaml
-from truearm.printable import is_one_line
 from truearm.writing import write_text
 
 
@@ -96,13 +95,3 @@ def test_a_permission_that_is_missing(tmp_path: Path, monkeypatch: pytest.Monkey
         read_bytes(tmp_path / "data.csv")
     with pytest.raises(InputError, match="Permission denied"):
         write_text(tmp_path / "data.csv", "")
-
-
-@pytest.mark.parametrize("text", ["smr 1", "<b>", "Träger", "a: #{}", "日本", "\u00a0x"])
-def test_one_line(text: str) -> None:
-    assert is_one_line(text)
-
-
-@pytest.mark.parametrize("text", ["", "  ", "\u00a0", "a\nb", "a\tb", "a\0", "a\x7f", "a\u2028b", "a\x85b", "\ud800"])
-def test_not_one_line(text: str) -> None:
-    assert not is_one_line(text)

@@ -51,6 +51,7 @@ LIMITS: Final[Mapping[str, Limit]] = {
     "cells": Limit(5_000_000, "the table has too many cells", "cells"),
     "pixels": Limit(80_000_000, "the image has too many dots", "dots"),
     "readings": Limit(400_000, "there would be too many readings", "readings"),
+    "places": Limit(2_000_000, "there are too many points for so many configurations", "places"),
     "derivatives": Limit(20_000_000, "there are too many readings for so many parameters", "derivatives"),
     "poses": Limit(400_000, "the number is out of range", "poses"),
     "candidates": Limit(100_000, "the number is out of range", "candidates"),

@@ -6,11 +6,15 @@ import difflib
 import re
 from collections.abc import Callable, Iterable, Iterator, Sized
 from contextlib import contextmanager
+from itertools import islice
 from numbers import Rational
 from typing import Final
 
 #: A parameter that a text names, with a value or without: `seed`, `train=all`.
 _NAMED: Final = re.compile(r"`(?P<name>[a-z][a-z_]*)(?:=(?P<value>[^`]*))?`")
+#: Names are compared with so many others at most, and not at all if they are longer: that takes long and helps nobody.
+_MOST_COMPARED: Final = 2000
+_LONGEST_NAME: Final = 200
 
 
 class InputError(ValueError):
@@ -116,14 +120,17 @@ def _shown(came: object) -> str:
 
 
 def nearest_names(name: str, known: Iterable[str], count: int = 3, likeness: float = 0.5) -> list[str]:
-    """Return the known names most like `name`, best first, for a message that offers them.
+    """Return the known names most like `name`, best first, for a message that offers them; of very many the first few.
 
     Parameters
     ----------
     likeness
         How like they must be, 0 to 1.
     """
-    by_folded = {candidate.lower(): candidate for candidate in known}
+    if len(name) > _LONGEST_NAME:
+        return []
+    few = (candidate for candidate in islice(known, _MOST_COMPARED) if len(candidate) <= _LONGEST_NAME)
+    by_folded = {candidate.lower(): candidate for candidate in few}
     return [by_folded[match] for match in difflib.get_close_matches(name.lower(), by_folded, count, likeness)]
 
 

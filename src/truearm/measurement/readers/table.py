@@ -220,7 +220,7 @@ def _everywhere(sigma: SigmaEntry | SigmaRotEntry | None, count: int, where: str
 
 
 def _is_reference(targets: list[str], references: list[str], where: str) -> NDArray[np.bool_]:
-    known = list(dict.fromkeys(targets))
+    known = dict.fromkeys(targets)
     for name in references:
         if name not in known:
             near = nearest_names(name, known, 1)

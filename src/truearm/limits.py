@@ -54,6 +54,7 @@ LIMITS: Final[Mapping[str, Limit]] = {
     "rows": Limit(500_000, "the table has too many lines", "lines"),
     "columns": Limit(10_000, "the table has too many columns", "columns"),
     "cells": Limit(5_000_000, "the table has too many cells", "cells"),
+    "steps": Limit(3_000_000_000, "the pattern takes too long for so many names", "steps", "Write a shorter pattern."),
     "pixels": Limit(80_000_000, "the image has too many dots", "dots"),
     "readings": Limit(400_000, "there would be too many readings", "readings"),
     "places": Limit(2_000_000, "there are too many points for so many configurations", "places"),

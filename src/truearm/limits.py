@@ -55,7 +55,15 @@ LIMITS: Final[Mapping[str, Limit]] = {
     "columns": Limit(10_000, "the table has too many columns", "columns"),
     "cells": Limit(5_000_000, "the table has too many cells", "cells"),
     "steps": Limit(3_000_000_000, "the pattern takes too long for so many names", "steps", "Write a shorter pattern."),
-    "pixels": Limit(80_000_000, "the image has too many dots", "dots"),
+    "pixels": Limit(
+        80_000_000,
+        "the image has too many dots",
+        "dots",
+        "Scan at 300 to 600 dpi: more does not show a pencil line better.",
+    ),
+    "dots": Limit(
+        20_000_000, "the page is too large to look for a circle on it", "dots", "Scan the part with the circle alone."
+    ),
     "readings": Limit(400_000, "there would be too many readings", "readings"),
     "places": Limit(2_000_000, "there are too many points for so many configurations", "places"),
     "derivatives": Limit(

@@ -12,11 +12,13 @@ from pydantic import BaseModel
 from truearm.compensation.cell import CellFile
 from truearm.compensation.program_files import CorrectionRecord
 from truearm.errors import InputError
-from truearm.files import exists, is_one_line, read_bytes, read_yaml, validated
+from truearm.files import exists, read_bytes, read_yaml
 from truearm.identification.solving.bounds import Bounds
 from truearm.measurement.readers.mapping import MappingFile
 from truearm.modeling.formats.robot_file import RobotFile
 from truearm.planning.constraints.constraints import Constraints
+from truearm.printable import is_one_line
+from truearm.schemas import validated
 from truearm.writing import write_text
 
 
@@ -126,7 +128,7 @@ ALLOWED = {"truearm": "truearm-constraints/1", "units": {"length": "mm", "angle"
     [
         (Bounds, BOUNDS | {"units": 3}, "units: named entries belong here; got 3; allowed: NAME: VALUE"),
         (Bounds, BOUNDS | {"within": [1]}, "within: named entries belong here; got [1]; allowed: NAME: VALUE"),
-        (Bounds, BOUNDS | {"within": {"d_1": None}}, "within.d_1: a number belongs here; got 'nothing'"),
+        (Bounds, BOUNDS | {"within": {"d_1": None}}, "within.d_1: a number belongs here; got nothing"),
         (Bounds, BOUNDS | {"within": {"d_1": 10**400}}, "within.d_1: a number belongs here; got a number of very"),
         (Bounds, BOUNDS | {"within": {"d_1": float("inf")}}, "within.d_1: a finite number belongs here; got inf"),
         (
@@ -146,7 +148,7 @@ ALLOWED = {"truearm": "truearm-constraints/1", "units": {"length": "mm", "angle"
         (
             Bounds,
             BOUNDS | {"between": {"d_1": [1, [10**5000]]}},
-            "between.d_1[2]: a number belongs here; got 'a list of 1",
+            "between.d_1[2]: a number belongs here; got a list of 1 entries",
         ),
         (Bounds, BOUNDS | {5: 1}, "5: the name of an entry must be a text; got 5; allowed: a name"),
         (

@@ -15,7 +15,10 @@ from truearm.files import path_argument, read_bytes
 from truearm.identification.choosing.selection import AUTO, select
 from truearm.identification.judging.advice import check_fit
 from truearm.identification.judging.arrival_lag import check_arrival_lag
+from truearm.identification.judging.changes import check_changes
 from truearm.identification.judging.implausible import check_plausible
+from truearm.identification.judging.left_over import LeftOver
+from truearm.identification.judging.sigma import check_sigma
 from truearm.identification.judging.transmission import check_transmission
 from truearm.identification.solving.bounds import Bounds, read_bounds
 from truearm.identification.solving.fit import Status, identify, place
@@ -211,6 +214,7 @@ def calibrate(
     # What the robust fit of the check could not explain, the fit itself may.
     noticed = tuple(notice for notice in noticed if notice.code != Status.IMPLAUSIBLE.value)
     unlike = check_plausible(fit, first, noticed)
+    left_over = LeftOver.of(fit, readings)
     history = (
         f"calibrated by truearm {__version__}: model {' + '.join([chosen.name, *effects])},"
         f" {count} of {n} configurations of {Path(readings.source).name}{digest}, seed {seed}, loss {loss},"
@@ -228,7 +232,9 @@ def calibrate(
             *_check_copies(readings, training, held_out),
             *check_fit(fit, doubted=has_error([*unlike, *noticed])),
             *(notice for notice in noticed if notice.level != "error"),
-            *check_arrival_lag(fit, readings),
+            *check_sigma(left_over),
+            *check_changes(left_over),
+            *check_arrival_lag(left_over),
             *check_transmission(fit, first),
         ),
         data=readings,

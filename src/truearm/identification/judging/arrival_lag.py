@@ -64,7 +64,7 @@ def arrival_lag(left_over: LeftOver) -> ArrivalLag | None:
     if free < 4 * H.shape[1]:
         return None
     left, moved = left_over.without_parameters(left_over.residual), left_over.without_parameters(H)
-    lags = np.linalg.lstsq(moved, left, rcond=1e-10)[0]
+    lags = np.asarray(np.linalg.lstsq(moved, left, rcond=1e-10)[0], dtype=np.float64)
     before = float(left @ left) / free
     after = float(np.sum((left - moved @ lags) ** 2)) / (free - H.shape[1])
     return ArrivalLag(1.0 - float(np.sqrt(after / before)) if before > 0 else 0.0, -lags)

@@ -17,6 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Final, Literal
 
 import numpy as np
@@ -130,7 +131,7 @@ def find_change(left: LeftOver) -> Change | None:
     if base:
         grown = C[:, [where[column] for column in base]] * (at / (n - 1.0) - 0.5)[:, None]
         grown -= Q @ (Q.T @ grown)
-        value = np.linalg.lstsq(grown, r, rcond=1e-10)[0]
+        value = np.asarray(np.linalg.lstsq(grown, r, rcond=1e-10)[0], dtype=np.float64)
         gain = float(r @ grown @ value)
         found.append(_judged("drift", "", int(order[0]), gain / total, value, effective, tests))
     _, change = min(found, key=lambda entry: entry[0])
@@ -166,7 +167,7 @@ def _sums(C: Array, r: Array, Q: Array, at: NDArray[np.intp], points: NDArray[np
         Change points, ascending, ``(k,)``.
     """
     edges = [*np.searchsorted(at, points).tolist(), len(at)]
-    parts = [slice(a, b) for a, b in zip(edges, edges[1:], strict=False)]
+    parts = [slice(a, b) for a, b in pairwise(edges)]
     pull = np.array([C[part].T @ r[part] for part in parts])
     inner = np.array([C[part].T @ C[part] for part in parts])
     taken = np.array([Q[part].T @ C[part] for part in parts])

@@ -59,7 +59,7 @@ class LeftOver:
     @property
     def freedom(self) -> int:
         """Number of equations that are left when the parameters have taken what they can."""
-        return len(self.residual) - self.basis.shape[1]
+        return len(self.residual) - int(self.basis.shape[1])
 
     def without_parameters(self, rows: Array) -> Array:
         """Return rows ``(rows,)`` or ``(rows, k)`` without what the free parameters can take."""

@@ -57,7 +57,7 @@ def check_sigma(left: LeftOver) -> list[Notice]:
     chance = max(1.0 - k - _QUANTILE * np.sqrt(k), 0.0) ** 1.5
     if freedom < _LEAST_FREEDOM or found >= min(_LARGEST_RATIO, chance):
         return []
-    sigma = np.concatenate([block.sigma for block in blocks if block.declared and block.observation.unit == "m"] or [[]])
+    sigma = np.array([s for b in blocks if b.declared and b.observation.unit == "m" for s in b.sigma.tolist()])
     size = f" ({np.sqrt(np.mean(sigma**2)) * 1e3:.3g} mm)" if len(sigma) else ""
     times = 1.0 / max(found, _SMALLEST_RATIO)
     words = f"The declared deviations{size} are about {times:.2g} times larger than what the readings scatter by"
@@ -65,8 +65,8 @@ def check_sigma(left: LeftOver) -> list[Notice]:
         return [
             Notice(
                 "sigma-too-large",
-                f"{words}. So the priors hold the robot near its nominal values, and it is {declared / found:.2g} times "
-                "farther from the readings than it need be. Mend sigma or its unit, or leave it out: the noise is then "
+                f"{words}. So the priors hold the robot near its nominal values, and it is {declared / found:.2g} "
+                "times farther from the readings than it need be. Mend sigma or its unit, or leave it out: the noise is then "
                 "estimated.",
                 "error",
             )

@@ -12,7 +12,7 @@ from typing import Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.errors import InputError
+from truearm.errors import InputError, nearest_names
 from truearm.measurement.dataset import Dataset, IntArray
 from truearm.measurement.dataset_fields import drawn_from
 from truearm.measurement.places import constellation, places_of
@@ -26,6 +26,10 @@ from truearm.shown import counted
 _COLDEST: Final = -30.0
 _WARMEST: Final = 80.0
 _MOST_NAMED: Final = 6
+#: A target read at this share of the configurations at most may be another one's misspelt name.
+_FEW_SHARE: Final = 0.1
+#: A target read at this share of the configurations or more is one that is always read.
+_OFTEN_SHARE: Final = 0.8
 
 
 def check_data(data: Dataset, suspects: Iterable[Suspect] | None = None) -> list[Notice]:
@@ -36,7 +40,7 @@ def check_data(data: Dataset, suspects: Iterable[Suspect] | None = None) -> list
     suspects
         Readings that are doubted for another reason as well, reported together with those found here.
     """
-    found = [*_missing(data), *_duplicates(data)]
+    found = [*_misnamed(data), *_missing(data), *_duplicates(data)]
     found += suspect_notices([*rigid_suspects(data), *reference_suspects(data), *(suspects or ())])
     return found + _moved(data) + _temperatures(data)
 
@@ -242,6 +246,50 @@ def _missing(data: Dataset) -> list[Notice]:
     words = _listed([f"{name} {count}" for name, count in counts.items() if count])
     left = "is missing ({}). It is left out" if total == 1 else "are missing ({}). They are left out"
     return [Notice("missing", f"{counted(total, 'reading')} {left.format(words)}; nothing needs to be done.")]
+
+
+def _misnamed(data: Dataset) -> list[Notice]:
+    """Say which names of targets seem to be slips.
+
+    A target that is read at a few configurations, at all of which another one is missing that is read everywhere else,
+    is that one, if the names are alike; and a configuration that has one target twice and another one not at all.
+    """
+    if data.fixture is not None or len(data.targets) < 2:
+        return []
+    read = data.has_reading
+    seen: list[set[int]] = [set() for _ in data.targets]
+    twice: list[tuple[int, int]] = []
+    for t, c in zip(data.target[read].tolist(), data.configuration[read].tolist(), strict=True):
+        if c in seen[t]:
+            twice.append((t, c))
+        seen[t].add(c)
+    often = [t for t, at in enumerate(seen) if len(at) >= _OFTEN_SHARE * data.configurations]
+    found = []
+    alike = {name.casefold(): name for name in (data.targets[t] for t in often)}
+    for t, at in enumerate(seen):
+        if not at or len(at) > _FEW_SHARE * data.configurations:
+            continue
+        name = data.targets[t]
+        meant = [alike[n] for n in nearest_names(name.casefold(), list(alike), 3)]
+        for other in meant:
+            if not at & seen[data.targets.index(other)]:
+                labels = _listed([data.labels[c] for c in sorted(at)])
+                found.append(f"{name} at {labels}, where {other} is missing: did you mean {other}?")
+                break
+    for t, c in twice:
+        lost = [data.targets[o] for o in often if c not in seen[o]]
+        if len(lost) == 1:
+            found.append(f"{data.targets[t]} is there twice at {data.labels[c]}, and {lost[0]} not at all")
+    if not found:
+        return []
+    return [
+        Notice(
+            "target-misspelt",
+            f"Names of targets look like slips: {'; '.join(found[:_MOST_NAMED])}. A misspelt name is a target of its "
+            "own. Correct the names.",
+            "error",
+        )
+    ]
 
 
 def _duplicates(data: Dataset) -> list[Notice]:

@@ -324,6 +324,10 @@ def _unrelated(robot: Robot, data: Dataset) -> list[Notice]:
     given = _misfit(robot, data)
     if given < _UNRELATED * _spread(data):
         return []
+    half = data.configurations // 2
+    for part in (data.of_configurations(np.arange(half)), data.of_configurations(np.arange(half, data.configurations))):
+        if part.has_position.any() and _misfit(robot, part) * _LEAST_IMPROVEMENT < given:
+            return []  # the robot or the instrument stands elsewhere in the other half
     rng = np.random.default_rng(0)
     drawn = (replace(data, joints=rng.permutation(data.joints)) for _ in range(_ORDERS_DRAWN))
     if any(_ALIKE * _misfit(robot, other) <= given for other in drawn):

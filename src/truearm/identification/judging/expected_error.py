@@ -41,6 +41,8 @@ _TRIED_CONFIGURATIONS: Final = 40
 _REMAINDER: Final = 0.1
 #: Configurations of a map, however many targets there are.
 _LEAST_MAPPED: Final = 20
+#: So that the variance of what is drawn exists.
+_LEAST_FREEDOM: Final = 3.0
 _INTERVAL: Final = (5.0, 95.0)
 
 
@@ -126,8 +128,13 @@ class PositionErrors:
     def _errors(self) -> dict[str, Array]:
         """Errors of the parameters by name, ``(draws,)`` each [SI]."""
         names, root = _root(self.fit)
-        normal = np.random.default_rng(self.seed).standard_normal((self.draws, root.shape[1]))
-        return dict(zip(names, root @ normal.T, strict=True))
+        rng = np.random.default_rng(self.seed)
+        drawn = root @ rng.standard_normal((self.draws, root.shape[1])).T
+        if not self.fit.declared or self.fit.excess > 1.0:
+            # The noise was estimated too: Student's distribution (Gelman et al. 2013, section 3.2).
+            freedom = _freedom(self.fit)
+            drawn *= np.sqrt(freedom / rng.chisquare(freedom, self.draws))
+        return dict(zip(names, drawn, strict=True))
 
     @cached_property
     def _bent(self) -> bool:
@@ -234,6 +241,13 @@ def _omissions(fit: Fit, remainder: float, overall: Expectation) -> Iterator[str
         yield "values at a bound count as exact"
     if fit.excess > 1.0 or remainder**2 > _REMAINDER * overall.mean**2:
         yield "the robot does something that the model cannot express, and it may do more of it elsewhere"
+
+
+def _freedom(fit: Fit) -> float:
+    """Return the degrees of freedom that the readings left to the estimate of their noise."""
+    rows = int(np.isfinite(fit.weight).sum()) * (3 if "position" in fit.sigma else 1)
+    spent = sum(fit.robot.parameters[name].informed or 0.0 for name in fit.free.names)
+    return max(rows - spent, _LEAST_FREEDOM)
 
 
 def _root(fit: Fit) -> tuple[tuple[str, ...], Array]:

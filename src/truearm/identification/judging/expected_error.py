@@ -25,12 +25,10 @@ from truearm.modeling.parts import Payload
 from truearm.modeling.postures import Postures
 
 #: Configurations at which positions are asked for, and draws of the parameters' errors: fewer for many targets.
-_CONFIGURATIONS: Final = (60, 300)
-_DRAWS: Final = (100, 300)
+_CONFIGURATIONS: Final = (60, 200)
+_DRAWS: Final = (100, 600)
 _POSITIONS: Final = 3_000
 _LENGTHS: Final = 3_000_000
-#: Squared mean length of a normal vector over its variance, if that is the same along all three axes.
-_MEAN_LENGTH: Final = 8.0 / (3.0 * math.pi)
 #: Deviation of an angle from which the derivatives are compared with the kinematics themselves [rad].
 _LARGE_ANGLE: Final = 5e-3
 #: Share of the error by which the derivatives may be wrong, and what it is tried on.
@@ -76,8 +74,7 @@ class ExpectedError:
     targets
         Of each, by its name.
     remainder
-        The part of the mean error that comes from what readings of an arrival share: repeatability plus what the model
-        leaves.
+        Root mean square of the part that readings of an arrival share: repeatability plus what the model leaves.
     payload
         What the robot carries there.
     gauge_freedoms
@@ -218,15 +215,12 @@ def _expectation(lengths: Array) -> Expectation:
 
 
 def _remainder(fit: Fit, joints: Array) -> float:
-    """Return the mean error of the targets that the joints' error of an arrival makes [m]."""
+    """Return the root mean square error of the targets that the joints' error of an arrival makes [m]."""
     if not fit.joint_error.any():
         return 0.0
     at = fit.robot.loaded(joints)
-    lengths = []
-    for kinematics in _to_targets(fit, at):
-        J = _by_joints(fit, kinematics) * fit.joint_error[:, None, None]
-        lengths.append(np.sqrt(_MEAN_LENGTH * np.sum(J**2, axis=(0, 1))))
-    return float(np.mean(lengths))
+    moved = [_by_joints(fit, kinematics) * fit.joint_error[:, None, None] for kinematics in _to_targets(fit, at)]
+    return math.sqrt(float(np.mean([np.sum(J**2, axis=(0, 1)) for J in moved])))
 
 
 def _omissions(fit: Fit, remainder: float, overall: Expectation) -> Iterator[str]:

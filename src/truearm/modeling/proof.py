@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final, Self
+from typing import Any, Final, Self
 
 import numpy as np
 
@@ -92,6 +92,10 @@ class Proof:
                 for number, row in enumerate(_factor(covariance, deviation).tolist())
             ),
         )
+
+    def summary(self) -> dict[str, Any]:
+        """Return how the calibration ended, and what it is about, as JSON holds it."""
+        return {"status": self.status, "errors": [error.code for error in self.errors], "sha256": self.digest}
 
     @property
     def root(self) -> Array:

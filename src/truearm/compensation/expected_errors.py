@@ -146,8 +146,8 @@ def _worse(length2: Array, along: Array) -> Array:
 
 def _mean_length(square: Array, variance: Array) -> Array:
     """Return the mean of a length from mean and variance of its square, to second order: within 6 %."""
-    safe = np.maximum(square, 1e-300)
-    return np.asarray(np.sqrt(safe) * (1.0 - variance / (8.0 * safe**2)))
+    safe = np.maximum(square, _NOTHING**4)
+    return np.asarray(np.sqrt(square) * (1.0 - variance / (8.0 * safe**2)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -43,6 +43,8 @@ class Proof:
     factor
         Rows of the lower triangular factor of their correlation matrix, each one longer than the one before; zero for
         parameters that are not uncertain.
+    lower_bound
+        Whether the error may be larger than covariance and joint error say, for a reason that is known.
     digest
         SHA-256 of the values that it is about; empty if it is about none yet.
     """
@@ -54,6 +56,7 @@ class Proof:
     names: tuple[str, ...]
     deviations: tuple[float, ...]
     factor: tuple[tuple[float, ...], ...]
+    lower_bound: bool = False
     digest: str = ""
 
     @classmethod
@@ -65,6 +68,8 @@ class Proof:
         joint_error: Array,
         parameters: Sequence[Parameter],
         covariance: Array,
+        *,
+        lower_bound: bool = False,
     ) -> Self:
         """Make the proof of a calibration, rounded to what a file holds of it.
 
@@ -91,6 +96,7 @@ class Proof:
                 tuple(round(v, _DECIMALS) + 0.0 for v in row[: number + 1])
                 for number, row in enumerate(_factor(covariance, deviation).tolist())
             ),
+            lower_bound,
         )
 
     def summary(self) -> dict[str, Any]:

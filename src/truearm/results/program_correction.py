@@ -17,11 +17,11 @@ from truearm.compensation.program_correction import CorrectedPrograms, Correctio
 from truearm.compensation.program_files import ProgramFile, language_called, recorded, write_programs
 from truearm.compensation.programs.program import Program, Skipped, Source
 from truearm.compensation.split import ProgramSplit
-from truearm.files import output_folder
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.results.record import Record, notice_lines, notice_summaries
+from truearm.writing import output_folder
 
 #: The report beside the corrected programs.
 REPORT: Final = "compensation.html"
@@ -157,7 +157,7 @@ class FileCorrection(Record):
             return None
         (mean, most), (mean_now, most_now) = ((v.mean() * 1e3, v.max() * 1e3) for v in self.expected)
         return (
-            f"  {self.name}, expected distance from its targets: {mean:.3f} mm on average and {most:.3f} mm at most "
+            f"  {self.name}, distance from its targets to expect: {mean:.3f} mm on average and {most:.3f} mm at most "
             f"before, {mean_now:.3f} and {most_now:.3f} mm now"
         )
 
@@ -231,6 +231,7 @@ class ProgramCorrection(Record):
         """Return it as JSON holds it, lengths in mm."""
         return {
             "programs": [file.summary() for file in self.files],
+            "expected_is_lower_bound": self.lower_bound,
             "warnings": notice_summaries(self.warnings),
         }
 
@@ -240,7 +241,10 @@ class ProgramCorrection(Record):
         parts = [(file, file.lines()) for file in self.files]
         text = [f"{file.name:{width}}{head.removeprefix(file.name)}" for file, (head, *_) in parts]
         skipped = [line for _, (_, *lines) in parts for line in lines]
-        text += [file.expected_line for file in self.files if file.expected_line is not None]
+        expected = [file.expected_line for file in self.files if file.expected_line is not None]
+        text += expected
+        if expected and self.lower_bound:
+            text.append("  These are lower bounds: the calibration cannot know all errors of the robot.")
         text += skipped[:_EXPLAINED]
         if len(skipped) > _EXPLAINED:
             text.append(f"  and {len(skipped) - _EXPLAINED} more; the JSON summary lists all")
@@ -250,6 +254,11 @@ class ProgramCorrection(Record):
                 text.append(f"  {moves} move{'s'[: moves > 1]} split by {more} more target{'s'[: more > 1]}")
         text += notice_lines(self.warnings)
         return text if self.simulated is None else [*text, *self.simulated.lines()]
+
+    @property
+    def lower_bound(self) -> bool:
+        """Whether the errors to expect may be larger, for a reason that the calibration knows."""
+        return self.robot.proof is not None and self.robot.proof.lower_bound
 
     @property
     def frame_words(self) -> list[str]:
@@ -307,5 +316,5 @@ class ProgramCorrection(Record):
             files[f"{one.name}.truearm.json"] = recorded(one.file, one.text, one.language, self.applied())
         files[REPORT] = program_html(self)
         progress("writing the files")
-        write_programs(folder, [one.file.path for one in self.files], files)
+        write_programs(folder, [one.file.path for one in self.files], files, self.command)
         return tuple(folder / name for name in files)

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from truearm.errors import InputError, did_you_mean
-from truearm.files import read_yaml, shown_entry
+from truearm.files import read_yaml
 from truearm.modeling.conventions import convention
 from truearm.modeling.effects import EFFECTS, NON_NEGATIVE
 from truearm.modeling.fixtures import Fixture
@@ -18,6 +18,7 @@ from truearm.modeling.parts import NO_PAYLOAD, Inertia, Joint, LinkMass, Payload
 from truearm.modeling.proof import Proof
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
+from truearm.schemas import shown_entry
 from truearm.shown import counted
 from truearm.units import SHOWN_AS, as_number, sized_si, to_si
 
@@ -199,6 +200,7 @@ def _proof(robot: Robot, entry: ProofEntry, shown: Mapping[str, str], where: str
             _row(row, number, f"{where}, proof.correlations[{number}]", cure)
             for number, row in enumerate(entry.correlations, 1)
         ),
+        lower_bound=entry.lower_bound,
         digest=entry.sha256,
     )
 

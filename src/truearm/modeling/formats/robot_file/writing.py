@@ -170,6 +170,8 @@ def _proof(
     made: dict[str, Any] = {"status": proof.status}
     if proof.errors:
         made["errors"] = [{"code": error.code, "message": text(error.message)} for error in proof.errors]
+    if proof.lower_bound:
+        made["lower_bound"] = True
     if len(proof.region) == len(robot.joints) and all(name in robot.parameters for name in proof.names):
         units = ["deg" if joint.kind == "revolute" else "mm" for joint in robot.joints]
         made["region"] = [listed([written(v, u) for v in one]) for one, u in zip(proof.region, units, strict=True)]

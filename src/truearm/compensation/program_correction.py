@@ -32,9 +32,8 @@ from truearm.compensation.resolved_configurations import (
 )
 from truearm.errors import InputError
 from truearm.modeling.chain import Array
-from truearm.modeling.formats.robot_file import is_intact
+from truearm.modeling.formats.robot_file import arm_is_known
 from truearm.modeling.inverse.solutions import PoseStatus
-from truearm.modeling.parameters import PLACES
 from truearm.modeling.robot import Robot
 
 #: A base that was not measured is found with this many targets, evenly along the programs.
@@ -199,7 +198,7 @@ def corrected_programs(
         base = base_shift(corrected, base)
     progress("finding fake targets")
     corrections = [one.correction(base, flange) for one in resolved]
-    if robot.proof is not None and _knows_the_arm(robot) and is_intact(robot):
+    if robot.proof is not None and arm_is_known(robot):
         progress("judging the targets")
         reached = [one.reached(made, flange) for one, made in zip(resolved, corrections, strict=True)]
         expected = expected_errors(robot, robot.proof, reached, tools, frames)
@@ -213,12 +212,6 @@ def corrected_programs(
         tuple(one.guess for one in resolved if one.guess),
         tuple(partial(one.between, base, flange) for one in resolved),
     )
-
-
-def _knows_the_arm(robot: Robot) -> bool:
-    """Return whether it is known how uncertain the parameters of the arm are, and not of its place alone."""
-    names = () if robot.proof is None else robot.proof.names
-    return any(robot.parameters[name].group not in PLACES for name in names if name in robot.parameters)
 
 
 def commanded(robot: Robot, program: Program, cell: Cell = EMPTY_CELL) -> Array:

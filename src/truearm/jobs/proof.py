@@ -6,21 +6,22 @@ from typing import Final
 
 from truearm.errors import InputError
 from truearm.jobs.arguments import choices_argument
-from truearm.modeling.formats.robot_file import is_intact
+from truearm.modeling.formats.robot_file import arm_is_known, is_intact
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 
 #: Ends of a fit of which no program is corrected.
 _UNSOUND: Final = ("rank-loss", "not-converged", "implausible")
-#: Codes of errors that a calibration may have ended with; those of the robot at hand are known as well.
-_ERRORS: Final = ("narrow-data",)
+#: Speaks against other regions than those that were measured. Programs need not be refused for it: every target is
+#: judged by what is known of the robot there, if that is known.
+_ELSEWHERE: Final = "narrow-data"
 #: Targets that would rather get worse, see :mod:`truearm.compensation.kept_targets`.
 NOT_BETTER: Final = "not-better-here"
 
 
 def accept_argument(accept: object, robot: Robot) -> tuple[str, ...]:
     """Return the names of what is accepted although it speaks against a correction."""
-    known = dict.fromkeys((*_UNSOUND, *_ERRORS, *_against(robot), NOT_BETTER))
+    known = dict.fromkeys((*_UNSOUND, _ELSEWHERE, *_against(robot), NOT_BETTER))
     return choices_argument(accept, "accept", list(known), "status or notice")
 
 
@@ -32,7 +33,8 @@ def refuse_unaccepted(robot: Robot, accept: tuple[str, ...]) -> None:
     InputError
         With what the calibration said.
     """
-    against = {name: message for name, message in _against(robot).items() if name not in accept}
+    judged = (_ELSEWHERE,) if arm_is_known(robot) else ()
+    against = {name: said for name, said in _against(robot).items() if name not in (*accept, *judged)}
     if against:
         name, message = next(iter(against.items()))
         others = f" It also ended with {', '.join([*against][1:])}." if len(against) > 1 else ""
@@ -57,15 +59,11 @@ def known_of(robot: Robot) -> list[Notice]:
                 "note",
             )
         ]
-    accepted = [
-        Notice(name, f"Accepted although it speaks against the calibration of this robot. {message}")
-        for name, message in _against(robot).items()
-    ]
-    return [*accepted, *_edited(robot)]
+    return told_of(robot)
 
 
 def told_of(robot: Robot) -> list[Notice]:
-    """Return what speaks against the calibration of a robot that is put to another use."""
+    """Return what speaks against the calibration of a robot that is used all the same."""
     return [
         *(Notice(name, f"From the calibration of this robot: {message}") for name, message in _against(robot).items()),
         *_edited(robot),

@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Final
 
 from truearm.modeling.formats.robot_file.writing import file_content
+from truearm.modeling.parameters import PLACES
 from truearm.modeling.proof import Proof
 from truearm.modeling.robot import Robot
 
@@ -24,6 +25,13 @@ def sealed(robot: Robot, proof: Proof) -> Robot:
 def is_intact(robot: Robot) -> bool:
     """Return whether a robot has the values that its proof is about, and the proof is as it was written."""
     return robot.proof is not None and robot.proof.digest == _digest(robot)
+
+
+def arm_is_known(robot: Robot) -> bool:
+    """Return whether it is known how uncertain the arm of a robot is, and not its place alone."""
+    if robot.proof is None or not is_intact(robot):
+        return False
+    return any(robot.parameters[name].group not in PLACES for name in robot.proof.names)
 
 
 def _digest(robot: Robot) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from numbers import Integral
 from pathlib import Path
 from typing import Final, Literal, get_args
@@ -51,7 +52,9 @@ from truearm.measurement.dataset import Dataset, IntArray
 from truearm.measurement.statistics import Errors, errors_of
 from truearm.measurement.table_motion import without_table_motion
 from truearm.modeling.effects import EFFECTS
+from truearm.modeling.formats.robot_file import is_intact
 from truearm.modeling.parts import Payload
+from truearm.modeling.proof import Proof
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice, has_error
 from truearm.results.calibration import RESULT_FILES, Calibration
@@ -266,10 +269,18 @@ def calibrate(
         urdf=urdf,
         inputs=inputs,
         selection=selection,
+        known_before=_known_before(nominal_robot),
     )
     if folder is not None:
         calibration.save(folder, progress)
     return calibration
+
+
+def _known_before(robot: Robot) -> Proof | None:
+    """Return what is known of a robot already; of one whose values were changed since, only what speaks against it."""
+    if robot.proof is None or is_intact(robot):
+        return robot.proof
+    return replace(robot.proof, names=(), deviations=(), factor=())
 
 
 def _check_split(training: Dataset, held_out: Dataset) -> None:

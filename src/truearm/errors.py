@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator, Sized
 from contextlib import contextmanager
+from itertools import islice
 from numbers import Rational
 from typing import Final
 
@@ -15,6 +16,8 @@ _NAMED: Final = re.compile(r"`(?P<name>[a-z][a-z_]*)(?:=(?P<value>[^`]*))?`")
 #: A part of a message of more characters is shortened, and what came much sooner.
 _LONGEST: Final = 1500
 _LONGEST_CAME: Final = 160
+#: Names are compared with so many others at most: more take long and help nobody.
+_MOST_COMPARED: Final = 2000
 
 
 class InputError(ValueError):
@@ -137,7 +140,7 @@ def _shown(came: object) -> str:
 
 
 def nearest_names(name: str, known: Iterable[str], count: int = 3, likeness: float = 0.5) -> list[str]:
-    """Return the known names most like `name`, best first, for a message that offers them.
+    """Return the known names most like `name`, best first, for a message that offers them; of very many the first few.
 
     Parameters
     ----------
@@ -148,7 +151,8 @@ def nearest_names(name: str, known: Iterable[str], count: int = 3, likeness: flo
 
     if len(name) > _LONGEST_CAME:  # nobody misspells that, and to compare it takes long
         return []
-    by_folded = {candidate.lower(): candidate for candidate in known}
+    few = (candidate for candidate in islice(known, _MOST_COMPARED) if len(candidate) <= _LONGEST_CAME)
+    by_folded = {candidate.lower(): candidate for candidate in few}
     if name.lower() in by_folded:
         return [by_folded[name.lower()]]
     return [by_folded[match] for match in difflib.get_close_matches(name.lower(), by_folded, count, likeness)]

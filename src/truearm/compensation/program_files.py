@@ -273,8 +273,9 @@ def _record(path: Path) -> CorrectionRecord | None:
     beside = record_path(path)
     if not exists(beside):
         return None
+    text = read_bytes(beside)
     try:
-        content = json.loads(read_bytes(beside))
+        content = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise InputError("this record cannot be read", where=str(beside), cure="Remove it, or restore it.") from error
     return validated(content, CorrectionRecord, str(beside))

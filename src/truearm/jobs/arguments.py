@@ -268,6 +268,16 @@ def choices_argument(values: object, parameter: str, known: Collection[str], wha
     return tuple(dict.fromkeys(named))
 
 
+def names_argument(values: object, parameter: str) -> tuple[str, ...]:
+    """Return names that only the data know, each once; numbers are names too."""
+    if not _is_sequence(values):
+        raise wrong_kind("a sequence of names belongs here", values, parameter, "names of configurations")
+    for value in values:
+        if isinstance(value, bool) or not isinstance(value, str | Integral):
+            raise wrong_kind("a name belongs here", value, parameter, "the name of a configuration")
+    return tuple(dict.fromkeys(str(value) for value in values))
+
+
 def device_argument(device: object, parameter: str = "device") -> Device:
     """Return the instrument of a name."""
     from truearm.simulation.devices import DEVICES  # with its inverse kinematics, only where it is asked for

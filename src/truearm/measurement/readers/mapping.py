@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import codecs
-import re
-from typing import Annotated, Literal
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints, model_validator
 from pydantic import field_validator as validator_of
@@ -93,6 +92,32 @@ class ConfigurationEntry(_Entry):
         return self
 
 
+#: What a compiled pattern may take [bytes]; one for names takes a few thousand.
+_PATTERN_MEMORY: Final = 1 << 15
+
+
+def name_pattern(pattern: str) -> Any:
+    r"""Return a pattern that finds what it finds in a time that grows with the text alone, whatever the pattern is.
+
+    RE2 knows no look-ahead, look-behind and repeated groups (``\1``), which take a time without bound.
+    """
+    import re2
+
+    options = re2.Options()
+    options.log_errors = False
+    options.max_mem = _PATTERN_MEMORY
+    try:
+        return re2.compile(pattern, options)
+    except re2.error as error:
+        reason = error.args[0] if error.args else ""
+        reason = reason.decode("utf-8", "replace") if isinstance(reason, bytes) else str(reason)
+        raise InputError(
+            f"this is not a regular expression that can be used ({reason})",
+            came=pattern,
+            allowed="the syntax of RE2: no look-ahead, no look-behind, no reference to a group",
+        ) from None
+
+
 class NamesEntry(_Entry):
     """A column whose text holds the label of the configuration, the name of the target, or both."""
 
@@ -103,14 +128,7 @@ class NamesEntry(_Entry):
     @validator_of("pattern")
     @classmethod
     def _compiles(cls, pattern: str) -> str:
-        try:
-            groups = set(re.compile(pattern).groupindex)
-        except (re.error, OverflowError, RecursionError) as error:
-            raise InputError(
-                f"this is not a regular expression ({error})",
-                came=pattern,
-                allowed="such as (?P<target>[a-z]+)_(?P<configuration>[0-9]+)",
-            ) from None
+        groups = set(name_pattern(pattern).groupindex)
         if not groups or groups - {"configuration", "target"}:
             raise InputError(
                 "the pattern has other named groups",
@@ -122,7 +140,7 @@ class NamesEntry(_Entry):
     @property
     def groups(self) -> tuple[str, ...]:
         """Return what the pattern finds."""
-        return tuple(re.compile(self.pattern).groupindex)
+        return tuple(name_pattern(self.pattern).groupindex)
 
 
 class ReadingEntry(_Entry):

@@ -18,6 +18,7 @@ from truearm.errors import InputError, refusals_of
 from truearm.files import path_argument
 from truearm.jobs.arguments import (
     command_argument,
+    files_of,
     flag_argument,
     folder_for,
     paths_argument,
@@ -28,7 +29,7 @@ from truearm.jobs.arguments import (
 )
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
-from truearm.results.program_correction import FileCorrection, ProgramCorrection
+from truearm.results.program_correction import REPORT, FileCorrection, ProgramCorrection
 
 
 def compensate(
@@ -87,7 +88,7 @@ def compensate(
     if split is not None:
         split = finite_number(split, "split")
         check_tolerance(split)
-    folder = None if out is None else folder_for((), out)
+    folder = None if out is None else folder_for((REPORT,), out, robot, tools, frames, *paths)
     invocation = command_argument(command) or python_call(
         "compensate",
         robot,
@@ -136,6 +137,7 @@ def compensate(
         splits=splits,
         warnings=check_correction(arm, result, splits),
         command=invocation,
+        inputs=files_of(robot, tools, frames),
     )
     if folder is not None:
         with refusals_of("out"):

@@ -62,8 +62,11 @@ def read_bytes(path: Path, most: str = "file_size") -> bytes:
 
 
 def _missing(path: Path) -> InputError:
-    if path.is_symlink():
-        return broken_link(path)
+    try:
+        if path.is_symlink():
+            return broken_link(path)
+    except OSError as error:
+        return InputError(f"the file cannot be read ({reason_of(error)})", where=str(path))
     try:
         siblings = [p.name for p in path.parent.iterdir()]
     except OSError:

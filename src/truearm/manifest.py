@@ -123,13 +123,13 @@ def refuse_unfinished(path: Path) -> None:
     for place in places:
         for folder, run in unfinished_above(place):
             if str(place.relative_to(folder)) in run.new.files:
-                again = f"Run it again: {run.new.command}" if run.new.command else "Run that command again."
                 raise InputError(
                     "a command that writes this file together with others has not finished,"
                     " and they may not belong together",
                     where=str(path),
                     came=f"its mark {folder / UNFINISHED}",
-                    cure=f"{again} Whatever writes into that folder next puts back what stood there before.",
+                    cure="Whatever writes into that folder next puts back what stood there before, so run that command"
+                    f" again{f': {run.new.command}' if run.new.command else '.'}",
                 )
 
 

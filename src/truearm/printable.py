@@ -9,7 +9,7 @@ from typing import Final
 #: Controls, halves of characters, breaks of lines and paragraphs, by their Unicode categories.
 _UNSEEN: Final = ("Cc", "Cs", "Zl", "Zp")
 #: What turns the direction of the text around it (Unicode Standard Annex 9): ``gpj.exe`` is shown as ``exe.jpg``.
-_TURNING: Final = frozenset("\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
+TURNING: Final = frozenset("\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
 #: A word of more characters is no word that anybody reads; paths are shorter.
 _LONGEST_WORD: Final = 300
 _LONG_WORD: Final = re.compile(rf"\S{{{_LONGEST_WORD + 1},}}")
@@ -41,7 +41,7 @@ def with_short_words(text: str) -> str:
 
 
 def _steers(character: str) -> bool:
-    return unicodedata.category(character) in _UNSEEN or character in _TURNING
+    return unicodedata.category(character) in _UNSEEN or character in TURNING
 
 
 def _escaped(character: str) -> str:

@@ -11,13 +11,14 @@ import gc
 import hashlib
 import json
 import os
+import re
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict
 
 from truearm.compensation.programs import LANGUAGES
 from truearm.compensation.programs.lines import replaced
@@ -30,7 +31,19 @@ from truearm.writing import refuse_overwriting, write_files
 
 SCHEMA: Final = "truearm-corrected/1"
 
-Hash = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+
+def _of_a_file(text: str) -> str:
+    if not re.fullmatch("[0-9a-f]{64}", text):
+        raise InputError(
+            "this is not the SHA-256 of a file",
+            came=text,
+            allowed="64 digits, 0 to 9 and a to f",
+            cure="Restore the record as it was written.",
+        )
+    return text
+
+
+Hash = Annotated[str, AfterValidator(_of_a_file)]
 
 
 class CorrectionRecord(BaseModel):
@@ -260,8 +273,9 @@ def _record(path: Path) -> CorrectionRecord | None:
     beside = record_path(path)
     if not exists(beside):
         return None
+    text = read_bytes(beside)
     try:
-        content = json.loads(read_bytes(beside))
+        content = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise InputError("this record cannot be read", where=str(beside), cure="Remove it, or restore it.") from error
     return validated(content, CorrectionRecord, str(beside))

@@ -14,7 +14,7 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from truearm.printable import printable, with_short_words
+from truearm.printable import TURNING, printable, with_short_words
 from truearm.reporting.drawing import AFTER, BEFORE, Figure
 from truearm.version import __version__
 
@@ -74,7 +74,8 @@ def with_code(text: str) -> Markup:
 
 def json_for_script(value: object) -> str:
     """Return JSON that can stand inside a script element whatever its texts hold."""
-    return json.dumps(value, separators=(",", ":"), allow_nan=False, ensure_ascii=False).translate(_UNSAFE)
+    text = json.dumps(value, separators=(",", ":"), allow_nan=False, ensure_ascii=False)
+    return text.translate(_UNSAFE | {ord(c): f"\\\\u{ord(c):04x}" for c in TURNING})
 
 
 def _plotly() -> str:

@@ -25,12 +25,10 @@ from truearm.modeling.parts import Payload
 from truearm.modeling.postures import Postures
 
 #: Configurations at which positions are asked for, and draws of the parameters' errors: fewer for many targets.
-_CONFIGURATIONS: Final = (60, 300)
-_DRAWS: Final = (100, 300)
+_CONFIGURATIONS: Final = (60, 200)
+_DRAWS: Final = (100, 600)
 _POSITIONS: Final = 3_000
 _LENGTHS: Final = 3_000_000
-#: Squared mean length of a normal vector over its variance, if that is the same along all three axes.
-_MEAN_LENGTH: Final = 8.0 / (3.0 * math.pi)
 #: Deviation of an angle from which the derivatives are compared with the kinematics themselves [rad].
 _LARGE_ANGLE: Final = 5e-3
 #: Share of the error by which the derivatives may be wrong, and what it is tried on.
@@ -41,6 +39,8 @@ _TRIED_CONFIGURATIONS: Final = 40
 _REMAINDER: Final = 0.1
 #: Configurations of a map, however many targets there are.
 _LEAST_MAPPED: Final = 20
+#: So that the variance of what is drawn exists.
+_LEAST_FREEDOM: Final = 3.0
 _INTERVAL: Final = (5.0, 95.0)
 
 
@@ -74,8 +74,7 @@ class ExpectedError:
     targets
         Of each, by its name.
     remainder
-        The part of the mean error that comes from what readings of an arrival share: repeatability plus what the model
-        leaves.
+        Root mean square of the part that readings of an arrival share: repeatability plus what the model leaves.
     payload
         What the robot carries there.
     gauge_freedoms
@@ -126,8 +125,13 @@ class PositionErrors:
     def _errors(self) -> dict[str, Array]:
         """Errors of the parameters by name, ``(draws,)`` each [SI]."""
         names, root = covariance_root(self.fit)
-        normal = np.random.default_rng(self.seed).standard_normal((self.draws, root.shape[1]))
-        return dict(zip(names, root @ normal.T, strict=True))
+        rng = np.random.default_rng(self.seed)
+        drawn = root @ rng.standard_normal((self.draws, root.shape[1])).T
+        if not self.fit.declared or self.fit.excess > 1.0:
+            # The noise was estimated too: Student's distribution (Gelman et al. 2013, section 3.2).
+            freedom = _freedom(self.fit)
+            drawn *= np.sqrt(freedom / rng.chisquare(freedom, self.draws))
+        return dict(zip(names, drawn, strict=True))
 
     @cached_property
     def _bent(self) -> bool:
@@ -211,15 +215,12 @@ def _expectation(lengths: Array) -> Expectation:
 
 
 def _remainder(fit: Fit, joints: Array) -> float:
-    """Return the mean error of the targets that the joints' error of an arrival makes [m]."""
+    """Return the root mean square error of the targets that the joints' error of an arrival makes [m]."""
     if not fit.joint_error.any():
         return 0.0
     at = fit.robot.loaded(joints)
-    lengths = []
-    for kinematics in _to_targets(fit, at):
-        J = _by_joints(fit, kinematics) * fit.joint_error[:, None, None]
-        lengths.append(np.sqrt(_MEAN_LENGTH * np.sum(J**2, axis=(0, 1))))
-    return float(np.mean(lengths))
+    moved = [_by_joints(fit, kinematics) * fit.joint_error[:, None, None] for kinematics in _to_targets(fit, at)]
+    return math.sqrt(float(np.mean([np.sum(J**2, axis=(0, 1)) for J in moved])))
 
 
 def _omissions(fit: Fit, remainder: float, overall: Expectation) -> Iterator[str]:
@@ -234,6 +235,13 @@ def _omissions(fit: Fit, remainder: float, overall: Expectation) -> Iterator[str
         yield "values at a bound count as exact"
     if fit.excess > 1.0 or remainder**2 > _REMAINDER * overall.mean**2:
         yield "the robot does something that the model cannot express, and it may do more of it elsewhere"
+
+
+def _freedom(fit: Fit) -> float:
+    """Return the degrees of freedom that the readings left to the estimate of their noise."""
+    rows = int(np.isfinite(fit.weight).sum()) * (3 if "position" in fit.sigma else 1)
+    spent = sum(fit.robot.parameters[name].informed or 0.0 for name in fit.free.names)
+    return max(rows - spent, _LEAST_FREEDOM)
 
 
 def covariance_root(fit: Fit) -> tuple[tuple[str, ...], Array]:

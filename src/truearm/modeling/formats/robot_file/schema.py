@@ -142,7 +142,7 @@ class ParameterEntry(_Entry):
     value: Number
     prior: Positive
     unit: str
-    deviation: Number | None = None
+    deviation: NotNegative | None = None
     informed: Number | None = None
 
 

@@ -15,6 +15,7 @@ from truearm import InputError, Robot
 from truearm.modeling.formats.robot_file import sealed
 from truearm.notices import Notice
 from truearm.results.program_correction import ProgramCorrection
+from truearm.results.robot_description import RobotDescription
 
 NARROW = Notice("narrow-data", "Over the workspace it is worse.", "error")
 SIGNS = Notice("joint-sign", "Joint 6 turns the other way.", "error")
@@ -127,6 +128,15 @@ def test_joints_for_poses_and_exports_are_made_with_a_warning(robot: Robot, tmp_
         assert {"rank-loss", "joint-sign", "edited-by-hand"} <= {notice["code"] for notice in summary["warnings"]}
     assert truearm.inverse(robot, position, rotation).warnings == ()
     assert truearm.inverse("irb120", position, rotation).warnings == ()
+
+
+def test_the_description_of_a_robot_says_how_its_calibration_ended(robot: Robot) -> None:
+    unsound = ended(robot, "rank-loss", SIGNS)
+    assert "Calibration: rank-loss, joint-sign" in RobotDescription(unsound).lines()
+    edited = RobotDescription(unsound.with_values({"theta_offset_2": 0.001}))
+    assert "Calibration: rank-loss, joint-sign; values were changed since" in edited.lines()
+    assert edited.summary()["proof"]["intact"] is False
+    assert RobotDescription(truearm.load_robot("irb120")).summary()["proof"] is None
 
 
 def test_what_is_expected_is_told(robot: Robot, program: Path, tmp_path: Path) -> None:

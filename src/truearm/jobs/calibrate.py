@@ -12,16 +12,21 @@ import numpy as np
 
 from truearm.errors import InputError, nearest_names, refusals_of, wrong_kind
 from truearm.files import path_argument, read_bytes
+from truearm.identification.base_changes import with_one_base
 from truearm.identification.choosing.selection import AUTO, select
 from truearm.identification.judging.advice import check_fit
 from truearm.identification.judging.arrival_lag import check_arrival_lag
+from truearm.identification.judging.changes import check_changes
 from truearm.identification.judging.expected_error import expected_error
+from truearm.identification.judging.implausible import check_plausible
+from truearm.identification.judging.left_over import LeftOver
 from truearm.identification.judging.narrow_data import check_narrow_data
+from truearm.identification.judging.sigma import check_sigma
 from truearm.identification.judging.transmission import check_transmission
 from truearm.identification.solving.bounds import Bounds, read_bounds
-from truearm.identification.solving.fit import identify, place
+from truearm.identification.solving.fit import Status, identify, place
 from truearm.identification.solving.losses import LOSSES, Loss
-from truearm.identification.solving.models import FRAMES, MODELS, Model
+from truearm.identification.solving.models import FRAMES, MODELS, Model, named_model
 from truearm.identification.solving.rounds import Redundant
 from truearm.jobs.arguments import (
     choice_argument,
@@ -31,6 +36,7 @@ from truearm.jobs.arguments import (
     files_of,
     folder_for,
     gravity_argument,
+    names_argument,
     payload_argument,
     progress_argument,
     python_call,
@@ -47,7 +53,7 @@ from truearm.measurement.table_motion import without_table_motion
 from truearm.modeling.effects import EFFECTS
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
-from truearm.notices import Notice
+from truearm.notices import Notice, has_error
 from truearm.results.calibration import RESULT_FILES, Calibration
 from truearm.shown import counted, listed
 from truearm.version import __version__
@@ -72,6 +78,7 @@ def calibrate(
     effects: Sequence[str] = (),
     payload: Payload | str | None = None,
     gravity: Sequence[float] | None = None,
+    base_changes: Sequence[str] = (),
     command: str | None = None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Calibration:
@@ -106,6 +113,10 @@ def calibrate(
     payload, gravity
         What the robot carried (an object, or a text such as ``2.7kg,50mm,25mm,100mm``) and free fall in its base frame
         [m/s^2], see :meth:`truearm.Robot.with_payload`.
+    base_changes
+        Configurations from which on, in the order of measurement, the instrument or the robot's base stood elsewhere.
+        The motion is found along with the model (``geometric`` for ``auto``) from the training configurations, and
+        taken out of the readings; no deviation contains what is not known of it.
     command
         How to run it again, for the report; None writes the call in Python.
     progress
@@ -126,6 +137,7 @@ def calibrate(
             came=effects[0],
             cure="Name another model.",
         )
+    base_changes = names_argument(base_changes, "base_changes")
     choice_argument(loss, "loss", {name: name for name in LOSSES})
     choice_argument(redundancy, "redundancy", {name: name for name in get_args(Redundant)})
     seed = whole_argument(seed, "seed")
@@ -141,6 +153,7 @@ def calibrate(
         redundancy=redundancy,
         bounds=bounds,
         effects=list(effects) or None,
+        base_changes=list(base_changes) or None,
         payload=payload,
         gravity=fall,
     )
@@ -182,6 +195,11 @@ def calibrate(
 
         progress("checking the data")
         steady = without_table_motion(readings)
+        moved: list[Notice] = []
+        if base_changes:
+            progress("finding how the base moved")
+            along = named_model("geometric") if named is None else named.also(effects)
+            steady, moved = with_one_base(nominal_robot, steady, training, base_changes, along, loss)
         noticed = notices_of(readings, nominal_robot, steady=steady)
         readings = steady
         first = readings.of_configurations(training)
@@ -211,10 +229,14 @@ def calibrate(
     before = errors_of(nominal.robot, judged)
     train_errors = errors_of(fit.robot, first)
     expected = expected_error(fit)
+    # What the robust fit of the check could not explain, the fit itself may.
+    noticed = tuple(notice for notice in noticed if notice.code != Status.IMPLAUSIBLE.value)
+    unlike = check_plausible(fit, first, noticed)
+    left_over = LeftOver.of(fit, readings)
     history = (
         f"calibrated by truearm {__version__}: model {' + '.join([chosen.name, *effects])},"
         f" {count} of {n} configurations of {Path(readings.source).name}{digest}, seed {seed}, loss {loss},"
-        f" redundancy {redundancy}"
+        f" redundancy {redundancy}{f', another base from {listed(base_changes)} on' if base_changes else ''}"
     )
     calibration = Calibration(
         fit=fit,
@@ -223,12 +245,17 @@ def calibrate(
         validation=validation,
         expected=expected,
         warnings=(
+            *(notice for notice in noticed if notice.level == "error"),
+            *unlike,
             *_check_proof(before, validation),
             *_check_copies(readings, training, held_out),
-            *check_fit(fit, expected),
+            *moved,
+            *check_fit(fit, expected, doubted=has_error([*unlike, *noticed])),
             *check_narrow_data(fit, expected, first, validation or train_errors, held_out=validation is not None),
-            *noticed,
-            *check_arrival_lag(fit, readings),
+            *(notice for notice in noticed if notice.level != "error"),
+            *check_sigma(left_over),
+            *check_changes(left_over),
+            *check_arrival_lag(left_over),
             *check_transmission(fit, first),
         ),
         data=readings,

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.errors import InputError, did_you_mean
-from truearm.files import output_folder, write_files
 from truearm.identification.choosing.selection import Selection
 from truearm.identification.judging.expected_error import ExpectedError
 from truearm.identification.solving.fit import Fit, Status
@@ -33,6 +32,7 @@ from truearm.results.summaries import (
 )
 from truearm.shown import counted
 from truearm.units import SHOWN_AS, from_si
+from truearm.writing import output_folder, write_files
 
 #: What a calibration writes into its folder.
 RESULT_FILES: Final = ("calibrated.yaml", "result.json", "report.html", "calibrated.urdf")
@@ -95,8 +95,9 @@ class Calibration(Record):
 
     @property
     def status(self) -> Status:
-        """How the fit ended."""
-        return self.fit.status
+        """How the fit ended, or that what it found cannot be this robot."""
+        unlike = any(notice.code == Status.IMPLAUSIBLE.value for notice in self.warnings)
+        return Status.IMPLAUSIBLE if unlike else self.fit.status
 
     @property
     def finished(self) -> bool:
@@ -236,5 +237,5 @@ class Calibration(Record):
             "calibrated.urdf": urdf,
         }
         progress("writing the files")
-        write_files(folder, files)
+        write_files(folder, files, self.command)
         return tuple(folder / name for name in files)

@@ -24,8 +24,16 @@ _LEAST_INFORMED: Final = 0.5
 _LARGEST_UNINFORMED_SHARE: Final = 0.05
 
 
-def check_fit(fit: Fit, expected: ExpectedError) -> list[Notice]:
-    """Return what a fit says about its model, its data and its parameters."""
+def check_fit(fit: Fit, expected: ExpectedError, *, doubted: bool = False) -> list[Notice]:
+    """Return what a fit says about its model, its data and its parameters.
+
+    Parameters
+    ----------
+    expected
+        Of the fit, over the workspace.
+    doubted
+        Whether the data are known to be wrong: wider priors are no cure then.
+    """
     found = []
     robot = fit.robot
     if "joint zero" in fit.model.groups and "geometry" in fit.model.groups:
@@ -99,7 +107,7 @@ def check_fit(fit: Fit, expected: ExpectedError) -> list[Notice]:
                 "far-from-nominal",
                 f"{', '.join(far[:8])}{' and others' if len(far) > 8 else ''} moved by more than {_LARGEST_MOVE:g} "
                 "standard deviations of their priors. Check that it is this robot, in these units, with its joints in "
-                "this order. If it is, enter wider priors in the robot file.",
+                f"this order.{'' if doubted else ' If it is, enter wider priors in the robot file.'}",
             )
         )
     if fit.excess > 1.0:

@@ -6,8 +6,8 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
-from truearm.errors import InputError, did_you_mean
-from truearm.files import read_yaml, shown_entry
+from truearm.errors import InputError, did_you_mean, name_place
+from truearm.files import read_yaml
 from truearm.modeling.conventions import convention
 from truearm.modeling.effects import EFFECTS, NON_NEGATIVE
 from truearm.modeling.fixtures import Fixture
@@ -15,6 +15,8 @@ from truearm.modeling.formats.robot_file.schema import JointEntry, RobotFile
 from truearm.modeling.parameters import Parameter
 from truearm.modeling.parts import NO_PAYLOAD, Inertia, Joint, LinkMass, Payload, Target, Tool, Truth
 from truearm.modeling.robot import Robot
+from truearm.schemas import shown_entry
+from truearm.shown import listed
 from truearm.units import SHOWN_AS, sized_si, to_si
 
 
@@ -25,6 +27,15 @@ def read_robot(path: Path) -> Robot:
 
 def robot_from_file(content: RobotFile, where: str) -> Robot:
     """Build the robot that a checked file describes; `where` names the file in messages."""
+    try:
+        return _robot(content, where)
+    except InputError as error:  # of the robot's parts, which know nothing of the file
+        if not (error.where or "").startswith(where):
+            name_place(error, f"{where}, {error.where}" if error.where else where)
+        raise
+
+
+def _robot(content: RobotFile, where: str) -> Robot:
     length, angle = content.units.length, content.units.angle
 
     def si(value: float, unit: str, entry: str, *, deviation: bool = False) -> float:
@@ -114,7 +125,13 @@ def _with_values(robot: Robot, content: RobotFile, where: str) -> Robot:
         for effect in EFFECTS:
             if name in [p.name for p in effect(robot.layout).parameters]:
                 cure = f"It belongs to the joint effect {effect.name}: add that to the entry effects."
-        raise InputError("the robot has no such parameter", where=f"{where}, {entry}", came=name, cure=cure)
+        raise InputError(
+            "the robot has no such parameter",
+            where=f"{where}, {entry}",
+            came=name,
+            allowed=listed(list(robot.parameters)),
+            cure=cure,
+        )
 
     truths = {
         truth_name: Truth(
@@ -177,7 +194,7 @@ def _joint(content: RobotFile, number: int, entry: JointEntry, where: str) -> Jo
                 where=where,
                 came=column,
                 allowed=", ".join(["name", "type", "limits", "transmission_periods", *allowed]),
-                cure=did_you_mean(column, allowed),
+                cure=did_you_mean(column, ["name", "type", "limits", "transmission_periods", *allowed]),
             )
         row[column] = sized_si(_number(value, f"{where}.{column}"), shown[units[column]], f"{where}.{column}")
     fault = table.fault(row, entry.type)

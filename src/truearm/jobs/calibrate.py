@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from numbers import Integral
 from pathlib import Path
 from typing import Final, Literal, get_args
@@ -46,12 +47,15 @@ from truearm.jobs.arguments import (
 )
 from truearm.jobs.check import notices_of
 from truearm.library import urdf_source
-from truearm.measurement.checks import check_joints, copies
+from truearm.measurement.checks import check_joints
 from truearm.measurement.dataset import Dataset, IntArray
+from truearm.measurement.repeats import copies, revisits
 from truearm.measurement.statistics import Errors, errors_of
 from truearm.measurement.table_motion import without_table_motion
 from truearm.modeling.effects import EFFECTS
+from truearm.modeling.formats.robot_file import is_intact
 from truearm.modeling.parts import Payload
+from truearm.modeling.proof import Proof
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice, has_error
 from truearm.results.calibration import RESULT_FILES, Calibration
@@ -271,10 +275,18 @@ def calibrate(
         urdf=urdf,
         inputs=inputs,
         selection=selection,
+        known_before=_known_before(nominal_robot),
     )
     if folder is not None:
         calibration.save(folder, progress)
     return calibration
+
+
+def _known_before(robot: Robot) -> Proof | None:
+    """Return what is known of a robot already; of one whose values were changed since, only what speaks against it."""
+    if robot.proof is None or is_intact(robot):
+        return robot.proof
+    return replace(robot.proof, names=(), deviations=(), factor=())
 
 
 def _check_split(training: Dataset, held_out: Dataset) -> None:
@@ -334,17 +346,32 @@ def _train_count(train: object, n: int, where: str) -> int:
 
 
 def _check_copies(data: Dataset, training: IntArray, held_out: IntArray) -> list[Notice]:
-    """Say if the fit has seen copies of what was held out."""
+    """Say if the fit has seen what was held out: copies, or other readings at the same joint positions."""
     seen = copies(data, held_out, training)
-    if not seen:
+    known = set(seen)
+    again = [label for label in revisits(data, held_out, training) if label not in known]
+    if not seen and not again:
         return []
-    one = len(seen) == 1
+    told = []
+    if seen:
+        told.append(f"{len(seen)} {'is a copy' if len(seen) == 1 else 'are copies'} of training ones ({listed(seen)})")
+    if again:
+        told.append(
+            f"{len(again)} {'has' if len(again) == 1 else 'have'} the same joint positions as training ones "
+            f"({listed(again)})"
+        )
+    cures = ["Leave copies out; for a bootstrap, draw from the training configurations alone and use `train=all`."]
     return [
         Notice(
             "held-out-seen",
-            f"Of {counted(len(held_out), 'held-out configuration')} {len(seen)} {'is a copy' if one else 'are copies'} "
-            f"of training ones ({listed(seen)}): the fit has seen them, and the errors flatter it. Leave "
-            "copies out; for a bootstrap, draw from the training configurations alone and use `train=all`.",
+            f"Of {counted(len(held_out), 'held-out configuration')} {' and '.join(told)}: the fit has seen them, and "
+            f"the errors flatter it. "
+            + " ".join(
+                [
+                    *(cures if seen else []),
+                    *(["Judge it at other joint positions with 'truearm validate'."] if again else []),
+                ]
+            ),
         )
     ]
 

@@ -26,6 +26,7 @@ from truearm.jobs.arguments import (
     python_call,
     robot_argument,
 )
+from truearm.jobs.proof import NOT_BETTER, accept_argument, known_of, refuse_unaccepted
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
 from truearm.results.program_correction import FileCorrection, ProgramCorrection
@@ -42,6 +43,7 @@ def compensate(
     strict: bool = False,
     split: float | None = None,
     again: bool = False,
+    accept: Sequence[str] = (),
     command: str | None = None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> ProgramCorrection:
@@ -67,6 +69,10 @@ def compensate(
         Split straight and circular moves where the correction between targets would deviate farther [m].
     again
         Take the originals of programs that were corrected already.
+    accept
+        What may speak against the robot's calibration or against a correction, by name: ``rank-loss``,
+        ``not-converged``, ``implausible``, or a notice of the level error that the calibration ended with; and
+        ``not-better-here`` to correct also the targets that would rather get worse.
     command
         How to do it again, for the report; None writes the call in Python.
     progress
@@ -75,8 +81,8 @@ def compensate(
     Raises
     ------
     InputError
-        If a program cannot be read or was corrected already, the robot is not calibrated, a tool or frame is not
-        defined, or with `strict` a target cannot be corrected.
+        If a program cannot be read or was corrected already, the robot is not calibrated or its calibration ended
+        badly, a tool or frame is not defined, or with `strict` a target cannot be corrected.
     """
     progress_argument(progress)
     paths = paths_argument(programs, "programs", "program")
@@ -88,6 +94,8 @@ def compensate(
         split = finite_number(split, "split")
         check_tolerance(split)
     folder = None if out is None else folder_for((), out)
+    arm = robot_argument(robot).with_payload(payload)
+    accepted = accept_argument(accept, arm)
     invocation = command_argument(command) or python_call(
         "compensate",
         robot,
@@ -98,8 +106,9 @@ def compensate(
         strict=strict or None,
         split=split,
         again=again or None,
+        accept=list(accepted) or None,
     )
-    arm = robot_argument(robot).with_payload(payload)
+    refuse_unaccepted(arm, accepted)
     with refusals_of("tools"):
         tools_given = read_tools(arm, tool_file)
     with refusals_of("frames"):
@@ -110,7 +119,7 @@ def compensate(
         progress("reading the programs")
         read = read_programs(files)
     with refusals_of("robot"):
-        result = corrected_programs(arm, read, cell, progress)
+        result = corrected_programs(arm, read, cell, progress, every=NOT_BETTER in accepted)
     if strict:
         _refuse_skipped(result)
     language = language_called(read[0].language)
@@ -134,7 +143,7 @@ def compensate(
         files=tuple(corrected),
         result=result,
         splits=splits,
-        warnings=check_correction(arm, result, splits),
+        warnings=(*known_of(arm), *check_correction(arm, result, splits)),
         command=invocation,
     )
     if folder is not None:

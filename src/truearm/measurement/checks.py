@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.errors import InputError, nearest_names
-from truearm.measurement.dataset import Dataset, IntArray
-from truearm.measurement.dataset_fields import drawn_from
+from truearm.measurement.dataset import Dataset
 from truearm.measurement.places import constellation, places_of
+from truearm.measurement.repeats import check_duplicates, repeated_joints, repeated_joints_notices
 from truearm.measurement.rigid_tool import DEVIATIONS, OTHER_REFLECTOR, SAME_POINT, UNMOVED, Suspect, rigid_suspects
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
@@ -40,8 +40,12 @@ def check_data(data: Dataset, suspects: Iterable[Suspect] | None = None) -> list
     suspects
         Readings that are doubted for another reason as well, reported together with those found here.
     """
-    found = [*_misnamed(data), *_missing(data), *_duplicates(data)]
-    found += suspect_notices([*rigid_suspects(data), *reference_suspects(data), *(suspects or ())])
+    found = [*_misnamed(data), *_missing(data), *check_duplicates(data)]
+    pairs = repeated_joints(data)
+    known = {label for pair in pairs for label in pair}
+    doubted = [suspect for suspect in suspects or () if suspect.configuration not in known]
+    found += repeated_joints_notices(data, pairs)
+    found += suspect_notices([*rigid_suspects(data), *reference_suspects(data), *doubted])
     return found + _moved(data) + _temperatures(data)
 
 
@@ -290,44 +294,6 @@ def _misnamed(data: Dataset) -> list[Notice]:
             "error",
         )
     ]
-
-
-def _duplicates(data: Dataset) -> list[Notice]:
-    found = []
-    for part in [data] if data.references is None else [data, data.references]:
-        first: dict[tuple[int, bytes], int] = {}
-        for reading in np.flatnonzero(part.has_position).tolist():
-            key = (int(part.target[reading]), part.position[reading].tobytes())
-            other = first.setdefault(key, reading)
-            a, b = (part.labels[part.configuration[r]] for r in (other, reading))
-            # A configuration that was drawn twice for a bootstrap counts twice because it shall.
-            if other != reading and (a == b or drawn_from(a) != drawn_from(b)):
-                found.append(f"{part.targets[key[0]]} at {a} and {b}")
-    if not found:
-        return []
-    return [
-        Notice(
-            "duplicates",
-            f"{counted(len(found), 'reading')} repeat{'s' if len(found) == 1 else ''} another one to the last digit "
-            f"(target at configurations): {_listed(found)}. Rows were copied, or the instrument stood still: remove "
-            f"{'it, it counts' if len(found) == 1 else 'them, they count'} twice.",
-        )
-    ]
-
-
-def copies(data: Dataset, some: IntArray, others: IntArray) -> list[str]:
-    """Return the labels of those of `some` configurations that are copies of one of the `others`.
-
-    Copies have the same joint positions and the same readings, all to the last digit.
-    """
-    values = [data.target[:, None], data.against[:, None], data.position]
-    values += [v.reshape(len(v), -1) for v in (data.quaternion, data.distance, data.height) if v is not None]
-    read: list[list[bytes]] = [[] for _ in data.labels]
-    for reading, row in zip(np.flatnonzero(data.has_reading), np.hstack(values)[data.has_reading], strict=True):
-        read[data.configuration[reading]].append(row.tobytes())
-    content = [(joints.tobytes(), *sorted(rows)) for joints, rows in zip(data.joints, read, strict=True)]
-    known = {content[c] for c in others if read[c]}
-    return [data.labels[c] for c in some if content[c] in known]
 
 
 def _are(things: Sequence[object]) -> str:

@@ -124,7 +124,7 @@ class PositionErrors:
     @cached_property
     def _errors(self) -> dict[str, Array]:
         """Errors of the parameters by name, ``(draws,)`` each [SI]."""
-        names, root = _root(self.fit)
+        names, root = covariance_root(self.fit)
         rng = np.random.default_rng(self.seed)
         drawn = root @ rng.standard_normal((self.draws, root.shape[1])).T
         if not self.fit.declared or self.fit.excess > 1.0:
@@ -252,7 +252,7 @@ def _freedom(fit: Fit) -> float:
     return max(rows - spent, _LEAST_FREEDOM)
 
 
-def _root(fit: Fit) -> tuple[tuple[str, ...], Array]:
+def covariance_root(fit: Fit) -> tuple[tuple[str, ...], Array]:
     """Return names of parameters and a root of the covariance of their errors, ``(parameters, rank)``.
 
     Where there were no priors, parameters that the data do not tell apart from others were held. They are off by what

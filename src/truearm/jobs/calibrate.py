@@ -232,10 +232,15 @@ def calibrate(
     validation = None if second is None else errors_of(fit.robot, second)
     before = errors_of(nominal.robot, judged)
     train_errors = errors_of(fit.robot, first)
-    expected = expected_error(fit)
     # What the robust fit of the check could not explain, the fit itself may.
     noticed = tuple(notice for notice in noticed if notice.code != Status.IMPLAUSIBLE.value)
     unlike = check_plausible(fit, first, noticed)
+    expected = expected_error(fit, plausible=not unlike)
+    narrow = (
+        []
+        if unlike
+        else check_narrow_data(fit, expected, first, validation or train_errors, held_out=validation is not None)
+    )
     left_over = LeftOver.of(fit, readings)
     history = (
         f"calibrated by truearm {__version__}: model {' + '.join([chosen.name, *effects])},"
@@ -255,7 +260,7 @@ def calibrate(
             *_check_copies(readings, training, held_out),
             *moved,
             *check_fit(fit, expected, doubted=has_error([*unlike, *noticed])),
-            *check_narrow_data(fit, expected, first, validation or train_errors, held_out=validation is not None),
+            *narrow,
             *(notice for notice in noticed if notice.level != "error"),
             *check_sigma(left_over),
             *check_changes(left_over),

@@ -66,8 +66,8 @@ def check_sigma(left: LeftOver) -> list[Notice]:
             Notice(
                 "sigma-too-large",
                 f"{words}. So the priors hold the robot near its nominal values, and it is {declared / found:.2g} "
-                "times farther from the readings than it need be. Mend sigma or its unit, or leave it out: the noise is then "
-                "estimated.",
+                "times farther from the readings than it need be. Mend sigma or its unit, or leave it out: the "
+                "noise is then estimated.",
                 "error",
             )
         ]

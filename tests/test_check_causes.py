@@ -25,7 +25,7 @@ ROBOT = "irb120"
 
 @cache
 def honest() -> Dataset:
-    return replace(campaign(ROBOT, 30, 0.05e-3, 5)[1], sigma=None)
+    return replace(campaign(ROBOT, 24, 0.05e-3, 5)[1], sigma=None)
 
 
 def noise(data: Dataset) -> Dataset:
@@ -62,7 +62,7 @@ def one_row_late(data: Dataset) -> Dataset:
 
 
 def of_another_robot(_: Dataset) -> Dataset:
-    return replace(campaign("puma560", 30, 0.05e-3, 6)[1], sigma=None)
+    return replace(campaign("puma560", 24, 0.05e-3, 6)[1], sigma=None)
 
 
 WRONG = [

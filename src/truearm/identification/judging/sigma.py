@@ -15,8 +15,8 @@ import numpy as np
 from truearm.identification.judging.left_over import LeftOver
 from truearm.notices import Notice
 
-#: Declared deviations are called too large if a fit agrees with itself at less than half of them: instruments are
-#: stated with some reserve, never with that much.
+#: Declared deviations are called too large if a fit agrees with itself at less than half of them, by more than chance:
+#: instruments are stated with some reserve, never with that much.
 _LARGEST_RATIO: Final = 0.5
 #: The priors hold the parameters back if the declared deviations leave so many times more than those that agree.
 _PRIORS_WIN: Final = 1.5
@@ -55,7 +55,7 @@ def check_sigma(left: LeftOver) -> list[Notice]:
             break
     k = 2.0 / (9.0 * max(freedom, 1.0))
     chance = max(1.0 - k - _QUANTILE * np.sqrt(k), 0.0) ** 1.5
-    if freedom < _LEAST_FREEDOM or found >= min(_LARGEST_RATIO, chance):
+    if freedom < _LEAST_FREEDOM or found >= _LARGEST_RATIO * chance:
         return []
     sigma = np.array([s for b in blocks if b.declared and b.observation.unit == "m" for s in b.sigma.tolist()])
     size = f" ({np.sqrt(np.mean(sigma**2)) * 1e3:.3g} mm)" if len(sigma) else ""

@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from truearm.identification.judging.left_over import LeftOver
+from truearm.identification.judging.left_over import LeftOver, chi_squared_tail
 from truearm.identification.solving.fit import Fit
 from truearm.identification.solving.problem import Block
 from truearm.measurement.dataset import Dataset
@@ -24,6 +24,8 @@ from truearm.units import from_si
 #: Part of the residuals that the direction of arrival must explain, and of the joints that must lag with one sign.
 _LEAST_EXPLAINED: Final = 0.05
 _LEAST_OF_ONE_SIGN: Final = 2 / 3
+#: Noise alone must show a direction of arrival that explains as much less often than this.
+_LARGEST_CHANCE: Final = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,19 +36,24 @@ class ArrivalLag:
     ----------
     share
         Part of the residual's root mean square that it explains, corrected for the number of joints.
+    chance
+        Probability that noise alone shows as much. The targets of a configuration share what the model leaves, so it
+        counts as one reading of three coordinates.
     lags
         True minus recorded position of each joint, times the sign of the last move [rad; m for sliding joints].
     """
 
     share: float
+    chance: float
     lags: Array
 
     @property
     def fires(self) -> bool:
-        """Whether it explains at least 5 % with one sign on most joints."""
+        """Whether it explains at least 5 %, more than chance, with one sign on most joints."""
         positive = int((self.lags > 0).sum())
         same = max(positive, len(self.lags) - positive)
-        return self.share >= _LEAST_EXPLAINED and same > _LEAST_OF_ONE_SIGN * len(self.lags)
+        told = self.share >= _LEAST_EXPLAINED and self.chance < _LARGEST_CHANCE
+        return told and same > _LEAST_OF_ONE_SIGN * len(self.lags)
 
 
 def arrival_lag(left_over: LeftOver) -> ArrivalLag | None:
@@ -67,7 +74,10 @@ def arrival_lag(left_over: LeftOver) -> ArrivalLag | None:
     lags = np.asarray(np.linalg.lstsq(moved, left, rcond=1e-10)[0], dtype=np.float64)
     before = float(left @ left) / free
     after = float(np.sum((left - moved @ lags) ** 2)) / (free - H.shape[1])
-    return ArrivalLag(1.0 - float(np.sqrt(after / before)) if before > 0 else 0.0, -lags)
+    share = 1.0 - after * (free - H.shape[1]) / (before * free) if before > 0 else 0.0
+    effective = max(3 * data.configurations - left_over.basis.shape[1], 0)
+    chance = chi_squared_tail(effective * share, H.shape[1])
+    return ArrivalLag(1.0 - float(np.sqrt(after / before)) if before > 0 else 0.0, chance, -lags)
 
 
 def _last_moves(data: Dataset, number: Array) -> Array:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import socket
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,11 +12,14 @@ from pydantic import BaseModel
 from truearm.compensation.cell import CellFile
 from truearm.compensation.program_files import CorrectionRecord
 from truearm.errors import InputError
-from truearm.files import exists, is_one_line, read_bytes, read_yaml, validated, write_files, write_text
+from truearm.files import exists, read_bytes, read_yaml
 from truearm.identification.solving.bounds import Bounds
 from truearm.measurement.readers.mapping import MappingFile
 from truearm.modeling.formats.robot_file import RobotFile
 from truearm.planning.constraints.constraints import Constraints
+from truearm.printable import is_one_line
+from truearm.schemas import validated
+from truearm.writing import write_text
 
 
 class Anything(BaseModel):
@@ -104,68 +106,6 @@ def test_a_permission_that_is_missing(tmp_path: Path, monkeypatch: pytest.Monkey
         write_text(tmp_path / "data.csv", "")
 
 
-def test_what_is_no_plain_file_is_not_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "folder").mkdir()
-    with pytest.raises(InputError, match="this is a folder, and a file must be written here"):
-        write_files(tmp_path, {"new": "", "folder": ""})
-    monkeypatch.chdir(tmp_path)  # the path of a socket must be short
-    with socket.socket(socket.AF_UNIX) as pipe:
-        pipe.bind("pipe")
-        with pytest.raises(InputError, match="this is a device or a pipe"):
-            write_text(tmp_path / "pipe", "")
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["folder", "pipe"]
-
-
-def test_a_name_as_long_as_may_be_is_written(tmp_path: Path) -> None:
-    write_text(tmp_path / ("x" * 255), "text")
-    assert (tmp_path / ("x" * 255)).read_text() == "text"
-    assert len(list(tmp_path.iterdir())) == 1
-
-
-@pytest.mark.parametrize("wrong", [KeyboardInterrupt(), OSError(28, "No space left on device")])
-@pytest.mark.parametrize(("call", "after"), [("open", 0), ("open", 2), ("replace", 0), ("replace", 1), ("replace", 2)])
-def test_all_files_are_new_or_none(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wrong: BaseException, call: str, after: int
-) -> None:
-    (tmp_path / "a").write_text("old a")
-    (tmp_path / "c").write_text("old c")
-    right, left = getattr(Path, call), [after]
-
-    def fails(path: Path, *words: object, **named: object) -> object:
-        left[0] -= 1
-        if left[0] == -1:
-            raise wrong
-        return right(path, *words, **named)
-
-    monkeypatch.setattr(Path, call, fails)
-    with pytest.raises(InputError if isinstance(wrong, OSError) else KeyboardInterrupt):
-        write_files(tmp_path, {"a": "new", "folder/b": "new", "c": "new"})
-    monkeypatch.undo()
-    assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {"a": "old a", "c": "old c"}
-
-
-def test_files_are_kept_where_they_cannot_have_two_names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refused(*_: object, **__: object) -> None:
-        raise PermissionError
-
-    monkeypatch.setattr(os, "link", refused)
-    (tmp_path / "a").write_text("old")
-    write_files(tmp_path, {"a": "new", "b": "new"})
-    assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {"a": "new", "b": "new"}
-
-
-@pytest.mark.skipif(not Path("/proc/self").exists(), reason="there is no folder that lies about being writable")
-def test_the_message_names_the_place_that_was_given() -> None:
-    with pytest.raises(InputError, match=r"^/proc: the folder cannot be written to"):
-        write_text(Path("/proc/x"), "")
-
-
-def test_half_a_character_is_not_written(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"holds half a character; got '\\ud800'"):
-        write_files(tmp_path / "new", {"a": "a", "b": "\ud800"})
-    assert not (tmp_path / "new").exists()
-
-
 @pytest.mark.parametrize("text", ["smr 1", "<b>", "Träger", "a: #{}", "日本", "\u00a0x"])
 def test_one_line(text: str) -> None:
     assert is_one_line(text)
@@ -188,7 +128,7 @@ ALLOWED = {"truearm": "truearm-constraints/1", "units": {"length": "mm", "angle"
     [
         (Bounds, BOUNDS | {"units": 3}, "units: named entries belong here; got 3; allowed: NAME: VALUE"),
         (Bounds, BOUNDS | {"within": [1]}, "within: named entries belong here; got [1]; allowed: NAME: VALUE"),
-        (Bounds, BOUNDS | {"within": {"d_1": None}}, "within.d_1: a number belongs here; got 'nothing'"),
+        (Bounds, BOUNDS | {"within": {"d_1": None}}, "within.d_1: a number belongs here; got nothing"),
         (Bounds, BOUNDS | {"within": {"d_1": 10**400}}, "within.d_1: a number belongs here; got a number of very"),
         (Bounds, BOUNDS | {"within": {"d_1": float("inf")}}, "within.d_1: a finite number belongs here; got inf"),
         (
@@ -208,7 +148,7 @@ ALLOWED = {"truearm": "truearm-constraints/1", "units": {"length": "mm", "angle"
         (
             Bounds,
             BOUNDS | {"between": {"d_1": [1, [10**5000]]}},
-            "between.d_1[2]: a number belongs here; got 'a list of 1",
+            "between.d_1[2]: a number belongs here; got a list of 1 entries",
         ),
         (Bounds, BOUNDS | {5: 1}, "5: the name of an entry must be a text; got 5; allowed: a name"),
         (

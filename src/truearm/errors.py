@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Callable, Iterable, Iterator, Sized
 from contextlib import contextmanager
 from numbers import Rational
 from typing import Final
 
+from truearm.printable import printable, shortened
+
 #: A parameter that a text names, with a value or without: `seed`, `train=all`.
 _NAMED: Final = re.compile(r"`(?P<name>[a-z][a-z_]*)(?:=(?P<value>[^`]*))?`")
+#: A part of a message of more characters is shortened, and what came much sooner.
+_LONGEST: Final = 1500
+_LONGEST_CAME: Final = 160
 
 
 class InputError(ValueError):
@@ -54,23 +58,24 @@ class InputError(ValueError):
         where = self.where
         if where is None and self.parameter is not None:
             where = ", ".join(spelled(name) for name in self.parameter.split(", "))
-        parts = [f"{where}: {self.what}" if where else self.what]
+        what = shortened(self.what, _LONGEST)
+        parts = [f"{shortened(where, _LONGEST)}: {what}" if where else what]
         if self.came is not None:
             parts.append(f"got {_shown(self.came)}")
         if self.allowed is not None:
-            parts.append(f"allowed: {self.allowed}")
+            parts.append(f"allowed: {shortened(self.allowed, _LONGEST)}")
         message = "; ".join(parts).rstrip(".") + "."
-        return f"{message} {self.cure}" if self.cure else message
+        return printable(f"{message} {shortened(self.cure, _LONGEST)}" if self.cure else message)
 
 
 def wrong_kind(what: str, came: object, parameter: str, allowed: str, *, where: str | None = None) -> InputError:
     """Return the refusal of a value of another kind than belongs here."""
     if came is None:
-        came = _Words("None")
+        came = Words("None")
     elif not isinstance(came, str | bytes | int | float):
         size = f" of {len(came)}" if isinstance(came, Sized) and getattr(came, "ndim", None) != 0 else ""
         held = f" that holds {came.dtype}" if hasattr(came, "dtype") else ""
-        came = _Words(f"an object of type {kind_of(came)}{size}{held}")
+        came = Words(f"an object of type {kind_of(came)}{size}{held}")
     return InputError(what, parameter=parameter, where=where, came=came, allowed=allowed)
 
 
@@ -101,7 +106,7 @@ def with_parameters(text: str, spelled: Callable[[str, str | None], str]) -> str
     return _NAMED.sub(lambda found: spelled(found["name"], found["value"]), text)
 
 
-class _Words(str):
+class Words(str):
     """What is said of a value instead of the value itself: shown without quotes."""
 
     __slots__ = ()
@@ -110,9 +115,9 @@ class _Words(str):
 def _shown(came: object) -> str:
     if isinstance(came, Rational) and max(abs(int(came.numerator)), int(came.denominator)) >> 300:
         return "a number of very many digits"  # Python may refuse to write it out
-    quoted = isinstance(came, str) and not isinstance(came, _Words)
-    text = repr(str(came)) if quoted else str(came)
-    return text if len(text) <= 500 else f"{text[:497]}..."
+    quoted = isinstance(came, str) and not isinstance(came, Words)
+    text = repr(shortened(str(came), _LONGEST_CAME)) if quoted else str(came)
+    return shortened(text, _LONGEST if isinstance(came, Words) else _LONGEST_CAME)
 
 
 def nearest_names(name: str, known: Iterable[str], count: int = 3, likeness: float = 0.5) -> list[str]:
@@ -123,7 +128,13 @@ def nearest_names(name: str, known: Iterable[str], count: int = 3, likeness: flo
     likeness
         How like they must be, 0 to 1.
     """
+    import difflib  # only where something is misspelt
+
+    if len(name) > _LONGEST_CAME:  # nobody misspells that, and to compare it takes long
+        return []
     by_folded = {candidate.lower(): candidate for candidate in known}
+    if name.lower() in by_folded:
+        return [by_folded[name.lower()]]
     return [by_folded[match] for match in difflib.get_close_matches(name.lower(), by_folded, count, likeness)]
 
 

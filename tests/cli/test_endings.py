@@ -28,7 +28,7 @@ def test_output_that_nobody_reads() -> None:
     os.close(reading)
     done = subprocess.run([*COMMAND, "show", "irb120", "--json"], stdout=writing, stderr=subprocess.PIPE, text=True)
     os.close(writing)
-    assert (done.returncode, done.stderr) == (1, "")
+    assert (done.returncode, done.stderr) == (141, "")
 
 
 def test_an_interrupted_run(truearm: Truearm, monkeypatch: pytest.MonkeyPatch) -> None:

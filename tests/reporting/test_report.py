@@ -14,6 +14,7 @@ from typing import Any, Final
 import numpy as np
 import pytest
 
+from truearm.identification.judging.expected_error import expected_error
 from truearm.identification.solving.fit import identify, place
 from truearm.identification.solving.losses import Loss
 from truearm.identification.solving.models import MODELS
@@ -89,6 +90,7 @@ def made(
         nominal=errors_of(place(robot, first).robot, judged),
         train=errors_of(fit.robot, first),
         validation=errors_of(fit.robot, judged) if len(held_out) else None,
+        expected=expected_error(fit),
         warnings=(Notice("odd", "Residuals are <i>odd</i> & large."),),
         command="truearm calibrate irb120 'cell <7>.csv' --seed 0",
         history="calibrated by truearm: 28 of 40 configurations of cell <7>.csv (sha256 0123456789ab)",

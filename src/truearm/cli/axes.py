@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from truearm.cli.output import Json, end_on_error, print_json, print_record, progress
+from truearm.cli.output import Json, end_on_error, print_json, print_line, print_record, progress
 
 
 def axes(
@@ -35,5 +35,5 @@ def axes(
         print_json(found.summary())
     else:
         print_record(found)
-        typer.echo(f"Written to {out}: calibrated.yaml, joint-errors.yaml, axes.json")
+        print_line(f"Written to {out}: calibrated.yaml, joint-errors.yaml, axes.json")
     end_on_error(found.warnings)

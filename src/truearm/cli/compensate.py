@@ -9,7 +9,7 @@ import typer
 
 from truearm.cli.loading import PayloadText
 from truearm.cli.options import command_line
-from truearm.cli.output import Json, end_on_error, print_json, print_record, progress
+from truearm.cli.output import Json, end_on_error, print_json, print_line, print_record, progress
 
 
 def compensate(
@@ -89,7 +89,7 @@ def compensate(
         print_json(correction.summary())
     else:
         print_record(correction)
-        typer.echo(f"Written to {out}, with the report {REPORT}")
+        print_line(f"Written to {out}, with the report {REPORT}")
     end_on_error(correction.warnings)
 
 

@@ -60,9 +60,13 @@ def _unit_length(q: tuple[float, ...]) -> tuple[float, ...]:
     return q
 
 
+#: No tool has a number of so many digits.
+_NO_NUMBER: Final = 10**18
+
+
 def _number_as_name(name: object) -> object:
     """Return the name of a tool that has a number, which YAML reads as one without quotes."""
-    return str(name) if type(name) is int else name
+    return str(name) if type(name) is int and abs(name) < _NO_NUMBER else name
 
 
 Name = Annotated[str, BeforeValidator(_number_as_name)]

@@ -23,11 +23,12 @@ from truearm.compensation.programs import LANGUAGES
 from truearm.compensation.programs.lines import replaced
 from truearm.compensation.programs.program import Edit, Language, Program, Source
 from truearm.errors import InputError
-from truearm.files import exists, read_bytes, refuse_overwriting, validated, write_files
+from truearm.files import exists, read_bytes
+from truearm.limits import limit, refuse_beyond
+from truearm.schemas import validated
+from truearm.writing import refuse_overwriting, write_files
 
 SCHEMA: Final = "truearm-corrected/1"
-#: A text of this size [bytes] and all that is made of it fit into the memory of a small computer.
-LARGEST: Final = 200_000_000
 
 Hash = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 
@@ -172,8 +173,13 @@ def recorded(file: ProgramFile, corrected: bytes, language: str, applied: Mappin
     return json.dumps(content.model_dump(), indent=1) + "\n"
 
 
-def write_programs(folder: Path, inputs: Sequence[Path], files: Mapping[str, str | bytes]) -> None:
+def write_programs(
+    folder: Path, inputs: Sequence[Path], files: Mapping[str, str | bytes], command: str | None = None
+) -> None:
     """Write results into a folder, all of them or none. Records and reports replace earlier ones.
+
+    Records are put in place first: there is never a corrected program whose record is missing, and which could be
+    corrected once more.
 
     Raises
     ------
@@ -203,7 +209,8 @@ def write_programs(folder: Path, inputs: Sequence[Path], files: Mapping[str, str
                 where=str(path),
                 cure="Choose another `out`.",
             )
-    write_files(folder, files)
+    order = sorted(files, key=lambda name: not name.endswith(".truearm.json"))
+    write_files(folder, {name: files[name] for name in order}, command)
 
 
 # -- reading ----------------------------------------------------------------------------------------------
@@ -231,12 +238,20 @@ def _unchanged_original(path: Path, record: CorrectionRecord) -> bytes:
             cure=f"To take it as an original, remove {record_path(path).name}.",
         )
     try:
-        original = zlib.decompress(base64.b64decode(record.original, validate=True))
+        original = _unpacked(base64.b64decode(record.original, validate=True), record_path(path))
     except (ValueError, zlib.error):
         original = b""
     if _hash(original) != record.original_sha256:
         raise InputError("the original in this record is damaged", where=str(record_path(path)))
     return original
+
+
+def _unpacked(packed: bytes, record: Path) -> bytes:
+    """Return the original that a record holds packed, or refuse one that was never so large."""
+    unpacking = zlib.decompressobj()
+    original = unpacking.decompress(packed, limit("program_size") + 1)
+    refuse_beyond("program_size", len(original), where=f"{record}, original")
+    return original if unpacking.eof else b""
 
 
 def _record(path: Path) -> CorrectionRecord | None:
@@ -253,17 +268,9 @@ def _record(path: Path) -> CorrectionRecord | None:
 
 
 def _text_bytes(path: Path) -> bytes:
-    content = read_bytes(path)
+    content = read_bytes(path, "program_size")
     if not content.strip():
         raise InputError("the file is empty", where=str(path))
-    if len(content) > LARGEST:
-        raise InputError(
-            "the program is too large to be corrected at once",
-            where=str(path),
-            came=f"{len(content) / 1e6:.0f} MB",
-            allowed=f"{LARGEST / 1e6:.0f} MB, about two million targets",
-            cure="Split it into several files.",
-        )
     if b"\0" in content:
         wide = content[:2] in (b"\xff\xfe", b"\xfe\xff")
         raise InputError(

@@ -12,7 +12,7 @@ import numpy as np
 
 from truearm.arrays import finite_number, number_array
 from truearm.errors import InputError, did_you_mean, name_parameter, refusals_of, wrong_kind
-from truearm.files import new_file, output_file, output_folder, path_argument
+from truearm.files import path_argument
 from truearm.library import is_robot, load_robot, urdf_source
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.readers.canonical import read_csv
@@ -20,6 +20,7 @@ from truearm.modeling.chain import Array
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
 from truearm.units import accepted_range, sized_si
+from truearm.writing import new_file, output_file, output_folder
 
 if TYPE_CHECKING:
     from truearm.simulation.devices import Device

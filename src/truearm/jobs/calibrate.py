@@ -15,9 +15,12 @@ from truearm.files import path_argument, read_bytes
 from truearm.identification.choosing.selection import AUTO, select
 from truearm.identification.judging.advice import check_fit
 from truearm.identification.judging.arrival_lag import check_arrival_lag
+from truearm.identification.judging.expected_error import expected_error
+from truearm.identification.judging.implausible import check_plausible
+from truearm.identification.judging.narrow_data import check_narrow_data
 from truearm.identification.judging.transmission import check_transmission
 from truearm.identification.solving.bounds import Bounds, read_bounds
-from truearm.identification.solving.fit import identify, place
+from truearm.identification.solving.fit import Status, identify, place
 from truearm.identification.solving.losses import LOSSES, Loss
 from truearm.identification.solving.models import FRAMES, MODELS, Model
 from truearm.identification.solving.rounds import Redundant
@@ -45,7 +48,7 @@ from truearm.measurement.table_motion import without_table_motion
 from truearm.modeling.effects import EFFECTS
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
-from truearm.notices import Notice
+from truearm.notices import Notice, has_error
 from truearm.results.calibration import RESULT_FILES, Calibration
 from truearm.shown import counted, listed
 from truearm.version import __version__
@@ -207,6 +210,11 @@ def calibrate(
     judged = first if second is None else second
     validation = None if second is None else errors_of(fit.robot, second)
     before = errors_of(nominal.robot, judged)
+    train_errors = errors_of(fit.robot, first)
+    expected = expected_error(fit)
+    # What the robust fit of the check could not explain, the fit itself may.
+    noticed = tuple(notice for notice in noticed if notice.code != Status.IMPLAUSIBLE.value)
+    unlike = check_plausible(fit, first, noticed)
     history = (
         f"calibrated by truearm {__version__}: model {' + '.join([chosen.name, *effects])},"
         f" {count} of {n} configurations of {Path(readings.source).name}{digest}, seed {seed}, loss {loss},"
@@ -215,13 +223,17 @@ def calibrate(
     calibration = Calibration(
         fit=fit,
         nominal=before,
-        train=errors_of(fit.robot, first),
+        train=train_errors,
         validation=validation,
+        expected=expected,
         warnings=(
+            *(notice for notice in noticed if notice.level == "error"),
+            *unlike,
             *_check_proof(before, validation),
             *_check_copies(readings, training, held_out),
-            *check_fit(fit),
-            *noticed,
+            *check_fit(fit, expected, doubted=has_error([*unlike, *noticed])),
+            *check_narrow_data(fit, expected, first, validation or train_errors, held_out=validation is not None),
+            *(notice for notice in noticed if notice.level != "error"),
             *check_arrival_lag(fit, readings),
             *check_transmission(fit, first),
         ),

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from truearm.arrays import axes
 from truearm.errors import InputError, refusals_of, wrong_kind
-from truearm.files import path_argument, write_text
+from truearm.files import path_argument
 from truearm.jobs.arguments import (
     array_argument,
     choice_argument,
@@ -26,6 +26,7 @@ from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import rotation_from_quaternion
 from truearm.results.joint_table import JointTable
+from truearm.writing import write_text
 
 
 def inverse(

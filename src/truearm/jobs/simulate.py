@@ -10,7 +10,7 @@ import numpy as np
 
 from truearm.arrays import finite_number
 from truearm.errors import InputError, refusals_of, wrong_kind
-from truearm.files import path_argument, write_text
+from truearm.files import path_argument
 from truearm.jobs.arguments import (
     count_argument,
     deviation_argument,
@@ -29,6 +29,7 @@ from truearm.results.simulation import Simulation
 from truearm.simulation.devices import measured_with
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import measure
+from truearm.writing import write_text
 
 
 def simulate(

@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from truearm.arrays import LARGEST, axes, number_array, shape_text
 from truearm.errors import InputError, wrong_kind
-from truearm.files import is_one_line
 from truearm.modeling.chain import Array
+from truearm.printable import is_one_line
 from truearm.units import accepted_range
 
 if TYPE_CHECKING:

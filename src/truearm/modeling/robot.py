@@ -399,6 +399,5 @@ class Robot(RobotData):
             raise wrong_kind("a count belongs here", count, "count", "a whole number, 0 or more")
         if not isinstance(rng, np.random.Generator):
             raise wrong_kind("a random number generator belongs here", rng, "rng", "numpy.random.default_rng(seed)")
-        default = {"revolute": (-np.pi, np.pi), "prismatic": (-0.5, 0.5)}
-        low, high = np.array([j.limits or default[j.kind] for j in self.joints]).T
+        low, high = np.array([joint.range for joint in self.joints]).T
         return rng.uniform(low, high, (count, len(self.joints)))

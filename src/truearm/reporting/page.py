@@ -14,6 +14,7 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
+from truearm.printable import printable, with_short_words
 from truearm.reporting.drawing import AFTER, BEFORE, Figure
 from truearm.version import __version__
 
@@ -39,6 +40,7 @@ def page(template: str, figures: Mapping[str, Figure], **content: Any) -> str:
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
+        finalize=_shown,
     )
     environment.filters["with_code"] = with_code
     return environment.get_template(template).render(
@@ -57,9 +59,16 @@ def page(template: str, figures: Mapping[str, Figure], **content: Any) -> str:
     )
 
 
+def _shown(value: object) -> object:
+    """Return what a template puts on the page: of texts that come from files, only what can be seen."""
+    if isinstance(value, str) and not isinstance(value, Markup):
+        return with_short_words(printable(value))
+    return value
+
+
 def with_code(text: str) -> Markup:
     """Return a text for a page: what is in backticks, parameters and values, as code."""
-    plain = str(escape(text))
+    plain = str(escape(with_short_words(printable(text))))
     return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", plain))
 
 

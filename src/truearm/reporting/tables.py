@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from truearm.identification.judging.expected_error import ExpectedError
 from truearm.identification.solving.fit import Fit, ParameterStatus
 from truearm.measurement.statistics import Errors, Spread
 from truearm.reporting.numbers import significant
@@ -73,6 +74,26 @@ def spread_rows(nominal: Errors, train: Errors, validation: Errors | None, kind:
             figures = (spread.mean * 1e3, spread.rms * 1e3, spread.p95 * 1e3, spread.max * 1e3)
             rows.append(SpreadRow(part, robot, errors.configurations, len(norms), figures))
     return tuple(rows)
+
+
+@dataclass(frozen=True)
+class ExpectedRow:
+    """The error to expect over the workspace, as printed [mm]."""
+
+    targets: str
+    mean: str
+    low: str
+    high: str
+    p95: str
+
+
+def expected_rows(expected: ExpectedError) -> tuple[ExpectedRow, ...]:
+    """Return a row for all targets together, then one for each where there are several."""
+    parts = {"all": expected.overall, **(expected.targets if len(expected.targets) > 1 else {})}
+    return tuple(
+        ExpectedRow(name, *(significant(1e3 * figure) for figure in (of.mean, *of.interval_90, of.p95)))
+        for name, of in parts.items()
+    )
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.errors import InputError, did_you_mean
-from truearm.files import output_folder, write_files
 from truearm.identification.choosing.selection import Selection
+from truearm.identification.judging.expected_error import ExpectedError
 from truearm.identification.solving.fit import Fit, Status
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import Errors
@@ -23,9 +23,16 @@ from truearm.modeling.robot import Robot
 from truearm.notices import Notice, has_error
 from truearm.results.record import Record, notice_lines, notice_summaries
 from truearm.results.residuals import Part, Residuals, residuals_of
-from truearm.results.summaries import error_line, errors_summary, selection_summary
+from truearm.results.summaries import (
+    error_line,
+    errors_summary,
+    expected_lines,
+    expected_summary,
+    selection_summary,
+)
 from truearm.shown import counted
 from truearm.units import SHOWN_AS, from_si
+from truearm.writing import output_folder, write_files
 
 #: What a calibration writes into its folder.
 RESULT_FILES: Final = ("calibrated.yaml", "result.json", "report.html", "calibrated.urdf")
@@ -46,6 +53,8 @@ class Calibration(Record):
         Errors of the calibrated robot on the training part.
     validation
         Errors of the calibrated robot on the held-out part; None if nothing was held out.
+    expected
+        The error of the targets' positions to expect over the workspace.
     warnings
         What to know about the result, in plain words.
     data
@@ -68,6 +77,7 @@ class Calibration(Record):
     nominal: Errors
     train: Errors
     validation: Errors | None
+    expected: ExpectedError
     warnings: tuple[Notice, ...]
     data: Dataset
     training: NDArray[np.intp]
@@ -85,8 +95,9 @@ class Calibration(Record):
 
     @property
     def status(self) -> Status:
-        """How the fit ended."""
-        return self.fit.status
+        """How the fit ended, or that what it found cannot be this robot."""
+        unlike = any(notice.code == Status.IMPLAUSIBLE.value for notice in self.warnings)
+        return Status.IMPLAUSIBLE if unlike else self.fit.status
 
     @property
     def finished(self) -> bool:
@@ -101,6 +112,7 @@ class Calibration(Record):
             "nominal": errors_summary(self.nominal),
             "train": errors_summary(self.train),
             "validation": None if self.validation is None else errors_summary(self.validation),
+            "expected_mm": expected_summary(self.expected),
         }
 
     def result(self) -> dict[str, Any]:
@@ -127,6 +139,7 @@ class Calibration(Record):
             text.append(f"Nothing was held out; on the {counted(self.train.configurations, 'training configuration')}:")
             text.append(f"  nominal     {error_line(self.nominal)}")
         text.append(f"  calibrated  {error_line(self.train)}")
+        text += expected_lines(self.expected)
         if self.selection is not None:
             text.append(f"Chosen model: {self.fit.model.summary}")
         if self.fit.model.name == "frames":
@@ -151,7 +164,7 @@ class Calibration(Record):
         Parameters
         ----------
         picture
-            ``residuals`` (configuration by configuration), ``workspace``, ``correlations``, and
+            ``residuals`` (configuration by configuration), ``expected-error``, ``workspace``, ``correlations``, and
             ``position-histogram``, ``orientation-histogram`` or ``length-histogram`` where such readings were held out.
 
         Raises
@@ -224,5 +237,5 @@ class Calibration(Record):
             "calibrated.urdf": urdf,
         }
         progress("writing the files")
-        write_files(folder, files)
+        write_files(folder, files, self.command)
         return tuple(folder / name for name in files)

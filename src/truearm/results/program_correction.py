@@ -17,11 +17,11 @@ from truearm.compensation.program_correction import CorrectedPrograms, Correctio
 from truearm.compensation.program_files import ProgramFile, language_called, recorded, write_programs
 from truearm.compensation.programs.program import Program, Skipped, Source
 from truearm.compensation.split import ProgramSplit
-from truearm.files import output_folder
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.results.record import Record, notice_lines, notice_summaries
+from truearm.writing import output_folder
 
 #: The report beside the corrected programs.
 REPORT: Final = "compensation.html"
@@ -254,5 +254,5 @@ class ProgramCorrection(Record):
             files[f"{one.name}.truearm.json"] = recorded(one.file, one.text, one.language, self.applied())
         files[REPORT] = program_html(self)
         progress("writing the files")
-        write_programs(folder, [one.file.path for one in self.files], files)
+        write_programs(folder, [one.file.path for one in self.files], files, self.command)
         return tuple(folder / name for name in files)

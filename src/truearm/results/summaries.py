@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from truearm.identification.choosing.selection import Selection
+from truearm.identification.judging.expected_error import Expectation, ExpectedError
 from truearm.measurement.statistics import Errors, Spread
+from truearm.modeling.parts import Payload
+from truearm.shown import listed
 
 
 def selection_summary(selection: Selection) -> dict[str, Any]:
@@ -57,3 +61,46 @@ def error_line(errors: Errors) -> str:
             mean, rms, p95, largest = (value * 1e3 for value in (spread.mean, spread.rms, spread.p95, spread.max))
             parts.append(f"mean {mean:.3f}  rms {rms:.3f}  95 % {p95:.3f}  max {largest:.3f} {unit}")
     return "   ".join(parts) if parts else "no readings"
+
+
+def expected_summary(expected: ExpectedError) -> dict[str, Any]:
+    """Return the error to expect over the workspace in mm, as JSON holds it."""
+    return {
+        **_expectation(expected.overall),
+        "lower_bound": expected.lower_bound,
+        "omissions": list(expected.omissions),
+        "targets": {name: _expectation(of_target) for name, of_target in expected.targets.items()},
+        "frame": expected.frame,
+        "payload": payload_words(expected.payload),
+    }
+
+
+def _expectation(of: Expectation) -> dict[str, Any]:
+    return {"mean": of.mean * 1e3, "p95": of.p95 * 1e3, "interval_90": [end * 1e3 for end in of.interval_90]}
+
+
+def expected_lines(expected: ExpectedError) -> list[str]:
+    """Return the error to expect over the workspace in words."""
+    mean, p95, low, high = (
+        figure * 1e3 for figure in (expected.overall.mean, expected.overall.p95, *expected.overall.interval_90)
+    )
+    places = max(3, -math.floor(math.log10(max(mean, 1e-6))) + 1)
+    lines = [
+        f"Expected over the workspace: mean {mean:.{places}f} mm (90 %: {low:.{places}f} to {high:.{places}f}), "
+        f"95 % below {p95:.{places}f} mm; {expected_of(expected)}"
+    ]
+    if expected.lower_bound:
+        lines.append(f"  a lower bound: {'; '.join(expected.omissions)}")
+    return lines
+
+
+def expected_of(expected: ExpectedError) -> str:
+    """Return what the error to expect is one of: targets, frame and payload."""
+    names = [*expected.targets]
+    targets = f"{'target' if len(names) == 1 else 'targets'} {listed(names)}"
+    return f"{targets} in {expected.frame}, {payload_words(expected.payload)}"
+
+
+def payload_words(payload: Payload) -> str:
+    """Return what the robot carries."""
+    return f"payload {payload.mass:g} kg" if payload.mass else "no payload"

@@ -50,7 +50,7 @@ _SHOWN: Final = (
 )
 _ALLOWED: Final = ", ".join(_SHOWN.values()).replace("[deg]", "[deg] ..")
 _HEADING: Final = re.compile(r"(?P<name>[^\[]*?)\s*(?:\[(?P<unit>[^\]]*)\])?")
-_JOINT: Final = re.compile(r"joint_([1-9][0-9]*)")
+_JOINT: Final = re.compile(r"joint_([1-9][0-9]{0,3})")
 _SEPARATORS: Final = {";": "semicolons", "\t": "tabs", "|": "vertical bars"}
 
 

@@ -10,15 +10,15 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 from pydantic import field_validator as validator_of
 
 from truearm.errors import InputError
-from truearm.files import is_one_line
 from truearm.measurement.readers.cells import Layout
+from truearm.printable import is_one_line
 from truearm.shown import counted
 
 _DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "whitespace": None}
 
 
 def _number_as_text(value: object) -> object:
-    return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
+    return str(value) if type(value) is int and abs(value) < 10**18 else value
 
 
 def _none_as_null(value: object) -> object:

@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from truearm.errors import InputError
-from truearm.files import is_one_line, read_text
+from truearm.files import read_text
 from truearm.measurement.dataset import Dataset, IntArray
 from truearm.modeling.chain import Array
 from truearm.modeling.postures import approach_of
+from truearm.printable import is_one_line
 from truearm.shown import counted
 from truearm.units import ANGLE_UNITS, LENGTH_UNITS, checked_unit, sized_si
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from truearm.errors import InputError, did_you_mean
-from truearm.files import read_yaml, shown_entry
+from truearm.files import read_yaml
 from truearm.modeling.conventions import convention
 from truearm.modeling.effects import EFFECTS, NON_NEGATIVE
 from truearm.modeling.fixtures import Fixture
@@ -15,6 +15,7 @@ from truearm.modeling.formats.robot_file.schema import JointEntry, RobotFile
 from truearm.modeling.parameters import Parameter
 from truearm.modeling.parts import NO_PAYLOAD, Inertia, Joint, LinkMass, Payload, Target, Tool, Truth
 from truearm.modeling.robot import Robot
+from truearm.schemas import shown_entry
 from truearm.units import SHOWN_AS, sized_si, to_si
 
 

@@ -9,12 +9,12 @@ import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
 
 from truearm.errors import InputError, did_you_mean
-from truearm.files import is_one_line
 from truearm.modeling.effects import EFFECTS
 from truearm.modeling.fixtures import FixtureKind
 from truearm.modeling.formats.controller_entry import ControllerEntry
 from truearm.modeling.formats.entries import STRICT, Name, NotNegative, Number, Place, Positive, Quaternion, Triple
 from truearm.modeling.parts import GRAVITY, POINT_MASS, Inertia
+from truearm.printable import is_one_line
 
 SCHEMA: Final = "truearm-robot/1"
 

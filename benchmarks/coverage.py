@@ -138,13 +138,15 @@ def judge(fit: Fit, true: Robot, counts: dict[str, Counts], rng: np.random.Gener
     """Count the intervals of a calibration."""
     for name in fit.free.names:
         p = fit.robot.parameters[name]
+        if p.group == "base" and (gauged or p.unit == "rad"):
+            continue  # angles of the base are counted from where each robot was placed
         if gauged and p.group not in GEOMETRIC.groups:
             continue
         if p.deviation is None or p.informed is None or p.informed < INFORMED:
             continue
         of = f"{p.group} [{p.unit}]"
         for group in (of, "parameters"):
-            apart = np.array([_apart(p.value, true.values[name], p.unit)])
+            apart = np.array([p.value - true.values[name]])
             counts.setdefault(group, Counts()).add(apart, np.array([p.deviation]))
     if gauged:
         return
@@ -155,10 +157,6 @@ def judge(fit: Fit, true: Robot, counts: dict[str, Counts], rng: np.random.Gener
         apart = kinematics.position.reshape(-1) - true.forward_kinematics(q, target.name).position.reshape(-1)
         deviation = np.sqrt(np.einsum("ij,jk,ik->i", J, fit.covariance, J))
         counts.setdefault("predictions", Counts()).add(apart, deviation)
-
-
-def _apart(a: float, b: float, unit: str) -> float:
-    return math.remainder(a - b, 2 * math.pi) if unit == "rad" else a - b
 
 
 def study(line: Line, trials: int, seed: int = 2026) -> dict[str, object]:

@@ -160,7 +160,7 @@ def _solve_with_noise(
     components = None
     for _ in range(_ROUNDS):
         if loss == "linear":
-            components = components_found(problem, solution, limits)
+            components = components_found(problem, solution, limits, components)
             there, change, joints = _with_components(problem, components, joints)
         else:
             there, change = _with_scale(problem, solution, loss)
@@ -186,7 +186,9 @@ def _solved(problem: Problem, joints: Array, loss: Loss, limits: tuple[Array, Ar
     return replace(solution, residual=residual, jacobian=jacobian)
 
 
-def components_found(problem: Problem, solution: Solution, limits: tuple[Array, Array] | None) -> Components:
+def components_found(
+    problem: Problem, solution: Solution, limits: tuple[Array, Array] | None, before: Components | None = None
+) -> Components:
     """Estimate the variances of readings and joints at a solution, those of :func:`factors_of` and of joints alike.
 
     Declared deviations are widened if residuals are larger than chance allows (1 in 1000), or were before.
@@ -205,16 +207,16 @@ def components_found(problem: Problem, solution: Solution, limits: tuple[Array, 
     )
     kinds = np.array([joint.kind for joint in problem.robot.joints])
     alike = [np.flatnonzero(kinds == kind) for kind in dict.fromkeys(kinds.tolist())]
-    free = [name not in (DECLARED, SETUP) for name in names]
-    wide = DECLARED in names and problem.widened > 1.0
-    if not wide:
+    if before is not None:
+        found = variance_components(at, before.estimated, alike, before)
+    else:
+        free = [name not in (DECLARED, SETUP) for name in names]
         found = variance_components(at, free, alike)
         if DECLARED in names:
             place = names.index(DECLARED)
-            wide = beyond_chance(float(found.squares[place]), max(float(found.freedom[place]), 1e-3))
-    if wide:
-        free = [known or name == DECLARED for known, name in zip(free, names, strict=True)]
-        found = variance_components(at, free, alike)
+            if beyond_chance(float(found.squares[place]), max(float(found.freedom[place]), 1e-3)):
+                free[place] = True
+                found = variance_components(at, free, alike)
     covariance = np.zeros((len(prior), len(prior)))
     covariance[np.ix_(uncertain, uncertain)] = found.covariance
     return replace(found, covariance=covariance)

@@ -22,9 +22,10 @@ from truearm.identification.solving.arrivals import Arrivals, Whitening
 from truearm.modeling.chain import Array
 
 #: Twice the gain in log-likelihood from which joint errors are believed.
-_SIGNIFICANT: Final = 2.71
+_SIGNIFICANT: Final = 5.41
 _STEPS: Final = 40
 _LARGEST_STEP: Final = 2.0  # in the logarithm of a variance
+_FURTHER: Final = 4.0  # how many times longer than the information says
 _SETTLED: Final = 1e-3  # what a step may still gain in twice the log-likelihood
 #: Least excess of a variance without errors of the joints that a difference of the parameters is judged by.
 _LEAST_DIFFERENCE: Final = 0.05
@@ -110,6 +111,8 @@ class _State:
         ET = self.E @ self.T
         p = self.T.shape[2]
         whole = np.tensordot(by, of.C, 1) - self.T.reshape(-1, p).T @ ET.reshape(-1, p)
+        self.whole = whole
+        self._curvatures: dict[int | tuple[int, ...], Array] = {}
         try:
             self.L = np.linalg.cholesky(whole + of.known)
         except np.linalg.LinAlgError:  # variances so far apart that rounding is all there is
@@ -123,21 +126,38 @@ class _State:
         self.likelihood = -0.5 * (logs + 2.0 * float(np.log(np.diag(self.L)).sum()) + left)
 
     @cached_property
+    def inverse(self) -> Array:
+        """Covariance of the parameters, in the directions that the moments are counted in, ``(p, p)``."""
+        root = np.linalg.solve(self.L, np.eye(len(self.L)))
+        return np.asarray(root.T @ root)
+
+    @cached_property
     def _parts(self) -> tuple[Array, Array, Array, Array]:
         u = self.t - self.T @ self.found
         e = (self.E @ u[..., None])[..., 0]
         Lm = np.eye(len(self.joints)) - self.M @ self.E
         return e, (Lm @ u[..., None])[..., 0], Lm @ self.M, Lm @ self.T
 
-    def curvature(self, joint: NDArray[np.intp] | None, factor: int = 0) -> Array:
-        """Return ``A' V^-1 V_i V^-1 A`` for the joints' variance, or that of a factor, ``(p, p)``."""
-        if joint is not None:
-            N = self._parts[3][:, joint].reshape(-1, self.T.shape[2])
-            return np.asarray(N.T @ N)
+    def curvature(self, kind: NDArray[np.intp] | int) -> Array:
+        """Return ``A' V^-1 V_i V^-1 A`` for the variance of joints, or that of a factor, ``(p, p)``."""
+        key = kind if isinstance(kind, int) else tuple(kind.tolist())
+        if key not in self._curvatures:
+            self._curvatures[key] = self._curvature(kind)
+        return self._curvatures[key]
+
+    def _curvature(self, kind: NDArray[np.intp] | int) -> Array:
         of, p = self.of, self.T.shape[2]
-        cross = of.T[factor].reshape(-1, p).T @ self.ET.reshape(-1, p)
-        inner = self.ET.reshape(-1, p).T @ (of.M[factor] @ self.ET).reshape(-1, p)
-        return np.asarray((of.C[factor] - cross - cross.T + inner) / self.factors[factor] ** 2)
+        if not isinstance(kind, int):
+            N = self._parts[3][:, kind].reshape(-1, p)
+            return np.asarray(N.T @ N)
+        if len(self.factors) == 1:  # all of them, each times its variance, are the information
+            rest = self.whole
+            for variance in np.unique(self.joints[self.joints > 0.0]).tolist():
+                rest = rest - variance * self.curvature(np.flatnonzero(self.joints == variance))
+            return np.asarray(rest / self.factors[0])
+        cross = of.T[kind].reshape(-1, p).T @ self.ET.reshape(-1, p)
+        inner = self.ET.reshape(-1, p).T @ (of.M[kind] @ self.ET).reshape(-1, p)
+        return np.asarray((of.C[kind] - cross - cross.T + inner) / self.factors[kind] ** 2)
 
     def slopes(self, kinds: Sequence[NDArray[np.intp] | int]) -> tuple[Array, Array, Array]:
         """Return ``z' P V_i P z`` and ``tr(P V_i)`` for variances, each ``(m,)``, and the information ``(m, m)``.
@@ -172,9 +192,7 @@ class _State:
                 traces[i] = float(np.sum(LM[:, kind, kind]))
                 shifts[i] = np.einsum("akp,ak->p", N[:, kind], g[:, kind])
                 inner[i] = np.einsum("akl,al->ak", LM[:, :, kind], g[:, kind])
-            joint = None if isinstance(kind, int) else kind
-            spread = np.linalg.solve(self.L, self.curvature(joint, kind if isinstance(kind, int) else 0))
-            traces[i] -= float(np.trace(np.linalg.solve(self.L, spread.T)))
+            traces[i] -= float(np.sum(self.inverse * self.curvature(kind)))
         information = np.empty((count, count))
         moved = np.linalg.solve(self.L, shifts.T)
         for i, kind in enumerate(kinds):
@@ -217,6 +235,8 @@ class Components:
     weighing
         Those that readings are to be weighed by: the same where errors of the joints explain how residuals of an
         arrival hang together, else the likeliest ones without errors of the joints.
+    estimated
+        Whether the variance of each factor was.
     holds
         Whether the residuals look as they do with the variances that readings are weighed by.
     covariance
@@ -228,16 +248,22 @@ class Components:
 
     likeliest: Variances
     weighing: Variances
+    estimated: tuple[bool, ...]
     holds: bool
     covariance: Array
     squares: Array
     freedom: Array
 
 
-def variance_components(at: Linearised, estimated: Sequence[bool], kinds: Sequence[NDArray[np.intp]]) -> Components:
+def variance_components(
+    at: Linearised,
+    estimated: Sequence[bool],
+    kinds: Sequence[NDArray[np.intp]],
+    before: Components | None = None,
+) -> Components:
     """Estimate the variances of the readings and of the joints' errors.
 
-    Errors of the joints are believed where they raise the likelihood by more than chance would in 1 of 20 cases
+    Errors of the joints are believed where they raise the likelihood by more than chance would in 1 of 100 cases
     without any (half of the time such a variance is estimated as zero; Self and Liang 1987). The covariance of the
     parameters contains what the variances are uncertain by: an interval of 1.96 deviations holds what one of Student's
     t with the degrees of freedom of Satterthwaite (1946) would, see :func:`_widened`.
@@ -248,15 +274,50 @@ def variance_components(at: Linearised, estimated: Sequence[bool], kinds: Sequen
         Whether the variance of each factor is free; else it is as assumed.
     kinds
         Joints that share one variance; of joints that are in none it is zero.
+    before
+        What was found at a solution nearby, with the same factors, by whose variances readings are now weighed. Whether
+        there are errors of the joints, and whether they explain the residuals, is as it was.
     """
     moments = _Moments(at, len(estimated))
     noise = [index for index, free in enumerate(estimated) if free]
-    start = np.ones(len(estimated))
+    if before is None:
+        alone, best = _with_and_without(at, moments, kinds, noise)
+        likeliest = Variances(best.factors, best.joints)
+        holds = (best is alone or _agree(alone, best)) and _independent(best)
+        best = best if holds else alone
+    else:
+        best = _State(moments, np.ones(len(estimated)), before.weighing.joints)
+        best = _maximised(moments, best, [kind for kind in kinds if best.joints[kind].any()], noise)
+        holds, likeliest = before.holds, Variances(best.factors, best.joints)
+        if before.likeliest is not before.weighing:
+            factors = before.likeliest.factors / before.weighing.factors * best.factors
+            likeliest = Variances(factors, before.likeliest.joints)
+    taken = [kind for kind in kinds if best.joints[kind].any()]
+    squares, traces, _ = best.slopes(range(len(estimated)))
+    inverse = np.asarray(np.linalg.solve(best.L, np.eye(len(best.L))), dtype=np.float64)
+    turned = at.directions @ inverse.T
+    covariance = turned @ _widened(best, inverse, [*taken, *noise]) @ turned.T
+    weighing = Variances(best.factors, best.joints)
+    return Components(
+        weighing if holds else likeliest,
+        weighing,
+        tuple(estimated),
+        holds,
+        covariance,
+        squares * best.factors,
+        traces * best.factors,
+    )
+
+
+def _with_and_without(
+    at: Linearised, moments: _Moments, kinds: Sequence[NDArray[np.intp]], noise: Sequence[int]
+) -> tuple[_State, _State]:
+    """Return the largest likelihood without errors of the joints and with them; the first twice if they gain little."""
+    start = np.ones(len(moments.rows))
     for index in noise:
         start[index] = max(float(np.mean(at.residual[at.factor == index] ** 2)), 1e-30)
-    still = np.zeros(at.by_joints.shape[1])
-    alone = _maximised(moments, _State(moments, start, still), [], noise)
-    best, taken = alone, list[NDArray[np.intp]]()
+    alone = _maximised(moments, _State(moments, start, np.zeros(at.by_joints.shape[1])), [], noise)
+    best = alone
     for _ in kinds:
         waiting = [kind for kind in kinds if not best.joints[kind].any()]
         if not waiting:
@@ -269,26 +330,9 @@ def variance_components(at: Linearised, estimated: Sequence[bool], kinds: Sequen
         joints = best.joints.copy()
         for kind, step in rising:
             joints[kind] = step
-        best = _maximised(moments, _State(moments, best.factors, joints), [*taken, *(k for k, _ in rising)], noise)
-        taken = [kind for kind in kinds if best.joints[kind].any()]
-    if 2.0 * (best.likelihood - alone.likelihood) < _SIGNIFICANT:
-        best, taken = alone, []
-    likeliest = Variances(best.factors, best.joints)
-    holds = (best is alone or _agree(alone, best)) and _independent(best)
-    if not holds:
-        best, taken = alone, []
-    squares, traces, _ = best.slopes(range(len(estimated)))
-    inverse = np.asarray(np.linalg.solve(best.L, np.eye(len(best.L))), dtype=np.float64)
-    turned = at.directions @ inverse.T
-    covariance = turned @ _widened(best, inverse, [*taken, *noise]) @ turned.T
-    return Components(
-        likeliest,
-        Variances(best.factors, best.joints),
-        holds,
-        covariance,
-        squares * best.factors,
-        traces * best.factors,
-    )
+        taken = [kind for kind in kinds if joints[kind].any()]
+        best = _maximised(moments, _State(moments, best.factors, joints), taken, noise)
+    return alone, best if 2.0 * (best.likelihood - alone.likelihood) >= _SIGNIFICANT else alone
 
 
 def _agree(alone: _State, best: _State) -> bool:
@@ -302,8 +346,8 @@ def _agree(alone: _State, best: _State) -> bool:
     p = T.shape[2]
     scattered = (T * best.joints[:, None]).reshape(-1, p).T @ T.reshape(-1, p)
     spread = np.tensordot(best.factors * by**2, of.C, 1) + of.known + scattered
-    turned = np.linalg.solve(alone.L, best.L)
-    turned = np.linalg.solve(alone.L.T, turned)
+    turned = np.asarray(np.linalg.solve(alone.L, best.L), dtype=np.float64)
+    turned = np.asarray(np.linalg.solve(alone.L.T, turned), dtype=np.float64)
     values, vectors = np.linalg.eigh(turned.T @ spread @ turned - np.eye(p))
     differ = values > _LEAST_DIFFERENCE
     if not differ.any():
@@ -348,6 +392,7 @@ def _maximised(moments: _Moments, start: _State, kinds: Sequence[NDArray[np.intp
     """Climb to the largest likelihood from some variances, all of them above zero."""
     here, kinds = start, list(kinds)
     size = np.trace(moments.M.sum(axis=(0, 1))) / moments.rows.sum()
+    before: tuple[Array, Array] | None = None
     for _ in range(_STEPS):
         free: list[NDArray[np.intp] | int] = [*kinds, *noise]
         if not free:
@@ -356,9 +401,12 @@ def _maximised(moments: _Moments, start: _State, kinds: Sequence[NDArray[np.intp
         squares, traces, information = here.slopes(free)
         slope = 0.5 * (squares - traces) * value
         bent = information * np.outer(value, value)
-        if float(slope @ np.linalg.solve(bent + 1e-9 * np.eye(len(free)), slope)) < _SETTLED:
+        step = np.linalg.solve(bent + 1e-9 * (1.0 + float(np.trace(bent))) * np.eye(len(free)), slope)
+        if float(slope @ step) < _SETTLED:
             break
-        step = np.linalg.solve(bent + 1e-9 * np.eye(len(free)) * max(1.0, float(np.trace(bent))), slope)
+        if before is not None:  # as much further as the last step fell short: the information is but an average
+            last, then = before
+            step *= float(np.clip(then @ last / max(float((then - slope) @ last), 1e-300), 0.3, _FURTHER))
         step *= min(1.0, _LARGEST_STEP / float(np.abs(step).max() + 1e-300))
         for _ in range(12):
             there = _at(moments, here, free, value * np.exp(step))
@@ -367,10 +415,10 @@ def _maximised(moments: _Moments, start: _State, kinds: Sequence[NDArray[np.intp
             step *= 0.4
         else:
             break
-        here = there
+        here, before = there, (step, slope)
         gone = [kind for kind in kinds if here.joints[kind[0]] * size < _LEAST * here.factors.min()]
         for kind in gone:
-            here = _at(moments, here, [kind], np.zeros(1))
+            here, before = _at(moments, here, [kind], np.zeros(1)), None
         kinds = [kind for kind in kinds if not any(kind is other for other in gone)]
     return here
 
@@ -403,8 +451,7 @@ def _widened(state: _State, inverse: Array, kinds: Sequence[NDArray[np.intp] | i
     relative = np.linalg.inv(information * np.outer(value, value) + _LEAST_INFORMATION * np.eye(len(kinds)))
     changes = []
     for kind, size in zip(kinds, value.tolist(), strict=True):
-        curved = state.curvature(None, kind) if isinstance(kind, int) else state.curvature(kind)
-        changes.append(size * inverse @ curved @ inverse.T)
+        changes.append(size * inverse @ state.curvature(kind) @ inverse.T)
     weighted = [sum(relative[i, j] * changes[j] for j in range(len(kinds))) for i in range(len(kinds))]
     spread = sum(change @ other for change, other in zip(changes, weighted, strict=True))
     spread = 0.5 * (spread + spread.T)

@@ -18,6 +18,7 @@ from truearm.identification.judging.arrival_lag import check_arrival_lag
 from truearm.identification.judging.expected_error import expected_error
 from truearm.identification.judging.implausible import check_plausible
 from truearm.identification.judging.narrow_data import check_narrow_data
+from truearm.identification.judging.one_sided import check_one_sided
 from truearm.identification.judging.transmission import check_transmission
 from truearm.identification.solving.bounds import Bounds, read_bounds
 from truearm.identification.solving.fit import Status, identify, place
@@ -234,6 +235,7 @@ def calibrate(
             *check_fit(fit, expected, doubted=has_error([*unlike, *noticed])),
             *check_narrow_data(fit, expected, first, validation or train_errors, held_out=validation is not None),
             *(notice for notice in noticed if notice.level != "error"),
+            *check_one_sided(fit, first),
             *check_arrival_lag(fit, readings),
             *check_transmission(fit, first),
         ),

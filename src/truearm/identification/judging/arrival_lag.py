@@ -13,10 +13,9 @@ from typing import Final
 import numpy as np
 
 from truearm.identification.solving.fit import Fit
-from truearm.identification.solving.problem import Block, Problem
+from truearm.identification.solving.problem import Problem
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.observations import OBSERVATIONS
-from truearm.measurement.sighting import Sighting
 from truearm.modeling.chain import Array
 from truearm.notices import Notice
 from truearm.units import from_si
@@ -59,16 +58,17 @@ def arrival_lag(fit: Fit, data: Dataset) -> ArrivalLag | None:
     """
     noise = {observation.name: fit.sigma.get(observation.name, 1.0) for observation in OBSERVATIONS}
     problem = Problem(fit.robot, replace(data, setup=None), fit.free, noise)
-    r, J = problem.linearised(np.array([fit.robot.values[name] for name in fit.free.names]))
-    arrived = _last_moves(data).T[:, None, :]
-    H = np.concatenate([_by_arrival(fit, block, arrived) for block in problem.blocks], axis=1).T
+    here = problem.at(np.array([fit.robot.values[name] for name in fit.free.names]))
+    r, J = here.residual, here.jacobian
+    of_row = [np.repeat(data.configuration[b.readings], b.observation.components) for b in problem.blocks]
+    H = here.by_joints * _last_moves(data)[np.concatenate(of_row)]
     U, s, _ = np.linalg.svd(J * fit.free.prior, full_matrices=False)
     basis = U[:, s > 1e-8 * s[0]]
     free = len(r) - basis.shape[1]
     if free < 4 * H.shape[1]:
         return None
     left, moved = r - basis @ (basis.T @ r), H - basis @ (basis.T @ H)
-    lags = np.linalg.lstsq(moved, left, rcond=1e-10)[0]
+    lags = np.asarray(np.linalg.lstsq(moved, left, rcond=1e-10)[0], dtype=np.float64)
     before = float(left @ left) / free
     after = float(np.sum((left - moved @ lags) ** 2)) / (free - H.shape[1])
     return ArrivalLag(1.0 - float(np.sqrt(after / before)) if before > 0 else 0.0, -lags)
@@ -80,24 +80,6 @@ def _last_moves(data: Dataset) -> Array:
     moves = np.zeros_like(data.joints)
     moves[order[1:]] = np.sign(np.diff(data.joints[order], axis=0))
     return moves
-
-
-def _by_arrival(fit: Fit, block: Block, arrived: Array) -> Array:
-    """Return how the whitened residuals of a block move with the lag of each joint, ``(joints, rows)``."""
-    robot = fit.robot
-    kinematics = robot.forward_kinematics(block.data.postures, block.target)
-    seen = Sighting(
-        kinematics, block.configurations, None if block.fixture is None else robot.fixture_kinematics(block.fixture)
-    )
-    by_joint, turned = (
-        (kinematics.position_jacobian, seen.position_jacobian)
-        if block.observation.velocity == "linear"
-        else (kinematics.orientation_jacobian, seen.orientation_jacobian)
-    )
-    velocity = turned(by_joint(robot.moving[: len(robot.joints)]) * arrived, ())
-    residual = block.observation.residual(seen, block.data, block.readings)
-    moved = block.observation.jacobian(seen, residual, velocity) / block.sigma[:, None]
-    return np.asarray(moved.reshape(len(moved), -1))
 
 
 def check_arrival_lag(fit: Fit, data: Dataset) -> list[Notice]:

@@ -104,6 +104,9 @@ class Fit:
     joint_error
         Standard deviation of the error of each joint that all readings of an arrival share, ``(joints,)`` [rad or m]:
         repeatability plus what the model leaves. Zero where none was found.
+    scattered
+        Whether the covariance follows from the scatter of the arrivals: for losses other than the linear one, and where
+        errors of the joints do not explain how the residuals of an arrival hang together.
     weight
         What the loss left of each reading, ``(readings,)``, in the order of the dataset; NaN where none was used.
         For ``l1``, which has no full weight, relative to the median reading.
@@ -126,6 +129,7 @@ class Fit:
     declared: bool
     excess: float
     joint_error: Array
+    scattered: bool
     weight: Array
     steps: int
 
@@ -218,7 +222,8 @@ def _fit(solved: Solved, model: Model, loss: Loss) -> Fit:
         excess *= problem.widened
     else:
         excess, joint_error = problem.widened, np.sqrt(components.likeliest.joints)
-    if components is not None and components.holds:
+    scattered = components is None or not components.holds
+    if components is not None and not scattered:
         covariance = components.covariance
     else:
         pull, rows = pulls(loss, solution.residual, solution.jacobian, problem.components)
@@ -280,6 +285,7 @@ def _fit(solved: Solved, model: Model, loss: Loss) -> Fit:
         declared=declared == set(noise),
         excess=excess,
         joint_error=joint_error,
+        scattered=scattered,
         weight=weight,
         steps=solution.steps,
     )

@@ -18,7 +18,7 @@ from truearm.identification.choosing.selection import AUTO, select
 from truearm.identification.judging.advice import check_fit
 from truearm.identification.judging.arrival_lag import check_arrival_lag
 from truearm.identification.judging.changes import check_changes
-from truearm.identification.judging.expected_error import expected_error
+from truearm.identification.judging.expected_error import as_residuals_allow, expected_error
 from truearm.identification.judging.implausible import check_plausible
 from truearm.identification.judging.left_over import LeftOver
 from truearm.identification.judging.narrow_data import check_narrow_data
@@ -235,7 +235,7 @@ def calibrate(
     # What the robust fit of the check could not explain, the fit itself may.
     noticed = tuple(notice for notice in noticed if notice.code != Status.IMPLAUSIBLE.value)
     unlike = check_plausible(fit, first, noticed)
-    expected = expected_error(fit, plausible=not unlike)
+    expected = expected_error(as_residuals_allow(fit, first), plausible=not unlike)
     narrow = (
         []
         if unlike

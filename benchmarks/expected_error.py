@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from truearm.identification.judging.expected_error import expected_error
+from truearm.identification.judging.expected_error import as_residuals_allow, expected_error
 from truearm.identification.judging.narrow_data import check_narrow_data
 from truearm.identification.solving.fit import Status, identify
 from truearm.identification.solving.models import named_model
@@ -67,7 +67,7 @@ def judged(rng: np.random.Generator, width: float | None, targets: int, scale: f
     training, held_out = (data.of_configurations(part) for part in np.split(order, [round(0.7 * POSES)]))
     fit = identify(nominal, training, GEOMETRIC)
     after = errors_of(fit.robot, held_out)
-    expected = expected_error(fit)
+    expected = expected_error(as_residuals_allow(fit, training))
     notices = check_narrow_data(fit, expected, training, after, held_out=True)
     # The truth has no effects that the twin alone would know.
     q = nominal.random_configurations(JUDGED, rng)

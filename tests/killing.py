@@ -34,7 +34,7 @@ def operations(work: Callable[[], object], folder: Path) -> int:
 
     def counting() -> None:
         done = [0]
-        _before_each(folder, lambda _: done.__setitem__(0, done[0] + 1))
+        before_each(folder, lambda _: done.__setitem__(0, done[0] + 1))
         work()
         os.write(writing, str(done[0]).encode())
 
@@ -59,7 +59,7 @@ def killed(work: Callable[[], object], folder: Path, number: int) -> None:
                 os.kill(os.getpid(), signal.SIGKILL)
             left[0] -= 1
 
-        _before_each(folder, hook)
+        before_each(folder, hook)
         work()
 
     status = _in_a_copy(until)
@@ -80,7 +80,7 @@ def between(one: Callable[[], object], other: Callable[[], object], folder: Path
                 if not _is_locked(folder):  # it is not in the way of the other, which comes in between as a whole
                     assert _end(children.pop()) == 0
 
-        _before_each(folder, hook)
+        before_each(folder, hook)
         one()
         left[0] = -1
         for child in children:
@@ -184,7 +184,7 @@ def _copy(work: Callable[[], object]) -> int:
     return child
 
 
-def _before_each(folder: Path, hook: Callable[[Callable[[], object] | None], None]) -> None:
+def before_each(folder: Path, hook: Callable[[Callable[[], object] | None], None]) -> None:
     """Call a hook before every operation below a folder, in this process and for ever."""
     inside = str(folder.resolve())
 

@@ -73,6 +73,7 @@ def test_calibrate_writes_its_files_and_prints_one_object(truearm: Truearm, smal
         "calibrated.yaml",
         "report.html",
         "result.json",
+        "truearm.manifest.json",
     ]
     result = json.loads((out / "result.json").read_text())
     assert {k: result[k] for k in summary} == summary

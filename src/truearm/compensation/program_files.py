@@ -200,9 +200,10 @@ def write_programs(
         If a program would be overwritten that was read, or that truearm has not written itself, or one without a
         record would be written beside the record of another.
     """
+    read = [*inputs, *map(record_path, inputs)]
     for name, content in files.items():
         path = folder / name
-        refuse_overwriting(path, inputs)
+        refuse_overwriting(path, read)
         if name.endswith((".truearm.json", ".html")):
             continue
         if exists(record_path(path)) and f"{name}.truearm.json" not in files:

@@ -22,6 +22,7 @@ from truearm.identification.judging.expected_error import as_residuals_allow, ex
 from truearm.identification.judging.implausible import check_plausible
 from truearm.identification.judging.left_over import LeftOver
 from truearm.identification.judging.narrow_data import check_narrow_data
+from truearm.identification.judging.one_sided import check_one_sided
 from truearm.identification.judging.sigma import check_sigma
 from truearm.identification.judging.transmission import check_transmission
 from truearm.identification.solving.bounds import Bounds, read_bounds
@@ -262,6 +263,7 @@ def calibrate(
             *check_fit(fit, expected, doubted=has_error([*unlike, *noticed])),
             *narrow,
             *(notice for notice in noticed if notice.level != "error"),
+            *check_one_sided(fit, first),
             *check_sigma(left_over),
             *check_changes(left_over),
             *check_arrival_lag(left_over),

@@ -26,7 +26,7 @@ _SIGNIFICANT: Final = 5.41
 _STEPS: Final = 40
 _LARGEST_STEP: Final = 2.0  # in the logarithm of a variance
 _FURTHER: Final = 4.0  # how many times longer than the information says
-_SETTLED: Final = 1e-3  # what a step may still gain in twice the log-likelihood
+_SETTLED: Final = 1e-5  # what a step may still gain in twice the log-likelihood
 #: Least excess of a variance without errors of the joints that a difference of the parameters is judged by.
 _LEAST_DIFFERENCE: Final = 0.05
 #: Of the logarithm of a variance: what is known of it beforehand.

@@ -53,6 +53,7 @@ LIMITS: Final[Mapping[str, Limit]] = {
         20_000_000, "the program is too large to be corrected at once", "bytes", "Split it into several files."
     ),
     "entries": Limit(100_000, "the file has too many entries", "entries"),
+    "nesting": Limit(100, "the entries are nested too deep", "levels"),
     "rows": Limit(500_000, "the table has too many lines", "lines"),
     "columns": Limit(10_000, "the table has too many columns", "columns"),
     "cells": Limit(5_000_000, "the table has too many cells", "cells"),
@@ -73,6 +74,9 @@ LIMITS: Final[Mapping[str, Limit]] = {
         "there are too many readings for so many parameters",
         "derivatives",
         "Leave out readings, or targets that say nothing more.",
+    ),
+    "parameters": Limit(
+        1000, "there are too many parameters", "parameters", "Leave out targets that say nothing more."
     ),
     "poses": Limit(50_000, "the number is out of range", "poses"),
     "candidates": Limit(50_000, "the number is out of range", "candidates"),

@@ -103,9 +103,9 @@ def rigid_suspects(data: Dataset) -> list[Suspect]:
     if not doubtful:
         return []
     count, ends, twice = len(places.target), np.concatenate([one, other]), np.concatenate([off, off])
-    compared: IntArray = np.maximum(np.bincount(ends, minlength=count), 1)
-    share: Array = np.bincount(ends[twice > allowed], minlength=count) / compared
-    most, total = np.zeros(count), np.bincount(ends, twice, count)
+    compared = np.maximum(np.bincount(ends, minlength=count), 1)
+    share = np.asarray(np.bincount(ends[twice > allowed], minlength=count) / compared, dtype=np.float64)
+    most, total = np.zeros(count), np.asarray(np.bincount(ends, twice, count), dtype=np.float64)
     np.maximum.at(most, ends, twice)
     distances = _Distances(places, pairs, usual, allowed, share, most, total)
     known = fixed_points(data)

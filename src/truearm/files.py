@@ -2,27 +2,21 @@
 
 from __future__ import annotations
 
-import os
 import re
 import stat
-import unicodedata
-from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final, TypeVar, get_args
+from typing import Any, Final
 
-from pydantic import BaseModel, ValidationError
-
-from truearm.errors import InputError, did_you_mean, nearest_names, wrong_kind
+from truearm.errors import InputError, nearest_names, wrong_kind
 from truearm.limits import limit, refuse_beyond
+from truearm.manifest import refuse_unfinished
+from truearm.schemas import Model, validated
 
-Model = TypeVar("Model", bound=BaseModel)
 #: What an entry of a YAML file cannot do without, unless it is the first: one of these stands before it.
 _BETWEEN_ENTRIES: Final = ("\n", ",", ":", "[", "{", "- ", "-\t", "? ")
 _BRACKET: Final = re.compile(r"[\[\]{}]")
 #: An entry that stands for another one, or what looks like it.
 _ALIAS: Final = re.compile(r"(?:^|[\s\[{,:])\*[^\s\[\]{},]")
-
-
 #: What is read but is no file, for messages. Whoever reads them may wait for ever, or never come to an end.
 _NO_FILES: Final = (
     (stat.S_ISFIFO, "a named pipe"),
@@ -44,6 +38,7 @@ def read_bytes(path: Path, most: str = "file_size") -> bytes:
         state = path.stat()
         if stat.S_ISDIR(state.st_mode):
             raise InputError("this is a folder, a file is needed", where=str(path))
+        refuse_unfinished(path)
         if not stat.S_ISREG(state.st_mode):
             raise InputError(
                 "this is no file",
@@ -105,11 +100,6 @@ def exists(path: Path) -> bool:
         return False
 
 
-def is_one_line(text: str) -> bool:
-    """Return whether a text is one line that can be seen: not blank, without breaks and control characters."""
-    return bool(text.strip()) and not any(unicodedata.category(c) in ("Cc", "Cs", "Zl", "Zp") for c in text)
-
-
 def read_text(path: Path, most: str = "file_size") -> str:
     """Return the text of a UTF-8 file without its byte order mark; `most` as for :func:`read_bytes`."""
     content = read_bytes(path, most)
@@ -142,8 +132,7 @@ def read_yaml(path: Path, schema: type[Model]) -> Model:
     except MarkedYAMLError as error:
         mark = error.problem_mark
         where = f"{path}, line {mark.line + 1}" if mark else str(path)
-        problem = " ".join(str(error.problem or "not valid").split())
-        raise InputError(f"this is not valid YAML ({problem})", where=where) from error
+        raise _not_yaml(" ".join(str(error.problem or "not valid").split()), where) from error
     except YAMLError as error:
         raise InputError(f"this is not valid YAML ({' '.join(str(error).split())})", where=str(path)) from error
     except InputError:
@@ -188,133 +177,30 @@ def _refuse_multiplied(root: Any, path: Path) -> None:
     refuse_beyond("entries", entries(root), where=str(path))
 
 
-def validated(content: object, schema: type[Model], where: str) -> Model:
-    """Return `content` as `schema`, or refuse it naming the entry that is wrong."""
-    if not isinstance(content, Mapping):
-        raise InputError("the file must hold named entries (name: value)", where=where, came=type(content).__name__)
-    try:
-        return schema.model_validate(dict(content))
-    except ValidationError as error:
-        raise _refusal(error, content, schema, where) from error
+#: What the YAML parser says, the same in plain words, and the cure; what is in quotes there is what came.
+_YAML_FAULTS: Final = (
+    ('duplicate key "([^"]*)"', "an entry is given twice", "Keep one of them."),
+    ("constructor for the tag '([^']*)'", "tags with ! cannot be used here", "Remove the tag."),
+    (
+        "undefined alias '?([^']*)'?",
+        "an alias with * stands for something that the file does not have",
+        "Write it out.",
+    ),
+    ("another document()", "a second document begins here, behind ---", "Keep one of them."),
+    (r"character '(\\t)'", "a tab stands where blanks belong", "Indent with blanks."),
+)
 
 
-_NUMBER: Final = ("a number belongs here", "a number without quotes and unit, such as 0.5")
-_WHOLE: Final = ("a whole number belongs here", "a whole number without quotes, such as 2")
-_TABLE: Final = ("named entries belong here", "NAME: VALUE, each on a line of its own or all in {{ }}")
-_LIST: Final = ("a list belongs here", "entries in brackets, such as [1, 2], or each on a line that begins with -")
-#: What pydantic finds wrong, by its names of errors: what that is in plain words, and what is allowed. What stands in
-#: braces is filled in from what pydantic says of the error.
-_FAULTS: Final[Mapping[str, tuple[str, str]]] = {
-    "float_type": _NUMBER,
-    "float_parsing": _NUMBER,
-    "finite_number": ("a finite number belongs here", "no nan, no infinity"),
-    "int_type": _WHOLE,
-    "int_from_float": _WHOLE,
-    "int_parsing": _WHOLE,
-    "greater_than": ("the number is too small", "more than {gt:g}"),
-    "greater_than_equal": ("the number is too small", "{ge:g} or more"),
-    "less_than_equal": ("the number is too large", "{le:g} or less"),
-    "string_type": ("a text belongs here", "a text, in quotes if it looks like a number, a date, yes or no"),
-    "string_too_short": ("the text is empty", "at least one character"),
-    "string_pattern_mismatch": ("the text does not have the form that belongs here", "{pattern}"),
-    "literal_error": ("this value is not known", "{expected}"),
-    "dict_type": _TABLE,
-    "model_type": _TABLE,
-    "list_type": _LIST,
-    "tuple_type": _LIST,
-    "too_short": ("there are too few entries", "at least {min_length}"),
-    "too_long": ("there are too many entries", "{max_length}"),
-    "invalid_key": ("the name of an entry must be a text", "a name, in quotes if it looks like a number"),
-}
-#: Of so many names the right one is found without a hint.
-_FEW_NAMES: Final = 6
-#: Lists and tables of more characters are not shown in messages.
-_LONGEST_SHOWN: Final = 60
-
-
-def shown_entry(value: object) -> object:
-    """Return an entry of a file as messages show it: of a long list or table only that it is one, nothing as such."""
-    if value is None:
-        return "nothing"
-    if not isinstance(value, list | tuple | Mapping):
-        return value
-    try:
-        text = str(value)
-    except (ValueError, RecursionError):  # numbers of very many digits, very many brackets
-        text = ""
-    if 0 < len(text) <= _LONGEST_SHOWN:
-        return value
-    return f"{'a table' if isinstance(value, Mapping) else 'a list'} of {len(value)} entries"
-
-
-def _refusal(error: ValidationError, content: Any, schema: type[BaseModel], where: str) -> InputError:
-    """Return the first fault that pydantic found as a refusal that names the entry."""
-    faults = error.errors(include_url=False)
-    first = faults[0]
-    kind, place = first["type"], first["loc"]
-    is_name = place[-1:] == ("[key]",)  # what stands before the colon
-    if is_name:
-        place = place[:-1]
-    holder, entry, holders = content, "", ""
-    for part in place:  # items of a list count from 1, keys stand as they are
-        holders, holder = entry, content
-        if isinstance(content, list) and isinstance(part, int):
-            entry += f"[{part + 1}]"
-            content = content[part] if part < len(content) else None  # of six numbers the fourth may be missing
-        else:
-            entry += f".{part}"
-            content = content.get(part) if isinstance(content, Mapping) else None
-    entry, holders = entry.lstrip("."), holders.lstrip(".")
-
-    def refused(what: str, came: object = None, allowed: str | None = None, cure: str | None = None) -> InputError:
-        return InputError(what, where=f"{where}, {entry}" if entry else where, came=came, allowed=allowed, cure=cure)
-
-    if kind == "extra_forbidden":
-        known = _known_entries(schema, place)
-        allowed = ", ".join(known) or None
-        return refused("this entry is not known here", None, allowed, did_you_mean(str(place[-1]), known))
-    if kind == "missing" and isinstance(holder, list):
-        entry = holders
-        needed = 1 + max(int(f["loc"][-1]) for f in faults if f["type"] == kind and f["loc"][:-1] == place[:-1])
-        return refused("there are too few entries", len(holder), f"{needed}")
-    if kind == "missing":
-        return refused("this entry is missing")
-    came, details = first.get("input"), first.get("ctx", {})
-    cause = details.get("error")
-    if isinstance(cause, InputError):  # a check of our own
-        came = cause.came if cause.came is not None else came
-        return refused(cause.what, shown_entry(came), cause.allowed, cause.cure)
-    if kind not in _FAULTS:
-        what = first["msg"].removeprefix("Value error, ")
-        return refused(what[0].lower() + what[1:], None if isinstance(came, dict | list) else came)
-    what, allowed = _FAULTS[kind]
-    if is_name:
-        what = f"{what}, as the name of the entry"
-    cure = None
-    if kind == "literal_error":
-        known = re.findall("'([^']*)'", details["expected"])
-        details = {"expected": ", ".join(known)}
-        cure = did_you_mean(str(came), known) if len(known) > _FEW_NAMES else None
-    if kind in ("too_short", "too_long"):
-        came = details["actual_length"]
-    return refused(what, shown_entry(came), allowed.format(**details), cure)
-
-
-def _known_entries(schema: type[BaseModel], place: Sequence[int | str]) -> list[str]:
-    """Return which entries there may be beside the one at a place, none if that is not one of a fixed set."""
-    holder: type[BaseModel] | None = schema
-    for part in place[:-1]:
-        if holder is not None and part in holder.model_fields:
-            holder = next(_models_in(holder.model_fields[str(part)].annotation), None)
-    return [] if holder is None else list(holder.model_fields)
-
-
-def _models_in(annotation: object) -> Iterator[type[BaseModel]]:
-    """Return the pydantic models that a type is, or is made of."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        yield annotation
-    for part in get_args(annotation):
-        yield from _models_in(part)
+def _not_yaml(problem: str, where: str) -> InputError:
+    for pattern, what, cure in _YAML_FAULTS:
+        found = re.search(pattern, problem)
+        if found is not None:
+            return InputError(what, where=where, came=found[1] or None, cure=cure)
+    return InputError(
+        f"this is not valid YAML ({problem})",
+        where=where,
+        cure="Look for a quote, a bracket or a colon too many or too few, here or in the line above.",
+    )
 
 
 def path_argument(path: object, parameter: str) -> Path:
@@ -324,13 +210,13 @@ def path_argument(path: object, parameter: str) -> Path:
             return Path(path)
         raise InputError("no file is given", parameter=parameter, came=str(path))
     raise wrong_kind(
-        "a path belongs here", path, parameter, "the path of a file or folder, as a text or a pathlib.Path"
+        "a path belongs here", path, parameter, "the path of a file or folder, as a text in UTF-8 or a pathlib.Path"
     )
 
 
 def _can_be_path(text: str) -> bool:
     try:
-        os.fsencode(text)
+        text.encode()
     except UnicodeEncodeError:  # half a character
         return False
     return "\0" not in text

@@ -11,25 +11,39 @@ import gc
 import hashlib
 import json
 import os
+import re
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict
 
 from truearm.compensation.programs import LANGUAGES
 from truearm.compensation.programs.lines import replaced
 from truearm.compensation.programs.program import Edit, Language, Program, Source
 from truearm.errors import InputError
-from truearm.files import exists, read_bytes, validated
+from truearm.files import exists, read_bytes
 from truearm.limits import limit, refuse_beyond
+from truearm.schemas import validated
 from truearm.writing import refuse_overwriting, write_files
 
 SCHEMA: Final = "truearm-corrected/1"
 
-Hash = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+
+def _of_a_file(text: str) -> str:
+    if not re.fullmatch("[0-9a-f]{64}", text):
+        raise InputError(
+            "this is not the SHA-256 of a file",
+            came=text,
+            allowed="64 digits, 0 to 9 and a to f",
+            cure="Restore the record as it was written.",
+        )
+    return text
+
+
+Hash = Annotated[str, AfterValidator(_of_a_file)]
 
 
 class CorrectionRecord(BaseModel):
@@ -172,8 +186,13 @@ def recorded(file: ProgramFile, corrected: bytes, language: str, applied: Mappin
     return json.dumps(content.model_dump(), indent=1) + "\n"
 
 
-def write_programs(folder: Path, inputs: Sequence[Path], files: Mapping[str, str | bytes]) -> None:
+def write_programs(
+    folder: Path, inputs: Sequence[Path], files: Mapping[str, str | bytes], command: str | None = None
+) -> None:
     """Write results into a folder, all of them or none. Records and reports replace earlier ones.
+
+    Records are put in place first: there is never a corrected program whose record is missing, and which could be
+    corrected once more.
 
     Raises
     ------
@@ -181,9 +200,10 @@ def write_programs(folder: Path, inputs: Sequence[Path], files: Mapping[str, str
         If a program would be overwritten that was read, or that truearm has not written itself, or one without a
         record would be written beside the record of another.
     """
+    read = [*inputs, *map(record_path, inputs)]
     for name, content in files.items():
         path = folder / name
-        refuse_overwriting(path, inputs)
+        refuse_overwriting(path, read)
         if name.endswith((".truearm.json", ".html")):
             continue
         if exists(record_path(path)) and f"{name}.truearm.json" not in files:
@@ -203,7 +223,8 @@ def write_programs(folder: Path, inputs: Sequence[Path], files: Mapping[str, str
                 where=str(path),
                 cure="Choose another `out`.",
             )
-    write_files(folder, files)
+    order = sorted(files, key=lambda name: not name.endswith(".truearm.json"))
+    write_files(folder, {name: files[name] for name in order}, command)
 
 
 # -- reading ----------------------------------------------------------------------------------------------
@@ -253,8 +274,9 @@ def _record(path: Path) -> CorrectionRecord | None:
     beside = record_path(path)
     if not exists(beside):
         return None
+    text = read_bytes(beside)
     try:
-        content = json.loads(read_bytes(beside))
+        content = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise InputError("this record cannot be read", where=str(beside), cure="Remove it, or restore it.") from error
     return validated(content, CorrectionRecord, str(beside))

@@ -42,13 +42,13 @@ def robot_argument(robot: object, parameter: str = "robot") -> Robot:
     raise wrong_kind("a robot belongs here", robot, parameter, "a Robot, a library id, a robot file or a URDF")
 
 
-def refuse_swapped(robot: object, data: object, job: str = "") -> None:
+def refuse_swapped(robot: object, data: object, job: str) -> None:
     """Refuse a robot where measurements belong, and measurements in its place.
 
     Parameters
     ----------
     job
-        Named with both in their order, where its command has the same order.
+        Named with both in their order.
     """
     if not (isinstance(robot, str | Path) and isinstance(data, str | Path)):
         return
@@ -58,7 +58,7 @@ def refuse_swapped(robot: object, data: object, job: str = "") -> None:
             parameter="robot",
             came=str(robot),
             allowed="a library id, a robot file or a URDF",
-            cure=f"Write 'truearm {job} {data} {robot}'." if job else "Exchange them.",
+            cure=f"Write 'truearm {job} {data} {robot}'.",
         )
 
 
@@ -267,6 +267,16 @@ def choices_argument(values: object, parameter: str, known: Collection[str], wha
         raise wrong_kind("a sequence of names belongs here", values, parameter, ", ".join(known))
     named = [choice_argument(value, parameter, {name: name for name in known}, what) for value in values]
     return tuple(dict.fromkeys(named))
+
+
+def names_argument(values: object, parameter: str) -> tuple[str, ...]:
+    """Return names that only the data know, each once; numbers are names too."""
+    if not _is_sequence(values):
+        raise wrong_kind("a sequence of names belongs here", values, parameter, "names of configurations")
+    for value in values:
+        if isinstance(value, bool) or not isinstance(value, str | Integral):
+            raise wrong_kind("a name belongs here", value, parameter, "the name of a configuration")
+    return tuple(dict.fromkeys(str(value) for value in values))
 
 
 def device_argument(device: object, parameter: str = "device") -> Device:

@@ -92,7 +92,9 @@ def hexapod_plan(
         )
     plan = HexapodPlan(arm, found)
     files = {sheet: plan.sheet_text(), text: plan.steps_text()}
-    write_files(Path(), {str(file): content for file, content in files.items() if file is not None})
+    written = {file.absolute(): content for file, content in files.items() if file is not None}
+    if written:
+        write_files(next(iter(written)).parent, {str(file): content for file, content in written.items()})
     return plan
 
 

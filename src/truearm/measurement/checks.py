@@ -12,10 +12,10 @@ from typing import Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.errors import InputError
-from truearm.measurement.dataset import Dataset, IntArray
-from truearm.measurement.dataset_fields import drawn_from
+from truearm.errors import InputError, nearest_names
+from truearm.measurement.dataset import Dataset
 from truearm.measurement.places import constellation, places_of
+from truearm.measurement.repeats import check_duplicates, repeated_joints, repeated_joints_notices
 from truearm.measurement.rigid_tool import DEVIATIONS, OTHER_REFLECTOR, SAME_POINT, UNMOVED, Suspect, rigid_suspects
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
@@ -26,6 +26,10 @@ from truearm.shown import counted
 _COLDEST: Final = -30.0
 _WARMEST: Final = 80.0
 _MOST_NAMED: Final = 6
+#: A target read at this share of the configurations at most may be another one's misspelt name.
+_FEW_SHARE: Final = 0.1
+#: A target read at this share of the configurations or more is one that is always read.
+_OFTEN_SHARE: Final = 0.8
 
 
 def check_data(data: Dataset, suspects: Iterable[Suspect] | None = None) -> list[Notice]:
@@ -36,8 +40,12 @@ def check_data(data: Dataset, suspects: Iterable[Suspect] | None = None) -> list
     suspects
         Readings that are doubted for another reason as well, reported together with those found here.
     """
-    found = [*_missing(data), *_duplicates(data)]
-    found += suspect_notices([*rigid_suspects(data), *reference_suspects(data), *(suspects or ())])
+    found = [*_misnamed(data), *_missing(data), *check_duplicates(data)]
+    pairs = repeated_joints(data)
+    known = {label for pair in pairs for label in pair}
+    doubted = [suspect for suspect in suspects or () if suspect.configuration not in known]
+    found += repeated_joints_notices(data, pairs)
+    found += suspect_notices([*rigid_suspects(data), *reference_suspects(data), *doubted])
     return found + _moved(data) + _temperatures(data)
 
 
@@ -244,42 +252,48 @@ def _missing(data: Dataset) -> list[Notice]:
     return [Notice("missing", f"{counted(total, 'reading')} {left.format(words)}; nothing needs to be done.")]
 
 
-def _duplicates(data: Dataset) -> list[Notice]:
+def _misnamed(data: Dataset) -> list[Notice]:
+    """Say which names of targets seem to be slips.
+
+    A target that is read at a few configurations, at all of which another one is missing that is read everywhere else,
+    is that one, if the names are alike; and a configuration that has one target twice and another one not at all.
+    """
+    if data.fixture is not None or len(data.targets) < 2:
+        return []
+    read = data.has_reading
+    seen: list[set[int]] = [set() for _ in data.targets]
+    twice: list[tuple[int, int]] = []
+    for t, c in zip(data.target[read].tolist(), data.configuration[read].tolist(), strict=True):
+        if c in seen[t]:
+            twice.append((t, c))
+        seen[t].add(c)
+    often = [t for t, at in enumerate(seen) if len(at) >= _OFTEN_SHARE * data.configurations]
     found = []
-    for part in [data] if data.references is None else [data, data.references]:
-        first: dict[tuple[int, bytes], int] = {}
-        for reading in np.flatnonzero(part.has_position).tolist():
-            key = (int(part.target[reading]), part.position[reading].tobytes())
-            other = first.setdefault(key, reading)
-            a, b = (part.labels[part.configuration[r]] for r in (other, reading))
-            # A configuration that was drawn twice for a bootstrap counts twice because it shall.
-            if other != reading and (a == b or drawn_from(a) != drawn_from(b)):
-                found.append(f"{part.targets[key[0]]} at {a} and {b}")
+    alike = {name.casefold(): name for name in (data.targets[t] for t in often)}
+    for t, at in enumerate(seen):
+        if not at or len(at) > _FEW_SHARE * data.configurations:
+            continue
+        name = data.targets[t]
+        meant = [alike[n] for n in nearest_names(name.casefold(), list(alike), 3)]
+        for other in meant:
+            if not at & seen[data.targets.index(other)]:
+                labels = _listed([data.labels[c] for c in sorted(at)])
+                found.append(f"{name} at {labels}, where {other} is missing: did you mean {other}?")
+                break
+    for t, c in twice:
+        lost = [data.targets[o] for o in often if c not in seen[o]]
+        if len(lost) == 1:
+            found.append(f"{data.targets[t]} is there twice at {data.labels[c]}, and {lost[0]} not at all")
     if not found:
         return []
     return [
         Notice(
-            "duplicates",
-            f"{counted(len(found), 'reading')} repeat{'s' if len(found) == 1 else ''} another one to the last digit "
-            f"(target at configurations): {_listed(found)}. Rows were copied, or the instrument stood still: remove "
-            f"{'it, it counts' if len(found) == 1 else 'them, they count'} twice.",
+            "target-misspelt",
+            f"Names of targets look like slips: {'; '.join(found[:_MOST_NAMED])}. A misspelt name is a target of its "
+            "own. Correct the names.",
+            "error",
         )
     ]
-
-
-def copies(data: Dataset, some: IntArray, others: IntArray) -> list[str]:
-    """Return the labels of those of `some` configurations that are copies of one of the `others`.
-
-    Copies have the same joint positions and the same readings, all to the last digit.
-    """
-    values = [data.target[:, None], data.against[:, None], data.position]
-    values += [v.reshape(len(v), -1) for v in (data.quaternion, data.distance, data.height) if v is not None]
-    read: list[list[bytes]] = [[] for _ in data.labels]
-    for reading, row in zip(np.flatnonzero(data.has_reading), np.hstack(values)[data.has_reading], strict=True):
-        read[data.configuration[reading]].append(row.tobytes())
-    content = [(joints.tobytes(), *sorted(rows)) for joints, rows in zip(data.joints, read, strict=True)]
-    known = {content[c] for c in others if read[c]}
-    return [data.labels[c] for c in some if content[c] in known]
 
 
 def _are(things: Sequence[object]) -> str:

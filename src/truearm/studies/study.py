@@ -214,7 +214,7 @@ class Study(Record):
         """
         folder = output_folder(folder)
         text = json.dumps(self.summary(), indent=2, allow_nan=False) + "\n"
-        write_files(folder, dict(zip(STUDY_FILES, (self.html(), text), strict=True)))
+        write_files(folder, dict(zip(STUDY_FILES, (self.html(), text), strict=True)), self.command or None)
         return tuple(folder / name for name in STUDY_FILES)
 
 

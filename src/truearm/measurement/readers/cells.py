@@ -17,9 +17,9 @@ from typing import Final
 import numpy as np
 
 from truearm.errors import InputError
-from truearm.files import is_one_line
 from truearm.limits import limit, refuse_beyond
 from truearm.modeling.chain import Array
+from truearm.printable import is_one_line
 from truearm.units import as_number, sized_si
 
 _WITH_COMMA: Final = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")

@@ -21,7 +21,7 @@ from truearm.measurement.readers.cells import Cells, Layout, read_cells
 from truearm.measurement.readers.rows import Configurations, found_configurations, in_order
 from truearm.units import ANGLE_UNITS, LENGTH_UNITS, checked_unit
 
-_HEADING: Final = re.compile(r"(configuration|joint_[1-9][0-9]*|angle|height)\s*(?:\[([^\]]*)\])?")
+_HEADING: Final = re.compile(r"(configuration|joint_[1-9][0-9]{0,3}|angle|height)\s*(?:\[([^\]]*)\])?")
 _ALLOWED: Final = "configuration, joint_1 [deg] .., angle [deg], height [mm]"
 #: How well the middle of a circle lies in its paper [m].
 _PAPER_DEVIATION: Final = 1e-5

@@ -9,15 +9,15 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 from pydantic import field_validator as validator_of
 
 from truearm.errors import InputError
-from truearm.files import is_one_line
 from truearm.measurement.readers.cells import Layout
+from truearm.printable import is_one_line
 from truearm.shown import counted
 
 _DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "whitespace": None}
 
 
 def _number_as_text(value: object) -> object:
-    return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
+    return str(value) if type(value) is int and abs(value) < 10**18 else value
 
 
 def _none_as_null(value: object) -> object:
@@ -34,7 +34,7 @@ Text = Annotated[str, StringConstraints(min_length=1, strip_whitespace=True)]
 PointName = Annotated[Text, AfterValidator(_on_one_line)]
 #: A column by its name; by its number, counted from 1, where the file has no header.
 Column = Annotated[Text, BeforeValidator(_number_as_text)]
-Line = Annotated[int, Field(ge=1, strict=True)]
+Line = Annotated[int, Field(ge=1, le=10**9, strict=True)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=True)]
 
 
@@ -57,7 +57,7 @@ class LayoutEntry(_Entry):
     def _known(cls, name: str) -> str:
         try:
             return codecs.lookup(name).name
-        except LookupError:
+        except (LookupError, ValueError):  # ValueError: half a character, a zero byte
             raise InputError(
                 "there is no such encoding", came=name, allowed="utf-8, utf-16, cp1252, latin-1 and others of Python"
             ) from None
@@ -65,7 +65,11 @@ class LayoutEntry(_Entry):
     @model_validator(mode="after")
     def _header_first(self) -> LayoutEntry:
         if self.first_row is not None and self.first_row <= (self.header or 0):
-            raise ValueError("first_row must be below the header")
+            raise InputError(
+                "first_row must be below the header",
+                came=f"header {self.header}, first_row {self.first_row}",
+                allowed=f"{(self.header or 0) + 1} or more for first_row",
+            )
         return self
 
     @property
@@ -185,7 +189,11 @@ class JointsEntry(_Entry):
         if (self.unit is None) == (self.units is None):
             raise ValueError("give either unit: for all joints, or units: with one for each joint")
         if self.units is not None and len(self.units) != len(self.columns):
-            raise ValueError(f"there are {counted(len(self.columns), 'column')} and {counted(len(self.units), 'unit')}")
+            raise InputError(
+                f"there are {counted(len(self.columns), 'column')} and {counted(len(self.units), 'unit')}",
+                came=", ".join(self.units),
+                allowed="units with one for each column, or unit for all of them",
+            )
         if self.file is None and (self.key is not None or self.layout is not None):
             raise ValueError("key and layout belong to a second file; name it with file:")
         return self
@@ -259,5 +267,9 @@ class MappingFile(_Entry):
             first: dict[str, str] = {}
             for column, entry in group:
                 if column in first:
-                    raise ValueError(f"the column {column!r} is used twice, for {first[column]} and for {entry}")
+                    raise InputError(
+                        f"a column is used twice, for {first[column]} and for {entry}",
+                        came=column,
+                        cure="Name the right column for one of them.",
+                    )
                 first[column] = entry

@@ -9,12 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from truearm.errors import InputError
-from truearm.files import is_one_line, read_text
+from truearm.files import read_text
 from truearm.limits import refuse_beyond
 from truearm.measurement.dataset import Dataset, IntArray
 from truearm.measurement.readers.cells import lines_of, refuse_long, split_line
 from truearm.modeling.chain import Array
 from truearm.modeling.postures import approach_of
+from truearm.printable import is_one_line
 from truearm.shown import counted
 from truearm.units import ANGLE_UNITS, LENGTH_UNITS, checked_unit, sized_si
 

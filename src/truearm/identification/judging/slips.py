@@ -1,0 +1,457 @@
+"""Slips that people make with units, signs, orders and axes, tried one by one on data that the robot does not fit.
+
+The nominal robot is placed by the closed form. Where that fails badly, the same data are tried as they would be with
+one slip mended; the simplest slip that makes them fit several times better is what happened.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Final
+
+import numpy as np
+
+from truearm.errors import InputError
+from truearm.identification.solving.models import named_model
+from truearm.identification.solving.problem import Problem
+from truearm.identification.start_values.frames import initial_frames
+from truearm.identification.start_values.from_readings import start_from_readings
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.observations import OBSERVATIONS
+from truearm.measurement.statistics import Errors, errors_of
+from truearm.modeling.chain import Array
+from truearm.modeling.robot import Robot
+from truearm.modeling.transform import Transform, rotation_from_quaternion, rotation_vector
+from truearm.notices import Notice
+
+#: A nominal robot that is placed better than this needs no explanation [m].
+_PLACED_WITHIN: Final = 3e-3
+_PLACED_WITHIN_BY_FIXTURES: Final = 6e-3
+#: A slip explains the data if they fit this many times better with it mended.
+_LEAST_IMPROVEMENT: Final = 4.0
+#: Beside a slip whose mending makes the data fit this many times better, nothing else is wrong.
+_PLAIN_IMPROVEMENT: Final = 20.0
+#: A simpler slip is preferred to one that fits this many times better: mirrored readings and the opposite signs of
+#: joints 1, 4 and 6 are the same for an arm that is its own mirror image, up to its errors.
+_AS_GOOD: Final = 1.5
+#: Configurations looked at; more tell nothing new.
+_CONFIGURATIONS_TRIED: Final = 60
+#: A campaign moves some joint by more than this [rad or m].
+_LEAST_TRAVEL: Final = 0.3
+#: Share of the spread of the readings that is left where these do not follow the joints; chance leaves 0.6 or more.
+_UNRELATED: Final = 0.3
+#: Orders of the rows that are drawn to see how well readings fit that have nothing to do with the joints, and how
+#: much better than the best of these data must fit that follow them.
+_ORDERS_DRAWN: Final = 19
+_ALIKE: Final = 0.8
+#: Orientations of a nominal robot agree better than this [rad]; a wrong order of a quaternion leaves 1 rad and more.
+_TURNED_WITHIN: Final = 0.1
+#: Largest ratio of the stretches along three axes that is still called a scale.
+_MOST_UNEVEN: Final = 1.2
+#: No target is farther from the flange [m].
+_LARGEST_TOOL: Final = 2.0
+#: Cosine between two axes of an instrument that are still called square.
+_SQUARE: Final = 0.1
+#: No instrument reads a robot from farther away [m].
+_FARTHEST: Final = 1e4
+#: Weight of readings against priors where slips are judged by a fit [m or rad].
+_FITTED_NOISE: Final = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Slip:
+    """One slip, mended.
+
+    Attributes
+    ----------
+    code
+        Of the notice.
+    words
+        What happened and what to do about it, without a full stop.
+    data
+        The data as they should be.
+    """
+
+    code: str
+    words: str
+    data: Dataset
+
+    @property
+    def notice(self) -> Notice:
+        """What is said if it explains the data."""
+        return Notice(self.code, f"{self.words}.", "error")
+
+
+def slips_in_positions(robot: Robot, data: Dataset) -> list[Notice]:
+    """Return which slip explains positions in the instrument's frame; nothing if they fit, or if none does."""
+    turned = _quaternion_slips(robot, data)
+    some, rest = _some(data), replace(data, quaternion=None, sigma_rot=None)
+    some = replace(some, quaternion=None, sigma_rot=None)
+    misfit = {t: _misfit(robot, _only(some, t)) for t in range(len(some.targets)) if _seen(some, t)}
+    least = min(misfit.values())
+    bad = [t for t, size in misfit.items() if size > max(_PLACED_WITHIN, _LEAST_IMPROVEMENT * least)]
+    if not bad:
+        if least <= _PLACED_WITHIN:
+            return turned
+        best = _best(robot, some, _simple_slips(robot, rest), lambda: [*_sign_slips(some, 2), *_sign_slips(some, 3)])
+        if best is not None:
+            return [best.notice]
+        return turned or _beyond_reach(robot, some) or _unrelated(robot, some)
+    # The other targets fit with the same joints, so these are right.
+    found = []
+    for t in bad:
+        only = _only(some, t)
+        best = _best(robot, only, [*_length_slips(only), *_mirrored(only), *_scale_slips(robot, only)])
+        if best is not None:
+            found.append(Notice(best.code, f"Target {some.targets[t]}: {best.words}.", "error"))
+    return [*turned, *found]
+
+
+def _simple_slips(robot: Robot, data: Dataset) -> Iterator[Slip]:
+    """Try everything but several slips at once, the simplest first."""
+    some = _some(data)
+    yield from _length_slips(some)
+    yield from _angle_slips(some)
+    yield from _mirrored(some)
+    yield from _sign_slips(some, 1)
+    yield from _order_slips(some)
+    yield from _shifted(data)
+    yield from _scale_slips(robot, some)
+
+
+def _best(robot: Robot, data: Dataset, slips: Iterable[Slip], several: Callable[[], list[Slip]] = list) -> Slip | None:
+    """Return the simplest slip that explains the data, None if none does.
+
+    Parameters
+    ----------
+    several
+        Several slips at once, tried where none alone makes the data fit as if nothing else were wrong.
+    """
+    tried = list(slips)
+    if not tried:
+        return None
+    given = _misfit(robot, data) / _spread(data)
+    shares = [_misfit(robot, slip.data) / _spread(slip.data) for slip in tried]
+    if min(shares) * _PLAIN_IMPROVEMENT > given:
+        more = several()
+        tried += more
+        shares += [_misfit(robot, slip.data) / _spread(slip.data) for slip in more]
+    least = min(shares)
+    best = next(slip for slip, share in zip(tried, shares, strict=True) if share <= _AS_GOOD * least)
+    return best if least * _LEAST_IMPROVEMENT < given else None
+
+
+def slips_in_lengths(robot: Robot, data: Dataset) -> list[Notice]:
+    """Return the first slip that explains readings against fixtures: turned about, several may fit alike."""
+    size = _misfit(robot, data)
+    if size <= _PLACED_WITHIN_BY_FIXTURES:
+        return []
+    for slip in (*_length_slips(data), *_angle_slips(data), *_sign_slips(data, 1), *_order_slips(data)):
+        if np.ptp(slip.data.joints, axis=0).max() < _LEAST_TRAVEL:
+            continue  # an arm that hardly moves fits any fixture
+        mended = _misfit(robot, slip.data)
+        if mended <= _PLACED_WITHIN_BY_FIXTURES and _LEAST_IMPROVEMENT * mended / _spread(slip.data) < size / _spread(
+            data
+        ):
+            return [slip.notice]
+    return [
+        Notice(
+            "fixtures-unlikely",
+            "The nominal robot does not fit the readings against fixtures. Half of them are off by more than "
+            f"{size * 1e3:.3g} mm, with base, targets and fixtures where they fit best. Check that the rows name the "
+            "right fixtures, and the places in the rows of the role fixture.",
+        )
+    ]
+
+
+def signs_by_fit(robot: Robot, data: Dataset) -> list[Notice]:
+    """Return the joint whose opposite sign explains what a fit leaves over.
+
+    The targets may be so near the axis of the last joint that the placed nominal robot hardly sees its sign. So one
+    step of the geometric fit from there is judged, which takes out what the robot's own errors explain.
+    """
+    some = _some(replace(data, quaternion=None, sigma=None, sigma_rot=None))
+    given = _fitted_misfit(robot, some)
+    tried = [(_fitted_misfit(robot, slip.data), slip) for slip in _sign_slips(some, 1)]
+    if not tried:
+        return []
+    left, slip = min(tried, key=lambda entry: entry[0])
+    return [slip.notice] if left * _LEAST_IMPROVEMENT < given else []
+
+
+def _fitted_misfit(robot: Robot, data: Dataset) -> float:
+    """Return the root mean square that one step of the geometric fit from the placed nominal robot leaves [m]."""
+    model = named_model("geometric")
+    start = initial_frames(model.prepared(robot), data)
+    noise = {observation.name: _FITTED_NOISE for observation in OBSERVATIONS}
+    problem = Problem(start, data, model.free(start), noise)
+    r, J = problem.linearised(problem.free.start)
+    prior, weight = problem.prior_rows(problem.free.start)
+    step = np.linalg.lstsq(np.concatenate([J, np.diag(weight)]), -np.concatenate([r, prior]), rcond=None)[0]
+    return float(np.sqrt(np.mean((r + J @ step) ** 2))) * _FITTED_NOISE
+
+
+def _misfit(robot: Robot, data: Dataset) -> float:
+    """Return the median distance that the placed nominal robot leaves [m]; infinite if it cannot be placed."""
+    if data.fixture is None:
+        return float(np.median(errors_of(initial_frames(robot, data), data).position_norms))
+    try:
+        return float(np.nanmedian(off_by(errors_of(start_from_readings(robot, data), data))))
+    except InputError:
+        return math.inf
+
+
+def off_by(errors: Errors) -> Array:
+    """Return how far off each position, distance or height is [m], NaN where there is none."""
+    off: Array = np.linalg.norm(errors.position_errors, axis=1)
+    return off if errors.length_errors is None else np.where(np.isfinite(off), off, np.abs(errors.length_errors))
+
+
+def _spread(data: Dataset) -> float:
+    """Return how far the readings lie apart [m]: positions that shrink fit better, but not in proportion."""
+    if data.fixture is not None:
+        counted = [data.position, *(v[:, None] for v in (data.distance, data.height) if v is not None)]
+        return float(np.sqrt(np.nanmean(np.concatenate([v.reshape(-1) for v in counted]) ** 2))) + 1e-3
+    return float(np.sqrt(np.mean(np.var(data.position[data.has_position], axis=0)))) + 1e-12
+
+
+# -- lengths -----------------------------------------------------------------------------------------------
+
+
+def _length_slips(data: Dataset) -> Iterator[Slip]:
+    for factor, words in (
+        (1e-3, "a thousand times too large, as if mm were called m"),
+        (1e3, "a thousand times too small, as if m were called mm"),
+        (25.4, "25.4 times too small, as if inches were called mm"),
+        (1 / 25.4, "25.4 times too large, as if mm were called inches"),
+    ):
+        if factor > 1.0 and np.nanmax(np.abs(data.position), initial=0.0) * factor > _FARTHEST:
+            continue
+        what = "positions" if data.fixture is None else "lengths"
+        words = f"The {what} are {words}. Mend the unit in the header"
+        yield Slip("unit-length", words, _scaled(data, factor))
+
+
+def _scaled(data: Dataset, factor: float) -> Dataset:
+    """Return the data with all measured lengths so many times as large."""
+
+    def scaled(values: Array | None) -> Array | None:
+        return None if values is None else values * factor
+
+    setup = None if data.setup is None else _scaled(data.setup, factor)
+    more = {"distance": scaled(data.distance), "height": scaled(data.height), "setup": setup}
+    return replace(data, position=data.position * factor, **more)  # type: ignore[arg-type]
+
+
+def _scale_slips(robot: Robot, data: Dataset) -> Iterator[Slip]:
+    """Try the factor by which readings are larger than the robot, from the linear map that takes them onto it.
+
+    Of ``B y = R_c t + p_c + u`` the map B, the targets t and u are found by least squares. Where B stretches all axes
+    alike, its inverse is a turn times the factor.
+    """
+    p, R = robot.with_frames(Transform(), {}).world_poses(data.postures)
+    readings = np.flatnonzero(data.has_position)
+    where, what = data.configuration[readings], data.target[readings]
+    y = data.position[readings] - data.position[readings].mean(axis=0)
+    seen = np.unique(what)
+    unknowns = 9 + 3 * len(seen) + 3
+    if 3 * len(readings) < 2 * unknowns:
+        return
+    rows = np.zeros((len(readings), 3, unknowns))
+    for i in range(3):
+        rows[:, i, 3 * i : 3 * i + 3] = y
+    for column, t in enumerate(seen.tolist()):
+        mine = what == t
+        rows[mine, :, 9 + 3 * column : 12 + 3 * column] = -R[where[mine]]
+    rows[:, :, -3:] = -np.eye(3)
+    found = np.linalg.lstsq(rows.reshape(-1, unknowns), p[where].reshape(-1), rcond=1e-10)[0]
+    onto = np.asarray(found[:9].reshape(3, 3), dtype=float)
+    stretch = np.linalg.svd(onto, compute_uv=False)
+    if stretch[2] <= 0.0:
+        return
+    if stretch[0] > _MOST_UNEVEN * stretch[2]:
+        yield from _column_slips(data, onto)
+        return
+    factor = float(np.prod(stretch)) ** (1 / 3)
+    size = f"{1 / factor:.4g} times too large" if factor < 1 else f"{factor:.4g} times too small"
+    yield Slip(
+        "unit-length", f"The positions are {size} for this robot. Mend them or their unit", _scaled(data, factor)
+    )
+
+
+def _column_slips(data: Dataset, onto: Array) -> Iterator[Slip]:
+    """Try single columns of positions in another unit, from the linear map that takes readings onto the robot."""
+    stretch = np.linalg.norm(onto, axis=0)
+    turned = onto / stretch
+    off = np.abs(stretch - 1.0) > _MOST_UNEVEN - 1.0
+    if np.abs(turned.T @ turned - np.eye(3)).max() > _SQUARE or off.all():
+        return
+    sizes = [f"{1 / by:.4g} times too large" if by < 1 else f"{by:.4g} times too small" for by in stretch.tolist()]
+    words = " and ".join(f"the column {axis} of the positions is {sizes[i]}" for i, axis in enumerate("xyz") if off[i])
+    mended = data.position * np.where(off, stretch, 1.0)
+    words = f"For this robot {words}. Mend the unit in the header, or the numbers"
+    yield Slip("unit-length", words, replace(data, position=mended))
+
+
+def _mirrored(data: Dataset) -> Iterator[Slip]:
+    words = (
+        "The positions are mirrored: two of the columns x, y and z are exchanged, or the sign of one is wrong. The "
+        "data fit with their mirror image. Mend the columns; an instrument's axes are right-handed"
+    )
+    yield Slip("mirrored", words, replace(data, position=data.position * np.array([1.0, 1.0, -1.0])))
+
+
+# -- joints ------------------------------------------------------------------------------------------------
+
+
+def _turning(data: Dataset) -> list[int]:
+    return [i for i in range(data.joints.shape[1]) if data.joint_kinds[i] == "revolute"]
+
+
+def _angle_slips(data: Dataset) -> Iterator[Slip]:
+    turning = _turning(data)
+    for factor, words in ((math.pi / 180, "degrees are called rad"), (180 / math.pi, "radians are called deg")):
+        for group in [turning, *([i] for i in turning)]:
+            if not group:
+                continue
+            joints = data.joints.copy()
+            joints[:, group] *= factor
+            which = "The joints" if len(group) > 1 else f"Joint {group[0] + 1}"
+            words_of = f"{which}: {words}. Mend the unit in the header"
+            yield Slip("unit-angle", words_of, replace(data, joints=joints))
+
+
+def _sign_slips(data: Dataset, size: int) -> Iterator[Slip]:
+    """Try the opposite signs of so many joints at once."""
+    for group in map(list, combinations(range(data.joints.shape[1]), size)):
+        joints = data.joints.copy()
+        joints[:, group] *= -1
+        which = " and ".join(str(i + 1) for i in group)
+        words = f"The sign of joint {which} is opposite to the robot's: the data fit with it changed. "
+        yield Slip(
+            "joint-sign", words + "Change it in the data, or correct the robot file", replace(data, joints=joints)
+        )
+
+
+def _order_slips(data: Dataset) -> Iterator[Slip]:
+    for a, b in combinations(range(data.joints.shape[1]), 2):
+        joints = data.joints.copy()
+        joints[:, [a, b]] = joints[:, [b, a]]
+        words = f"Joints {a + 1} and {b + 1} are in the wrong order: the data fit with the columns exchanged. "
+        yield Slip("joint-sign", words + "Exchange their columns", replace(data, joints=joints))
+
+
+def _shifted(data: Dataset) -> Iterator[Slip]:
+    """Try the joint positions of the row before, and of the row after."""
+    for by, words in ((1, "before"), (-1, "after")):
+        joints = np.roll(data.joints, by, axis=0)
+        said = f"The readings of each configuration fit the joint positions of the one {words} it: the columns are "
+        yield Slip("rows-shifted", said + "shifted by one row. Shift them back", _some(replace(data, joints=joints)))
+
+
+def _beyond_reach(robot: Robot, data: Dataset) -> list[Notice]:
+    """Say if readings lie so far apart that no arm of this size was read, in whatever frame."""
+    reach = float(np.linalg.norm(robot.with_frames(Transform(), {}).world_poses(data.postures)[0], axis=1).max())
+    read = data.position[data.has_position]
+    apart = float(np.linalg.norm(read - np.median(read, axis=0), axis=1).max())
+    if apart <= 2.0 * (reach + _LARGEST_TOOL):
+        return []
+    return [
+        Notice(
+            "unit-length",
+            f"The positions lie up to {apart:.3g} m from the middle of all, where the arm reaches {reach:.2g} m. Some "
+            "of their numbers are in another unit, or lost their decimal point or comma.",
+            "error",
+        )
+    ]
+
+
+def _unrelated(robot: Robot, data: Dataset) -> list[Notice]:
+    """Say if the readings fit the joints no better than in an order that is drawn."""
+    given = _misfit(robot, data)
+    if given < _UNRELATED * _spread(data):
+        return []
+    half = data.configurations // 2
+    for part in (data.of_configurations(np.arange(half)), data.of_configurations(np.arange(half, data.configurations))):
+        if part.has_position.any() and _misfit(robot, part) * _LEAST_IMPROVEMENT < given:
+            return []  # the robot or the instrument stands elsewhere in the other half
+    rng = np.random.default_rng(0)
+    drawn = (replace(data, joints=rng.permutation(data.joints)) for _ in range(_ORDERS_DRAWN))
+    if any(_ALIKE * _misfit(robot, other) <= given for other in drawn):
+        return [
+            Notice(
+                "rows-unrelated",
+                "The readings do not follow the joint positions: in an order drawn at random they fit the robot as "
+                "well. Check that joint positions and readings are of the same campaign, and row by row of the same "
+                "configuration.",
+                "error",
+            )
+        ]
+    return []
+
+
+# -- orientations ------------------------------------------------------------------------------------------
+
+
+def _quaternion_slips(robot: Robot, data: Dataset) -> list[Notice]:
+    """Say if the orientations agree with the robot only with the numbers of the quaternions in another order."""
+    some = _some(data)
+    if some.quaternion is None or not some.has_orientation.any():
+        return []
+    read = some.quaternion
+    placed = initial_frames(robot, replace(some, quaternion=None, sigma_rot=None))
+    given = _turned(placed, some, read)
+    if given <= _TURNED_WITHIN:
+        return []
+    inverse = np.array([1.0, -1.0, -1.0, -1.0])
+    orders = [
+        ("their numbers are in the order x, y, z, w. Exchange the columns", read[:, [3, 0, 1, 2]]),
+        ("they turn the other way round. Change the sign of qw", read * inverse),
+        (
+            "their numbers are in the order x, y, z, w, and they turn the other way round. Mend the columns",
+            read[:, [3, 0, 1, 2]] * inverse,
+        ),
+    ]
+    tried = [(_turned(placed, some, mended), words) for words, mended in orders]
+    left, words = min(tried)
+    if left * _LEAST_IMPROVEMENT > given:
+        return []
+    return [Notice("quaternion-order", f"The quaternions do not turn as the robot does: {words}.", "error")]
+
+
+def _turned(placed: Robot, data: Dataset, quaternion: Array) -> float:
+    """Return how far a target's orientation on the flange differs from its mean, as a root mean square [rad]."""
+    _, R = placed.world_poses(data.postures)
+    left = []
+    for t in range(len(data.targets)):
+        mine = np.flatnonzero(data.has_orientation & (data.target == t))
+        if len(mine) < 2:
+            continue
+        on_flange = np.swapaxes(R[data.configuration[mine]], 1, 2) @ rotation_from_quaternion(quaternion[mine])
+        U, _, Vt = np.linalg.svd(on_flange.mean(axis=0))
+        mean = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
+        left.append(np.linalg.norm(rotation_vector(mean.T @ on_flange), axis=1))
+    return float(np.sqrt(np.mean(np.concatenate(left) ** 2))) if left else 0.0
+
+
+# -- parts of the data -------------------------------------------------------------------------------------
+
+
+def _some(data: Dataset) -> Dataset:
+    if data.configurations <= _CONFIGURATIONS_TRIED:
+        return data
+    return data.of_configurations(np.linspace(0, data.configurations - 1, _CONFIGURATIONS_TRIED).astype(np.intp))
+
+
+def _only(data: Dataset, target: int) -> Dataset:
+    kept = (data.target == target) & data.has_position
+
+    some = data.of_readings(kept)
+    return replace(some, target=np.zeros(len(some.target), dtype=np.intp), targets=(data.targets[target],))
+
+
+def _seen(data: Dataset, target: int) -> bool:
+    return bool((data.has_position & (data.target == target)).any())

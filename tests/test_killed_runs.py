@@ -194,6 +194,26 @@ def test_two_runs_into_one_folder_leave_one_of_them_whole(tmp_path: Path) -> Non
             assert all(hash_of((folder / name).read_bytes()) == known for name, known in one.files.items())
 
 
+def test_a_file_that_was_changed_later_is_not_what_the_others_describe(folder: Path, tmp_path: Path) -> None:
+    given = EXAMPLES["validate"](folder)
+    out = shutil.copytree(given["robot"].parent, tmp_path / "out")
+    robot = out / "calibrated.yaml"
+    programs = EXAMPLES["compensate"](folder)["programs"]
+
+    def codes() -> list[set[str]]:
+        made = truearm.validate(robot, given["data"]), truearm.compensate(robot, programs)
+        return [{notice.code for notice in one.warnings} & {"changed-since-written"} for one in made]
+
+    assert codes() == [set(), set()]
+    robot.write_text(robot.read_text() + "# looked at\n")
+    assert codes() == [{"changed-since-written"}] * 2
+    told = next(n for n in truearm.validate(robot, given["data"]).warnings if n.code == "changed-since-written")
+    assert "written together with result.json, report.html, calibrated.urdf" in told.message
+    alone = robot.rename(tmp_path / "calibrated.yaml")
+    robot = alone
+    assert codes() == [set(), set()]
+
+
 # -- what a reader says, and what stays readable
 
 

@@ -117,10 +117,7 @@ def refuse_unfinished(path: Path) -> None:
     InputError
         If it is one of them.
     """
-    places = {path.absolute()}
-    with suppress(OSError, RuntimeError, ValueError):  # links that lead round, a zero byte
-        places.add(path.resolve())
-    for place in places:
+    for place in _places(path):
         for folder, run in unfinished_above(place):
             if str(place.relative_to(folder)) in run.new.files:
                 raise InputError(
@@ -131,6 +128,28 @@ def refuse_unfinished(path: Path) -> None:
                     cure="Whatever writes into that folder next puts back what stood there before, so run that command"
                     f" again{f': {run.new.command}' if run.new.command else '.'}",
                 )
+
+
+def written_differently(path: Path) -> tuple[str, ...]:
+    """Return what was written together with a file that has been changed or exchanged since; empty for any other.
+
+    A run that was killed leaves its mark, so such a file was changed later, and the others do not describe it.
+    """
+    for place in _places(path):
+        for folder in place.parents:
+            name = str(place.relative_to(folder))
+            for one in sets_in(folder):
+                if name in one.files and hash_of(place.read_bytes()) != one.files[name]:
+                    return tuple(other for other in one.files if other != name)
+    return ()
+
+
+def _places(path: Path) -> set[Path]:
+    """Return where a file is, as it is named and with links followed."""
+    places = {path.absolute()}
+    with suppress(OSError, RuntimeError, ValueError):  # links that lead round, a zero byte
+        places.add(path.resolve())
+    return places
 
 
 def unfinished_above(path: Path) -> Iterator[tuple[Path, Unfinished]]:

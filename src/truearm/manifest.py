@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import stat
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -174,6 +176,8 @@ def _read_as_ours(path: Path) -> Iterator[None]:
 def _content(path: Path) -> dict[str, Any] | None:
     try:
         found = path.stat()
+        if _planted(found, path.parent):
+            return None
         if not stat.S_ISREG(found.st_mode) or found.st_size > _LARGEST:
             raise _not_ours(path)
         content = json.loads(path.read_bytes())
@@ -184,6 +188,14 @@ def _content(path: Path) -> dict[str, Any] | None:
     if not isinstance(content, dict) or content.get("truearm") != _SCHEMAS[path.name]:
         raise _not_ours(path)
     return content
+
+
+def _planted(found: os.stat_result, folder: Path) -> bool:
+    """Return whether a file is of somebody else, in a folder that everybody may write to: it is not believed."""
+    if sys.platform == "win32":
+        return False
+    place = folder.stat()
+    return bool(place.st_mode & stat.S_ISVTX) and found.st_uid not in (os.getuid(), place.st_uid)
 
 
 def _file_set(content: Any) -> FileSet:

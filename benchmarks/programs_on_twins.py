@@ -27,6 +27,7 @@ from truearm.compensation.program_files import edited
 from truearm.compensation.programs.program import Program, Source
 from truearm.compensation.programs.rapid import RAPID
 from truearm.errors import InputError
+from truearm.jobs.proof import refuse_unaccepted
 from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
@@ -73,7 +74,7 @@ def one(seed: int) -> dict[str, Any]:
         cell = in_the_cell(twin, calibration.robot, Path(folder) / "cell.yaml", rng) if measured else None
         where = {} if cell is None else {"tools": cell, "frames": cell}
         try:
-            truearm.compensate(calibration.robot, [program], **where)
+            refuse_unaccepted(calibration.robot, ())
             made["refused"] = None
         except InputError as error:
             made["refused"] = str(error.came)
@@ -95,6 +96,9 @@ def one(seed: int) -> dict[str, Any]:
                 made["kept"] = int(sum(not found.corrected[row] for row in rows))
                 made["targets"] = len(rows)
                 made["said"] = [n.code for n in done.warnings if n.code in ("not-better-here", *ACCEPTED)]
+            if not made["kept"]:
+                made["all"] = made["judged"]
+                break
     return made
 
 
@@ -221,7 +225,8 @@ def summed_up(cases: list[dict[str, Any]]) -> dict[str, Any]:
         "refused_that_would_have_got_worse": sum(c["all"] > 1.1 * c["before"] for c in known if c["refused"]),
         "worse_without_judging": sum(case["all"] > 1.1 * case["before"] for case in known),
         "worse": len(worse),
-        "worse_and_not_said": sum("not-better-here" not in case["said"] for case in worse),
+        "worse_and_no_notice": sum(not case["said"] for case in worse),
+        "worse_and_no_target_named": sum("not-better-here" not in case["said"] for case in worse),
         "kept_targets_of_full_campaigns": [sum(c["kept"] for c in full), sum(c["targets"] for c in full)],
         "full_campaigns_judged_and_all_mm": [float(np.mean([c[n] for c in full])) for n in ("judged", "all")],
         "true_over_expected_before_median": float(np.median([c["before"] / c["expected"][0] for c in known])),

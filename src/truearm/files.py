@@ -130,8 +130,7 @@ def read_yaml(path: Path, schema: type[Model]) -> Model:
     except MarkedYAMLError as error:
         mark = error.problem_mark
         where = f"{path}, line {mark.line + 1}" if mark else str(path)
-        problem = " ".join(str(error.problem or "not valid").split())
-        raise InputError(f"this is not valid YAML ({problem})", where=where) from error
+        raise _not_yaml(" ".join(str(error.problem or "not valid").split()), where) from error
     except YAMLError as error:
         raise InputError(f"this is not valid YAML ({' '.join(str(error).split())})", where=str(path)) from error
     except InputError:
@@ -165,6 +164,32 @@ def _refuse_multiplied(root: Any, path: Path) -> None:
         return counts[id(node)]
 
     refuse_beyond("entries", entries(root), where=str(path))
+
+
+#: What the YAML parser says, the same in plain words, and the cure; what is in quotes there is what came.
+_YAML_FAULTS: Final = (
+    ('duplicate key "([^"]*)"', "an entry is given twice", "Keep one of them."),
+    ("constructor for the tag '([^']*)'", "tags with ! cannot be used here", "Remove the tag."),
+    (
+        "undefined alias '?([^']*)'?",
+        "an alias with * stands for something that the file does not have",
+        "Write it out.",
+    ),
+    ("another document()", "a second document begins here, behind ---", "Keep one of them."),
+    (r"character '(\\t)'", "a tab stands where blanks belong", "Indent with blanks."),
+)
+
+
+def _not_yaml(problem: str, where: str) -> InputError:
+    for pattern, what, cure in _YAML_FAULTS:
+        found = re.search(pattern, problem)
+        if found is not None:
+            return InputError(what, where=where, came=found[1] or None, cure=cure)
+    return InputError(
+        f"this is not valid YAML ({problem})",
+        where=where,
+        cure="Look for a quote, a bracket or a colon too many or too few, here or in the line above.",
+    )
 
 
 def path_argument(path: object, parameter: str) -> Path:

@@ -105,7 +105,6 @@ def test_noise_that_was_estimated_widens_the_interval(tmp_path: Path) -> None:
     ("change", "words"),
     [
         ({"status": Status.NOT_CONVERGED}, "did not converge"),
-        ({"status": Status.IMPLAUSIBLE}, "cannot be this robot"),
         ({"model": FRAMES}, "geometry counts as exact"),
         ({"at_bound": ("a_1",)}, "values at a bound"),
         ({"excess": 2.0}, "the model cannot express"),
@@ -116,6 +115,14 @@ def test_what_makes_it_a_lower_bound(change: dict[str, object], words: str, tmp_
     assert not expected_error(fit).lower_bound
     (omission,) = expected_error(replace(fit, **change)).omissions  # type: ignore[arg-type]
     assert words in omission
+
+
+def test_what_cannot_be_this_robot_is_no_more_than_a_lower_bound() -> None:
+    _, data = campaign("irb120", 30, 0.02e-3, 1)
+    found = calibrate(IRB120, replace(data, position=data.position * 1e3))
+    assert found.status is Status.IMPLAUSIBLE
+    assert "what was fitted cannot be this robot" in found.expected.omissions
+    assert "narrow-data" not in {n.code for n in found.warnings}
 
 
 def narrowed(degrees: float) -> Robot:

@@ -22,6 +22,7 @@ from truearm.identification.judging.expected_error import expected_error
 from truearm.identification.judging.implausible import check_plausible
 from truearm.identification.judging.left_over import LeftOver
 from truearm.identification.judging.narrow_data import check_narrow_data
+from truearm.identification.judging.one_sided import check_one_sided
 from truearm.identification.judging.sigma import check_sigma
 from truearm.identification.judging.transmission import check_transmission
 from truearm.identification.solving.bounds import Bounds, read_bounds
@@ -232,10 +233,15 @@ def calibrate(
     validation = None if second is None else errors_of(fit.robot, second)
     before = errors_of(nominal.robot, judged)
     train_errors = errors_of(fit.robot, first)
-    expected = expected_error(fit)
     # What the robust fit of the check could not explain, the fit itself may.
     noticed = tuple(notice for notice in noticed if notice.code != Status.IMPLAUSIBLE.value)
     unlike = check_plausible(fit, first, noticed)
+    expected = expected_error(fit, plausible=not unlike)
+    narrow = (
+        []
+        if unlike
+        else check_narrow_data(fit, expected, first, validation or train_errors, held_out=validation is not None)
+    )
     left_over = LeftOver.of(fit, readings)
     history = (
         f"calibrated by truearm {__version__}: model {' + '.join([chosen.name, *effects])},"
@@ -255,8 +261,9 @@ def calibrate(
             *_check_copies(readings, training, held_out),
             *moved,
             *check_fit(fit, expected, doubted=has_error([*unlike, *noticed])),
-            *check_narrow_data(fit, expected, first, validation or train_errors, held_out=validation is not None),
+            *narrow,
             *(notice for notice in noticed if notice.level != "error"),
+            *check_one_sided(fit, first),
             *check_sigma(left_over),
             *check_changes(left_over),
             *check_arrival_lag(left_over),

@@ -12,6 +12,7 @@ from truearm.errors import InputError, refusals_of
 from truearm.files import path_argument, read_bytes
 from truearm.identification.judging.target_names import check_names
 from truearm.jobs.arguments import data_argument, gravity_argument, payload_argument, refuse_swapped, robot_argument
+from truearm.jobs.proof import changed_since
 from truearm.measurement.checks import check_joints
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of
@@ -50,6 +51,7 @@ def validate(
     if isinstance(data, str | Path):
         digest = hashlib.sha256(read_bytes(path_argument(data, "data"))).hexdigest()
     data = data_argument(data)
+    changed = changed_since(robot)
     robot = as_measured(robot, data, payload, gravity)
     identified = {p.group for p in robot.parameters.values() if p.deviation is not None}
     if data.anchored and robot.fixtures and identified and "base" not in identified:
@@ -61,7 +63,7 @@ def validate(
             "'truearm distances'.",
         )
     errors = errors_of(robot, data)
-    warnings = (*check_names(robot, data, errors), *_seen_in_training(robot, data, digest))
+    warnings = (*changed, *check_names(robot, data, errors), *_seen_in_training(robot, data, digest))
     return Validation(data.source, errors, warnings)
 
 

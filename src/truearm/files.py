@@ -186,6 +186,11 @@ _YAML_FAULTS: Final = (
         "an alias with * stands for something that the file does not have",
         "Write it out.",
     ),
+    (
+        "unhashable key()",
+        "a list or a table stands where the name of an entry belongs",
+        "Write a name before the colon.",
+    ),
     ("another document()", "a second document begins here, behind ---", "Keep one of them."),
     (r"character '(\\t)'", "a tab stands where blanks belong", "Indent with blanks."),
 )

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from tests.simulated import campaign
 
-from truearm.identification.judging.expected_error import expected_error, expected_map
+from truearm.identification.judging.expected_error import as_residuals_allow, expected_error, expected_map
 from truearm.identification.solving.fit import Fit, Status, identify
 from truearm.identification.solving.models import FRAMES, MODELS, Model
 from truearm.jobs.calibrate import calibrate
@@ -92,6 +92,21 @@ def test_an_error_of_every_arrival_is_in_the_error_to_expect_and_makes_it_a_lowe
     assert found.overall.mean * 0.85 < low < high < found.overall.mean * 1.15
     assert found.lower_bound
     assert "the model cannot express" in found.omissions[0]
+
+
+def test_joint_errors_count_as_far_as_the_residuals_allow() -> None:
+    """Errors of an arrival in all joints, found ten times too large."""
+    twin, data = campaign("irb120", 40, 0.02e-3, 1)
+    rng = np.random.default_rng(0)
+    repeatability = np.radians(0.01)
+    jogged = measure(twin, data.joints + repeatability * rng.standard_normal(data.joints.shape), 0.02e-3, rng)
+    data = replace(data, position=jogged.position)
+    fit = identify(IRB120, data, MODEL["geometric"])
+    true = replace(fit, joint_error=np.full(6, repeatability), sigma={"position": 0.02e-3})
+    np.testing.assert_allclose(as_residuals_allow(true, data).joint_error, repeatability, rtol=0.25)
+    large = replace(true, joint_error=10 * true.joint_error)
+    np.testing.assert_allclose(as_residuals_allow(large, data).joint_error, repeatability, rtol=0.35)
+    assert not as_residuals_allow(replace(large, sigma={"position": 1.0}), data).joint_error.any()
 
 
 def test_noise_that_was_estimated_widens_the_interval(tmp_path: Path) -> None:

@@ -135,7 +135,7 @@ class PositionErrors:
         names, root = covariance_root(self.fit)
         rng = np.random.default_rng(self.seed)
         drawn = root @ rng.standard_normal((self.draws, root.shape[1])).T
-        if not self.fit.declared or self.fit.excess > 1.0:
+        if not self.fit.declared or self.fit.excess > 1.0 or self.fit.joint_error.any():
             # The noise was estimated too: Student's distribution (Gelman et al. 2013, section 3.2).
             freedom = _freedom(self.fit)
             drawn *= np.sqrt(freedom / rng.chisquare(freedom, self.draws))

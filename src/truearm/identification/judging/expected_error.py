@@ -135,11 +135,18 @@ class PositionErrors:
         names, root = covariance_root(self.fit)
         rng = np.random.default_rng(self.seed)
         drawn = root @ rng.standard_normal((self.draws, root.shape[1])).T
-        if not self.fit.declared or self.fit.excess > 1.0 or self.fit.joint_error.any():
-            # The noise was estimated too: Student's distribution (Gelman et al. 2013, section 3.2).
-            freedom = _freedom(self.fit)
-            drawn *= np.sqrt(freedom / rng.chisquare(freedom, self.draws))
-        return dict(zip(names, drawn, strict=True))
+        return dict(zip(names, drawn * self._scale, strict=True))
+
+    @cached_property
+    def _scale(self) -> Array:
+        """How many times larger the errors of each draw are, ``(draws,)``: Student's distribution.
+
+        Variances that were estimated are uncertain themselves (Gelman et al. 2013, section 3.2).
+        """
+        if self.fit.declared and self.fit.excess == 1.0 and not self.fit.joint_error.any():
+            return np.ones(self.draws)
+        freedom = _freedom(self.fit)
+        return np.asarray(np.sqrt(freedom / np.random.default_rng((self.seed, 3)).chisquare(freedom, self.draws)))
 
     @cached_property
     def _bent(self) -> bool:
@@ -159,7 +166,7 @@ class PositionErrors:
         fit, at = self.fit, self.fit.robot.loaded(joints)
         shape = (self.draws, len(joints), len(fit.joint_error))
         normal = np.random.default_rng((self.seed, 1)).standard_normal(shape) if fit.joint_error.any() else None
-        shared = None if normal is None else normal * fit.joint_error
+        shared = None if normal is None else normal * fit.joint_error * self._scale[:, None, None]
         moves: Iterable[Array] = _moves(fit, at, self._errors, shared, exact=self._bent)
         if fit.gauge_freedoms:
             moves = _without_gauge(fit, at, np.stack([*moves]))
@@ -271,8 +278,10 @@ def _omissions(fit: Fit, remainder: float, overall: Expectation, *, plausible: b
         yield "the robot's own geometry counts as exact"
     if fit.at_bound:
         yield "values at a bound count as exact"
-    if fit.excess > 1.0 or remainder**2 > _REMAINDER * overall.mean**2:
+    if fit.excess > 1.0:
         yield "the robot does something that the model cannot express, and it may do more of it elsewhere"
+    elif remainder**2 > _REMAINDER * overall.mean**2:
+        yield "what the model cannot express is in it only as far as it was seen where the robot was measured"
 
 
 def _freedom(fit: Fit) -> float:

@@ -73,7 +73,7 @@ EARLIER: dict[str, Arguments] = {
     "simulate": {"seed": 2},
     "axes": {"frame": "instrument"},
     "hexapod_plan": {"fixture": (0.24, 0.0, 0.1, -0.5)},
-    "compensate": {"split": None},
+    "compensate": {"split": None, "accept": ["not-better-here"]},
     "study": {"seeds": 2},
 }
 
@@ -138,11 +138,12 @@ def tried(job: str, folder: Path, *, earlier: bool) -> str:
     old = contents(out) if out.exists() else {}
     number = copies(lambda: call(**given), out, kept)
     written = together(out)
-    names = {*contents(out)}
+    new = contents(out)
+    names = {*new}
     seen: dict[str, int] = {}
     healed: list[object] = []
     for copy in sorted(kept.iterdir()):
-        word = found(copy, old, written)
+        word = found(copy, old, new, written)
         seen[word] = seen.get(word, 0) + 1
         if job == "compensate" and (copy / "plate.mod").exists():
             try:

@@ -14,6 +14,7 @@ from truearm.schemas import Model, validated
 
 #: What an entry of a YAML file cannot do without, unless it is the first: one of these stands before it.
 _BETWEEN_ENTRIES: Final = ("\n", ",", ":", "[", "{", "- ", "-\t", "? ")
+_BRACKET: Final = re.compile(r"[\[\]{}]")
 #: An entry that stands for another one, or what looks like it.
 _ALIAS: Final = re.compile(r"(?:^|[\s\[{,:])\*[^\s\[\]{},]")
 #: What is read but is no file, for messages. Whoever reads them may wait for ever, or never come to an end.
@@ -122,6 +123,7 @@ def read_yaml(path: Path, schema: type[Model]) -> Model:
     from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
     text = read_text(path, "yaml_size")
+    refuse_beyond("nesting", _deepest(text), where=str(path))
     refuse_beyond("entries", 1 + sum(map(text.count, _BETWEEN_ENTRIES)), where=str(path))
     try:
         if _ALIAS.search(text):
@@ -143,6 +145,15 @@ def read_yaml(path: Path, schema: type[Model]) -> Model:
             f"a value cannot be understood ({reason})", where=str(path), cure="Put text into quotes."
         ) from error
     return validated(content, schema, str(path))
+
+
+def _deepest(text: str) -> int:
+    """Return how many brackets are open at once in a YAML document, those in quotes and comments included."""
+    depth = deepest = 0
+    for found in _BRACKET.finditer(text):
+        depth = depth + 1 if found[0] in "[{" else max(depth - 1, 0)
+        deepest = max(deepest, depth)
+    return deepest
 
 
 def _refuse_multiplied(root: Any, path: Path) -> None:
@@ -174,6 +185,11 @@ _YAML_FAULTS: Final = (
         "undefined alias '?([^']*)'?",
         "an alias with * stands for something that the file does not have",
         "Write it out.",
+    ),
+    (
+        "unhashable key()",
+        "a list or a table stands where the name of an entry belongs",
+        "Write a name before the colon.",
     ),
     ("another document()", "a second document begins here, behind ---", "Keep one of them."),
     (r"character '(\\t)'", "a tab stands where blanks belong", "Indent with blanks."),

@@ -135,7 +135,7 @@ lines: Callable[..., Any] = partial(truearm.lines, "kr5")
         (lambda: lines((2.85, 0.0, 0.6)), "centre", "cannot go to a pose"),
         (lambda: lines(CENTRE, size=(0.6, 0.0, 0.4)), "size", "three sizes above zero"),
         (lambda: lines(CENTRE, noise=-1e-5), "noise", "the length is out of range"),
-        (lambda: lines(CENTRE, repeats=0), "repeats", "allowed: 1 to 1000000"),
+        (lambda: lines(CENTRE, repeats=0), "repeats", "allowed: 1 to 100000"),
         (lambda: lines(CENTRE, seed=-1), "seed", "allowed: 0 or more"),
         (lambda: lines(CENTRE, truth="nominal", data="x.csv"), "truth, data", "only one of them"),
         (lambda: lines(CENTRE, truth="axis-test"), "truth", "Did you mean axis-tests?"),

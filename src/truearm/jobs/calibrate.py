@@ -47,6 +47,7 @@ from truearm.jobs.arguments import (
     whole_argument,
 )
 from truearm.jobs.check import notices_of
+from truearm.jobs.validate import trained_on
 from truearm.library import urdf_source
 from truearm.measurement.checks import check_joints
 from truearm.measurement.dataset import Dataset, IntArray
@@ -175,9 +176,9 @@ def calibrate(
             asked.free(asked.prepared(nominal_robot))
     progress("reading the data")
     readings = data_argument(data)
-    digest = ""
+    sha256 = None
     if isinstance(data, str | Path):
-        digest = f" (sha256 {hashlib.sha256(read_bytes(path_argument(data, 'data'))).hexdigest()[:12]})"
+        sha256 = hashlib.sha256(read_bytes(path_argument(data, "data"))).hexdigest()
     bounds_file = str(bounds) if isinstance(bounds, str | Path) else "bounds"
     if bounds is not None and not isinstance(bounds, Bounds):
         with refusals_of("bounds"):
@@ -243,6 +244,7 @@ def calibrate(
         else check_narrow_data(fit, expected, first, validation or train_errors, held_out=validation is not None)
     )
     left_over = LeftOver.of(fit, readings)
+    digest = "" if sha256 is None else f" (sha256 {sha256[:12]})"
     history = (
         f"calibrated by truearm {__version__}: model {' + '.join([chosen.name, *effects])},"
         f" {count} of {n} configurations of {Path(readings.source).name}{digest}, seed {seed}, loss {loss},"
@@ -259,6 +261,7 @@ def calibrate(
             *unlike,
             *_check_proof(before, validation),
             *_check_copies(readings, training, held_out),
+            *_check_trained_before(nominal_robot, sha256, (count, n, seed)),
             *moved,
             *check_fit(fit, expected, doubted=has_error([*unlike, *noticed])),
             *narrow,
@@ -374,6 +377,29 @@ def _check_copies(data: Dataset, training: IntArray, held_out: IntArray) -> list
                     *(["Judge it at other joint positions with 'truearm validate'."] if again else []),
                 ]
             ),
+        )
+    ]
+
+
+def _check_trained_before(robot: Robot, sha256: str | None, split: tuple[int, int, int]) -> list[Notice]:
+    """Say if the robot to begin with has been trained on what is held out now.
+
+    Parameters
+    ----------
+    sha256
+        Of the data; None if they are no file.
+    split
+        How many configurations are trained on, of how many, and the seed.
+    """
+    before = None if sha256 is None else trained_on(robot, sha256)
+    if before is None or before == split or split[0] == split[1]:
+        return []
+    return [
+        Notice(
+            "training-data",
+            f"The robot to begin with was calibrated with this file already, on {before[0]} of its {before[1]} "
+            f"configurations (seed {before[2]}): what is held out now was partly seen then, and the held-out errors "
+            "flatter it. Begin with the nominal robot, or with the same `train` and `seed`.",
         )
     ]
 

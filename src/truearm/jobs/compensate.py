@@ -27,7 +27,7 @@ from truearm.jobs.arguments import (
     python_call,
     robot_argument,
 )
-from truearm.jobs.proof import NOT_BETTER, accept_argument, known_of, refuse_unaccepted
+from truearm.jobs.proof import NOT_BETTER, accept_argument, changed_since, known_of, refuse_unaccepted
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
 from truearm.results.program_correction import REPORT, FileCorrection, ProgramCorrection
@@ -144,7 +144,7 @@ def compensate(
         files=tuple(corrected),
         result=result,
         splits=splits,
-        warnings=(*known_of(arm), *check_correction(arm, result, splits)),
+        warnings=(*changed_since(robot), *known_of(arm), *check_correction(arm, result, splits)),
         command=invocation,
         inputs=files_of(robot, tools, frames),
     )

@@ -205,6 +205,7 @@ class Evaluation:
         names = self.problem.free.names
         # Parameter by parameter in memory: as forward kinematics gives it, and as QR decompositions take it.
         shape = (*self.vector.shape[:-1], len(names), self.problem.rows)
+        refuse_beyond("parameters", len(names), where=self.problem.data.source)
         refuse_beyond("derivatives", math.prod(shape), where=self.problem.data.source)
         J = np.empty(shape)
         by_parameter = np.moveaxis(J, -2, 0)

@@ -38,6 +38,7 @@ Redundant = Literal["prior", "drop"]
 #: Noise assumed for readings that declare none, until their own residuals say better [m, rad].
 _FIRST_NOISE: Final = {observation.name: 1e-4 for observation in OBSERVATIONS}
 _NOISE_FLOOR: Final = 1e-9
+_LEAST_WIDENED: Final = 1e-12
 #: What the variances of readings with declared deviations are counted under.
 DECLARED: Final = "declared"
 #: Rounds until deviations and loads agree with the solution; each leaves a hundredth of the loads' error or less.
@@ -207,16 +208,19 @@ def components_found(
     )
     kinds = np.array([joint.kind for joint in problem.robot.joints])
     alike = [np.flatnonzero(kinds == kind) for kind in dict.fromkeys(kinds.tolist())]
+    free = [name not in (DECLARED, SETUP) for name in names]
+    least = np.array(
+        [(_NOISE_FLOOR / problem.noise[n]) ** 2 if f else _LEAST_WIDENED for f, n in zip(free, names, strict=True)]
+    )
     if before is not None:
-        found = variance_components(at, before.estimated, alike, before)
+        found = variance_components(at, before.estimated, least, alike, before)
     else:
-        free = [name not in (DECLARED, SETUP) for name in names]
-        found = variance_components(at, free, alike)
+        found = variance_components(at, free, least, alike)
         if DECLARED in names:
             place = names.index(DECLARED)
             if beyond_chance(float(found.squares[place]), max(float(found.freedom[place]), 1e-3)):
                 free[place] = True
-                found = variance_components(at, free, alike)
+                found = variance_components(at, free, least, alike)
     covariance = np.zeros((len(prior), len(prior)))
     covariance[np.ix_(uncertain, uncertain)] = found.covariance
     return replace(found, covariance=covariance)

@@ -26,7 +26,7 @@ _SIGNIFICANT: Final = 5.41
 _STEPS: Final = 40
 _LARGEST_STEP: Final = 2.0  # in the logarithm of a variance
 _FURTHER: Final = 4.0  # how many times longer than the information says
-_SETTLED: Final = 1e-3  # what a step may still gain in twice the log-likelihood
+_SETTLED: Final = 1e-5  # what a step may still gain in twice the log-likelihood
 #: Least excess of a variance without errors of the joints that a difference of the parameters is judged by.
 _LEAST_DIFFERENCE: Final = 0.05
 #: Of the logarithm of a variance: what is known of it beforehand.
@@ -258,6 +258,7 @@ class Components:
 def variance_components(
     at: Linearised,
     estimated: Sequence[bool],
+    least: Array,
     kinds: Sequence[NDArray[np.intp]],
     before: Components | None = None,
 ) -> Components:
@@ -272,6 +273,8 @@ def variance_components(
     ----------
     estimated
         Whether the variance of each factor is free; else it is as assumed.
+    least
+        What each factor is at least, ``(factors,)``: readings without noise leave but rounding.
     kinds
         Joints that share one variance; of joints that are in none it is zero.
     before
@@ -279,14 +282,17 @@ def variance_components(
         there are errors of the joints, and whether they explain the residuals, is as it was.
     """
     moments = _Moments(at, len(estimated))
-    noise = [index for index, free in enumerate(estimated) if free]
+    start = np.ones(len(estimated))
+    for index in np.flatnonzero(estimated).tolist():
+        start[index] = max(float(np.mean(at.residual[at.factor == index] ** 2)), float(least[index]))
+    noise = [index for index, free in enumerate(estimated) if free and start[index] > least[index]]
     if before is None:
-        alone, best = _with_and_without(at, moments, kinds, noise)
+        alone, best = _with_and_without(moments, start, kinds, noise)
         likeliest = Variances(best.factors, best.joints)
         holds = (best is alone or _agree(alone, best)) and _independent(best)
         best = best if holds else alone
     else:
-        best = _State(moments, np.ones(len(estimated)), before.weighing.joints)
+        best = _State(moments, np.where(start > least, 1.0, start), before.weighing.joints)
         best = _maximised(moments, best, [kind for kind in kinds if best.joints[kind].any()], noise)
         holds, likeliest = before.holds, Variances(best.factors, best.joints)
         if before.likeliest is not before.weighing:
@@ -310,13 +316,10 @@ def variance_components(
 
 
 def _with_and_without(
-    at: Linearised, moments: _Moments, kinds: Sequence[NDArray[np.intp]], noise: Sequence[int]
+    moments: _Moments, start: Array, kinds: Sequence[NDArray[np.intp]], noise: Sequence[int]
 ) -> tuple[_State, _State]:
     """Return the largest likelihood without errors of the joints and with them; the first twice if they gain little."""
-    start = np.ones(len(moments.rows))
-    for index in noise:
-        start[index] = max(float(np.mean(at.residual[at.factor == index] ** 2)), 1e-30)
-    alone = _maximised(moments, _State(moments, start, np.zeros(at.by_joints.shape[1])), [], noise)
+    alone = _maximised(moments, _State(moments, start, np.zeros(moments.M.shape[-1])), [], noise)
     best = alone
     for _ in kinds:
         waiting = [kind for kind in kinds if not best.joints[kind].any()]
@@ -406,8 +409,8 @@ def _maximised(moments: _Moments, start: _State, kinds: Sequence[NDArray[np.intp
             break
         if before is not None:  # as much further as the last step fell short: the information is but an average
             last, then = before
-            further, short = float(then @ last), float((then - slope) @ last)
-            step *= float(np.clip(further / max(short, abs(further) / _FURTHER, 1e-300), 0.3, _FURTHER))
+            gain, fall = float(then @ last), float((then - slope) @ last)
+            step *= _FURTHER if gain > max(0.0, _FURTHER * fall) else 0.3 if fall <= 0.0 else max(0.3, gain / fall)
         step *= min(1.0, _LARGEST_STEP / float(np.abs(step).max() + 1e-300))
         for _ in range(12):
             there = _at(moments, here, free, value * np.exp(step))

@@ -25,6 +25,7 @@ from truearm.measurement.statistics import errors_of
 from truearm.modeling.chain import Array, ForwardKinematics
 from truearm.modeling.parts import Payload
 from truearm.modeling.postures import Postures
+from truearm.modeling.robot import Robot
 
 #: Configurations at which positions are asked for, and draws of the parameters' errors: fewer for many targets.
 _CONFIGURATIONS: Final = (60, 200)
@@ -133,9 +134,12 @@ class PositionErrors:
     def _errors(self) -> dict[str, Array]:
         """Errors of the parameters by name, ``(draws,)`` each [SI]."""
         names, root = covariance_root(self.fit)
-        rng = np.random.default_rng(self.seed)
-        drawn = root @ rng.standard_normal((self.draws, root.shape[1])).T
-        return dict(zip(names, drawn * self._scale, strict=True))
+        normal = np.random.default_rng(self.seed).standard_normal((self.draws, root.shape[1]))
+        if self.draws > 2 * root.shape[1]:
+            # So few draws have a covariance of their own: they are turned and stretched to the one they are drawn from.
+            normal -= normal.mean(axis=0)
+            normal = np.linalg.qr(normal)[0] * math.sqrt(self.draws)
+        return dict(zip(names, root @ normal.T * self._scale, strict=True))
 
     @cached_property
     def _scale(self) -> Array:
@@ -192,7 +196,7 @@ def expected_error(fit: Fit, seed: int = 0, *, plausible: bool = True) -> Expect
     count = min(many, max(few, _POSITIONS // max(len(robot.targets), 1)))
     few, many = _DRAWS
     draws = min(many, max(few, _LENGTHS // (count * max(len(robot.targets), 1))))
-    joints = robot.random_configurations(count, np.random.default_rng(seed))
+    joints = _all_over(robot, count, np.random.default_rng(seed))
     lengths = PositionErrors(fit, draws, seed).at(joints)
     overall = _expectation(lengths.reshape(draws, -1))
     remainder = _remainder(fit, joints)
@@ -246,6 +250,16 @@ def expected_map(fit: Fit, positions: int, seed: int = 0) -> tuple[Array, Array]
     joints = robot.random_configurations(count, np.random.default_rng((seed, 2)))
     error = PositionErrors(fit, _DRAWS[0], seed).at(joints).mean(axis=0)
     return np.concatenate([robot.forward(joints, target=target.name)[0] for target in robot.targets]), error.reshape(-1)
+
+
+def _all_over(robot: Robot, count: int, rng: np.random.Generator) -> Array:
+    """Return joint positions ``(count, joints)``, evenly spread within the limits of every joint.
+
+    A Latin hypercube (McKay, Beckman and Conover 1979): means over it vary less than over independent ones.
+    """
+    low, high = np.array([joint.range for joint in robot.joints]).T
+    slices = rng.permuted(np.tile(np.arange(count), (len(low), 1)), axis=1).T
+    return np.asarray(low + (high - low) * (slices + rng.random(slices.shape)) / count)
 
 
 def _expectation(lengths: Array) -> Expectation:

@@ -155,6 +155,23 @@ def test_what_is_expected_is_told(robot: Robot, program: Path, tmp_path: Path) -
     assert f'<td class="n">{1e3 * now.mean():.3f}</td>' in page
 
 
+def test_targets_that_were_measured_nowhere_near_are_named(robot: Robot, program: Path) -> None:
+    assert robot.proof is not None
+    known = truearm.compensate(robot, [program])
+    assert "beyond-measured" not in codes(known)
+    (low, high), *others = robot.proof.region
+    turned = ((low + 2 * np.pi, high + 2 * np.pi), *others)
+    assert "beyond-measured" not in codes(
+        truearm.compensate(sealed(robot, replace(robot.proof, region=turned)), [program])
+    )
+    elsewhere = sealed(robot, replace(robot.proof, region=((1.5, 2.0), *others)))
+    (notice,) = [n for n in truearm.compensate(elsewhere, [program]).warnings if n.code == "beyond-measured"]
+    assert (
+        "44 targets were corrected although axis_1 stood nowhere near in calibration: plate.mod line 7"
+        in notice.message
+    )
+
+
 def test_a_lower_bound_is_called_one(robot: Robot, program: Path) -> None:
     assert robot.proof is not None
     for bound in (True, False):
@@ -172,6 +189,8 @@ def test_targets_that_rather_get_worse_are_kept_and_listed(robot: Robot, program
     kept = [row for row in file.not_better if not file.correction.corrected[row]]
     assert kept
     assert codes(done)["not-better-here"] == "warning"
+    (assumed,) = [notice for notice in done.warnings if notice.code == "frames-assumed"]
+    assert "so few targets" not in assumed.message
     told = done.summary()["programs"][0]
     assert told["corrected"] == 44 - len(kept)
     assert len(told["not_better"]) == len(file.not_better)

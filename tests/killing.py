@@ -34,7 +34,7 @@ def operations(work: Callable[[], object], folder: Path) -> int:
 
     def counting() -> None:
         done = [0]
-        _before_each(folder, lambda _: done.__setitem__(0, done[0] + 1))
+        before_each(folder, lambda _: done.__setitem__(0, done[0] + 1))
         work()
         os.write(writing, str(done[0]).encode())
 
@@ -59,7 +59,7 @@ def killed(work: Callable[[], object], folder: Path, number: int) -> None:
                 os.kill(os.getpid(), signal.SIGKILL)
             left[0] -= 1
 
-        _before_each(folder, hook)
+        before_each(folder, hook)
         work()
 
     status = _in_a_copy(until)
@@ -80,7 +80,7 @@ def between(one: Callable[[], object], other: Callable[[], object], folder: Path
                 if not _is_locked(folder):  # it is not in the way of the other, which comes in between as a whole
                     assert _end(children.pop()) == 0
 
-        _before_each(folder, hook)
+        before_each(folder, hook)
         one()
         left[0] = -1
         for child in children:
@@ -109,15 +109,16 @@ def done(work: Callable[[], object]) -> bool:
     return status == 0
 
 
-def found(folder: Path, old: dict[str, bytes], written: list[set[str]]) -> str:
+def found(folder: Path, old: dict[str, bytes], new: dict[str, bytes], written: list[set[str]]) -> str:
     """Return what readers find where a run was killed: old, new or refused; a mixture fails.
 
     Parameters
     ----------
-    old
-        What stood in the folder before, by name.
+    old, new
+        What stood in the folder before, and what the run writes, by name. A file is new as soon as it is not the old
+        one; one that is the same in both says nothing.
     written
-        The names of the files that belong together. A file is new as soon as it is not the old one.
+        The names of the files that belong together.
     """
     words = set()
     for names in written:
@@ -133,17 +134,18 @@ def found(folder: Path, old: dict[str, bytes], written: list[set[str]]) -> str:
                     states[name] = "refused"
                     continue
                 content = None
-            states[name] = "old" if content == old.get(name) else "new"
+            if old.get(name) != new[name]:
+                states[name] = "old" if content == old.get(name) else "new"
         seen = {state for name, state in states.items() if state != "old" or name in old}
         if "refused" in seen:
             assert all("again" in cure for cure in refused)
-            there = {states[name] for name in names if (folder / name).exists()}
+            there = {states.get(name) for name in names if (folder / name).exists()}
             assert there == {"refused"}, f"some of these can be read, and others not: {states}"
             words.add("refused")
             continue
-        assert len(set(states.values())) == 1, f"a mixture: {states}"
-        words.add(next(iter(states.values())))
-    return next(word for word in ("refused", "new", "old") if word in words)
+        assert len(set(states.values())) <= 1, f"a mixture: {states}"
+        words |= set(states.values())
+    return next((word for word in ("refused", "new", "old") if word in words), "the same")
 
 
 def leftovers(folder: Path) -> list[str]:
@@ -184,7 +186,7 @@ def _copy(work: Callable[[], object]) -> int:
     return child
 
 
-def _before_each(folder: Path, hook: Callable[[Callable[[], object] | None], None]) -> None:
+def before_each(folder: Path, hook: Callable[[Callable[[], object] | None], None]) -> None:
     """Call a hook before every operation below a folder, in this process and for ever."""
     inside = str(folder.resolve())
 

@@ -30,6 +30,18 @@ class Anything(BaseModel):
         ("a: !!int ''", "a value cannot be understood"),
         ("%YAML 1.3\n---\na: 1", "a value cannot be understood (version"),
         ("a: \x07", "this is not valid YAML"),
+        ("a: 1\na: 2", "f.yaml, line 2: an entry is given twice; got 'a'. Keep one of them."),
+        (
+            "a: !!python/object:os.system x",
+            "tags with ! cannot be used here; got 'tag:yaml.org",
+        ),
+        ("a: *y", "line 1: an alias with * stands for something that the file does not have; got 'y'"),
+        ("a: 1\n---\na: 2", "line 2: a second document begins here, behind ---"),
+        ("a:\tb\n\tc: 1", "line 1: a tab stands where blanks belong"),
+        (
+            "a: {b: 1",
+            "this is not valid YAML (expected ',' or '}', but got '<stream end>'). Look",
+        ),
         (
             "a: 0x" + "f" * 6000,
             "f.yaml, a: a text belongs here; got a number of very many digits; allowed: a text, in quotes",

@@ -27,6 +27,10 @@ OLD = {"a": "old a", "folder/c": "old c"}
 NEW = {"a": "new a", "b": "new b", "folder/c": "new c"}
 
 
+def in_bytes(texts: dict[str, str]) -> dict[str, bytes]:
+    return {name: text.encode() for name, text in texts.items()}
+
+
 def fresh(folder: Path, old: dict[str, str]) -> Path:
     if folder.exists():
         shutil.rmtree(folder)
@@ -51,7 +55,7 @@ def unfinished(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize("old", [{}, OLD])
 def test_several_files_are_old_or_new_or_refused(tmp_path: Path, old: dict[str, str]) -> None:
     folder = tmp_path / "out"
-    before = {name: text.encode() for name, text in old.items()}
+    before, as_new = in_bytes(old), in_bytes(NEW)
     seen = set()
 
     def work() -> None:
@@ -61,9 +65,9 @@ def test_several_files_are_old_or_new_or_refused(tmp_path: Path, old: dict[str, 
     for number in range(operations(work, tmp_path)):
         fresh(folder, old)
         killed(work, tmp_path, number)
-        seen.add(found(folder, before, [set(NEW)]))
+        seen.add(found(folder, before, as_new, [set(NEW)]))
         work()
-        assert contents(folder) == {name: text.encode() for name, text in NEW.items()}
+        assert contents(folder) == as_new
         assert leftovers(folder) == []
     assert seen == {"old", "refused", "new"}
     assert [set(one.files) for one in sets_in(folder)] == [set(NEW)]
@@ -80,15 +84,15 @@ def test_a_single_file_is_old_or_new(tmp_path: Path) -> None:
 
 def test_a_run_that_heals_may_be_killed_too(tmp_path: Path, unfinished: Path) -> None:
     folder = tmp_path / "out"
-    before = {name: text.encode() for name, text in OLD.items()}
+    before, as_new = in_bytes(OLD), in_bytes(NEW)
     shutil.copytree(unfinished, folder)
     for number in range(operations(lambda: write_files(folder, NEW), folder)):
         shutil.rmtree(folder)
         shutil.copytree(unfinished, folder)
         killed(lambda: write_files(folder, NEW), folder, number)
-        found(folder, before, [set(NEW)])
+        found(folder, before, as_new, [set(NEW)])
         write_files(folder, NEW)
-        assert contents(folder) == {name: text.encode() for name, text in NEW.items()}
+        assert contents(folder) == as_new
         assert leftovers(folder) == []
 
 
@@ -103,7 +107,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def corrections(folder: Path) -> tuple[ProgramCorrection, ProgramCorrection]:
     """A program corrected in two ways."""
-    given = EXAMPLES["compensate"](folder) | {"out": None}
+    given = EXAMPLES["compensate"](folder) | {"out": None, "accept": ["not-better-here"]}
     return truearm.compensate(**given), truearm.compensate(**given | {"split": None})
 
 
@@ -127,10 +131,11 @@ def test_a_program_is_never_corrected_twice(
     first.save(tmp_path / "first")
     before = prepare()
     texts = written_by(second)
+    assert before.get("plate.mod") != texts["plate.mod"]
     for number in range(operations(work, out)):
         prepare()
         killed(work, tmp_path, number)
-        found(out, before, [set(texts)])
+        found(out, before, texts, [set(texts)])
         if (out / "plate.mod").exists():
             with pytest.raises(InputError, match=r"corrected already|has not finished"):
                 program_files([out / "plate.mod"])
@@ -141,19 +146,15 @@ def test_a_program_is_never_corrected_twice(
                 assert program_files([out / "plate.mod"], again=True)[0].original == original
                 assert restored([out / "plate.mod"])[0].original == original
         work()
-        assert contents(out) == {name: as_bytes(text) for name, text in texts.items()}
+        assert contents(out) == texts
         assert leftovers(out) == []
 
 
-def written_by(correction: ProgramCorrection) -> dict[str, str | bytes]:
+def written_by(correction: ProgramCorrection) -> dict[str, bytes]:
     """Return what a correction writes, drawn once."""
     with tempfile.TemporaryDirectory() as folder:
         correction.save(folder)
-        return {**contents(Path(folder))}
-
-
-def as_bytes(text: str | bytes) -> bytes:
-    return text if isinstance(text, bytes) else text.encode()
+        return contents(Path(folder))
 
 
 def test_records_stand_before_their_programs(
@@ -188,10 +189,30 @@ def test_two_runs_into_one_folder_leave_one_of_them_whole(tmp_path: Path) -> Non
         fresh(folder, {})
         folder.mkdir()
         between(partial(write_files, folder, NEW), partial(write_files, folder, other), folder, number)
-        assert contents(folder) in [{name: text.encode() for name, text in one.items()} for one in whole]
+        assert contents(folder) in [in_bytes(one) for one in whole]
         assert leftovers(folder) == []
         for one in sets_in(folder):
             assert all(hash_of((folder / name).read_bytes()) == known for name, known in one.files.items())
+
+
+def test_a_file_that_was_changed_later_is_not_what_the_others_describe(folder: Path, tmp_path: Path) -> None:
+    given = EXAMPLES["validate"](folder)
+    out = shutil.copytree(given["robot"].parent, tmp_path / "out")
+    robot = out / "calibrated.yaml"
+    programs = EXAMPLES["compensate"](folder)["programs"]
+
+    def codes() -> list[set[str]]:
+        made = truearm.validate(robot, given["data"]), truearm.compensate(robot, programs)
+        return [{notice.code for notice in one.warnings} & {"changed-since-written"} for one in made]
+
+    assert codes() == [set(), set()]
+    robot.write_text(robot.read_text() + "# looked at\n")
+    assert codes() == [{"changed-since-written"}] * 2
+    told = next(n for n in truearm.validate(robot, given["data"]).warnings if n.code == "changed-since-written")
+    assert "written together with result.json, report.html, calibrated.urdf" in told.message
+    alone = robot.rename(tmp_path / "calibrated.yaml")
+    robot = alone
+    assert codes() == [set(), set()]
 
 
 # -- what a reader says, and what stays readable
@@ -231,6 +252,16 @@ def test_what_has_the_name_of_a_manifest_and_is_none_is_not_overwritten(tmp_path
             write()
     assert (tmp_path / name).read_text() == text
     assert len([*tmp_path.iterdir()]) == 1
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root may give files away")
+def test_somebody_else_s_mark_in_a_folder_for_everybody_is_not_believed(tmp_path: Path, unfinished: Path) -> None:
+    out = shutil.copytree(unfinished, tmp_path / "out")
+    os.chown(out / UNFINISHED, 12345, 12345)
+    with pytest.raises(InputError, match="has not finished"):
+        read_bytes(out / "a")
+    out.chmod(0o1777)
+    assert read_bytes(out / "a") == b"new a"
 
 
 @pytest.mark.parametrize("name", [MANIFEST, UNFINISHED])

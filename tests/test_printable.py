@@ -48,9 +48,11 @@ def test_long_texts_lose_their_middle() -> None:
     assert shortened("a" * 100 + "b" * 100, 40) == "a" * 27 + "..." + "b" * 10
     assert with_short_words(f"a {'x' * 5000} b") == f"a {'x' * 222}...{'x' * 75} b"
     assert len(str(InputError("x" * 9000, where="y" * 9000, came="z" * 9000, allowed="w" * 9000))) < 5000
+    assert len(str(InputError("x" * 9000, allowed="a, b, " + "w" * 9000))) < 700
     assert "got 'zzz" in str(InputError("wrong", came="z" * 9000))
 
 
 def test_a_report_shows_what_cannot_be_seen() -> None:
     assert with_code("a\x1b `b\u202e` <c>") == r"a\x1b <code>b\u202e</code> &lt;c&gt;"
+    assert json_for_script({"x" * 5000: [1.25] * 400}) == f'{{"{"x" * 222}...{"x" * 75}":[{",".join(["1.25"] * 400)}]}}'
     assert json_for_script(["a\u202eb\u2028"]) == r'["a\\u202eb\u2028"]'

@@ -9,7 +9,7 @@ from itertools import islice
 from numbers import Rational
 from typing import Final
 
-from truearm.printable import printable, shortened
+from truearm.printable import printable, shortened, with_short_words
 
 #: A parameter that a text names, with a value or without: `seed`, `train=all`.
 _NAMED: Final = re.compile(r"`(?P<name>[a-z][a-z_]*)(?:=(?P<value>[^`]*))?`")
@@ -61,14 +61,14 @@ class InputError(ValueError):
         where = self.where
         if where is None and self.parameter is not None:
             where = ", ".join(spelled(name) for name in self.parameter.split(", "))
-        what = shortened(self.what, _LONGEST)
+        what = shortened(with_short_words(self.what), _LONGEST)
         parts = [f"{shortened(where, _LONGEST)}: {what}" if where else what]
         if self.came is not None:
             parts.append(f"got {_shown(self.came)}")
         if self.allowed is not None:
-            parts.append(f"allowed: {shortened(self.allowed, _LONGEST)}")
+            parts.append(f"allowed: {shortened(with_short_words(self.allowed), _LONGEST)}")
         message = "; ".join(parts).rstrip(".") + "."
-        return printable(f"{message} {shortened(self.cure, _LONGEST)}" if self.cure else message)
+        return printable(f"{message} {shortened(with_short_words(self.cure), _LONGEST)}" if self.cure else message)
 
 
 def wrong_kind(what: str, came: object, parameter: str, allowed: str, *, where: str | None = None) -> InputError:

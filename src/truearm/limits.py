@@ -18,6 +18,8 @@ from truearm.errors import InputError, did_you_mean
 
 #: The environment variable that changes limits.
 VARIABLE: Final = "TRUEARM_LIMITS"
+#: No limit can be raised so far; Python may refuse to write such a number out.
+_BEYOND_ALL: Final = 10**15
 _ENTRY: Final = re.compile(r"(?P<name>[a-z_]+)=(?P<most>[1-9][0-9]{0,14})")
 
 
@@ -51,6 +53,7 @@ LIMITS: Final[Mapping[str, Limit]] = {
         20_000_000, "the program is too large to be corrected at once", "bytes", "Split it into several files."
     ),
     "entries": Limit(100_000, "the file has too many entries", "entries"),
+    "nesting": Limit(100, "the entries are nested too deep", "levels"),
     "rows": Limit(500_000, "the table has too many lines", "lines"),
     "columns": Limit(10_000, "the table has too many columns", "columns"),
     "cells": Limit(5_000_000, "the table has too many cells", "cells"),
@@ -72,8 +75,11 @@ LIMITS: Final[Mapping[str, Limit]] = {
         "derivatives",
         "Leave out readings, or targets that say nothing more.",
     ),
+    "parameters": Limit(
+        1000, "there are too many parameters", "parameters", "Leave out targets that say nothing more."
+    ),
     "poses": Limit(50_000, "the number is out of range", "poses"),
-    "candidates": Limit(100_000, "the number is out of range", "candidates"),
+    "candidates": Limit(50_000, "the number is out of range", "candidates"),
     "trials": Limit(1_000_000, "the number is out of range", "trials"),
     "repeats": Limit(100_000, "the number is out of range", "repeats"),
     "seeds": Limit(1000, "the number is out of range", "seeds"),
@@ -101,14 +107,15 @@ def refuse_beyond(name: str, came: int, *, where: str | None = None, parameter: 
     if came <= most:
         return
     known = LIMITS[name]
-    raised = f"More is allowed by the environment variable: {VARIABLE}={name}={came}."
+    meant = came < _BEYOND_ALL
+    raised = f"More is allowed by the environment variable: {VARIABLE}={name}={came}." if meant else ""
     raise InputError(
         known.what,
         parameter=parameter,
         where=where,
-        came=f"{came} {known.unit}",
+        came=f"{came if meant else 'very many'} {known.unit}",
         allowed=f"{most} {known.unit} or fewer",
-        cure=f"{known.cure} {raised}".strip(),
+        cure=f"{known.cure} {raised}".strip() or None,
     )
 
 

@@ -11,8 +11,8 @@ _UNSEEN: Final = ("Cc", "Cs", "Zl", "Zp")
 #: What turns the direction of the text around it (Unicode Standard Annex 9): ``gpj.exe`` is shown as ``exe.jpg``.
 TURNING: Final = frozenset("\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
 #: A word of more characters is no word that anybody reads; paths are shorter.
-_LONGEST_WORD: Final = 300
-_LONG_WORD: Final = re.compile(rf"\S{{{_LONGEST_WORD + 1},}}")
+LONGEST_WORD: Final = 300
+_LONG_WORD: Final = re.compile(rf"\S{{{LONGEST_WORD + 1},}}")
 
 
 def is_one_line(text: str) -> bool:
@@ -37,7 +37,7 @@ def shortened(text: str, longest: int) -> str:
 
 def with_short_words(text: str) -> str:
     """Return a text in which very long words, such as a name of 5000 characters, have lost their middle."""
-    return _LONG_WORD.sub(lambda found: shortened(found[0], _LONGEST_WORD), text)
+    return _LONG_WORD.sub(lambda found: shortened(found[0], LONGEST_WORD), text)
 
 
 def _steers(character: str) -> bool:

@@ -76,6 +76,7 @@ def test_the_contract(truearm: Truearm, cell: Path) -> None:
         "compensation.html",
         "plate.mod",
         "plate.mod.truearm.json",
+        "truearm.manifest.json",
     ]
     record = json.loads((cell / "out" / "plate.mod.truearm.json").read_text())
     assert record["applied"]["frames"] == "assumed"

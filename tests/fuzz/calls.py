@@ -69,7 +69,7 @@ def _bent(rng: Random, value: Any, folder: Path) -> Any:
     """Return something like an argument, or nothing like it."""
     way = int(rng.integers(4))
     if way == 0:
-        return one_of(rng, (None, Odd(), "", "twelve", b"x", {}, [], (), {0: 1.0}, np.zeros(0), np.array(1.0), object))
+        return one_of(rng, (None, Odd(), "", "twelve", b"x", {}, [], (), {0: 1.0}, np.zeros(0), np.array(1.0)))
     if isinstance(value, Robot | Dataset):
         return one_of(rng, (truearm.load_robot("ur5"), truearm.load_robot("kr5"), value))
     if isinstance(value, bool):

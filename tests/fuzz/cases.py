@@ -127,7 +127,9 @@ def _command(rng: Random, folder: Path) -> list[str]:
     if len(ended.err) > verdicts.LONGEST:
         found.append(f"the message has {len(ended.err)} characters: {ended.err[:200]}")
     told = "" if ended.err.startswith("Usage:") else ended.err  # the words of the library that reads options
-    found += verdicts.of_printed(told, texts + told) + verdicts.of_printed(ended.out, texts)
-    if done and "--json" in words and not {"--help", "-h", "--version"} & set(words):
+    helped = bool({"--help", "-h", "--version"} & set(words))
+    found += verdicts.of_printed(told, texts + told)
+    found += verdicts.of_printed(ended.out, texts + ended.out * helped)
+    if done and "--json" in words and not helped:
         found += verdicts.of_json(ended.out)
     return [f"truearm {' '.join(words)[:300]}: {word}" for word in found]

@@ -250,7 +250,7 @@ def _tree(rng: Random, text: str, *, is_json: bool = False) -> str:
             holder[key] = {str(one_of(rng, ODD)): value}
         elif way == 5:
             holder[key] = deepcopy(_at(content, one_of(rng, places)))
-        elif way == 6 and isinstance(value, int | float) and not isinstance(value, bool):
+        elif way == 6 and isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e100:
             holder[key] = value * one_of(rng, (-1, 0, 1e3, 1e-3, 1e6, 1e12, 1e150, 57.3))
         elif way == 7 and isinstance(value, list):
             value.insert(int(rng.integers(len(value) + 1)), one_of(rng, value) if value else 0)

@@ -222,7 +222,7 @@ LIES: Final[dict[str, Lie]] = {
         "/2",
     ),
     "targets-exchanged": Lie(names_exchanged, "check", "implausible", "error", "targets", 3),
-    "another-robot": Lie(two_robots, "calibrate", "not-better", "warning", ""),
+    "another-robot": Lie(two_robots, "calibrate", "residuals-exceed-sigma", "warning", "times"),
 }
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from tests.simulated import campaign
 
-from truearm.identification.judging.expected_error import expected_error, expected_map
+from truearm.identification.judging.expected_error import as_residuals_allow, expected_error, expected_map
 from truearm.identification.solving.fit import Fit, Status, identify
 from truearm.identification.solving.models import FRAMES, MODELS, Model
 from truearm.jobs.calibrate import calibrate
@@ -94,6 +94,21 @@ def test_an_error_of_every_arrival_is_in_the_error_to_expect_and_makes_it_a_lowe
     assert "the model cannot express" in found.omissions[0]
 
 
+def test_joint_errors_count_as_far_as_the_residuals_allow() -> None:
+    """Errors of an arrival in all joints, found ten times too large."""
+    twin, data = campaign("irb120", 40, 0.02e-3, 1)
+    rng = np.random.default_rng(0)
+    repeatability = np.radians(0.01)
+    jogged = measure(twin, data.joints + repeatability * rng.standard_normal(data.joints.shape), 0.02e-3, rng)
+    data = replace(data, position=jogged.position)
+    fit = identify(IRB120, data, MODEL["geometric"])
+    true = replace(fit, joint_error=np.full(6, repeatability), sigma={"position": 0.02e-3})
+    np.testing.assert_allclose(as_residuals_allow(true, data).joint_error, repeatability, rtol=0.25)
+    large = replace(true, joint_error=10 * true.joint_error)
+    np.testing.assert_allclose(as_residuals_allow(large, data).joint_error, repeatability, rtol=0.35)
+    assert not as_residuals_allow(replace(large, sigma={"position": 1.0}), data).joint_error.any()
+
+
 def test_noise_that_was_estimated_widens_the_interval(tmp_path: Path) -> None:
     fit = uncertain(fitted(ARM, tmp_path), base_x=1e-4, base_y=1e-4, base_z=1e-4)
     few = replace(fit, declared=False, weight=fit.weight[:4])
@@ -105,7 +120,6 @@ def test_noise_that_was_estimated_widens_the_interval(tmp_path: Path) -> None:
     ("change", "words"),
     [
         ({"status": Status.NOT_CONVERGED}, "did not converge"),
-        ({"status": Status.IMPLAUSIBLE}, "cannot be this robot"),
         ({"model": FRAMES}, "geometry counts as exact"),
         ({"at_bound": ("a_1",)}, "values at a bound"),
         ({"excess": 2.0}, "the model cannot express"),
@@ -116,6 +130,14 @@ def test_what_makes_it_a_lower_bound(change: dict[str, object], words: str, tmp_
     assert not expected_error(fit).lower_bound
     (omission,) = expected_error(replace(fit, **change)).omissions  # type: ignore[arg-type]
     assert words in omission
+
+
+def test_what_cannot_be_this_robot_is_no_more_than_a_lower_bound() -> None:
+    _, data = campaign("irb120", 30, 0.02e-3, 1)
+    found = calibrate(IRB120, replace(data, position=data.position * 1e3))
+    assert found.status is Status.IMPLAUSIBLE
+    assert "what was fitted cannot be this robot" in found.expected.omissions
+    assert "narrow-data" not in {n.code for n in found.warnings}
 
 
 def narrowed(degrees: float) -> Robot:

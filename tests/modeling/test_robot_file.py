@@ -199,7 +199,11 @@ def with_effect(effect: str, name: str, unit: str, nominal: float = 0.0, value: 
         pytest.param("  \n", ["the file is empty"], id="empty"),
         pytest.param("# nothing\n", ["holds no entries, only comments"], id="comment only"),
         pytest.param("- a\n- b\n", ["must hold named entries", "got [a, b]", "allowed: NAME: VALUE"], id="a list"),
-        pytest.param(PLAIN + "name: other\n", ["line 18", "duplicate key", "name"], id="duplicate key"),
+        pytest.param(
+            PLAIN + "name: other\n",
+            ["line 18: an entry is given twice; got 'name'. Keep one of them."],
+            id="duplicate key",
+        ),
         pytest.param(PLAIN + "joints: [\n", ["line 19", "not valid YAML"], id="invalid YAML"),
         pytest.param("a: b\n c: d: e\n", ["line 2", "not valid YAML", "mapping values"], id="bad nesting"),
         pytest.param(

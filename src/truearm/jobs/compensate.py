@@ -18,6 +18,7 @@ from truearm.errors import InputError, refusals_of
 from truearm.files import path_argument
 from truearm.jobs.arguments import (
     command_argument,
+    files_of,
     flag_argument,
     folder_for,
     paths_argument,
@@ -26,10 +27,10 @@ from truearm.jobs.arguments import (
     python_call,
     robot_argument,
 )
-from truearm.jobs.proof import NOT_BETTER, accept_argument, known_of, refuse_unaccepted
+from truearm.jobs.proof import NOT_BETTER, accept_argument, changed_since, known_of, refuse_unaccepted
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
-from truearm.results.program_correction import FileCorrection, ProgramCorrection
+from truearm.results.program_correction import REPORT, FileCorrection, ProgramCorrection
 
 
 def compensate(
@@ -93,7 +94,7 @@ def compensate(
     if split is not None:
         split = finite_number(split, "split")
         check_tolerance(split)
-    folder = None if out is None else folder_for((), out)
+    folder = None if out is None else folder_for((REPORT,), out, robot, tools, frames, *paths)
     arm = robot_argument(robot).with_payload(payload)
     accepted = accept_argument(accept, arm)
     invocation = command_argument(command) or python_call(
@@ -143,8 +144,9 @@ def compensate(
         files=tuple(corrected),
         result=result,
         splits=splits,
-        warnings=(*known_of(arm), *check_correction(arm, result, splits)),
+        warnings=(*changed_since(robot), *known_of(arm), *check_correction(arm, result, splits)),
         command=invocation,
+        inputs=files_of(robot, tools, frames),
     )
     if folder is not None:
         with refusals_of("out"):

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Final
 
 from truearm.errors import InputError
+from truearm.files import exists
 from truearm.jobs.arguments import choices_argument
+from truearm.manifest import written_differently
 from truearm.modeling.formats.robot_file import arm_is_known, is_intact
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
@@ -60,6 +63,22 @@ def known_of(robot: Robot) -> list[Notice]:
             )
         ]
     return told_of(robot)
+
+
+def changed_since(robot: object) -> list[Notice]:
+    """Say if the file of a robot is not as it was written together with others, which then do not describe it."""
+    if not isinstance(robot, str | Path) or not exists(Path(robot)) or Path(robot).is_dir():
+        return []
+    others = written_differently(Path(robot))
+    if not others:
+        return []
+    return [
+        Notice(
+            "changed-since-written",
+            f"{Path(robot).name} was changed or exchanged after it was written together with {', '.join(others)}: "
+            "what they say is not about it.",
+        )
+    ]
 
 
 def told_of(robot: Robot) -> list[Notice]:

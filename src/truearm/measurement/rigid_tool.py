@@ -25,6 +25,8 @@ SAME_POINT: Final = 1e-3
 OTHER_REFLECTOR: Final = 0.02
 #: To how many of the next targets of a configuration distances are taken: of up to nine targets that is all of them.
 _PARTNERS: Final = 8
+#: So many of the distances of a wrong reading are off; across its error a distance hardly changes.
+_WRONG_SHARE: Final = 0.75
 #: Among so many targets of a configuration exchanged names are looked for.
 _EXCHANGED: Final = (3, 6)
 
@@ -61,7 +63,9 @@ class _Distances:
         The pairs of targets, as one number each and in order, with the median of their distances [m], ``(pairs,)``.
     allowed
         How far off a distance may be [m].
-    least, most, total
+    share
+        Of the distances of each place how many are off by more, ``(places,)``.
+    most, total
         How far off the distances of each place are [m], ``(places,)``.
     """
 
@@ -69,7 +73,7 @@ class _Distances:
     pairs: IntArray
     usual: Array
     allowed: float
-    least: Array
+    share: Array
     most: Array
     total: Array
 
@@ -98,12 +102,12 @@ def rigid_suspects(data: Dataset) -> list[Suspect]:
     doubtful = np.unique(places.configuration[one[off > allowed]]).tolist()
     if not doubtful:
         return []
-    least, most, total = np.full(len(places.target), np.inf), np.zeros(len(places.target)), np.zeros(len(places.target))
-    for end in (one, other):
-        np.minimum.at(least, end, off)
-        np.maximum.at(most, end, off)
-        np.add.at(total, end, off)
-    distances = _Distances(places, pairs, usual, allowed, least, most, total)
+    count, ends, twice = len(places.target), np.concatenate([one, other]), np.concatenate([off, off])
+    compared = np.maximum(np.bincount(ends, minlength=count), 1)
+    share = np.asarray(np.bincount(ends[twice > allowed], minlength=count) / compared, dtype=np.float64)
+    most, total = np.zeros(count), np.asarray(np.bincount(ends, twice, count), dtype=np.float64)
+    np.maximum.at(most, ends, twice)
+    distances = _Distances(places, pairs, usual, allowed, share, most, total)
     known = fixed_points(data)
     suspects: list[Suspect] = []
     for c in doubtful:
@@ -131,7 +135,7 @@ def _blamed(data: Dataset, distances: _Distances, c: int, known: dict[str, Array
     swap = _swap(here, distances.usual_between(seen), allowed) if _EXCHANGED[0] <= len(seen) <= _EXCHANGED[1] else []
     if swap:
         return [Suspect("targets-swapped", label, names[seen[a]], f"is target {names[seen[b]]}") for a, b in swap]
-    wrong: NDArray[np.bool_] = distances.least[mine] > allowed
+    wrong: NDArray[np.bool_] = distances.share[mine] >= _WRONG_SHARE
     if len(seen) > 2 and wrong.sum() > 1:
         wrong = np.arange(len(seen)) == np.argmax(np.where(wrong, distances.total[mine], -1.0))
     doubted = wrong if wrong.any() else distances.most[mine] > allowed

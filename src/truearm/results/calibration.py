@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from truearm.errors import InputError, did_you_mean
 from truearm.identification.choosing.selection import Selection
 from truearm.identification.judging.expected_error import ExpectedError
+from truearm.identification.judging.repeatability import Repeatability, repeatability
 from truearm.identification.solving.fit import Fit, Status
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import Errors
@@ -30,6 +31,8 @@ from truearm.results.summaries import (
     errors_summary,
     expected_lines,
     expected_summary,
+    noise_lines,
+    noise_summary,
     selection_summary,
 )
 from truearm.shown import counted
@@ -101,6 +104,11 @@ class Calibration(Record):
         found = replace(self.fit.robot, history=(*self.fit.robot.history, self.history), tools={}, truths={})
         return sealed(found, proof)
 
+    @cached_property
+    def repeatability(self) -> Repeatability | None:
+        """How well the robot comes back to a posture; None if too few were visited again."""
+        return repeatability(self.data, self.fit.sigma.get("position", 0.0))
+
     @property
     def status(self) -> Status:
         """How the fit ended, or that what it found cannot be this robot."""
@@ -131,6 +139,7 @@ class Calibration(Record):
             "command": self.command,
             "history": self.history,
             "model": {"name": self.fit.model.name, "effects": list(self.fit.model.effects)},
+            "noise": noise_summary(self.fit, self.repeatability),
             "parameters": list(self._parameters()),
             **({} if self.selection is None else {"selection": selection_summary(self.selection)}),
         }
@@ -148,6 +157,7 @@ class Calibration(Record):
             text.append(f"  nominal     {error_line(self.nominal)}")
         text.append(f"  calibrated  {error_line(self.train)}")
         text += expected_lines(self.expected)
+        text += noise_lines(self.fit, self.repeatability)
         if self.selection is not None:
             text.append(f"Chosen model: {self.fit.model.summary}")
         if self.fit.model.name == "frames":

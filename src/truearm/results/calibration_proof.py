@@ -43,7 +43,7 @@ def proof_of(
         What was known of the robot already. It holds for the parameters of the arm that this fit has not touched, as
         where only base and targets are found anew; and if there are any, so does what spoke against them.
     """
-    ended, joint_error = status.value, fit.joint_error
+    ended, joint_error = status.value, expected.joint_error
     errors = [notice for notice in warnings if notice.level == "error"]
     lower_bound = expected.lower_bound
     names, root = covariance_root(fit)

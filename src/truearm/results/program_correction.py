@@ -217,6 +217,8 @@ class ProgramCorrection(Record):
         How to do it again.
     simulated
         What a simulated robot does with the programs, where there is one.
+    inputs
+        The files that were read besides the programs: none of them is overwritten.
     """
 
     robot: Robot
@@ -226,6 +228,7 @@ class ProgramCorrection(Record):
     warnings: tuple[Notice, ...]
     command: str
     simulated: SimulatedRun | None = None
+    inputs: tuple[Path, ...] = ()
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it, lengths in mm."""
@@ -316,5 +319,5 @@ class ProgramCorrection(Record):
             files[f"{one.name}.truearm.json"] = recorded(one.file, one.text, one.language, self.applied())
         files[REPORT] = program_html(self)
         progress("writing the files")
-        write_programs(folder, [one.file.path for one in self.files], files, self.command)
+        write_programs(folder, [*(one.file.path for one in self.files), *self.inputs], files, self.command)
         return tuple(folder / name for name in files)

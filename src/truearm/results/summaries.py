@@ -7,9 +7,13 @@ from typing import Any
 
 from truearm.identification.choosing.selection import Selection
 from truearm.identification.judging.expected_error import Expectation, ExpectedError
+from truearm.identification.judging.repeatability import Repeatability
+from truearm.identification.solving.fit import Fit
+from truearm.measurement.observations import OBSERVATIONS
 from truearm.measurement.statistics import Errors, Spread
 from truearm.modeling.parts import Payload
-from truearm.shown import listed
+from truearm.shown import counted, listed
+from truearm.units import from_si
 
 
 def selection_summary(selection: Selection) -> dict[str, Any]:
@@ -41,6 +45,53 @@ def errors_summary(errors: Errors) -> dict[str, Any]:
         if spread is not None:
             made[key] = _scaled(spread, scale)
     return made
+
+
+def joint_error_text(fit: Fit) -> str:
+    """Return what readings of a configuration share as an error of each joint, empty if nothing; by kind of joint."""
+    found = dict[str, list[float]]()
+    for joint, error in zip(fit.robot.joints, fit.joint_error.tolist(), strict=True):
+        if error > 0.0:
+            found.setdefault("deg" if joint.kind == "revolute" else "mm", []).append(error)
+    shown = [f"{from_si(max(errors), unit):.2g} {unit}" for unit, errors in found.items()]
+    return " and ".join(shown)
+
+
+def noise_summary(fit: Fit, again: Repeatability | None) -> dict[str, Any]:
+    """Return the deviations of readings and joints, as JSON holds them: mm, mrad and deg."""
+    units = {observation.name: observation.unit for observation in OBSERVATIONS}
+    units_shown = ["deg" if joint.kind == "revolute" else "mm" for joint in fit.robot.joints]
+    errors = fit.joint_error.tolist()
+    return {
+        "sigma": {f"{name}_{'mm' if units[name] == 'm' else 'mrad'}": value * 1e3 for name, value in fit.sigma.items()},
+        "declared": fit.declared,
+        "excess": fit.excess,
+        "joint_error": [
+            {"joint": k, "unit": unit, "deviation": from_si(error, unit)}
+            for k, (unit, error) in enumerate(zip(units_shown, errors, strict=True), 1)
+        ],
+        "scattered": fit.scattered,
+        "repeatability": None
+        if again is None
+        else {"rp_mm": again.rp * 1e3, "postures": again.postures, "visits": again.visits},
+    }
+
+
+def noise_lines(fit: Fit, again: Repeatability | None) -> list[str]:
+    """Return what readings of a configuration share, and how well the robot comes back, as lines."""
+    shared = joint_error_text(fit)
+    lines = []
+    if shared:
+        lines.append(
+            f"Shared by the readings of a configuration: errors of the joints of {shared}, repeatability plus what the "
+            "model leaves"
+        )
+    if again is not None:
+        lines.append(
+            f"Repeatability (RP of ISO 9283) at {counted(again.postures, 'posture')} visited again: "
+            f"{again.rp * 1e3:.2g} mm"
+        )
+    return lines
 
 
 def _scaled(spread: Spread, scale: float) -> dict[str, float]:

@@ -110,13 +110,15 @@ def check_fit(fit: Fit, expected: ExpectedError, *, doubted: bool = False) -> li
                 f"this order.{'' if doubted else ' If it is, enter wider priors in the robot file.'}",
             )
         )
+    shared = fit.joint_error.any() and not fit.scattered
     if fit.excess > 1.0:
         found.append(
             Notice(
                 "residuals-exceed-sigma",
-                f"The residuals are {fit.excess:.1f} times what the declared deviations allow. Either the robot does "
-                f"something that the {fit.model.name} model cannot express, or sigma is too small. The deviations of "
-                "the parameters are widened by that factor.",
+                f"The residuals are {fit.excess:.1f} times what the declared deviations"
+                f"{', and errors of the joints that readings of a configuration share,' if shared else ''} allow. "
+                f"Either the robot does something that the {fit.model.name} model cannot express, or sigma is too "
+                "small. The deviations of the parameters allow for it.",
             )
         )
     found += _check_effects(fit)

@@ -12,11 +12,8 @@ from typing import Final
 
 import numpy as np
 
-from truearm.identification.judging.left_over import LeftOver
-from truearm.identification.solving.fit import Fit
-from truearm.identification.solving.problem import Block
+from truearm.identification.judging.left_over import LeftOver, chi_squared_tail
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.sighting import Sighting
 from truearm.modeling.chain import Array
 from truearm.notices import Notice
 from truearm.units import from_si
@@ -24,6 +21,8 @@ from truearm.units import from_si
 #: Part of the residuals that the direction of arrival must explain, and of the joints that must lag with one sign.
 _LEAST_EXPLAINED: Final = 0.05
 _LEAST_OF_ONE_SIGN: Final = 2 / 3
+#: Noise alone must show a direction of arrival that explains as much less often than this.
+_LARGEST_CHANCE: Final = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,19 +33,24 @@ class ArrivalLag:
     ----------
     share
         Part of the residual's root mean square that it explains, corrected for the number of joints.
+    chance
+        Probability that noise alone shows as much. The targets of a configuration share what the model leaves, so it
+        counts as one reading of three coordinates.
     lags
         True minus recorded position of each joint, times the sign of the last move [rad; m for sliding joints].
     """
 
     share: float
+    chance: float
     lags: Array
 
     @property
     def fires(self) -> bool:
-        """Whether it explains at least 5 % with one sign on most joints."""
+        """Whether it explains at least 5 %, more than chance, with one sign on most joints."""
         positive = int((self.lags > 0).sum())
         same = max(positive, len(self.lags) - positive)
-        return self.share >= _LEAST_EXPLAINED and same > _LEAST_OF_ONE_SIGN * len(self.lags)
+        told = self.share >= _LEAST_EXPLAINED and self.chance < _LARGEST_CHANCE
+        return told and same > _LEAST_OF_ONE_SIGN * len(self.lags)
 
 
 def arrival_lag(left_over: LeftOver) -> ArrivalLag | None:
@@ -54,12 +58,11 @@ def arrival_lag(left_over: LeftOver) -> ArrivalLag | None:
 
     None where too few readings are left, or where the order of measurement is not known.
     """
-    data = left_over.problem.data
+    data, problem = left_over.problem.data, left_over.problem
     if data.number is None:
         return None
-    arrived = _last_moves(data, data.number).T[:, None, :]
-    blocks = left_over.problem.blocks
-    H = np.concatenate([_by_arrival(left_over.fit, block, arrived) for block in blocks], axis=1).T
+    here = problem.at(np.array([problem.robot.values[name] for name in problem.free.names]))
+    H = here.by_joints * _last_moves(data, data.number)[left_over.configuration]
     free = left_over.freedom
     if free < 4 * H.shape[1]:
         return None
@@ -67,7 +70,10 @@ def arrival_lag(left_over: LeftOver) -> ArrivalLag | None:
     lags = np.asarray(np.linalg.lstsq(moved, left, rcond=1e-10)[0], dtype=np.float64)
     before = float(left @ left) / free
     after = float(np.sum((left - moved @ lags) ** 2)) / (free - H.shape[1])
-    return ArrivalLag(1.0 - float(np.sqrt(after / before)) if before > 0 else 0.0, -lags)
+    share = 1.0 - after * (free - H.shape[1]) / (before * free) if before > 0 else 0.0
+    effective = max(3 * data.configurations - left_over.basis.shape[1], 0)
+    chance = chi_squared_tail(effective * share, H.shape[1])
+    return ArrivalLag(1.0 - float(np.sqrt(after / before)) if before > 0 else 0.0, chance, -lags)
 
 
 def _last_moves(data: Dataset, number: Array) -> Array:
@@ -76,24 +82,6 @@ def _last_moves(data: Dataset, number: Array) -> Array:
     moves = np.zeros_like(data.joints)
     moves[order[1:]] = np.sign(np.diff(data.joints[order], axis=0))
     return moves
-
-
-def _by_arrival(fit: Fit, block: Block, arrived: Array) -> Array:
-    """Return how the whitened residuals of a block move with the lag of each joint, ``(joints, rows)``."""
-    robot = fit.robot
-    kinematics = robot.forward_kinematics(block.data.postures, block.target)
-    seen = Sighting(
-        kinematics, block.configurations, None if block.fixture is None else robot.fixture_kinematics(block.fixture)
-    )
-    by_joint, turned = (
-        (kinematics.position_jacobian, seen.position_jacobian)
-        if block.observation.velocity == "linear"
-        else (kinematics.orientation_jacobian, seen.orientation_jacobian)
-    )
-    velocity = turned(by_joint(robot.moving[: len(robot.joints)]) * arrived, ())
-    residual = block.observation.residual(seen, block.data, block.readings)
-    moved = block.observation.jacobian(seen, residual, velocity) / block.sigma[:, None]
-    return np.asarray(moved.reshape(len(moved), -1))
 
 
 def check_arrival_lag(left_over: LeftOver) -> list[Notice]:

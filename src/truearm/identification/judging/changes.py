@@ -23,7 +23,7 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.identification.judging.left_over import LeftOver
+from truearm.identification.judging.left_over import LeftOver, chi_squared_tail
 from truearm.modeling.chain import Array
 from truearm.notices import Notice
 
@@ -203,18 +203,9 @@ def _judged(
     share = min(max(share, 0.0), 1.0 - 1e-12)
     points = 0.0 if kind == "drift" else 1.0
     criterion = effective * math.log(1.0 - share) + (len(values) + points) * math.log(effective)
-    chance = min(1.0, tests * _upper_tail(effective * share, len(values)))
+    chance = min(1.0, tests * chi_squared_tail(effective * share, len(values)))
     # Residuals of a moved fit are prediction minus reading: the columns, times minus these values, lead back.
     return criterion, Change(kind, what, first, share, tuple((-values).tolist()), chance)
-
-
-def _upper_tail(x: float, freedom: int) -> float:
-    """Return the probability that chi squared of so many degrees of freedom is larger than x."""
-    tail, k = (math.erfc(math.sqrt(x / 2.0)), 1) if freedom % 2 else (math.exp(-x / 2.0), 2)
-    while k < freedom:
-        tail += math.exp(k / 2.0 * math.log(max(x, 1e-300) / 2.0) - x / 2.0 - math.lgamma(k / 2.0 + 1.0))
-        k += 2
-    return tail
 
 
 def check_changes(left: LeftOver) -> list[Notice]:
@@ -224,7 +215,8 @@ def check_changes(left: LeftOver) -> list[Notice]:
         return []
     data = left.problem.data
     label = data.labels[change.first]
-    level: Literal["error", "warning"] = "error" if change.share > _SPOILING_SHARE else "warning"
+    spoils = change.share > _SPOILING_SHARE and change.kind != "drift"  # a drift is slow: its mean is in the result
+    level: Literal["error", "warning"] = "error" if spoils else "warning"
     size = _size(left, change)
     explains = f"That explains {change.share:.0%} of the squared residuals."
     words = {

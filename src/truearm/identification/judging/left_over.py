@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -74,3 +75,12 @@ class LeftOver:
                 for block in self.problem.blocks
             ]
         )
+
+
+def chi_squared_tail(x: float, freedom: int) -> float:
+    """Return the probability that chi squared of so many degrees of freedom is larger than x."""
+    tail, k = (math.erfc(math.sqrt(x / 2.0)), 1) if freedom % 2 else (math.exp(-x / 2.0), 2)
+    while k < freedom:
+        tail += math.exp(k / 2.0 * math.log(max(x, 1e-300) / 2.0) - x / 2.0 - math.lgamma(k / 2.0 + 1.0))
+        k += 2
+    return tail

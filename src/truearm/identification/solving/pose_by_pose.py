@@ -239,6 +239,7 @@ def _poses(
         quaternion=None,
         sigma=None if data.sigma is None else data.sigma[kept],
         sigma_rot=None,
+        visit=None,
         references=None,
     )
     return _Poses(robot, of_target, tuple(names), target, unit)

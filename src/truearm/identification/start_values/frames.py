@@ -48,6 +48,7 @@ def initial_frames(robot: Robot, data: Dataset) -> Robot:
         raise InputError("there is no position reading", where=data.source, cure="Fill in x, y and z.")
     readings = np.flatnonzero(with_position)
     seen = np.unique(data.target[readings]).tolist()
+    refuse_beyond("parameters", 3 * len(seen) + 3, where=data.source)
     refuse_beyond("derivatives", len(readings) * 3 * (3 * len(seen) + 3), where=data.source)
     where, what = data.configuration[readings], data.target[readings]
     centre = data.position[readings].mean(axis=0)

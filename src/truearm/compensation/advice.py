@@ -163,8 +163,8 @@ def _beyond(robot: Robot, result: CorrectedPrograms) -> list[Notice]:
 
 def _joints_beyond(robot: Robot, targets: Sequence[tuple[Correction, int]]) -> str:
     """Return the joints that are at some targets well beyond what was measured."""
-    beyond = beyond_measured(robot, np.array([one.joints[row] for one, row in targets])).any(axis=0)
-    return listed([joint.name for joint, one in zip(robot.joints, beyond.tolist(), strict=True) if one])
+    beyond = beyond_measured(robot, np.array([one.joints[row] for one, row in targets]))
+    return listed([robot.joints[number].name for number in np.flatnonzero(beyond.any(axis=0)).tolist()])
 
 
 def _lines(targets: Sequence[tuple[Correction, int]]) -> str:

@@ -98,7 +98,9 @@ def _distances(
     """Return distances from two points beside the robot: a closed loop."""
     base = np.array(true.base.translation)
     points = base + rng.uniform(-0.6, 0.6, (2, 3))
-    d = np.linalg.norm(positions[:, :, None, :] - points, axis=3) + SIGMA * rng.standard_normal((*positions.shape[:2], 2))
+    d = np.linalg.norm(positions[:, :, None, :] - points, axis=3) + SIGMA * rng.standard_normal(
+        (*positions.shape[:2], 2)
+    )
     n, k = positions.shape[:2]
     return Dataset(
         source="ballbar",

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from contextlib import suppress
 from io import TextIOWrapper
 from typing import Any, NoReturn
 
@@ -69,8 +70,11 @@ def main() -> None:
     except BaseException:
         if not interrupts.came:
             raise
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # what is left is to end
-        sys.exit(_INTERRUPTED)
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        for stream in (sys.stdout, sys.stderr):
+            with suppress(OSError, ValueError):
+                stream.flush()
+        os._exit(_INTERRUPTED)  # everything is in order, and Python's own end may not survive what was cut off
 
 
 def _prepare_streams() -> None:

@@ -5,16 +5,19 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator, Sized
 from contextlib import contextmanager
+from itertools import islice
 from numbers import Rational
 from typing import Final
 
-from truearm.printable import printable, shortened
+from truearm.printable import printable, shortened, with_short_words
 
 #: A parameter that a text names, with a value or without: `seed`, `train=all`.
 _NAMED: Final = re.compile(r"`(?P<name>[a-z][a-z_]*)(?:=(?P<value>[^`]*))?`")
 #: A part of a message of more characters is shortened, and what came much sooner.
 _LONGEST: Final = 1500
 _LONGEST_CAME: Final = 160
+#: Names are compared with so many others at most: more take long and help nobody.
+_MOST_COMPARED: Final = 2000
 
 
 class InputError(ValueError):
@@ -58,14 +61,14 @@ class InputError(ValueError):
         where = self.where
         if where is None and self.parameter is not None:
             where = ", ".join(spelled(name) for name in self.parameter.split(", "))
-        what = shortened(self.what, _LONGEST)
+        what = shortened(with_short_words(self.what), _LONGEST)
         parts = [f"{shortened(where, _LONGEST)}: {what}" if where else what]
         if self.came is not None:
             parts.append(f"got {_shown(self.came)}")
         if self.allowed is not None:
-            parts.append(f"allowed: {shortened(self.allowed, _LONGEST)}")
+            parts.append(f"allowed: {shortened(with_short_words(self.allowed), _LONGEST)}")
         message = "; ".join(parts).rstrip(".") + "."
-        return printable(f"{message} {shortened(self.cure, _LONGEST)}" if self.cure else message)
+        return printable(f"{message} {shortened(with_short_words(self.cure), _LONGEST)}" if self.cure else message)
 
 
 def wrong_kind(what: str, came: object, parameter: str, allowed: str, *, where: str | None = None) -> InputError:
@@ -96,6 +99,22 @@ def name_parameter(error: InputError, parameter: str) -> None:
     error.args = (error.message(str),)
 
 
+def name_place(error: InputError, where: str) -> None:
+    """Let a refusal name the place in a file."""
+    error.where = where
+    error.args = (error.message(str),)
+
+
+@contextmanager
+def refusals_at(where: str) -> Iterator[None]:
+    """Let refusals name the place in a file where the value that they refuse stands."""
+    try:
+        yield
+    except InputError as error:
+        name_place(error, where)
+        raise
+
+
 def kind_of(came: object) -> str:
     """Return the name of an object's type, for messages."""
     return type(came).__name__
@@ -121,7 +140,7 @@ def _shown(came: object) -> str:
 
 
 def nearest_names(name: str, known: Iterable[str], count: int = 3, likeness: float = 0.5) -> list[str]:
-    """Return the known names most like `name`, best first, for a message that offers them.
+    """Return the known names most like `name`, best first, for a message that offers them; of very many the first few.
 
     Parameters
     ----------
@@ -132,7 +151,8 @@ def nearest_names(name: str, known: Iterable[str], count: int = 3, likeness: flo
 
     if len(name) > _LONGEST_CAME:  # nobody misspells that, and to compare it takes long
         return []
-    by_folded = {candidate.lower(): candidate for candidate in known}
+    few = (candidate for candidate in islice(known, _MOST_COMPARED) if len(candidate) <= _LONGEST_CAME)
+    by_folded = {candidate.lower(): candidate for candidate in few}
     if name.lower() in by_folded:
         return [by_folded[name.lower()]]
     return [by_folded[match] for match in difflib.get_close_matches(name.lower(), by_folded, count, likeness)]

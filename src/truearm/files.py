@@ -14,6 +14,7 @@ from truearm.schemas import Model, validated
 
 #: What an entry of a YAML file cannot do without, unless it is the first: one of these stands before it.
 _BETWEEN_ENTRIES: Final = ("\n", ",", ":", "[", "{", "- ", "-\t", "? ")
+_BRACKET: Final = re.compile(r"[\[\]{}]")
 #: An entry that stands for another one, or what looks like it.
 _ALIAS: Final = re.compile(r"(?:^|[\s\[{,:])\*[^\s\[\]{},]")
 #: What is read but is no file, for messages. Whoever reads them may wait for ever, or never come to an end.
@@ -62,8 +63,11 @@ def read_bytes(path: Path, most: str = "file_size") -> bytes:
 
 
 def _missing(path: Path) -> InputError:
-    if path.is_symlink():
-        return broken_link(path)
+    try:
+        if path.is_symlink():
+            return broken_link(path)
+    except OSError as error:
+        return InputError(f"the file cannot be read ({reason_of(error)})", where=str(path))
     try:
         siblings = [p.name for p in path.parent.iterdir()]
     except OSError:
@@ -119,6 +123,7 @@ def read_yaml(path: Path, schema: type[Model]) -> Model:
     from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
     text = read_text(path, "yaml_size")
+    refuse_beyond("nesting", _deepest(text), where=str(path))
     refuse_beyond("entries", 1 + sum(map(text.count, _BETWEEN_ENTRIES)), where=str(path))
     try:
         if _ALIAS.search(text):
@@ -127,8 +132,7 @@ def read_yaml(path: Path, schema: type[Model]) -> Model:
     except MarkedYAMLError as error:
         mark = error.problem_mark
         where = f"{path}, line {mark.line + 1}" if mark else str(path)
-        problem = " ".join(str(error.problem or "not valid").split())
-        raise InputError(f"this is not valid YAML ({problem})", where=where) from error
+        raise _not_yaml(" ".join(str(error.problem or "not valid").split()), where) from error
     except YAMLError as error:
         raise InputError(f"this is not valid YAML ({' '.join(str(error).split())})", where=str(path)) from error
     except InputError:
@@ -141,6 +145,15 @@ def read_yaml(path: Path, schema: type[Model]) -> Model:
             f"a value cannot be understood ({reason})", where=str(path), cure="Put text into quotes."
         ) from error
     return validated(content, schema, str(path))
+
+
+def _deepest(text: str) -> int:
+    """Return how many brackets are open at once in a YAML document, those in quotes and comments included."""
+    depth = deepest = 0
+    for found in _BRACKET.finditer(text):
+        depth = depth + 1 if found[0] in "[{" else max(depth - 1, 0)
+        deepest = max(deepest, depth)
+    return deepest
 
 
 def _refuse_multiplied(root: Any, path: Path) -> None:
@@ -162,6 +175,37 @@ def _refuse_multiplied(root: Any, path: Path) -> None:
         return counts[id(node)]
 
     refuse_beyond("entries", entries(root), where=str(path))
+
+
+#: What the YAML parser says, the same in plain words, and the cure; what is in quotes there is what came.
+_YAML_FAULTS: Final = (
+    ('duplicate key "([^"]*)"', "an entry is given twice", "Keep one of them."),
+    ("constructor for the tag '([^']*)'", "tags with ! cannot be used here", "Remove the tag."),
+    (
+        "undefined alias '?([^']*)'?",
+        "an alias with * stands for something that the file does not have",
+        "Write it out.",
+    ),
+    (
+        "unhashable key()",
+        "a list or a table stands where the name of an entry belongs",
+        "Write a name before the colon.",
+    ),
+    ("another document()", "a second document begins here, behind ---", "Keep one of them."),
+    (r"character '(\\t)'", "a tab stands where blanks belong", "Indent with blanks."),
+)
+
+
+def _not_yaml(problem: str, where: str) -> InputError:
+    for pattern, what, cure in _YAML_FAULTS:
+        found = re.search(pattern, problem)
+        if found is not None:
+            return InputError(what, where=where, came=found[1] or None, cure=cure)
+    return InputError(
+        f"this is not valid YAML ({problem})",
+        where=where,
+        cure="Look for a quote, a bracket or a colon too many or too few, here or in the line above.",
+    )
 
 
 def path_argument(path: object, parameter: str) -> Path:

@@ -18,6 +18,8 @@ from truearm.errors import InputError, did_you_mean
 
 #: The environment variable that changes limits.
 VARIABLE: Final = "TRUEARM_LIMITS"
+#: No limit can be raised so far; Python may refuse to write such a number out.
+_BEYOND_ALL: Final = 10**15
 _ENTRY: Final = re.compile(r"(?P<name>[a-z_]+)=(?P<most>[1-9][0-9]{0,14})")
 
 
@@ -33,27 +35,51 @@ class Limit:
         What there is too much of, for the refusal.
     unit
         What is counted.
+    cure
+        What else to do than to allow more.
     """
 
     most: int
     what: str
     unit: str
+    cure: str = ""
 
 
 #: Every limit by its name.
 LIMITS: Final[Mapping[str, Limit]] = {
     "file_size": Limit(100_000_000, "the file is too large", "bytes"),
     "yaml_size": Limit(4_000_000, "the file is too large for YAML", "bytes"),
-    "program_size": Limit(20_000_000, "the program is too large to be corrected at once", "bytes"),
+    "program_size": Limit(
+        20_000_000, "the program is too large to be corrected at once", "bytes", "Split it into several files."
+    ),
     "entries": Limit(100_000, "the file has too many entries", "entries"),
+    "nesting": Limit(100, "the entries are nested too deep", "levels"),
     "rows": Limit(500_000, "the table has too many lines", "lines"),
     "columns": Limit(10_000, "the table has too many columns", "columns"),
     "cells": Limit(5_000_000, "the table has too many cells", "cells"),
-    "pixels": Limit(80_000_000, "the image has too many dots", "dots"),
+    "steps": Limit(3_000_000_000, "the pattern takes too long for so many names", "steps", "Write a shorter pattern."),
+    "pixels": Limit(
+        80_000_000,
+        "the image has too many dots",
+        "dots",
+        "Scan at 300 to 600 dpi: more does not show a pencil line better.",
+    ),
+    "dots": Limit(
+        20_000_000, "the page is too large to look for a circle on it", "dots", "Scan the part with the circle alone."
+    ),
     "readings": Limit(400_000, "there would be too many readings", "readings"),
-    "derivatives": Limit(20_000_000, "there are too many readings for so many parameters", "derivatives"),
-    "poses": Limit(400_000, "the number is out of range", "poses"),
-    "candidates": Limit(100_000, "the number is out of range", "candidates"),
+    "places": Limit(2_000_000, "there are too many points for so many configurations", "places"),
+    "derivatives": Limit(
+        10_000_000,
+        "there are too many readings for so many parameters",
+        "derivatives",
+        "Leave out readings, or targets that say nothing more.",
+    ),
+    "parameters": Limit(
+        1000, "there are too many parameters", "parameters", "Leave out targets that say nothing more."
+    ),
+    "poses": Limit(50_000, "the number is out of range", "poses"),
+    "candidates": Limit(50_000, "the number is out of range", "candidates"),
     "trials": Limit(1_000_000, "the number is out of range", "trials"),
     "repeats": Limit(100_000, "the number is out of range", "repeats"),
     "seeds": Limit(1000, "the number is out of range", "seeds"),
@@ -65,9 +91,7 @@ def limit(name: str) -> int:
     return _changed(os.environ.get(VARIABLE, "")).get(name, LIMITS[name].most)
 
 
-def refuse_beyond(
-    name: str, came: int, *, where: str | None = None, parameter: str | None = None, cure: str | None = None
-) -> None:
+def refuse_beyond(name: str, came: int, *, where: str | None = None, parameter: str | None = None) -> None:
     """Refuse what is more than a limit allows.
 
     Parameters
@@ -78,21 +102,20 @@ def refuse_beyond(
         How much there is.
     where, parameter
         What the refusal names.
-    cure
-        What else to do than to raise the limit.
     """
     most = limit(name)
     if came <= most:
         return
     known = LIMITS[name]
-    raised = f"More is allowed by the environment variable: {VARIABLE}={name}={came}."
+    meant = came < _BEYOND_ALL
+    raised = f"More is allowed by the environment variable: {VARIABLE}={name}={came}." if meant else ""
     raise InputError(
         known.what,
         parameter=parameter,
         where=where,
-        came=f"{came} {known.unit}",
+        came=f"{came if meant else 'very many'} {known.unit}",
         allowed=f"{most} {known.unit} or fewer",
-        cure=raised if cure is None else f"{cure} {raised}",
+        cure=f"{known.cure} {raised}".strip() or None,
     )
 
 

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import stat
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -117,20 +119,39 @@ def refuse_unfinished(path: Path) -> None:
     InputError
         If it is one of them.
     """
-    places = {path.absolute()}
-    with suppress(OSError, RuntimeError, ValueError):  # links that lead round, a zero byte
-        places.add(path.resolve())
-    for place in places:
+    for place in _places(path):
         for folder, run in unfinished_above(place):
             if str(place.relative_to(folder)) in run.new.files:
-                again = f"Run it again: {run.new.command}" if run.new.command else "Run that command again."
                 raise InputError(
                     "a command that writes this file together with others has not finished,"
                     " and they may not belong together",
                     where=str(path),
                     came=f"its mark {folder / UNFINISHED}",
-                    cure=f"{again} Whatever writes into that folder next puts back what stood there before.",
+                    cure="Whatever writes into that folder next puts back what stood there before, so run that command"
+                    f" again{f': {run.new.command}' if run.new.command else '.'}",
                 )
+
+
+def written_differently(path: Path) -> tuple[str, ...]:
+    """Return what was written together with a file that has been changed or exchanged since; empty for any other.
+
+    A run that was killed leaves its mark, so such a file was changed later, and the others do not describe it.
+    """
+    for place in _places(path):
+        for folder in place.parents:
+            name = str(place.relative_to(folder))
+            for one in sets_in(folder):
+                if name in one.files and hash_of(place.read_bytes()) != one.files[name]:
+                    return tuple(other for other in one.files if other != name)
+    return ()
+
+
+def _places(path: Path) -> set[Path]:
+    """Return where a file is, as it is named and with links followed."""
+    places = {path.absolute()}
+    with suppress(OSError, RuntimeError, ValueError):  # links that lead round, a zero byte
+        places.add(path.resolve())
+    return places
 
 
 def unfinished_above(path: Path) -> Iterator[tuple[Path, Unfinished]]:
@@ -155,6 +176,8 @@ def _read_as_ours(path: Path) -> Iterator[None]:
 def _content(path: Path) -> dict[str, Any] | None:
     try:
         found = path.stat()
+        if _planted(found, path.parent):
+            return None
         if not stat.S_ISREG(found.st_mode) or found.st_size > _LARGEST:
             raise _not_ours(path)
         content = json.loads(path.read_bytes())
@@ -165,6 +188,14 @@ def _content(path: Path) -> dict[str, Any] | None:
     if not isinstance(content, dict) or content.get("truearm") != _SCHEMAS[path.name]:
         raise _not_ours(path)
     return content
+
+
+def _planted(found: os.stat_result, folder: Path) -> bool:
+    """Return whether a file is of somebody else, in a folder that everybody may write to: it is not believed."""
+    if sys.platform == "win32":
+        return False
+    place = folder.stat()
+    return bool(place.st_mode & stat.S_ISVTX) and found.st_uid not in (os.getuid(), place.st_uid)
 
 
 def _file_set(content: Any) -> FileSet:

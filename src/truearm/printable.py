@@ -9,10 +9,10 @@ from typing import Final
 #: Controls, halves of characters, breaks of lines and paragraphs, by their Unicode categories.
 _UNSEEN: Final = ("Cc", "Cs", "Zl", "Zp")
 #: What turns the direction of the text around it (Unicode Standard Annex 9): ``gpj.exe`` is shown as ``exe.jpg``.
-_TURNING: Final = frozenset("\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
+TURNING: Final = frozenset("\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
 #: A word of more characters is no word that anybody reads; paths are shorter.
-_LONGEST_WORD: Final = 300
-_LONG_WORD: Final = re.compile(rf"\S{{{_LONGEST_WORD + 1},}}")
+LONGEST_WORD: Final = 300
+_LONG_WORD: Final = re.compile(rf"\S{{{LONGEST_WORD + 1},}}")
 
 
 def is_one_line(text: str) -> bool:
@@ -37,11 +37,11 @@ def shortened(text: str, longest: int) -> str:
 
 def with_short_words(text: str) -> str:
     """Return a text in which very long words, such as a name of 5000 characters, have lost their middle."""
-    return _LONG_WORD.sub(lambda found: shortened(found[0], _LONGEST_WORD), text)
+    return _LONG_WORD.sub(lambda found: shortened(found[0], LONGEST_WORD), text)
 
 
 def _steers(character: str) -> bool:
-    return unicodedata.category(character) in _UNSEEN or character in _TURNING
+    return unicodedata.category(character) in _UNSEEN or character in TURNING
 
 
 def _escaped(character: str) -> str:

@@ -32,9 +32,29 @@ def validated(content: object, schema: type[Model], where: str) -> Model:
             allowed=_ENTRIES,
         )
     try:
-        return schema.model_validate(dict(content))
+        made = schema.model_validate(dict(content))
     except ValidationError as error:
         raise _refusal(error, content, schema, where) from error
+    _refuse_half_characters(content, where)
+    return made
+
+
+def _refuse_half_characters(content: object, where: str) -> None:
+    r"""Refuse texts such as ``"\ud800"``, which no file that is written later could hold."""
+    waiting, seen = [(content, "")], set[int]()
+    while waiting:
+        value, entry = waiting.pop()
+        if isinstance(value, str):
+            if not value.isascii() and any("\ud800" <= character <= "\udfff" for character in value):
+                what, allowed = _FAULTS["string_unicode"]
+                raise InputError(what, where=f"{where}, {entry.lstrip('.')}", came=value, allowed=allowed)
+        elif isinstance(value, Mapping | list) and id(value) not in seen:
+            seen.add(id(value))  # an entry may hold itself
+            if isinstance(value, Mapping):
+                waiting += [(part, f"{entry}.{_name(name)}") for name, part in value.items()]
+                waiting += [(name, entry) for name in value]
+            else:
+                waiting += [(part, f"{entry}[{number}]") for number, part in enumerate(value, 1)]
 
 
 _NUMBER: Final = ("a number belongs here", "a number without quotes and unit, such as 0.5")
@@ -58,7 +78,6 @@ _FAULTS: Final[Mapping[str, tuple[str, str]]] = {
     "string_type": ("a text belongs here", "a text, in quotes if it looks like a number, a date, yes or no"),
     "string_unicode": ("the text holds half a character", "text that can be written as UTF-8"),
     "string_too_short": ("the text is empty", "at least one character"),
-    "string_pattern_mismatch": ("the text does not have the form that belongs here", "{pattern}"),
     "literal_error": ("this value is not known", "{expected}"),
     "dict_type": _TABLE,
     "model_type": _TABLE,
@@ -94,9 +113,12 @@ def shown_entry(value: object) -> object:
 def _name(part: object) -> str:
     """Return the name of an entry as messages show it."""
     try:
-        return shortened(str(part), _LONGEST_SHOWN)
+        text = _flow(part)
     except ValueError:
+        text = "<unprintable"
+    if text.startswith("<unprintable"):  # as pydantic calls it
         return "a number of very many digits"
+    return shortened(text, _LONGEST_SHOWN) or '""'
 
 
 def _flow(value: object) -> str:
@@ -117,6 +139,8 @@ def _refusal(error: ValidationError, content: Any, schema: type[BaseModel], wher
     is_name = place[-1:] == ("[key]",)  # what stands before the colon
     if is_name:
         place = place[:-1]
+    if is_name or kind == "invalid_key":  # pydantic says None, and not what the file has
+        place = (*place[:-1], first["input"])
     holder, entry, holders = content, "", ""
     for part in place:  # items of a list count from 1, keys stand as they are
         holders, holder = entry, content
@@ -184,11 +208,8 @@ def refused_value(fault: Mapping[str, Any], where: str, *, is_name: bool = False
 
 def _missing(where: str, name: str, holder: object, known: Sequence[str], kind: str | None) -> InputError:
     """Return the refusal of a table without an entry that it needs; it may be there under another name."""
-    others = (
-        [other for other in holder if isinstance(other, str) and other not in known]
-        if isinstance(holder, Mapping)
-        else []
-    )
+    there = holder if isinstance(holder, Mapping) else ()
+    others = [other for other in there if isinstance(other, str) and other not in known]
     near = nearest_names(name, others, count=1)
     cure = f"It may be the entry {near[0]}, which is not known here: rename it." if near else "Add it."
     return InputError("this entry is missing", where=where, allowed=kind, cure=cure)
@@ -211,6 +232,8 @@ def _field(schema: type[BaseModel], place: Sequence[int | str]) -> str | None:
         return ", ".join(map(str, get_args(annotation)))
     if get_origin(annotation) in (list, tuple):
         return _LIST[1]
+    if get_origin(annotation) is dict:
+        return "named entries"
     if table is not None:
         return f"named entries ({', '.join(table.model_fields)})"
     plain = {float: _NUMBER[1], int: _WHOLE[1], str: "a text"}

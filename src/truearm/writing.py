@@ -196,9 +196,12 @@ def write_files(folder: Path, files: Mapping[str, str | bytes], command: str | N
 
 def put_back_old(folder: Path) -> None:
     """Put back the old files where a run that wrote into a folder was killed between two steps."""
-    for place, _ in unfinished_above(folder.absolute() / "any"):
-        with _refusals_at(place), _alone_in([place]):
+    for place, run in unfinished_above(folder.absolute() / "any"):
+        folders = {place, *((place / name).parent for name in run.new.files)}
+        with _refusals_at(place), _alone_in(each for each in folders if each.is_dir()):
             _undo(place)
+            for each in folders:
+                _clear(each)
 
 
 @contextmanager
@@ -231,6 +234,8 @@ def _locked(folder: Path) -> Iterator[None]:
         with suppress(OSError):  # a file system without locks
             fcntl.flock(handle, fcntl.LOCK_EX)
         yield
+        with suppress(OSError):  # by itself, as a copy of this process would hold on to it
+            fcntl.flock(handle, fcntl.LOCK_UN)
     finally:
         os.close(handle)
 

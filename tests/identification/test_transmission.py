@@ -9,13 +9,14 @@ import pytest
 
 from truearm.identification.judging.transmission import check_transmission, periodic_errors
 from truearm.identification.solving.fit import Fit, identify
-from truearm.identification.solving.models import MODELS
+from truearm.identification.solving.models import MODELS, named_model
 from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
+from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import Twin, measure
-from truearm.simulation.twin_joint import JointTruth
+from truearm.simulation.twin_joint import PERFECT, JointTruth
 
 ELASTIC = next(model for model in MODELS if model.name == "elastic")
 
@@ -122,3 +123,14 @@ def test_a_joint_that_stands_still_is_not_named() -> None:
     joints[:, 3] = 0.3
     fit, data = moved_by_a_joint(robot, joints, 3, 3e-5 * rng.normal(size=150))
     assert 4 not in [error.joint for error in periodic_errors(fit, data)]
+
+
+def test_sag_that_the_model_does_not_follow_is_no_periodic_error() -> None:
+    nominal = load_robot("ur10").with_payload(Payload(5.0, (0.05, 0.02, 0.15)))
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        twin = truth_twin(nominal, "random", rng)
+        soft = {j: replace(PERFECT, compliance=2e-6 * float(rng.uniform(5, 20))) for j in range(1, 7)}
+        data = measure(replace(twin, joints=soft), nominal.random_configurations(150, rng), 0.02e-3, rng)
+        data = replace(data, sigma=None)
+        assert periodic_errors(identify(nominal, data, named_model("geometric")), data) == ()

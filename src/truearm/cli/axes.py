@@ -11,8 +11,8 @@ from truearm.cli.output import Json, end_on_error, print_json, print_line, print
 
 
 def axes(
-    data: Annotated[str, typer.Argument(metavar="DATA.csv", help="Measurements in which one joint moves at a time.")],
     robot: Annotated[str, typer.Argument(metavar="ROBOT", help="A library id, a robot file or a URDF.")],
+    data: Annotated[str, typer.Argument(metavar="DATA.csv", help="Measurements in which one joint moves at a time.")],
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the results.")],
     frame: Annotated[
         str,

@@ -44,6 +44,15 @@ def calibrate(
     ] = None,
     payload: PayloadText = None,
     gravity: GravityText = None,
+    base_changes: Annotated[
+        str | None,
+        typer.Option(
+            "--base-changes",
+            metavar="AT,...",
+            help="Configurations from which on the instrument or the robot's base stood elsewhere.",
+            show_default=False,
+        ),
+    ] = None,
     json: Json = False,
 ) -> None:
     """Identify the real robot from measurements and judge it on configurations it has not seen.
@@ -66,6 +75,7 @@ def calibrate(
             effects=effects or (),
             payload=payload,
             gravity=read_gravity(gravity),
+            base_changes=[name.strip() for name in base_changes.split(",")] if base_changes else (),
             command=command_line(),
             progress=say,
         )

@@ -47,6 +47,15 @@ def compensate(
     again: Annotated[
         bool, typer.Option("--again", help="Correct the originals of programs corrected before, anew.")
     ] = False,
+    accept: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="Accept what speaks against the calibration, as rank-loss, or against a target, not-better-here; "
+            "repeatable.",
+            show_default=False,
+        ),
+    ] = None,
     revert: Annotated[bool, typer.Option("--revert", help="Write the originals of corrected programs.")] = False,
     json: Json = False,
 ) -> None:
@@ -66,6 +75,7 @@ def compensate(
             split=split,
             strict=strict or None,
             again=again or None,
+            accept=accept or None,
         )
         return
     from truearm.jobs.compensate import compensate as run
@@ -82,6 +92,7 @@ def compensate(
             strict=strict,
             split=None if split is None else split / 1e3,
             again=again,
+            accept=accept or (),
             command=command_line(),
             progress=say,
         )

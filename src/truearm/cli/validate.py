@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from truearm.cli.loading import GravityText, PayloadText, read_gravity
-from truearm.cli.output import Json, print_json, print_record
+from truearm.cli.output import Json, end_on_error, print_json, print_record
 
 
 def validate(
@@ -25,3 +25,4 @@ def validate(
         print_json(validation.summary())
     else:
         print_record(validation)
+    end_on_error(validation.warnings)

@@ -11,13 +11,14 @@ import gc
 import hashlib
 import json
 import os
+import re
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict
 
 from truearm.compensation.programs import LANGUAGES
 from truearm.compensation.programs.lines import replaced
@@ -30,7 +31,19 @@ from truearm.writing import refuse_overwriting, write_files
 
 SCHEMA: Final = "truearm-corrected/1"
 
-Hash = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+
+def _of_a_file(text: str) -> str:
+    if not re.fullmatch("[0-9a-f]{64}", text):
+        raise InputError(
+            "this is not the SHA-256 of a file",
+            came=text,
+            allowed="64 digits, 0 to 9 and a to f",
+            cure="Restore the record as it was written.",
+        )
+    return text
+
+
+Hash = Annotated[str, AfterValidator(_of_a_file)]
 
 
 class CorrectionRecord(BaseModel):
@@ -187,9 +200,10 @@ def write_programs(
         If a program would be overwritten that was read, or that truearm has not written itself, or one without a
         record would be written beside the record of another.
     """
+    read = [*inputs, *map(record_path, inputs)]
     for name, content in files.items():
         path = folder / name
-        refuse_overwriting(path, inputs)
+        refuse_overwriting(path, read)
         if name.endswith((".truearm.json", ".html")):
             continue
         if exists(record_path(path)) and f"{name}.truearm.json" not in files:
@@ -237,19 +251,19 @@ def _unchanged_original(path: Path, record: CorrectionRecord) -> bytes:
             where=str(path),
             cure=f"To take it as an original, remove {record_path(path).name}.",
         )
-    try:
-        original = _unpacked(base64.b64decode(record.original, validate=True), record_path(path))
-    except (ValueError, zlib.error):
-        original = b""
+    original = _unpacked(record.original, record_path(path))
     if _hash(original) != record.original_sha256:
         raise InputError("the original in this record is damaged", where=str(record_path(path)))
     return original
 
 
-def _unpacked(packed: bytes, record: Path) -> bytes:
-    """Return the original that a record holds packed, or refuse one that was never so large."""
+def _unpacked(packed: str, record: Path) -> bytes:
+    """Return the original that a record holds packed, nothing if it is damaged; refuse one larger than programs are."""
     unpacking = zlib.decompressobj()
-    original = unpacking.decompress(packed, limit("program_size") + 1)
+    try:
+        original = unpacking.decompress(base64.b64decode(packed, validate=True), limit("program_size") + 1)
+    except (ValueError, zlib.error):
+        return b""
     refuse_beyond("program_size", len(original), where=f"{record}, original")
     return original if unpacking.eof else b""
 
@@ -260,8 +274,9 @@ def _record(path: Path) -> CorrectionRecord | None:
     beside = record_path(path)
     if not exists(beside):
         return None
+    text = read_bytes(beside)
     try:
-        content = json.loads(read_bytes(beside))
+        content = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise InputError("this record cannot be read", where=str(beside), cure="Remove it, or restore it.") from error
     return validated(content, CorrectionRecord, str(beside))

@@ -16,6 +16,7 @@ from truearm.jobs.arguments import (
     payload_argument,
     robot_argument,
 )
+from truearm.jobs.proof import told_of
 from truearm.measurement.readers.poses import read_poses
 from truearm.modeling.chain import Array
 from truearm.modeling.formats.joint_table import joints_csv
@@ -106,7 +107,7 @@ def inverse(
         )
     if file is not None:
         write_text(file, joints_csv(solutions, labels, arm.joints))
-    return JointTable(labels, solutions)
+    return JointTable(labels, solutions, tuple(told_of(arm)))
 
 
 def _poses(poses: object, rotations: object) -> tuple[tuple[str, ...], Array, Array | None]:

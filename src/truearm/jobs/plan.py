@@ -163,7 +163,7 @@ def plan(
         seen_from_the_origin=own,
         readings=readings,
     )
-    planned = Plan(made, call, files_of(robot, candidates_from, constraints))
+    planned = Plan(made, call, files_of(robot, candidates_from, constraints), deviation)
     if table is not None:
         progress("writing the files")
         planned.save(table)

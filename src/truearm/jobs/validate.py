@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import hashlib
+import re
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Final
 
 from truearm.errors import InputError, refusals_of
+from truearm.files import path_argument, read_bytes
+from truearm.identification.judging.target_names import check_names
 from truearm.jobs.arguments import data_argument, gravity_argument, payload_argument, refuse_swapped, robot_argument
+from truearm.jobs.proof import changed_since
 from truearm.measurement.checks import check_joints
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
+from truearm.notices import Notice
 from truearm.results.validation import Validation
 
 
@@ -40,7 +47,11 @@ def validate(
         If the robot has no targets, or the data name others.
     """
     refuse_swapped(robot, data, "validate")
+    digest = None
+    if isinstance(data, str | Path):
+        digest = hashlib.sha256(read_bytes(path_argument(data, "data"))).hexdigest()
     data = data_argument(data)
+    changed = changed_since(robot)
     robot = as_measured(robot, data, payload, gravity)
     identified = {p.group for p in robot.parameters.values() if p.deviation is not None}
     if data.anchored and robot.fixtures and identified and "base" not in identified:
@@ -51,7 +62,44 @@ def validate(
             cure="Place it first: calibrate the calibrated robot with `model=frames`, or compare distances with "
             "'truearm distances'.",
         )
-    return Validation(data.source, errors_of(robot, data))
+    errors = errors_of(robot, data)
+    warnings = (*changed, *check_names(robot, data, errors), *_seen_in_training(robot, data, digest))
+    return Validation(data.source, errors, warnings)
+
+
+#: How a calibration says in the robot's history which configurations of which file it was trained on.
+_TRAINED: Final = re.compile(r"(\d+) of (\d+) configurations of .*?\(sha256 ([0-9a-f]+)\), seed (\d+)")
+
+
+def trained_on(robot: Robot, digest: str) -> tuple[int, int, int] | None:
+    """Return how many configurations of a file a robot was trained on, of how many, and the seed; None if on none.
+
+    Parameters
+    ----------
+    digest
+        SHA-256 of the file.
+    """
+    for line in robot.history:
+        found = _TRAINED.search(line)
+        if found is not None and found[3] == digest[: len(found[3])]:
+            return int(found[1]), int(found[2]), int(found[4])
+    return None
+
+
+def _seen_in_training(robot: Robot, data: Dataset, digest: str | None) -> list[Notice]:
+    """Say if the readings are from the file that the robot was calibrated with, and how many it was trained on."""
+    trained = None if digest is None else trained_on(robot, digest)
+    if trained is None:
+        return []
+    count, of, _ = trained
+    held_out = "; the rest was held out, and its errors are in the result of the calibration" if of > count else ""
+    return [
+        Notice(
+            "training-data",
+            f"The robot was calibrated with this file: {count} of its {of} configurations are those it was trained "
+            f"on{held_out}. These errors flatter it. Validate with measurements that were not used.",
+        )
+    ]
 
 
 def as_measured(robot: object, data: Dataset, payload: object, gravity: object) -> Robot:

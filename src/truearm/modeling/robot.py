@@ -88,6 +88,8 @@ class Robot(RobotData):
     ) -> Robot:
         """Return the robot with another payload, or mounted another way; None leaves what it has.
 
+        What is known of its calibration is about the arm and holds as before.
+
         Parameters
         ----------
         payload
@@ -100,11 +102,16 @@ class Robot(RobotData):
         InputError
             If the payload is none, or the gravity.
         """
-        return replace(
+        other = replace(
             self,
             payload=self.payload if payload is None else Payload.of(payload),
             gravity=self.gravity if gravity is None else checked_gravity(gravity),
         )
+        if self.proof is None or (other.payload, other.gravity) == (self.payload, self.gravity):
+            return other
+        from truearm.modeling.formats.robot_file import is_intact, sealed
+
+        return sealed(other, self.proof) if is_intact(self) else other
 
     def with_effects(self, names: Sequence[str]) -> Robot:
         """Return the robot with these joint effects added.

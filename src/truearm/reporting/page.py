@@ -14,12 +14,14 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from truearm.printable import printable, with_short_words
+from truearm.printable import LONGEST_WORD, TURNING, printable, shortened, with_short_words
 from truearm.reporting.drawing import AFTER, BEFORE, Figure
 from truearm.version import __version__
 
 #: Characters that could end a script element or a line of JavaScript, as JSON escapes them.
 _UNSAFE: Final = {ord(c): f"\\u{ord(c):04x}" for c in "<>&\u2028\u2029"}
+#: Part of a text, and of nothing else that JSON has.
+_LONG_WORD: Final = re.compile(rf'[^\s"\\,:\[\]{{}}]{{{LONGEST_WORD + 1},}}')
 
 
 def page(template: str, figures: Mapping[str, Figure], **content: Any) -> str:
@@ -74,7 +76,9 @@ def with_code(text: str) -> Markup:
 
 def json_for_script(value: object) -> str:
     """Return JSON that can stand inside a script element whatever its texts hold."""
-    return json.dumps(value, separators=(",", ":"), allow_nan=False, ensure_ascii=False).translate(_UNSAFE)
+    text = json.dumps(value, separators=(",", ":"), allow_nan=False, ensure_ascii=False)
+    text = _LONG_WORD.sub(lambda found: shortened(found[0], LONGEST_WORD), text)
+    return text.translate(_UNSAFE | {ord(c): f"\\\\u{ord(c):04x}" for c in TURNING})
 
 
 def _plotly() -> str:

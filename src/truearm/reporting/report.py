@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Final
@@ -100,7 +100,8 @@ class Report:
                 self.judged_part, self._tips(self.judged_part), _millimetres(nominal), _millimetres(judged)
             )
         drawn["expected-error"] = expected_error_map(
-            *expected_map(run.fit, _MAPPED), self._tips(run.data.of_configurations(run.training))
+            *expected_map(replace(run.fit, joint_error=run.expected.joint_error), _MAPPED),
+            self._tips(run.data.of_configurations(run.training)),
         )
         parts = [("training", run.training, _millimetres(run.train))]
         if run.validation is not None:

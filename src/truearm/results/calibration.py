@@ -19,9 +19,11 @@ from truearm.identification.judging.repeatability import Repeatability, repeatab
 from truearm.identification.solving.fit import Fit, Status
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import Errors
-from truearm.modeling.formats.robot_file import robot_text
+from truearm.modeling.formats.robot_file import robot_text, sealed
+from truearm.modeling.proof import Proof
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice, has_error
+from truearm.results.calibration_proof import proof_of
 from truearm.results.record import Record, notice_lines, notice_summaries
 from truearm.results.residuals import Part, Residuals, residuals_of
 from truearm.results.summaries import (
@@ -74,6 +76,8 @@ class Calibration(Record):
         How the model was chosen; None if it was named.
     inputs
         The files that were read: none of them is overwritten.
+    known_before
+        What was known of the robot from an earlier calibration; None if nothing was.
     """
 
     fit: Fit
@@ -90,11 +94,15 @@ class Calibration(Record):
     urdf: bytes | None = None
     selection: Selection | None = None
     inputs: tuple[Path, ...] = ()
+    known_before: Proof | None = None
 
     @cached_property
     def robot(self) -> Robot:
-        """The calibrated robot, base and targets included."""
-        return replace(self.fit.robot, history=(*self.fit.robot.history, self.history), tools={}, truths={})
+        """The calibrated robot, base and targets included, with what the calibration knows about it."""
+        training = self.data.of_configurations(self.training)
+        proof = proof_of(self.fit, self.status, self.warnings, self.expected, training, self.known_before)
+        found = replace(self.fit.robot, history=(*self.fit.robot.history, self.history), tools={}, truths={})
+        return sealed(found, proof)
 
     @cached_property
     def repeatability(self) -> Repeatability | None:

@@ -29,11 +29,14 @@ class Plan(Record):
         How to run it again.
     inputs
         The files that were read: none of them is overwritten.
+    noise
+        Standard deviation of a coordinate about the model that was assumed [m].
     """
 
     made: MeasurementPlan
     command: str
     inputs: tuple[Path, ...] = ()
+    noise: float = 1e-4
 
     @property
     def joints(self) -> Array:
@@ -56,9 +59,14 @@ class Plan(Record):
             f"Measured at these {len(self.joints)} configurations, the {self.made.model.name} model will miss readings "
             f"elsewhere by {planned} mm on average. No number of poses brings that below {floor} mm, the noise."
         )
+        assumed = (
+            f"That assumes that a coordinate of a reading is off by {significant(self.noise * 1e3, 3)} mm about the "
+            "model, by the instrument and by what the model cannot follow; give `noise` where you know better."
+        )
         if prediction.sufficient_number is None:
-            return first, "More poses than were looked at are needed to come within 10 % of that."
-        return first, f"{prediction.sufficient_number} well-chosen poses are enough to come within 10 % of that."
+            return first, "More poses than were looked at are needed to come within 10 % of that.", assumed
+        enough = f"{prediction.sufficient_number} well-chosen poses are enough to come within 10 % of that."
+        return first, enough, assumed
 
     def summary(self) -> dict[str, Any]:
         """Return the figures as JSON holds them: errors in mm."""

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from truearm.measurement.statistics import Errors, Spread
-from truearm.results.record import Record
+from truearm.notices import Notice
+from truearm.results.record import Record, notice_lines, notice_summaries
 from truearm.results.summaries import error_line, errors_summary
 from truearm.shown import counted
 
@@ -21,10 +22,13 @@ class Validation(Record):
         The measurements, for messages.
     errors
         Predicted minus measured, reading by reading.
+    warnings
+        What to know about them, in plain words.
     """
 
     source: str
     errors: Errors
+    warnings: tuple[Notice, ...] = ()
 
     @property
     def position(self) -> Spread | None:
@@ -43,11 +47,12 @@ class Validation(Record):
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it, in mm and mrad."""
-        return errors_summary(self.errors)
+        return {**errors_summary(self.errors), "warnings": notice_summaries(self.warnings)}
 
     def lines(self) -> list[str]:
         """Return what the command prints."""
         return [
             f"On {counted(self.errors.configurations, 'configuration')} of {self.source}:",
             f"  {error_line(self.errors)}",
+            *notice_lines(self.warnings),
         ]

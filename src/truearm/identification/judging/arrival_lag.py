@@ -7,15 +7,13 @@ residuals of the identified model, after removing what its own parameters could 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from truearm.identification.solving.fit import Fit
-from truearm.identification.solving.problem import Problem
+from truearm.identification.judging.left_over import LeftOver, chi_squared_tail
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.observations import OBSERVATIONS
 from truearm.modeling.chain import Array
 from truearm.notices import Notice
 from truearm.units import from_si
@@ -23,6 +21,8 @@ from truearm.units import from_si
 #: Part of the residuals that the direction of arrival must explain, and of the joints that must lag with one sign.
 _LEAST_EXPLAINED: Final = 0.05
 _LEAST_OF_ONE_SIGN: Final = 2 / 3
+#: Noise alone must show a direction of arrival that explains as much less often than this.
+_LARGEST_CHANCE: Final = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,61 +33,63 @@ class ArrivalLag:
     ----------
     share
         Part of the residual's root mean square that it explains, corrected for the number of joints.
+    chance
+        Probability that noise alone shows as much. The targets of a configuration share what the model leaves, so it
+        counts as one reading of three coordinates.
     lags
         True minus recorded position of each joint, times the sign of the last move [rad; m for sliding joints].
     """
 
     share: float
+    chance: float
     lags: Array
 
     @property
     def fires(self) -> bool:
-        """Whether it explains at least 5 % with one sign on most joints."""
+        """Whether it explains at least 5 %, more than chance, with one sign on most joints."""
         positive = int((self.lags > 0).sum())
         same = max(positive, len(self.lags) - positive)
-        return self.share >= _LEAST_EXPLAINED and same > _LEAST_OF_ONE_SIGN * len(self.lags)
+        told = self.share >= _LEAST_EXPLAINED and self.chance < _LARGEST_CHANCE
+        return told and same > _LEAST_OF_ONE_SIGN * len(self.lags)
 
 
-def arrival_lag(fit: Fit, data: Dataset) -> ArrivalLag | None:
-    """Return what arrival directions explain of the residuals of a fit; None where too few readings are left.
+def arrival_lag(left_over: LeftOver) -> ArrivalLag | None:
+    """Return what arrival directions explain of the residuals of a fit.
 
-    Parameters
-    ----------
-    data
-        All readings. Without the number of each configuration in the campaign, they are taken to be in measuring order.
+    None where too few readings are left, or where the order of measurement is not known.
     """
-    noise = {observation.name: fit.sigma.get(observation.name, 1.0) for observation in OBSERVATIONS}
-    problem = Problem(fit.robot, replace(data, setup=None), fit.free, noise)
-    here = problem.at(np.array([fit.robot.values[name] for name in fit.free.names]))
-    r, J = here.residual, here.jacobian
-    of_row = [np.repeat(data.configuration[b.readings], b.observation.components) for b in problem.blocks]
-    H = here.by_joints * _last_moves(data)[np.concatenate(of_row)]
-    U, s, _ = np.linalg.svd(J * fit.free.prior, full_matrices=False)
-    basis = U[:, s > 1e-8 * s[0]]
-    free = len(r) - basis.shape[1]
+    data, problem = left_over.problem.data, left_over.problem
+    if data.number is None:
+        return None
+    here = problem.at(np.array([problem.robot.values[name] for name in problem.free.names]))
+    H = here.by_joints * _last_moves(data, data.number)[left_over.configuration]
+    free = left_over.freedom
     if free < 4 * H.shape[1]:
         return None
-    left, moved = r - basis @ (basis.T @ r), H - basis @ (basis.T @ H)
+    left, moved = left_over.without_parameters(left_over.residual), left_over.without_parameters(H)
     lags = np.asarray(np.linalg.lstsq(moved, left, rcond=1e-10)[0], dtype=np.float64)
     before = float(left @ left) / free
     after = float(np.sum((left - moved @ lags) ** 2)) / (free - H.shape[1])
-    return ArrivalLag(1.0 - float(np.sqrt(after / before)) if before > 0 else 0.0, -lags)
+    share = 1.0 - after * (free - H.shape[1]) / (before * free) if before > 0 else 0.0
+    effective = max(3 * data.configurations - left_over.basis.shape[1], 0)
+    chance = chi_squared_tail(effective * share, H.shape[1])
+    return ArrivalLag(1.0 - float(np.sqrt(after / before)) if before > 0 else 0.0, chance, -lags)
 
 
-def _last_moves(data: Dataset) -> Array:
+def _last_moves(data: Dataset, number: Array) -> Array:
     """Return the sign of each joint's move from the configuration measured before, ``(configurations, joints)``."""
-    order = np.arange(data.configurations) if data.number is None else np.argsort(data.number, kind="stable")
+    order = np.argsort(number, kind="stable")
     moves = np.zeros_like(data.joints)
     moves[order[1:]] = np.sign(np.diff(data.joints[order], axis=0))
     return moves
 
 
-def check_arrival_lag(fit: Fit, data: Dataset) -> list[Notice]:
+def check_arrival_lag(left_over: LeftOver) -> list[Notice]:
     """Return a notice if the joints were not at rest."""
-    found = arrival_lag(fit, data)
+    found = arrival_lag(left_over)
     if found is None or not found.fires:
         return []
-    units = ["deg" if kind == "revolute" else "mm" for kind in data.joint_kinds]
+    units = ["deg" if kind == "revolute" else "mm" for kind in left_over.problem.data.joint_kinds]
     shown = ", ".join(f"{from_si(lag, unit):+.3f} {unit}" for lag, unit in zip(found.lags.tolist(), units, strict=True))
     return [
         Notice(

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
 
@@ -20,17 +20,17 @@ import numpy as np
 
 from truearm.identification.solving.fit import Fit, Status
 from truearm.identification.solving.redundancy import gauge_motions
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.statistics import errors_of
 from truearm.modeling.chain import Array, ForwardKinematics
 from truearm.modeling.parts import Payload
 from truearm.modeling.postures import Postures
 
 #: Configurations at which positions are asked for, and draws of the parameters' errors: fewer for many targets.
-_CONFIGURATIONS: Final = (60, 300)
-_DRAWS: Final = (100, 300)
+_CONFIGURATIONS: Final = (60, 200)
+_DRAWS: Final = (100, 600)
 _POSITIONS: Final = 3_000
 _LENGTHS: Final = 3_000_000
-#: Squared mean length of a normal vector over its variance, if that is the same along all three axes.
-_MEAN_LENGTH: Final = 8.0 / (3.0 * math.pi)
 #: Deviation of an angle from which the derivatives are compared with the kinematics themselves [rad].
 _LARGE_ANGLE: Final = 5e-3
 #: Share of the error by which the derivatives may be wrong, and what it is tried on.
@@ -39,8 +39,12 @@ _TRIED_DRAWS: Final = 12
 _TRIED_CONFIGURATIONS: Final = 40
 #: Share of the squared error from which what the model leaves makes the figure a lower bound.
 _REMAINDER: Final = 0.1
+#: Share of the equations that parameters leave to the residuals at least.
+_LEAST_LEFT: Final = 0.1
 #: Configurations of a map, however many targets there are.
 _LEAST_MAPPED: Final = 20
+#: So that the variance of what is drawn exists.
+_LEAST_FREEDOM: Final = 3.0
 _INTERVAL: Final = (5.0, 95.0)
 
 
@@ -63,7 +67,7 @@ class Expectation:
     interval_90: tuple[float, float]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ExpectedError:
     """The error of the targets' positions to expect over the workspace, without the noise of a reading [m].
 
@@ -73,9 +77,11 @@ class ExpectedError:
         Of all targets together.
     targets
         Of each, by its name.
+    joint_error
+        Error of each joint in every arrival that is in it, a standard deviation [rad or m]: repeatability plus what the
+        model leaves.
     remainder
-        The part of the mean error that comes from what readings of an arrival share: repeatability plus what the model
-        leaves.
+        Root mean square of what that does to the targets.
     payload
         What the robot carries there.
     gauge_freedoms
@@ -86,6 +92,7 @@ class ExpectedError:
 
     overall: Expectation
     targets: dict[str, Expectation]
+    joint_error: Array
     remainder: float
     payload: Payload
     gauge_freedoms: tuple[str, ...]
@@ -125,9 +132,14 @@ class PositionErrors:
     @cached_property
     def _errors(self) -> dict[str, Array]:
         """Errors of the parameters by name, ``(draws,)`` each [SI]."""
-        names, root = _root(self.fit)
-        normal = np.random.default_rng(self.seed).standard_normal((self.draws, root.shape[1]))
-        return dict(zip(names, root @ normal.T, strict=True))
+        names, root = covariance_root(self.fit)
+        rng = np.random.default_rng(self.seed)
+        drawn = root @ rng.standard_normal((self.draws, root.shape[1])).T
+        if not self.fit.declared or self.fit.excess > 1.0:
+            # The noise was estimated too: Student's distribution (Gelman et al. 2013, section 3.2).
+            freedom = _freedom(self.fit)
+            drawn *= np.sqrt(freedom / rng.chisquare(freedom, self.draws))
+        return dict(zip(names, drawn, strict=True))
 
     @cached_property
     def _bent(self) -> bool:
@@ -154,11 +166,19 @@ class PositionErrors:
         return np.stack([np.sqrt(np.einsum("dxn,dxn->dn", move, move)) for move in moves], axis=1)
 
 
-def expected_error(fit: Fit, seed: int = 0) -> ExpectedError:
+def expected_error(fit: Fit, seed: int = 0, *, plausible: bool = True) -> ExpectedError:
     """Return the error of the targets' positions to expect over the workspace.
 
     Joint positions are drawn evenly within the limits (or a turn, or 1 m), with payload and gravity of the fit. Base
-    and targets are as fitted, with their own uncertainty.
+    and targets are as fitted, with their own uncertainty. What depends on the order of measurement or the temperature
+    is in its middle.
+
+    Parameters
+    ----------
+    seed
+        Of joint positions and draws.
+    plausible
+        Whether what was fitted can be this robot.
     """
     robot = fit.robot
     few, many = _CONFIGURATIONS
@@ -172,11 +192,33 @@ def expected_error(fit: Fit, seed: int = 0) -> ExpectedError:
     return ExpectedError(
         overall=overall,
         targets={t.name: _expectation(lengths[:, k]) for k, t in enumerate(robot.targets)},
+        joint_error=fit.joint_error,
         remainder=remainder,
         payload=robot.payload,
         gauge_freedoms=fit.gauge_freedoms,
-        omissions=tuple(_omissions(fit, remainder, overall)),
+        omissions=tuple(_omissions(fit, remainder, overall, plausible=plausible)),
     )
+
+
+def as_residuals_allow(fit: Fit, data: Dataset) -> Fit:
+    """Return a fit whose joint errors move the targets no further than the readings have been found to lie off.
+
+    Residuals that hang together in another way than errors of the joints make them are not explained by any: what was
+    found for the joints is then too large in some directions.
+
+    Parameters
+    ----------
+    data
+        The training readings.
+    """
+    off = errors_of(fit.robot, data).position_norms
+    if not fit.joint_error.any() or fit.gauge_freedoms or not len(off):
+        return fit
+    some = np.linspace(0, data.configurations - 1, min(data.configurations, _CONFIGURATIONS[1])).round()
+    moved = _remainder(fit, data.postures.at(some.astype(np.intp)))
+    spent = sum(fit.robot.parameters[name].informed or 0.0 for name in fit.free.names)
+    left = float(np.mean(off**2)) / max(1.0 - spent / (3 * len(off)), _LEAST_LEFT) - 3.0 * fit.sigma["position"] ** 2
+    return replace(fit, joint_error=fit.joint_error * math.sqrt(min(max(left / moved**2, 0.0), 1.0)))
 
 
 def expected_map(fit: Fit, positions: int, seed: int = 0) -> tuple[Array, Array]:
@@ -210,25 +252,22 @@ def _expectation(lengths: Array) -> Expectation:
     )
 
 
-def _remainder(fit: Fit, joints: Array) -> float:
-    """Return the mean error of the targets that the joints' error of an arrival makes [m]."""
+def _remainder(fit: Fit, joints: Array | Postures) -> float:
+    """Return the root mean square error of the targets that the joints' error of an arrival makes [m]."""
     if not fit.joint_error.any():
         return 0.0
     at = fit.robot.loaded(joints)
-    lengths = []
-    for kinematics in _to_targets(fit, at):
-        J = _by_joints(fit, kinematics) * fit.joint_error[:, None, None]
-        lengths.append(np.sqrt(_MEAN_LENGTH * np.sum(J**2, axis=(0, 1))))
-    return float(np.mean(lengths))
+    moved = [_by_joints(fit, kinematics) * fit.joint_error[:, None, None] for kinematics in _to_targets(fit, at)]
+    return math.sqrt(float(np.mean([np.sum(J**2, axis=(0, 1)) for J in moved])))
 
 
-def _omissions(fit: Fit, remainder: float, overall: Expectation) -> Iterator[str]:
+def _omissions(fit: Fit, remainder: float, overall: Expectation, *, plausible: bool) -> Iterator[str]:
     """Say what the covariance cannot know."""
     if fit.status is Status.NOT_CONVERGED:
         yield "the fit did not converge"
-    if fit.status is Status.IMPLAUSIBLE:
+    if not plausible:
         yield "what was fitted cannot be this robot"
-    if not {"joint zero", "geometry"} & set(fit.model.groups):
+    if "geometry" not in fit.model.groups:
         yield "the robot's own geometry counts as exact"
     if fit.at_bound:
         yield "values at a bound count as exact"
@@ -236,7 +275,14 @@ def _omissions(fit: Fit, remainder: float, overall: Expectation) -> Iterator[str
         yield "the robot does something that the model cannot express, and it may do more of it elsewhere"
 
 
-def _root(fit: Fit) -> tuple[tuple[str, ...], Array]:
+def _freedom(fit: Fit) -> float:
+    """Return the degrees of freedom that the readings left to the estimate of their noise."""
+    rows = int(np.isfinite(fit.weight).sum()) * (3 if "position" in fit.sigma else 1)
+    spent = sum(fit.robot.parameters[name].informed or 0.0 for name in fit.free.names)
+    return max(rows - spent, _LEAST_FREEDOM)
+
+
+def covariance_root(fit: Fit) -> tuple[tuple[str, ...], Array]:
     """Return names of parameters and a root of the covariance of their errors, ``(parameters, rank)``.
 
     Where there were no priors, parameters that the data do not tell apart from others were held. They are off by what

@@ -15,6 +15,7 @@ from typing import Final
 
 import numpy as np
 
+from truearm.identification.judging.left_over import LeftOver
 from truearm.identification.solving.fit import Fit
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of
@@ -29,6 +30,8 @@ LARGEST_ANGLE_LEFT: Final = 0.1
 LARGEST_MOVE: Final = 5.0
 #: How far a joint zero may have moved [rad]: marks are missed by a tooth of the gear, never by a quarter of a turn.
 LARGEST_ZERO: Final = math.radians(30.0)
+#: Prior deviations over the one that the readings leave, of a direction that these see.
+_SEEN: Final = 1.0
 #: Deviations by which a parameter may be where it is without having moved.
 _UNKNOWN: Final = 2.0
 
@@ -70,26 +73,44 @@ def implausible(fit: Fit, data: Dataset) -> str | None:
             f"half of the orientations are off by more than {math.degrees(turned):.3g} deg (allowed: "
             f"{math.degrees(LARGEST_ANGLE_LEFT):.2g})"
         )
-    moves, zeros = [], {}
-    for name in fit.free.names:
-        p = robot.parameters[name]
-        moved = max(abs(p.value - p.nominal) - _UNKNOWN * (p.deviation or 0.0), 0.0)
-        if p.group == "geometry":
-            moves.append(moved / p.prior)
-        elif p.group == "joint zero" and p.unit == "rad":
-            zeros[name] = moved
-    size = float(np.sqrt(np.mean(np.square(moves)))) if moves else 0.0
+    size = _geometry_moved(fit, data)
     if size > LARGEST_MOVE:
         return (
             f"its geometry moved by {size:.2g} standard deviations of its priors, as a root mean square (allowed: "
             f"{LARGEST_MOVE:g})"
         )
+    zeros = {}
+    for name in fit.free.names:
+        p = robot.parameters[name]
+        if p.group == "joint zero" and p.unit == "rad":
+            zeros[name] = abs(p.value - p.nominal) - _UNKNOWN * (p.deviation or 0.0)
     farthest = max(zeros, key=lambda name: zeros[name], default=None)
     if farthest is not None and zeros[farthest] > LARGEST_ZERO:
         return (
             f"{farthest} moved by {math.degrees(zeros[farthest]):.3g} deg (allowed: {math.degrees(LARGEST_ZERO):.2g})"
         )
     return None
+
+
+def _geometry_moved(fit: Fit, data: Dataset) -> float:
+    """Return how far the geometry moved, as a root mean square over its free parameters [priors].
+
+    Of all robots that the readings cannot tell from the one found, that one counts whose geometry moved least: what
+    moves along a direction that they do not see costs nothing, nor do base, targets and joint zeros. An arm that was
+    never mastered has its zeros in a twist as well, if its convention lets them be there.
+    """
+    own = np.array([p.group == "geometry" for p in fit.free.parameters], dtype=bool)
+    if not own.any():
+        return 0.0
+    values = np.array([fit.robot.values[name] for name in fit.free.names])
+    moves = (values - fit.free.nominal) / fit.free.prior
+    if np.sqrt(np.mean(moves[own] ** 2)) <= LARGEST_MOVE:
+        return 0.0
+    left = LeftOver.of(fit, data)
+    seen = left.turns[left.strength > _SEEN]
+    unseen = np.linalg.svd(seen, full_matrices=True)[2][len(seen) :].T
+    least = moves[own] - unseen[own] @ np.linalg.lstsq(unseen[own], moves[own], rcond=1e-10)[0]
+    return float(np.sqrt(np.mean(least**2)))
 
 
 def check_plausible(fit: Fit, data: Dataset, others: Iterable[Notice] = ()) -> list[Notice]:

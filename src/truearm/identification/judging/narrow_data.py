@@ -7,20 +7,22 @@ and says nothing about the rest of the workspace: the expected error does.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
-from truearm.identification.judging.expected_error import ExpectedError, expected_map
+from truearm.identification.judging.expected_error import ExpectedError, PositionErrors, expected_map
 from truearm.identification.solving.fit import Fit
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import Errors
 from truearm.notices import Notice
 from truearm.units import SHOWN_AS, from_si
 
-#: Expected over known error from which the result is an error, and end of the interval from which it is a warning.
+#: Expected over known error from which the result is an error. It is a warning where the error may be as large, and is
+#: expected to be so many times the known one.
 _ERROR: Final = 3.0
-_WARNING: Final = 3.0
+_WARNING: Final = 2.0
 #: Below this no instrument sees a robot move, and simulated readings without noise would be doubted [m].
 _NEGLIGIBLE: Final = 2e-6
 #: Mean length of an error of three normal coordinates over the mean size of one.
@@ -29,6 +31,7 @@ _OF_ONE: Final = 2.0
 _LITTLE: Final = 0.5
 #: Configurations at which the largest errors are looked for, and the percentile from which they are large.
 _PLACES: Final = 300
+_DRAWS: Final = 100
 _WORST: Final = 90.0
 
 
@@ -47,11 +50,17 @@ def check_narrow_data(
     of_readings = judged.position or judged.length
     if of_readings is None:
         return []
-    # A distance sees one coordinate of three.
-    known = of_readings.mean if judged.position else _OF_ONE * of_readings.mean
+    fit = replace(fit, joint_error=expected.joint_error)
+    known = of_readings.mean
     low, high = expected.overall.interval_90
     mean = expected.overall.mean
-    if high <= max(_WARNING * known, _NEGLIGIBLE):
+    if (judged.position is None or fit.gauge_freedoms) and mean > _NEGLIGIBLE:
+        # Such readings see positions badly wherever the arm is, and a length is one coordinate of three.
+        known = max(known if judged.position else _OF_ONE * known, _expected_where_measured(fit, measured))
+    if mean <= max(_WARNING * known, _NEGLIGIBLE) or high <= _ERROR * known:
+        return []
+    few = _joints_that_moved_little(fit, measured)
+    if fit.gauge_freedoms and not few:
         return []
     part = "held-out" if held_out else "training"
     words = (
@@ -59,12 +68,17 @@ def check_narrow_data(
         f"{_mm(high)}), where the {part} {'error' if judged.position else 'error of lengths'} is "
         f"{_mm(of_readings.mean)} mm: that one says how good the robot is where it was measured, not elsewhere. "
     )
-    few = _joints_that_moved_little(fit, measured)
     if few:
         words += f"Measure configurations in which these joints move further: {'; '.join(few)}."
     else:
         words += f"Measure more configurations, also {_least_known(fit)}."
     return [Notice("narrow-data", words, "error" if mean > _ERROR * known else "warning")]
+
+
+def _expected_where_measured(fit: Fit, measured: Dataset) -> float:
+    """Return the mean error to expect at the configurations of the training part [m]."""
+    some = np.linspace(0, measured.configurations - 1, min(measured.configurations, _PLACES)).round().astype(np.intp)
+    return float(PositionErrors(fit, _DRAWS).at(measured.joints[some]).mean())
 
 
 def _joints_that_moved_little(fit: Fit, measured: Dataset) -> list[str]:

@@ -7,7 +7,7 @@ one slip mended; the simplest slip that makes them fit several times better is w
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Final
@@ -32,6 +32,8 @@ _PLACED_WITHIN: Final = 3e-3
 _PLACED_WITHIN_BY_FIXTURES: Final = 6e-3
 #: A slip explains the data if they fit this many times better with it mended.
 _LEAST_IMPROVEMENT: Final = 4.0
+#: Beside a slip whose mending makes the data fit this many times better, nothing else is wrong.
+_PLAIN_IMPROVEMENT: Final = 20.0
 #: A simpler slip is preferred to one that fits this many times better: mirrored readings and the opposite signs of
 #: joints 1, 4 and 6 are the same for an arm that is its own mirror image, up to its errors.
 _AS_GOOD: Final = 1.5
@@ -49,6 +51,10 @@ _ALIKE: Final = 0.8
 _TURNED_WITHIN: Final = 0.1
 #: Largest ratio of the stretches along three axes that is still called a scale.
 _MOST_UNEVEN: Final = 1.2
+#: No target is farther from the flange [m].
+_LARGEST_TOOL: Final = 2.0
+#: Cosine between two axes of an instrument that are still called square.
+_SQUARE: Final = 0.1
 #: No instrument reads a robot from farther away [m].
 _FARTHEST: Final = 1e4
 #: Weight of readings against priors where slips are judged by a fit [m or rad].
@@ -90,10 +96,10 @@ def slips_in_positions(robot: Robot, data: Dataset) -> list[Notice]:
     if not bad:
         if least <= _PLACED_WITHIN:
             return turned
-        best = _best(robot, some, _every_slip(robot, rest))
+        best = _best(robot, some, _simple_slips(robot, rest), lambda: [*_sign_slips(some, 2), *_sign_slips(some, 3)])
         if best is not None:
             return [best.notice]
-        return turned or _unrelated(robot, some)
+        return turned or _beyond_reach(robot, some) or _unrelated(robot, some)
     # The other targets fit with the same joints, so these are right.
     found = []
     for t in bad:
@@ -104,8 +110,8 @@ def slips_in_positions(robot: Robot, data: Dataset) -> list[Notice]:
     return [*turned, *found]
 
 
-def _every_slip(robot: Robot, data: Dataset) -> Iterator[Slip]:
-    """Try all slips, the simple ones first."""
+def _simple_slips(robot: Robot, data: Dataset) -> Iterator[Slip]:
+    """Try everything but several slips at once, the simplest first."""
     some = _some(data)
     yield from _length_slips(some)
     yield from _angle_slips(some)
@@ -114,19 +120,28 @@ def _every_slip(robot: Robot, data: Dataset) -> Iterator[Slip]:
     yield from _order_slips(some)
     yield from _shifted(data)
     yield from _scale_slips(robot, some)
-    yield from _sign_slips(some, 2)
-    yield from _sign_slips(some, 3)
 
 
-def _best(robot: Robot, data: Dataset, slips: Iterable[Slip]) -> Slip | None:
-    """Return the simplest slip that explains the data, None if none does."""
+def _best(robot: Robot, data: Dataset, slips: Iterable[Slip], several: Callable[[], list[Slip]] = list) -> Slip | None:
+    """Return the simplest slip that explains the data, None if none does.
+
+    Parameters
+    ----------
+    several
+        Several slips at once, tried where none alone makes the data fit as if nothing else were wrong.
+    """
     tried = list(slips)
     if not tried:
         return None
-    shares = np.array([_misfit(robot, slip.data) / _spread(slip.data) for slip in tried])
-    best = tried[int(np.argmax(shares <= _AS_GOOD * shares.min()))]
     given = _misfit(robot, data) / _spread(data)
-    return best if shares.min() * _LEAST_IMPROVEMENT < given else None
+    shares = [_misfit(robot, slip.data) / _spread(slip.data) for slip in tried]
+    if min(shares) * _PLAIN_IMPROVEMENT > given:
+        more = several()
+        tried += more
+        shares += [_misfit(robot, slip.data) / _spread(slip.data) for slip in more]
+    least = min(shares)
+    best = next(slip for slip, share in zip(tried, shares, strict=True) if share <= _AS_GOOD * least)
+    return best if least * _LEAST_IMPROVEMENT < given else None
 
 
 def slips_in_lengths(robot: Robot, data: Dataset) -> list[Notice]:
@@ -253,14 +268,32 @@ def _scale_slips(robot: Robot, data: Dataset) -> Iterator[Slip]:
         rows[mine, :, 9 + 3 * column : 12 + 3 * column] = -R[where[mine]]
     rows[:, :, -3:] = -np.eye(3)
     found = np.linalg.lstsq(rows.reshape(-1, unknowns), p[where].reshape(-1), rcond=1e-10)[0]
-    stretch = np.linalg.svd(found[:9].reshape(3, 3), compute_uv=False)
-    if stretch[2] <= 0.0 or stretch[0] > _MOST_UNEVEN * stretch[2]:
+    onto = np.asarray(found[:9].reshape(3, 3), dtype=float)
+    stretch = np.linalg.svd(onto, compute_uv=False)
+    if stretch[2] <= 0.0:
+        return
+    if stretch[0] > _MOST_UNEVEN * stretch[2]:
+        yield from _column_slips(data, onto)
         return
     factor = float(np.prod(stretch)) ** (1 / 3)
     size = f"{1 / factor:.4g} times too large" if factor < 1 else f"{factor:.4g} times too small"
     yield Slip(
         "unit-length", f"The positions are {size} for this robot. Mend them or their unit", _scaled(data, factor)
     )
+
+
+def _column_slips(data: Dataset, onto: Array) -> Iterator[Slip]:
+    """Try single columns of positions in another unit, from the linear map that takes readings onto the robot."""
+    stretch = np.linalg.norm(onto, axis=0)
+    turned = onto / stretch
+    off = np.abs(stretch - 1.0) > _MOST_UNEVEN - 1.0
+    if np.abs(turned.T @ turned - np.eye(3)).max() > _SQUARE or off.all():
+        return
+    sizes = [f"{1 / by:.4g} times too large" if by < 1 else f"{by:.4g} times too small" for by in stretch.tolist()]
+    words = " and ".join(f"the column {axis} of the positions is {sizes[i]}" for i, axis in enumerate("xyz") if off[i])
+    mended = data.position * np.where(off, stretch, 1.0)
+    words = f"For this robot {words}. Mend the unit in the header, or the numbers"
+    yield Slip("unit-length", words, replace(data, position=mended))
 
 
 def _mirrored(data: Dataset) -> Iterator[Slip]:
@@ -319,11 +352,32 @@ def _shifted(data: Dataset) -> Iterator[Slip]:
         yield Slip("rows-shifted", said + "shifted by one row. Shift them back", _some(replace(data, joints=joints)))
 
 
+def _beyond_reach(robot: Robot, data: Dataset) -> list[Notice]:
+    """Say if readings lie so far apart that no arm of this size was read, in whatever frame."""
+    reach = float(np.linalg.norm(robot.with_frames(Transform(), {}).world_poses(data.postures)[0], axis=1).max())
+    read = data.position[data.has_position]
+    apart = float(np.linalg.norm(read - np.median(read, axis=0), axis=1).max())
+    if apart <= 2.0 * (reach + _LARGEST_TOOL):
+        return []
+    return [
+        Notice(
+            "unit-length",
+            f"The positions lie up to {apart:.3g} m from the middle of all, where the arm reaches {reach:.2g} m. Some "
+            "of their numbers are in another unit, or lost their decimal point or comma.",
+            "error",
+        )
+    ]
+
+
 def _unrelated(robot: Robot, data: Dataset) -> list[Notice]:
     """Say if the readings fit the joints no better than in an order that is drawn."""
     given = _misfit(robot, data)
     if given < _UNRELATED * _spread(data):
         return []
+    half = data.configurations // 2
+    for part in (data.of_configurations(np.arange(half)), data.of_configurations(np.arange(half, data.configurations))):
+        if part.has_position.any() and _misfit(robot, part) * _LEAST_IMPROVEMENT < given:
+            return []  # the robot or the instrument stands elsewhere in the other half
     rng = np.random.default_rng(0)
     drawn = (replace(data, joints=rng.permutation(data.joints)) for _ in range(_ORDERS_DRAWN))
     if any(_ALIKE * _misfit(robot, other) <= given for other in drawn):

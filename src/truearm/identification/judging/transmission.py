@@ -94,7 +94,8 @@ def periodic_errors(fit: Fit, data: Dataset) -> tuple[PeriodicError, ...]:
         noise = total / max(free, 1)
         tried = [(*_strongest(at.joints[:, i], pull[:, i], weight[:, i, i], noise), i) for i in open_joints]
         explained, periods, a, b, joint = max(tried)
-        chance = len(open_joints) * len(_PERIODS) * math.exp(-0.5 * free * explained / total)
+        agreement = min(free * explained / total, _agreement(periods * at.joints[:, joint], pull[:, joint]))
+        chance = len(open_joints) * len(_PERIODS) * math.exp(-0.5 * agreement)
         if chance >= _LARGEST_CHANCE:
             break
         found.append(PeriodicError(joint + 1, periods, math.hypot(a, b), explained / total, chance))
@@ -131,6 +132,18 @@ def _strongest(q: Array, pull: Array, weight: Array, noise: float) -> tuple[floa
     explained = np.where(seen, a * ys + b * yc, 0.0)
     best = int(np.argmax(explained))
     return float(explained[best]), int(_PERIODS[best]), float(a[best]), float(b[best])
+
+
+def _agreement(angle: Array, pull: Array) -> float:
+    """Return how far the pulls of all configurations agree on one sine, chi squared of two degrees by chance.
+
+    It takes the size of every pull as it is (White 1980, "A heteroskedasticity-consistent covariance matrix estimator
+    and a direct test for heteroskedasticity"). What a model cannot follow, the sag of a stretched arm for example, is
+    large at some configurations: a few of these agree on a sine far sooner than noise of one size does.
+    """
+    waves = np.stack([np.sin(angle), np.cos(angle)]) * pull
+    total = waves.sum(axis=1)
+    return float(total @ np.linalg.lstsq(waves @ waves.T, total, rcond=1e-10)[0])
 
 
 def check_transmission(fit: Fit, data: Dataset) -> list[Notice]:

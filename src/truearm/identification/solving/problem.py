@@ -6,6 +6,7 @@ one more row, (value - nominal) / deviation.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.errors import InputError
+from truearm.limits import refuse_beyond
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.observations import Observation, compared
 from truearm.measurement.sighting import Sighting
@@ -202,7 +204,10 @@ class Evaluation:
         """Derivative of the residual, ``(rows, parameters)``."""
         names = self.problem.free.names
         # Parameter by parameter in memory: as forward kinematics gives it, and as QR decompositions take it.
-        J = np.empty((*self.vector.shape[:-1], len(names), self.problem.rows))
+        shape = (*self.vector.shape[:-1], len(names), self.problem.rows)
+        refuse_beyond("parameters", len(names), where=self.problem.data.source)
+        refuse_beyond("derivatives", math.prod(shape), where=self.problem.data.source)
+        J = np.empty(shape)
         by_parameter = np.moveaxis(J, -2, 0)
         for block, rows in self._rows():
             observation, sigma = block.observation, block.sigma[:, None]

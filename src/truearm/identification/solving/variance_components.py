@@ -409,7 +409,8 @@ def _maximised(moments: _Moments, start: _State, kinds: Sequence[NDArray[np.intp
             break
         if before is not None:  # as much further as the last step fell short: the information is but an average
             last, then = before
-            step *= float(np.clip(then @ last / max(float((then - slope) @ last), 1e-300), 0.3, _FURTHER))
+            gain, fall = float(then @ last), float((then - slope) @ last)
+            step *= _FURTHER if gain > max(0.0, _FURTHER * fall) else 0.3 if fall <= 0.0 else max(0.3, gain / fall)
         step *= min(1.0, _LARGEST_STEP / float(np.abs(step).max() + 1e-300))
         for _ in range(12):
             there = _at(moments, here, free, value * np.exp(step))

@@ -19,7 +19,7 @@ from truearm.errors import InputError, nearest_names
 from truearm.files import read_text
 from truearm.measurement.dataset import Dataset, IntArray
 from truearm.measurement.dataset_fields import VISITS
-from truearm.measurement.readers.cells import Cells, Layout, read_cells
+from truearm.measurement.readers.cells import Cells, Layout, lines_of, read_cells
 from truearm.measurement.readers.fixtures import check_lengths, read_setup
 from truearm.measurement.readers.rows import Readings, dataset_of, found_configurations, same_everywhere
 from truearm.modeling.chain import Array
@@ -72,7 +72,7 @@ def read_csv(path: Path) -> Dataset:
         Configurations in order of first appearance; rows of the role ``reference`` are in ``references``.
     """
     text = read_text(path)
-    header = 1 + next(number for number, line in enumerate(io.StringIO(text, newline="")) if line.strip())
+    header = 1 + next(number for number, line in enumerate(lines_of(text)) if line.strip())
     refuse_other_separators(text, f"{path}, line {header}")
     cells = read_cells(text, str(path), Layout(header=header))
     columns = _columns(cells)
@@ -133,7 +133,7 @@ def read_csv(path: Path) -> Dataset:
 
 def refuse_other_separators(text: str, where: str) -> None:
     """Refuse a text whose header is not separated by commas; `where` names the header."""
-    heading = text.lstrip().splitlines()[0]
+    heading = next(line for line in lines_of(text) if line.strip())
     seen = next((name for sign, name in _SEPARATORS.items() if sign in heading), None)
     if seen is None and "," not in heading and len(heading.split()) > 3:
         seen = "blanks"
@@ -188,8 +188,9 @@ def _columns(cells: Cells) -> dict[str, _Column]:
 def _refuse_missing(cells: Cells, columns: dict[str, _Column]) -> None:
     where = f"{cells.source}, line {cells.header}"
     numbers = _joint_numbers(columns)
+    there_are = set(numbers)
     for number in range(1, max(numbers, default=1) + 1):
-        if number not in numbers:
+        if number not in there_are:
             raise InputError(
                 f"the column joint_{number} is missing",
                 where=where,

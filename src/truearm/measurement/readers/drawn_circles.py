@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -122,7 +123,7 @@ def _page(page: Page, dpi: float | tuple[float, float] | None) -> tuple[Configur
     labels = cells.texts(columns["configuration"][0])
     found = found_configurations(cells, labels, [place for place, _ in joints], [unit for _, unit in joints])
     if len(found.labels) < len(labels):
-        again = next(label for k, label in enumerate(labels) if label in labels[:k])
+        again = Counter(labels).most_common(1)[0][0]
         raise InputError(
             "a configuration appears twice",
             where=f"{page.points}, column configuration",

@@ -142,7 +142,7 @@ class ParameterEntry(_Entry):
     value: Number
     prior: Positive
     unit: str
-    deviation: Number | None = None
+    deviation: NotNegative | None = None
     informed: Number | None = None
 
 
@@ -151,6 +151,26 @@ class PriorsEntry(_Entry):
 
     length: Positive | None = None
     angle: Positive | None = None
+
+
+class ErrorEntry(_Entry):
+    """A notice of the level error."""
+
+    code: Name
+    message: str
+
+
+class ProofEntry(_Entry):
+    """What the calibration knew about its result; `correlations` are the rows of a lower triangular factor."""
+
+    status: Literal["converged", "at-bound", "rank-loss", "not-converged", "implausible"]
+    errors: list[ErrorEntry] = []
+    lower_bound: Annotated[bool, Field(strict=True)] = False
+    region: list[tuple[Number, Number]] = []
+    joint_error: list[NotNegative] = []
+    deviations: dict[str, NotNegative] = {}
+    correlations: list[Annotated[str, StringConstraints(strict=True)]] = []
+    sha256: Annotated[str, StringConstraints(strict=True, pattern="^[0-9a-f]{64}$")]
 
 
 class RobotFile(_Entry):
@@ -189,4 +209,5 @@ class RobotFile(_Entry):
     targets: list[TargetEntry] = []
     fixtures: list[FixtureEntry] = []
     parameters: dict[str, ParameterEntry] = {}
+    proof: ProofEntry | None = None
     history: list[str] = []

@@ -1,0 +1,86 @@
+"""What a fit leaves of all readings, and what its own parameters could still take of it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.identification.solving.fit import Fit
+from truearm.identification.solving.problem import Problem
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.observations import OBSERVATIONS
+from truearm.modeling.chain import Array
+
+
+@dataclass(frozen=True, eq=False)
+class LeftOver:
+    """The whitened residuals of a fit on readings, linearised at its solution.
+
+    Attributes
+    ----------
+    fit
+        What left them.
+    problem
+        The readings; what is known of fixtures is left out.
+    residual
+        ``(rows,)``.
+    jacobian
+        Derivative by the free parameters, ``(rows, parameters)``.
+    basis
+        Orthonormal directions of residuals that the free parameters can take, ``(rows, rank)``.
+    strength
+        Singular values of the Jacobian per prior, of those directions, ``(rank,)``.
+    turns
+        Directions of the parameters per prior that belong to them, ``(rank, parameters)``.
+    """
+
+    fit: Fit
+    problem: Problem
+    residual: Array
+    jacobian: Array
+    basis: Array
+    strength: Array
+    turns: Array
+
+    @classmethod
+    def of(cls, fit: Fit, data: Dataset) -> LeftOver:
+        """Linearise a fit on readings, those it was not made from too."""
+        noise = {observation.name: fit.sigma.get(observation.name, 1.0) for observation in OBSERVATIONS}
+        problem = Problem(fit.robot, replace(data, setup=None), fit.free, noise)
+        r, J = problem.linearised(np.array([fit.robot.values[name] for name in fit.free.names]))
+        # Of the square triangle, which is small, instead of the whole Jacobian.
+        Q, R = np.linalg.qr(J * fit.free.prior)
+        U, s, Vt = np.linalg.svd(R, full_matrices=False)
+        kept = s > 1e-8 * s[0]
+        return cls(fit, problem, r, J, Q @ U[:, kept], s[kept], Vt[kept])
+
+    @property
+    def freedom(self) -> int:
+        """Number of equations that are left when the parameters have taken what they can."""
+        return len(self.residual) - int(self.basis.shape[1])
+
+    def without_parameters(self, rows: Array) -> Array:
+        """Return rows ``(rows,)`` or ``(rows, k)`` without what the free parameters can take."""
+        return np.asarray(rows - self.basis @ (self.basis.T @ rows))
+
+    @property
+    def configuration(self) -> NDArray[np.intp]:
+        """Configuration of each equation, ``(rows,)``."""
+        return np.concatenate(
+            [
+                np.repeat(self.problem.data.configuration[block.readings], block.observation.components)
+                for block in self.problem.blocks
+            ]
+        )
+
+
+def chi_squared_tail(x: float, freedom: int) -> float:
+    """Return the probability that chi squared of so many degrees of freedom is larger than x."""
+    tail, k = (math.erfc(math.sqrt(x / 2.0)), 1) if freedom % 2 else (math.exp(-x / 2.0), 2)
+    while k < freedom:
+        tail += math.exp(k / 2.0 * math.log(max(x, 1e-300) / 2.0) - x / 2.0 - math.lgamma(k / 2.0 + 1.0))
+        k += 2
+    return tail

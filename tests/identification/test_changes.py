@@ -1,0 +1,166 @@
+"""What moved during a campaign is told from what else could have, with where and by how much; and a second base."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.simulated import campaign
+
+from truearm.errors import InputError
+from truearm.identification.judging.changes import check_changes, find_change
+from truearm.identification.judging.left_over import LeftOver, chi_squared_tail
+from truearm.identification.solving.fit import identify
+from truearm.identification.solving.models import named_model
+from truearm.jobs.calibrate import calibrate
+from truearm.library import load_robot
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.readers.matrices import read_matrices
+from truearm.modeling.chain import Array
+from truearm.modeling.transform import rotation_from_vector
+from truearm.notices import Notice
+from truearm.simulation.twin import Twin
+
+FIRST_MOVED = 23
+
+
+@cache
+def honest() -> tuple[Twin, Dataset]:
+    twin, data = campaign("irb120", 50, 0.05e-3, 3)
+    return twin, replace(data, sigma=None, number=np.arange(50.0))
+
+
+def told(data: Dataset, robot: str = "irb120") -> list[Notice]:
+    return check_changes(LeftOver.of(identify(load_robot(robot), data, named_model("geometric")), data))
+
+
+def moved_instrument(data: Dataset, shift: Array, turn: Array | None = None) -> Dataset:
+    R = np.eye(3) if turn is None else rotation_from_vector(turn)
+    late = data.configuration >= FIRST_MOVED
+    return replace(data, position=np.where(late[:, None], data.position @ R.T + shift, data.position))
+
+
+def test_a_moved_instrument_is_named_with_its_configuration_and_size() -> None:
+    (notice,) = told(moved_instrument(honest()[1], np.array([1.2e-3, -1.6e-3, 0.0])))
+    assert (notice.code, notice.level) == ("instrument-moved", "error")
+    size = re.match(f"From configuration {FIRST_MOVED + 1} on, all readings stand ([0-9.]+) mm", notice.message)
+    assert size is not None
+    assert float(size[1]) == pytest.approx(2.0, rel=0.05)
+    assert "`base_changes`" in notice.message
+
+
+def test_a_small_motion_is_a_warning() -> None:
+    (notice,) = told(moved_instrument(honest()[1], np.array([0.0, 0.0, 0.16e-3])))
+    assert (notice.code, notice.level) == ("instrument-moved", "warning")
+
+
+def test_a_moved_target_is_named() -> None:
+    twin, data = honest()
+    _, R = twin.robot.world_poses(data.joints)
+    late = (data.configuration >= FIRST_MOVED) & (data.target == 1)
+    shift = R[data.configuration] @ np.array([0.0, 1e-3, 0.0])
+    (notice,) = told(replace(data, position=np.where(late[:, None], data.position + shift, data.position)))
+    assert (notice.code, notice.level) == ("target-moved", "error")
+    assert notice.message.startswith(f"From configuration {FIRST_MOVED + 1} on, target 2 stands 1")
+    assert 0.9 < float(re.findall(r"stands ([0-9.]+) mm", notice.message)[0]) < 1.1
+
+
+@pytest.mark.parametrize("joint", [1, 3, 6])
+def test_a_jumped_joint_zero_is_named(joint: int) -> None:
+    _, data = honest()
+    joints = data.joints.copy()
+    joints[FIRST_MOVED:, joint - 1] += np.radians(0.2)
+    (notice,) = told(replace(data, joints=joints))
+    assert (notice.code, notice.level) == ("joint-zero-jumped", "error")
+    found = re.search(r"From configuration (\d+) on, joint (\d) stands ([0-9.]+) deg off", notice.message)
+    assert found is not None
+    assert (int(found[1]), int(found[2])) == (FIRST_MOVED + 1, joint)
+    assert 0.18 < float(found[3]) < 0.22
+
+
+def test_a_drift_is_told() -> None:
+    _, data = honest()
+    along = (data.configuration / data.configurations)[:, None] * np.array([0.5e-3, 0.0, 0.0])
+    (notice,) = told(replace(data, position=data.position + along))
+    assert (notice.code, notice.level) == ("drift", "warning")
+    assert "Measure reference points" in notice.message
+
+
+@pytest.mark.parametrize("robot", ["irb120", "katana450", "kr5", "ur10"])
+def test_nothing_is_told_of_honest_campaigns(robot: str) -> None:
+    for seed in range(3):
+        _, data = campaign(robot, 40, 0.05e-3, seed)
+        assert told(replace(data, number=np.arange(40.0)), robot) == []
+
+
+def test_rows_in_another_order_say_the_same_and_without_an_order_nothing() -> None:
+    data = moved_instrument(honest()[1], np.array([2e-3, 0.0, 0.0]))
+    shuffled = data.of_configurations(np.random.default_rng(0).permutation(50))
+    (notice,) = told(shuffled)
+    assert notice.message.startswith(f"From configuration {FIRST_MOVED + 1} on, all readings stand 1.9")
+    assert told(replace(data, number=None)) == []
+    assert told(data.of_configurations(np.arange(FIRST_MOVED - 9, FIRST_MOVED + 9))) == []
+
+
+def test_measured_campaigns_show_no_change(measured_data: Path) -> None:
+    folder = measured_data / "irb120-faro"
+    targets = {str(i): folder / f"target_{i}.txt" for i in (1, 2, 3)}
+    data = read_matrices(folder / "joints_commanded.txt", targets, {}, "deg", "mm")[0]
+    left = LeftOver.of(identify(load_robot("irb120"), data, named_model("geometric")), data)
+    assert find_change(left) is None
+
+
+def test_tails_of_chi_squared() -> None:
+    # Abramowitz and Stegun, table 26.8: quantiles of 1 %.
+    for freedom, quantile in ((1, 6.63490), (2, 9.21034), (3, 11.3449), (6, 16.8119)):
+        assert chi_squared_tail(quantile, freedom) == pytest.approx(0.01, rel=1e-4)
+
+
+# -- a second base -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("shift", "turn"), [((2e-3, 0.0, 0.0), (0.0, 0.0, 0.0)), ((1.0, 0.3, 0.2), (0.1, 0.5, -1.0))])
+def test_a_second_base_cures_a_moved_instrument(shift: tuple[float, ...], turn: tuple[float, ...]) -> None:
+    _, data = honest()
+    steady = calibrate("irb120", data)
+    moved = moved_instrument(data, np.array(shift), np.array(turn))
+    assert not calibrate("irb120", moved).finished
+    cured = calibrate("irb120", moved, base_changes=[str(FIRST_MOVED + 1)])
+    assert cured.finished
+    assert steady.validation is not None
+    assert cured.validation is not None
+    assert cured.validation.position_norms.mean() <= 1.1 * steady.validation.position_norms.mean()
+    (notice,) = [n for n in cured.warnings if n.code == "base-changed"]
+    assert notice.level == "note"
+    assert f"from {FIRST_MOVED + 1} on by " in notice.message
+    assert f"another base from {FIRST_MOVED + 1} on" in cured.robot.history[-1]
+    assert "base_changes=" in cured.command
+
+
+def test_a_second_base_where_nothing_moved_moves_nothing() -> None:
+    (notice,) = [n for n in calibrate("irb120", honest()[1], base_changes=["24"]).warnings if n.code == "base-changed"]
+    assert float(re.findall(r"by ([0-9.]+) mm", notice.message)[0]) < 0.06
+
+
+@pytest.mark.parametrize(
+    ("labels", "words"),
+    [
+        (["nowhere"], "there is no configuration of this name"),
+        (["1"], "nothing was measured before the first configuration"),
+        (["3"], "too few training configurations"),
+        ([2.5], "a name belongs here"),
+        ("24", "a sequence of names belongs here"),
+    ],
+)
+def test_what_cannot_be_a_change_of_the_base_is_refused(labels: list[str], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        calibrate("irb120", honest()[1], base_changes=labels)
+
+
+def test_a_change_of_the_base_needs_the_order() -> None:
+    with pytest.raises(InputError, match="the order of measurement is not known"):
+        calibrate("irb120", replace(honest()[1], number=None, approach=None), base_changes=["24"])

@@ -1,0 +1,58 @@
+"""Validation says when its readings are those of the training, and when targets were renamed."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from tests.simulated import campaign, more_of
+from typer.testing import CliRunner
+
+from truearm.cli import app
+from truearm.jobs.calibrate import calibrate
+from truearm.jobs.validate import validate
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.readers.canonical import csv_text
+
+
+@pytest.fixture(scope="module")
+def calibrated(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Dataset]:
+    """A folder with a campaign, its calibration, and a new campaign of the same twin."""
+    folder = tmp_path_factory.mktemp("validated")
+    twin, data = campaign("irb120", 30, 0.05e-3, 1)
+    (folder / "first.csv").write_text(csv_text(data))
+    calibrate("irb120", folder / "first.csv", out=folder / "result", train=20)
+    return folder, more_of(twin, 12, 0.05e-3, 2)
+
+
+def test_training_readings_are_noticed(calibrated: tuple[Path, Dataset]) -> None:
+    folder, _ = calibrated
+    found = validate(folder / "result" / "calibrated.yaml", folder / "first.csv")
+    (notice,) = found.warnings
+    assert (notice.code, notice.level) == ("training-data", "warning")
+    assert "20 of its 30 configurations are those it was trained on; the rest was held out" in notice.message
+    assert found.lines()[-1].startswith("Warning (training-data): ")
+    assert found.summary()["warnings"] == [notice.summary()]
+
+
+def test_new_readings_are_left_alone(calibrated: tuple[Path, Dataset]) -> None:
+    folder, new = calibrated
+    (folder / "new.csv").write_text(csv_text(new))
+    assert validate(folder / "result" / "calibrated.yaml", folder / "new.csv").warnings == ()
+    assert validate(folder / "result" / "calibrated.yaml", new).warnings == ()
+
+
+def test_renamed_targets_are_told(calibrated: tuple[Path, Dataset]) -> None:
+    folder, new = calibrated
+    renamed = replace(new, targets=("2", "3", "1"))
+    (notice,) = validate(folder / "result" / "calibrated.yaml", renamed).warnings
+    assert (notice.code, notice.level) == ("targets-renamed", "error")
+    assert "2 is 1, 3 is 2, 1 is 3" in notice.message
+    (folder / "renamed.csv").write_text(csv_text(renamed))
+    told = CliRunner().invoke(
+        app, ["validate", str(folder / "result" / "calibrated.yaml"), str(folder / "renamed.csv"), "--json"]
+    )
+    assert told.exit_code == 3
+    assert json.loads(told.stdout)["warnings"][0]["code"] == "targets-renamed"

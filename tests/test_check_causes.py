@@ -1,0 +1,183 @@
+"""The cause of data that cannot be the robot's is named, first and as an error; honest data are left alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from tests.simulated import campaign
+
+from truearm.identification.solving.fit import Status
+from truearm.jobs.calibrate import calibrate
+from truearm.jobs.check import check
+from truearm.library import load_robot
+from truearm.measurement.dataset import Dataset
+from truearm.modeling.parts import Tool
+from truearm.modeling.transform import quaternion_from_rotation
+from truearm.simulation.truths import at_station
+from truearm.simulation.twin import Twin, measure
+
+ROBOT = "irb120"
+
+
+@cache
+def honest() -> Dataset:
+    return replace(campaign(ROBOT, 24, 0.05e-3, 5)[1], sigma=None)
+
+
+def noise(data: Dataset) -> Dataset:
+    return replace(data, position=np.random.default_rng(0).normal(0.0, 0.5, data.position.shape))
+
+
+def scaled(factor: float) -> Callable[[Dataset], Dataset]:
+    return lambda data: replace(data, position=data.position * factor)
+
+
+def exchanged_axes(data: Dataset) -> Dataset:
+    return replace(data, position=data.position[:, [1, 0, 2]])
+
+
+def negated_axis(data: Dataset) -> Dataset:
+    return replace(data, position=data.position * np.array([1.0, -1.0, 1.0]))
+
+
+def sign_of(joint: int) -> Callable[[Dataset], Dataset]:
+    def with_sign(data: Dataset) -> Dataset:
+        joints = data.joints.copy()
+        joints[:, joint - 1] *= -1
+        return replace(data, joints=joints)
+
+    return with_sign
+
+
+def shuffled(data: Dataset) -> Dataset:
+    return replace(data, joints=np.random.default_rng(0).permutation(data.joints))
+
+
+def one_row_late(data: Dataset) -> Dataset:
+    return replace(data, joints=np.roll(data.joints, 1, axis=0))
+
+
+def of_another_robot(_: Dataset) -> Dataset:
+    return replace(campaign("puma560", 24, 0.05e-3, 6)[1], sigma=None)
+
+
+WRONG = [
+    pytest.param(noise, "rows-unrelated", "in an order drawn at random", id="noise"),
+    pytest.param(scaled(2.0), "unit-length", "times too large for this robot", id="twice as large"),
+    pytest.param(scaled(1e4), "unit-length", "times too large for this robot", id="ten thousand times"),
+    pytest.param(scaled(1e3), "unit-length", "as if mm were called m", id="mm called m"),
+    pytest.param(scaled(1e-3), "unit-length", "as if m were called mm", id="m called mm"),
+    pytest.param(exchanged_axes, "mirrored", "columns x, y and z", id="x and y exchanged"),
+    pytest.param(negated_axis, "mirrored", "columns x, y and z", id="y negated"),
+    pytest.param(sign_of(4), "joint-sign", "The sign of joint 4 is", id="sign of joint 4"),
+    pytest.param(sign_of(6), "joint-sign", "The sign of joint 6 is", id="sign of joint 6"),
+    pytest.param(shuffled, "rows-unrelated", "do not follow the joint positions", id="rows shuffled"),
+    pytest.param(one_row_late, "rows-shifted", "shifted by one row", id="joints one row late"),
+    pytest.param(of_another_robot, None, "", id="another robot"),
+]
+
+
+@pytest.mark.parametrize(("spoil", "code", "words"), WRONG)
+def test_what_cannot_be_the_robot_is_implausible_and_its_cause_named(
+    spoil: Callable[[Dataset], Dataset], code: str | None, words: str
+) -> None:
+    run = calibrate(ROBOT, spoil(honest()))
+    assert run.status is Status.IMPLAUSIBLE
+    assert not run.finished
+    first = run.warnings[0]
+    assert first.level == "error"
+    (told,) = [n for n in run.warnings if n.code == "implausible"]
+    assert told.level == "error"
+    assert "enter wider priors" not in " ".join(n.message for n in run.warnings)
+    if code is not None:
+        assert first.code == code
+        assert words in first.message
+        assert f"The cause is most likely what {code} says" in told.message
+
+
+@pytest.mark.parametrize(("robot", "poses"), [("irb120", 30), ("ur10", 12), ("katana450", 30), ("li3", 20)])
+def test_honest_data_have_no_error(robot: str, poses: int) -> None:
+    run = calibrate(robot, campaign(robot, poses, 0.05e-3, 8)[1])
+    assert run.finished
+    assert not [n for n in run.warnings if n.level == "error"]
+
+
+def test_an_unmastered_robot_is_the_robot() -> None:
+    data = honest()
+    off = np.radians(5.0) * np.array([1, -1, 1, 1, -1, 1])
+    run = calibrate(ROBOT, replace(data, joints=data.joints + off))
+    assert run.status is Status.CONVERGED
+    assert not [n for n in run.warnings if n.level == "error"]
+    assert "enter wider priors" in next(n.message for n in run.warnings if n.code == "far-from-nominal")
+
+
+@pytest.mark.parametrize("offset", [0.5e-3, 5e-3])
+def test_the_sign_of_the_last_joint_is_named_for_a_target_near_its_axis(offset: float) -> None:
+    nominal, rng = load_robot(ROBOT), np.random.default_rng(2)
+    drawn = {
+        p.name: p.value + p.prior * float(rng.standard_normal())
+        for p in nominal.parameters.values()
+        if p.group in ("geometry", "joint zero")
+    }
+    tool = Tool({"A": (offset, 0.0, 0.1)})
+    twin = Twin(at_station(nominal.with_values(drawn), tool), {}, None)
+    data = replace(measure(twin, nominal.random_configurations(40, rng), 0.02e-3, rng), sigma=None)
+    assert not check(ROBOT, data).warnings
+    (notice,) = check(ROBOT, sign_of(6)(data)).warnings
+    assert (notice.code, notice.level) == ("joint-sign", "error")
+    assert notice.message.startswith("The sign of joint 6 is opposite")
+
+
+def with_orientations(order: list[int]) -> Dataset:
+    twin, data = campaign(ROBOT, 25, 0.0, 5)
+    _, R = twin.robot.world_poses(data.joints)
+    quaternion = quaternion_from_rotation(R[data.configuration])[:, order]
+    return replace(data, quaternion=quaternion, sigma=None)
+
+
+def test_quaternions_in_another_order_are_told() -> None:
+    right = with_orientations([0, 1, 2, 3])
+    assert "quaternion-order" not in {n.code for n in check(ROBOT, right).warnings}
+    found = {n.code: n for n in check(ROBOT, with_orientations([1, 2, 3, 0])).warnings}
+    assert found["quaternion-order"].level == "error"
+    assert "in the order x, y, z, w" in found["quaternion-order"].message
+    inverse = replace(right, quaternion=np.asarray(right.quaternion) * [1.0, -1.0, -1.0, -1.0])
+    told = next(n.message for n in check(ROBOT, inverse).warnings if n.code == "quaternion-order")
+    assert "turn the other way round" in told
+
+
+def test_joint_positions_of_another_row_are_told() -> None:
+    data = honest()
+    joints = data.joints.copy()
+    joints[[4, 9]] = joints[[9, 4]]
+    (notice,) = check(ROBOT, replace(data, joints=joints)).warnings
+    assert notice.code == "joints-mistaken"
+    assert "5 (those of 10), 10 (those of 5)" in notice.message
+    joints = data.joints.copy()
+    joints[4] = joints[9]
+    (notice,) = check(ROBOT, replace(data, joints=joints)).warnings
+    assert notice.code in ("outliers", "target-mistaken")
+
+
+def renamed(data: Dataset, readings: list[int], name: str) -> Dataset:
+    target = data.target.copy()
+    names = (*data.targets, name) if name not in data.targets else data.targets
+    target[readings] = names.index(name)
+    return replace(data, target=target, targets=names)
+
+
+def test_a_misspelt_target_is_told() -> None:
+    data = replace(honest(), targets=("A", "B", "C"))
+    assert not check(None, data).warnings
+    first_of = np.flatnonzero(data.target == 0).tolist()
+    found = {n.code: n for n in check(None, renamed(data, first_of[3:5], "a")).warnings}
+    assert found["target-misspelt"].level == "error"
+    assert "a at 4, 5, where A is missing: did you mean A?" in found["target-misspelt"].message
+    found = {n.code: n for n in check(None, renamed(data, first_of[6:7], "B")).warnings}
+    assert "B is there twice at 7, and A not at all" in found["target-misspelt"].message
+    other = renamed(data, first_of[3:5], "spare-marker")
+    assert "target-misspelt" not in {n.code for n in check(None, other).warnings}

@@ -82,9 +82,9 @@ class Fit:
         The parameters that were identified, in the order of `covariance`.
     covariance
         Of the free parameters [SI], ``(parameters, parameters)``. An interval of 1.96 deviations to both sides is one of
-        95 %: where the variances of readings and joints are known from few readings, it is wider by what Student's t is
-        wider than the normal distribution. Readings of an arrival may hang together. Outliers that lie to one side bias
-        a robust fit, and the covariance does not contain that.
+        95 %: where variances are known from few readings, it is as much wider as one of Student's t. Readings of an
+        arrival may hang together. Outliers that lie to one side bias a robust fit, and the covariance does not contain
+        that.
     redundancies
         Parameters held because the data cannot tell them apart, with the combination.
     at_bound

@@ -67,7 +67,7 @@ def robot_of(nominal: Robot, targets: int, rng: np.random.Generator) -> Robot:
     turned = np.array([1.0, *rng.uniform(-0.05, 0.05, 2), rng.uniform(-1.0, 1.0)])
     base = Transform(tuple(rng.uniform(-2, 2, 3).tolist()), tuple((turned / np.linalg.norm(turned)).tolist()))
     places = {
-        str(i + 1): tuple((rng.uniform(-0.1, 0.1, 3) + np.array([0.0, 0.0, 0.1])).tolist()) for i in range(targets)
+        str(i + 1): tuple((np.array([0.0, 0.0, 0.1]) + rng.uniform(-0.1, 0.1, 3)).tolist()) for i in range(targets)
     }
     placed = nominal.with_frames(base, places)
     drawn = GEOMETRIC.prepared(placed).parameters.values()

@@ -81,7 +81,7 @@ class Fit:
     free
         The parameters that were identified, in the order of `covariance`.
     covariance
-        Of the free parameters [SI], ``(parameters, parameters)``. An interval of 1.96 deviations to both sides is one of
+        Of the free parameters [SI], ``(parameters, parameters)``. An interval of 1.96 deviations to both sides is of
         95 %: where variances are known from few readings, it is as much wider as one of Student's t. Readings of an
         arrival may hang together. Outliers that lie to one side bias a robust fit, and the covariance does not contain
         that.

@@ -11,6 +11,7 @@ import pytest
 
 from truearm.errors import InputError
 from truearm.identification.judging.advice import check_fit
+from truearm.identification.judging.expected_error import expected_error
 from truearm.identification.solving.fit import identify
 from truearm.identification.solving.models import MODELS
 from truearm.jobs.calibrate import calibrate
@@ -132,7 +133,7 @@ def test_the_stated_accuracy_of_positions_is_true(device: str) -> None:
     for seed in (1, 2, 3):
         twin, data = campaign(device, 60, seed)
         fit = identify(ROBOT, data, GEOMETRIC)
-        (notice,) = (n for n in check_fit(fit) if n.code == "closed-loop")
+        (notice,) = (n for n in check_fit(fit, expected_error(fit)) if n.code == "closed-loop")
         stated.append(float(notice.message.split("accurate to about ")[1].split(" mm")[0]))
         q = ROBOT.random_configurations(150, np.random.default_rng(seed))
         at = twin.frames(q)[data.targets[0]][:, :3, 3]

@@ -15,11 +15,10 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
-from truearm.errors import InputError
-from truearm.jobs import JOBS
 from truearm.version import __version__
 
 if TYPE_CHECKING:
+    from truearm.errors import InputError
     from truearm.jobs.axes import axes
     from truearm.jobs.calibrate import calibrate
     from truearm.jobs.check import check
@@ -99,16 +98,19 @@ __all__ = [
 _HOME: Final = {
     "Calibration": "truearm.results.calibration",
     "Dataset": "truearm.measurement.dataset",
+    "InputError": "truearm.errors",
     "Parameter": "truearm.modeling.parameters",
     "Payload": "truearm.modeling.parts",
     "Robot": "truearm.modeling.robot",
-    **{job: f"truearm.jobs.{job}" for job in JOBS},
 }
 
 
 def __getattr__(name: str) -> Any:
-    if name in _HOME:
-        return getattr(import_module(_HOME[name]), name)
+    from truearm.jobs import JOBS  # not before: the command can be interrupted quietly once it has begun
+
+    home = f"truearm.jobs.{name}" if name in JOBS else _HOME.get(name)
+    if home is not None:
+        return getattr(import_module(home), name)
     raise AttributeError(f"module 'truearm' has no attribute {name!r}")
 
 

@@ -1,42 +1,73 @@
-"""Reading text and writing files so that nothing is ever half-written."""
+"""Reading files, and refusing in plain words what cannot be read or does not fit its schema."""
 
 from __future__ import annotations
 
-import os
 import re
-import secrets
-import shutil
-import tempfile
-import unicodedata
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+import stat
 from pathlib import Path
-from typing import Any, Final, TypeVar, get_args
+from typing import Any, Final
 
-from pydantic import BaseModel, ValidationError
+from truearm.errors import InputError, nearest_names, wrong_kind
+from truearm.limits import limit, refuse_beyond
+from truearm.manifest import refuse_unfinished
+from truearm.schemas import Model, validated
 
-from truearm.errors import InputError, did_you_mean, nearest_names, refusals_of, wrong_kind
+#: What an entry of a YAML file cannot do without, unless it is the first: one of these stands before it.
+_BETWEEN_ENTRIES: Final = ("\n", ",", ":", "[", "{", "- ", "-\t", "? ")
+_BRACKET: Final = re.compile(r"[\[\]{}]")
+#: An entry that stands for another one, or what looks like it.
+_ALIAS: Final = re.compile(r"(?:^|[\s\[{,:])\*[^\s\[\]{},]")
+#: What is read but is no file, for messages. Whoever reads them may wait for ever, or never come to an end.
+_NO_FILES: Final = (
+    (stat.S_ISFIFO, "a named pipe"),
+    (stat.S_ISCHR, "a device"),
+    (stat.S_ISBLK, "a device"),
+    (stat.S_ISSOCK, "a socket"),
+)
 
-Model = TypeVar("Model", bound=BaseModel)
 
+def read_bytes(path: Path, most: str = "file_size") -> bytes:
+    """Return the content of a file, or refuse with the reason it cannot be read.
 
-def read_bytes(path: Path) -> bytes:
-    """Return the content of a file, or refuse with the reason it cannot be read."""
+    Parameters
+    ----------
+    most
+        Name of the limit of its size, see :mod:`truearm.limits`.
+    """
     try:
-        if path.is_dir():
+        state = path.stat()
+        if stat.S_ISDIR(state.st_mode):
             raise InputError("this is a folder, a file is needed", where=str(path))
-        return path.read_bytes()
+        refuse_unfinished(path)
+        if not stat.S_ISREG(state.st_mode):
+            raise InputError(
+                "this is no file",
+                where=str(path),
+                came=next((kind for is_one, kind in _NO_FILES if is_one(state.st_mode)), None),
+                allowed="a file on disk",
+                cure="Write what it yields into a file first.",
+            )
+        refuse_beyond(most, state.st_size, where=str(path))
+        with path.open("rb") as stream:
+            content = stream.read(state.st_size + 1)
+            if len(content) > state.st_size:  # it grows, or its size is not known beforehand, as that of some of /proc
+                content += stream.read(limit(most) + 1)
+        refuse_beyond(most, len(content), where=str(path))
+        return content
     except FileNotFoundError as error:
         raise _missing(path) from error
     except InputError:
         raise
     except (OSError, ValueError) as error:  # ValueError: a zero byte in the path
-        raise InputError(f"the file cannot be read ({_reason(error)})", where=str(path)) from error
+        raise InputError(f"the file cannot be read ({reason_of(error)})", where=str(path)) from error
 
 
 def _missing(path: Path) -> InputError:
-    if path.is_symlink():
-        return _broken_link(path)
+    try:
+        if path.is_symlink():
+            return broken_link(path)
+    except OSError as error:
+        return InputError(f"the file cannot be read ({reason_of(error)})", where=str(path))
     try:
         siblings = [p.name for p in path.parent.iterdir()]
     except OSError:
@@ -46,7 +77,8 @@ def _missing(path: Path) -> InputError:
     return InputError("there is no such file", where=str(path), cure=cure)
 
 
-def _broken_link(path: Path) -> InputError:
+def broken_link(path: Path) -> InputError:
+    """Return the refusal of a link that leads to nothing."""
     return InputError(
         "this is a link, and there is nothing where it points to",
         where=str(path),
@@ -55,7 +87,8 @@ def _broken_link(path: Path) -> InputError:
     )
 
 
-def _reason(error: OSError | ValueError) -> str:
+def reason_of(error: OSError | ValueError) -> str:
+    """Return what the operating system says of a failure."""
     return (error.strerror if isinstance(error, OSError) else None) or str(error)
 
 
@@ -67,14 +100,9 @@ def exists(path: Path) -> bool:
         return False
 
 
-def is_one_line(text: str) -> bool:
-    """Return whether a text is one line that can be seen: not blank, without breaks and control characters."""
-    return bool(text.strip()) and not any(unicodedata.category(c) in ("Cc", "Cs", "Zl", "Zp") for c in text)
-
-
-def read_text(path: Path) -> str:
-    """Return the text of a UTF-8 file without its byte order mark."""
-    content = read_bytes(path)
+def read_text(path: Path, most: str = "file_size") -> str:
+    """Return the text of a UTF-8 file without its byte order mark; `most` as for :func:`read_bytes`."""
+    content = read_bytes(path, most)
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -94,16 +122,21 @@ def read_yaml(path: Path, schema: type[Model]) -> Model:
     from ruamel.yaml import YAML
     from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
-    text = read_text(path)
+    text = read_text(path, "yaml_size")
+    refuse_beyond("nesting", _deepest(text), where=str(path))
+    refuse_beyond("entries", 1 + sum(map(text.count, _BETWEEN_ENTRIES)), where=str(path))
     try:
+        if _ALIAS.search(text):
+            _refuse_multiplied(YAML(typ="safe", pure=True).compose(text), path)
         content = YAML(typ="safe", pure=True).load(text)
     except MarkedYAMLError as error:
         mark = error.problem_mark
         where = f"{path}, line {mark.line + 1}" if mark else str(path)
-        problem = " ".join(str(error.problem or "not valid").split())
-        raise InputError(f"this is not valid YAML ({problem})", where=where) from error
+        raise _not_yaml(" ".join(str(error.problem or "not valid").split()), where) from error
     except YAMLError as error:
         raise InputError(f"this is not valid YAML ({' '.join(str(error).split())})", where=str(path)) from error
+    except InputError:
+        raise
     except RecursionError as error:
         raise InputError("the entries are nested too deep", where=str(path)) from error
     except Exception as error:  # the parser lets pass what its conversions raise: 30 February, 5000 digits
@@ -114,133 +147,65 @@ def read_yaml(path: Path, schema: type[Model]) -> Model:
     return validated(content, schema, str(path))
 
 
-def validated(content: object, schema: type[Model], where: str) -> Model:
-    """Return `content` as `schema`, or refuse it naming the entry that is wrong."""
-    if not isinstance(content, Mapping):
-        raise InputError("the file must hold named entries (name: value)", where=where, came=type(content).__name__)
-    try:
-        return schema.model_validate(dict(content))
-    except ValidationError as error:
-        raise _refusal(error, content, schema, where) from error
+def _deepest(text: str) -> int:
+    """Return how many brackets are open at once in a YAML document, those in quotes and comments included."""
+    depth = deepest = 0
+    for found in _BRACKET.finditer(text):
+        depth = depth + 1 if found[0] in "[{" else max(depth - 1, 0)
+        deepest = max(deepest, depth)
+    return deepest
 
 
-_NUMBER: Final = ("a number belongs here", "a number without quotes and unit, such as 0.5")
-_WHOLE: Final = ("a whole number belongs here", "a whole number without quotes, such as 2")
-_TABLE: Final = ("named entries belong here", "NAME: VALUE, each on a line of its own or all in {{ }}")
-_LIST: Final = ("a list belongs here", "entries in brackets, such as [1, 2], or each on a line that begins with -")
-#: What pydantic finds wrong, by its names of errors: what that is in plain words, and what is allowed. What stands in
-#: braces is filled in from what pydantic says of the error.
-_FAULTS: Final[Mapping[str, tuple[str, str]]] = {
-    "float_type": _NUMBER,
-    "float_parsing": _NUMBER,
-    "finite_number": ("a finite number belongs here", "no nan, no infinity"),
-    "int_type": _WHOLE,
-    "int_from_float": _WHOLE,
-    "int_parsing": _WHOLE,
-    "greater_than": ("the number is too small", "more than {gt:g}"),
-    "greater_than_equal": ("the number is too small", "{ge:g} or more"),
-    "less_than_equal": ("the number is too large", "{le:g} or less"),
-    "string_type": ("a text belongs here", "a text, in quotes if it looks like a number, a date, yes or no"),
-    "string_too_short": ("the text is empty", "at least one character"),
-    "string_pattern_mismatch": ("the text does not have the form that belongs here", "{pattern}"),
-    "literal_error": ("this value is not known", "{expected}"),
-    "dict_type": _TABLE,
-    "model_type": _TABLE,
-    "list_type": _LIST,
-    "tuple_type": _LIST,
-    "too_short": ("there are too few entries", "at least {min_length}"),
-    "too_long": ("there are too many entries", "{max_length}"),
-    "invalid_key": ("the name of an entry must be a text", "a name, in quotes if it looks like a number"),
-}
-#: Of so many names the right one is found without a hint.
-_FEW_NAMES: Final = 6
-#: Lists and tables of more characters are not shown in messages.
-_LONGEST_SHOWN: Final = 60
+def _refuse_multiplied(root: Any, path: Path) -> None:
+    """Refuse a YAML document that holds too many entries once each alias is replaced by what it stands for."""
+    counts: dict[int, int] = {}
+    inside: set[int] = set()
+
+    def entries(node: Any) -> int:
+        """Return how many entries a node holds, itself included."""
+        if node is None or isinstance(node.value, str):
+            return 1
+        if id(node) not in counts:
+            if id(node) in inside:
+                raise InputError("an entry holds itself", where=f"{path}, line {node.start_mark.line + 1}")
+            inside.add(id(node))
+            held = [part for pair in node.value for part in (pair if isinstance(pair, tuple) else (pair,))]
+            counts[id(node)] = 1 + sum(map(entries, held))
+            inside.discard(id(node))
+        return counts[id(node)]
+
+    refuse_beyond("entries", entries(root), where=str(path))
 
 
-def shown_entry(value: object) -> object:
-    """Return an entry of a file as messages show it: of a long list or table only that it is one, nothing as such."""
-    if value is None:
-        return "nothing"
-    if not isinstance(value, list | tuple | Mapping):
-        return value
-    try:
-        text = str(value)
-    except (ValueError, RecursionError):  # numbers of very many digits, very many brackets
-        text = ""
-    if 0 < len(text) <= _LONGEST_SHOWN:
-        return value
-    return f"{'a table' if isinstance(value, Mapping) else 'a list'} of {len(value)} entries"
+#: What the YAML parser says, the same in plain words, and the cure; what is in quotes there is what came.
+_YAML_FAULTS: Final = (
+    ('duplicate key "([^"]*)"', "an entry is given twice", "Keep one of them."),
+    ("constructor for the tag '([^']*)'", "tags with ! cannot be used here", "Remove the tag."),
+    (
+        "undefined alias '?([^']*)'?",
+        "an alias with * stands for something that the file does not have",
+        "Write it out.",
+    ),
+    (
+        "unhashable key()",
+        "a list or a table stands where the name of an entry belongs",
+        "Write a name before the colon.",
+    ),
+    ("another document()", "a second document begins here, behind ---", "Keep one of them."),
+    (r"character '(\\t)'", "a tab stands where blanks belong", "Indent with blanks."),
+)
 
 
-def _refusal(error: ValidationError, content: Any, schema: type[BaseModel], where: str) -> InputError:
-    """Return the first fault that pydantic found as a refusal that names the entry."""
-    faults = error.errors(include_url=False)
-    first = faults[0]
-    kind, place = first["type"], first["loc"]
-    is_name = place[-1:] == ("[key]",)  # what stands before the colon
-    if is_name:
-        place = place[:-1]
-    holder, entry, holders = content, "", ""
-    for part in place:  # items of a list count from 1, keys stand as they are
-        holders, holder = entry, content
-        if isinstance(content, list) and isinstance(part, int):
-            entry += f"[{part + 1}]"
-            content = content[part] if part < len(content) else None  # of six numbers the fourth may be missing
-        else:
-            entry += f".{part}"
-            content = content.get(part) if isinstance(content, Mapping) else None
-    entry, holders = entry.lstrip("."), holders.lstrip(".")
-
-    def refused(what: str, came: object = None, allowed: str | None = None, cure: str | None = None) -> InputError:
-        return InputError(what, where=f"{where}, {entry}" if entry else where, came=came, allowed=allowed, cure=cure)
-
-    if kind == "extra_forbidden":
-        known = _known_entries(schema, place)
-        allowed = ", ".join(known) or None
-        return refused("this entry is not known here", None, allowed, did_you_mean(str(place[-1]), known))
-    if kind == "missing" and isinstance(holder, list):
-        entry = holders
-        needed = 1 + max(int(f["loc"][-1]) for f in faults if f["type"] == kind and f["loc"][:-1] == place[:-1])
-        return refused("there are too few entries", len(holder), f"{needed}")
-    if kind == "missing":
-        return refused("this entry is missing")
-    came, details = first.get("input"), first.get("ctx", {})
-    cause = details.get("error")
-    if isinstance(cause, InputError):  # a check of our own
-        came = cause.came if cause.came is not None else came
-        return refused(cause.what, shown_entry(came), cause.allowed, cause.cure)
-    if kind not in _FAULTS:
-        what = first["msg"].removeprefix("Value error, ")
-        return refused(what[0].lower() + what[1:], None if isinstance(came, dict | list) else came)
-    what, allowed = _FAULTS[kind]
-    if is_name:
-        what = f"{what}, as the name of the entry"
-    cure = None
-    if kind == "literal_error":
-        known = re.findall("'([^']*)'", details["expected"])
-        details = {"expected": ", ".join(known)}
-        cure = did_you_mean(str(came), known) if len(known) > _FEW_NAMES else None
-    if kind in ("too_short", "too_long"):
-        came = details["actual_length"]
-    return refused(what, shown_entry(came), allowed.format(**details), cure)
-
-
-def _known_entries(schema: type[BaseModel], place: Sequence[int | str]) -> list[str]:
-    """Return which entries there may be beside the one at a place, none if that is not one of a fixed set."""
-    holder: type[BaseModel] | None = schema
-    for part in place[:-1]:
-        if holder is not None and part in holder.model_fields:
-            holder = next(_models_in(holder.model_fields[str(part)].annotation), None)
-    return [] if holder is None else list(holder.model_fields)
-
-
-def _models_in(annotation: object) -> Iterator[type[BaseModel]]:
-    """Return the pydantic models that a type is, or is made of."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        yield annotation
-    for part in get_args(annotation):
-        yield from _models_in(part)
+def _not_yaml(problem: str, where: str) -> InputError:
+    for pattern, what, cure in _YAML_FAULTS:
+        found = re.search(pattern, problem)
+        if found is not None:
+            return InputError(what, where=where, came=found[1] or None, cure=cure)
+    return InputError(
+        f"this is not valid YAML ({problem})",
+        where=where,
+        cure="Look for a quote, a bracket or a colon too many or too few, here or in the line above.",
+    )
 
 
 def path_argument(path: object, parameter: str) -> Path:
@@ -250,200 +215,13 @@ def path_argument(path: object, parameter: str) -> Path:
             return Path(path)
         raise InputError("no file is given", parameter=parameter, came=str(path))
     raise wrong_kind(
-        "a path belongs here", path, parameter, "the path of a file or folder, as a text or a pathlib.Path"
+        "a path belongs here", path, parameter, "the path of a file or folder, as a text in UTF-8 or a pathlib.Path"
     )
 
 
 def _can_be_path(text: str) -> bool:
     try:
-        os.fsencode(text)
+        text.encode()
     except UnicodeEncodeError:  # half a character
         return False
     return "\0" not in text
-
-
-def output_folder(
-    folder: object, names: Iterable[str] = (), read: Collection[Path] = (), parameter: str = "folder"
-) -> Path:
-    """Return the folder that was given for files of some names, or refuse one that cannot be written to.
-
-    Parameters
-    ----------
-    read
-        None of these files may be overwritten.
-    """
-    with refusals_of(parameter):
-        path = writable_folder(path_argument(folder, parameter))
-        for name in names:
-            refuse_overwriting(path / name, read)
-    return path
-
-
-def output_file(file: object, read: Iterable[Path] = (), parameter: str = "file") -> Path:
-    """Return the file that was given to write to, or refuse a place that cannot be; `read` as for a folder."""
-    with refusals_of(parameter):
-        path = writable_file(path_argument(file, parameter))
-        refuse_overwriting(path, read)
-    return path
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a whole file or nothing: a reader never sees half of it, and a failure leaves the old one."""
-    write_files(path.parent, {path.name: text})
-
-
-def write_new_text(path: Path, text: str) -> None:
-    """Write a file that does not exist yet; nothing is overwritten."""
-    write_text(new_file(path), text)
-
-
-def new_file(path: Path) -> Path:
-    """Make sure that a file does not exist yet and can be written at `path`, before any long work, and return it."""
-    if exists(path):
-        raise InputError("this exists already and is not overwritten", where=str(path), cure="Choose another name.")
-    return writable_file(path)
-
-
-def writable_folder(folder: Path) -> Path:
-    """Make sure that files can be written in `folder`, before any long work, and return it."""
-    try:
-        for parent in (folder, *folder.parents):
-            if parent.is_symlink() and not parent.exists():
-                raise _broken_link(parent)
-            if parent.exists():
-                if not parent.is_dir():
-                    raise InputError("this is a file, a folder is needed", where=str(parent))
-                _try_writing(parent)
-                break
-    except OSError as error:
-        raise InputError(f"the folder cannot be used ({_reason(error)})", where=str(folder)) from error
-    return folder
-
-
-def _try_writing(folder: Path) -> None:
-    """Refuse a folder that no file can be made in: its permissions alone do not tell."""
-    try:
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        raise InputError("the folder cannot be written to", where=str(folder), cure="Choose another `out`.") from error
-
-
-def writable_file(path: Path) -> Path:
-    """Make sure that a file can be written at `path`, before any long work, and return it."""
-    writable_folder(path.parent)
-    try:
-        if path.is_symlink() and not path.exists():
-            raise _broken_link(path)
-        if path.name in ("", "..") or path.is_dir():
-            raise InputError("this is a folder, and a file must be written here", where=str(path))
-        if path.exists() and not path.is_file():
-            raise InputError("this is a device or a pipe, and a file must be written here", where=str(path))
-    except OSError as error:
-        raise InputError(f"the file cannot be written ({_reason(error)})", where=str(path)) from error
-    return path
-
-
-def same_place(one: Path, other: Path) -> bool:
-    """Return whether two paths lead to the same file, whether it exists or not."""
-    try:
-        return one.resolve() == other.resolve() or one.samefile(other)
-    except (OSError, RuntimeError):  # where one of them does not exist, or links lead round
-        return False
-
-
-def refuse_overwriting(out: Path, inputs: Iterable[Path]) -> None:
-    """Refuse an output that is one of the inputs, by whatever path."""
-    for path in inputs:
-        try:
-            same = out.samefile(path)
-        except (OSError, ValueError):  # where one of them does not exist they are not the same
-            same = False
-        if same:
-            raise InputError(
-                "this file is read, and would be overwritten", where=str(out), cure="Choose another `out`."
-            )
-
-
-def write_files(folder: Path, files: Mapping[str, str | bytes]) -> None:
-    """Write several files into a folder, all of them or none.
-
-    They are put in place only once all of them are on disk, each in one step. Whatever goes wrong or interrupts before
-    the last one is there, the old files are put back, and new files and folders removed. Only where the process is
-    killed or the machine stops between two steps, some of the files may be new and others old.
-
-    Parameters
-    ----------
-    files
-        What they hold, by name. Names may begin with folders in that folder, or be whole paths.
-
-    Raises
-    ------
-    InputError
-        If one of them cannot be written.
-    """
-    contents: dict[Path, bytes] = {}
-    for name, text in files.items():
-        target = writable_file(folder / name)
-        try:
-            contents[target] = text if isinstance(text, bytes) else text.encode()
-        except UnicodeEncodeError as error:
-            raise InputError(
-                "the text for this file holds half a character", where=str(target), came=text[error.start]
-            ) from error
-    made: list[Path] = []
-    staged: dict[Path, Path] = {}
-    kept: dict[Path, Path] = {}
-    target = folder
-    try:
-        for target, content in contents.items():
-            _make_folders(target.parent, made)
-            staged[target] = target.with_name(f".truearm.{secrets.token_hex(8)}")
-            with staged[target].open("xb") as stream:
-                stream.write(content)
-        for target in staged:
-            if os.path.lexists(target):
-                kept[target] = target.with_name(f".truearm.{secrets.token_hex(8)}")
-                _keep(target, kept[target])
-        _put_in_place(staged, kept)
-        made.clear()
-    except OSError as error:
-        raise InputError(f"the file cannot be written ({_reason(error)})", where=str(target)) from error
-    finally:
-        for temporary in (*staged.values(), *kept.values()):
-            temporary.unlink(missing_ok=True)
-        for new in reversed(made):
-            with suppress(OSError):  # somebody else has put something into it
-                new.rmdir()
-
-
-def _make_folders(folder: Path, made: list[Path]) -> None:
-    """Make a folder with those above it, and note which are new."""
-    for missing in reversed([parent for parent in (folder, *folder.parents) if not parent.exists()]):
-        made.append(missing)
-        missing.mkdir(exist_ok=True)
-
-
-def _keep(file: Path, name: Path) -> None:
-    """Give a file a second name, or copy it where files cannot have two."""
-    try:
-        os.link(file, name, follow_symlinks=False)
-    except OSError:
-        shutil.copy2(file, name, follow_symlinks=False)
-
-
-def _put_in_place(staged: Mapping[Path, Path], kept: dict[Path, Path]) -> None:
-    """Move new files to where they belong; where that fails, put back the old ones that were kept."""
-    try:
-        for target, temporary in staged.items():
-            temporary.replace(target)
-    except BaseException:
-        for target, temporary in staged.items():
-            with suppress(OSError):  # an old file that cannot be put back stays beside its place
-                if target in kept:
-                    old = kept.pop(target)
-                    old.replace(target)
-                    old.unlink(missing_ok=True)
-                elif not temporary.exists():
-                    target.unlink()
-        raise

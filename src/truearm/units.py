@@ -91,6 +91,14 @@ def sized_si(
         Whether it is a standard deviation, which can be too small as well.
     """
     low, high = accepted_range(unit, deviation=deviation)
+    if math.isnan(value):
+        raise InputError(
+            "this is not a number",
+            parameter=parameter,
+            where=where,
+            came=value if came is None else came,
+            allowed=f"{low:.6g} to {high:.6g}{'' if unit == '1' else f' {unit}'}",
+        )
     if low <= value <= high:
         return to_si(value, unit)
     raise InputError(

@@ -31,7 +31,7 @@ def kr5(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_axes_tolerance_and_lines(truearm: Truearm, kr5: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    run = truearm("axes", kr5, "kr5", "--frame", "robot", "--out", out, "--json")
+    run = truearm("axes", "kr5", kr5, "--frame", "robot", "--out", out, "--json")
     assert run.code == 0, run.err
     said = json.loads(run.out)
     assert said == json.loads((out / "axes.json").read_text())
@@ -41,7 +41,7 @@ def test_axes_tolerance_and_lines(truearm: Truearm, kr5: Path, tmp_path: Path) -
     found = {e["name"]: e for e in said["joint_errors"]["found"]}
     assert found["ebeta_2"]["value"] == pytest.approx(0.1813, abs=0.005)
     assert found["ebeta_2"]["interval"][0] < found["ebeta_2"]["value"] < found["ebeta_2"]["interval"][1]
-    plain = truearm("axes", kr5, "kr5", "--frame", "robot", "--out", out)
+    plain = truearm("axes", "kr5", kr5, "--frame", "robot", "--out", out)
     assert "ez_6 (moves the flange)" in plain.out
     errors = out / "joint-errors.yaml"
 
@@ -59,7 +59,7 @@ def test_axes_tolerance_and_lines(truearm: Truearm, kr5: Path, tmp_path: Path) -
 
 
 def test_measured_lines_are_judged(truearm: Truearm, kr5: Path, tmp_path: Path) -> None:
-    truearm("axes", kr5, "kr5", "--frame", "robot", "--out", tmp_path)
+    truearm("axes", "kr5", kr5, "--frame", "robot", "--out", tmp_path)
     truearm("lines", "kr5", "--centre", "850,0,600", "--out", tmp_path / "plan.csv")
     rows = [line.split(",") for line in (tmp_path / "plan.csv").read_text().splitlines()[1:]]
     rng = np.random.default_rng(1)
@@ -79,8 +79,8 @@ def test_measured_lines_are_judged(truearm: Truearm, kr5: Path, tmp_path: Path) 
 
 def test_refusals(truearm: Truearm, kr5: Path, small: Path, tmp_path: Path) -> None:
     for words, part in (
-        (("axes", small / "data.csv", "irb120", "--out", tmp_path), "one joint moves alone"),
-        (("axes", kr5, "kr5", "--frame", "table", "--out", tmp_path), "there is no frame of this name"),
+        (("axes", "irb120", small / "data.csv", "--out", tmp_path), "one joint moves alone"),
+        (("axes", "kr5", kr5, "--frame", "table", "--out", tmp_path), "there is no frame of this name"),
         (("tolerance", "kr5", "--depth", "50"), "not described by joint errors"),
         (("tolerance", "kr5", "--depth", "0", "--lean", "1"), "--depth: a hole needs a depth"),
         (("tolerance", "kr5", "--depth", "50", "--lean", "-1"), "--lean: the length is out of range; got '-0.001 m'"),

@@ -11,7 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.cli.conftest import Truearm
+from tests.simulated import campaign
 
+from truearm.jobs.calibrate import calibrate
 from truearm.jobs.demo import demo
 from truearm.library import load_robot
 from truearm.modeling.formats.robot_file import robot_text
@@ -54,17 +56,27 @@ def test_the_contract(truearm: Truearm, cell: Path) -> None:
     code, said = run(truearm, cell, "--json")
     assert code == 0
     told = json.loads(said)
-    assert set(told) == {"programs", "warnings"}
+    assert set(told) == {"programs", "expected_is_lower_bound", "warnings"}
     (program,) = told["programs"]
-    assert set(program) == {"file", "language", "targets", "corrected", "skipped", "shift_mm"}
+    assert set(program) == {
+        "file",
+        "language",
+        "targets",
+        "corrected",
+        "skipped",
+        "shift_mm",
+        "expected_mm",
+        "not_better",
+    }
     assert (program["file"], program["language"]) == ("plate.mod", "RAPID")
     assert program["targets"] == program["corrected"] == 44
     assert 0.05 < program["shift_mm"]["mean"] < program["shift_mm"]["max"] < 3.0
-    assert {warning["code"] for warning in told["warnings"]} == {"frames-assumed", "tools-assumed"}
+    assert {warning["code"] for warning in told["warnings"]} == {"unproven", "frames-assumed", "tools-assumed"}
     assert sorted(p.name for p in (cell / "out").iterdir()) == [
         "compensation.html",
         "plate.mod",
         "plate.mod.truearm.json",
+        "truearm.manifest.json",
     ]
     record = json.loads((cell / "out" / "plate.mod.truearm.json").read_text())
     assert record["applied"]["frames"] == "assumed"
@@ -75,7 +87,7 @@ def test_with_tool_and_frame_nothing_is_assumed(truearm: Truearm, cell: Path) ->
     code, said = run(truearm, cell, "--tool", cell / "cell.yaml", "--frame", cell / "cell.yaml", "--json")
     assert code == 0
     told = json.loads(said)
-    assert told["warnings"] == []
+    assert [warning["code"] for warning in told["warnings"]] == ["unproven"]
     # The frame is half a millimetre beside what the controller has.
     assert 0.5 < told["programs"][0]["shift_mm"]["mean"] < 3.0
 
@@ -226,7 +238,7 @@ def test_a_program_without_targets_says_so(truearm: Truearm, cell: Path) -> None
     code, said = run(truearm, cell, "--json")
     assert code == 0
     told = json.loads(said)
-    assert [warning["code"] for warning in told["warnings"]] == ["no-targets"]
+    assert [warning["code"] for warning in told["warnings"]] == ["no-targets", "unproven"]
     assert told["programs"][0]["shift_mm"] == {"mean": 0.0, "max": 0.0}
     assert (cell / "out" / "plate.mod").read_bytes() == (cell / "plate.mod").read_bytes()
 
@@ -338,3 +350,27 @@ def test_the_demo_ends_with_a_corrected_program(tmp_path: Path) -> None:
     shutil.copy(tmp_path / "measurements.csv", tmp_path / "plate.mod")
     with pytest.raises(ValueError, match="another file of that name"):
         demo(tmp_path)
+
+
+def test_a_fit_that_lost_rank_is_accepted_by_name(truearm: Truearm, cell: Path) -> None:
+    made = calibrate("irb120", campaign("irb120", 3, 2e-5, 1)[1], model="geometric", train="all")
+    (cell / "calibrated.yaml").write_text(robot_text(made.robot))
+    code, said = run(truearm, cell)
+    assert code == 2
+    assert "got 'rank-loss'" in said
+    assert "give --accept rank-loss" in " ".join(said.split())
+    assert not (cell / "out").exists()
+    code, said = run(truearm, cell, "--accept", "rank-lost")
+    assert code == 2
+    assert "--accept: there is no status or notice of this name" in " ".join(said.split())
+    code, said = run(truearm, cell, "--accept", "rank-loss", "--accept", "not-better-here")
+    assert code == 0
+    assert "Warning (rank-loss)" in said
+    assert "compensate" in (cell / "out" / "compensation.html").read_text()
+    assert "--accept rank-loss --accept not-better-here" in (cell / "out" / "compensation.html").read_text()
+
+
+def test_accept_does_not_go_with_revert(truearm: Truearm, cell: Path) -> None:
+    code, said = run(truearm, cell, "--revert", "--accept", "rank-loss")
+    assert code == 2
+    assert "--accept" in said

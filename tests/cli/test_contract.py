@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -60,7 +61,7 @@ def test_calibrate_writes_its_files_and_prints_one_object(truearm: Truearm, smal
     run = truearm("calibrate", "irb120", small / "data.csv", "--model", "geometric", "--out", out, "--json")
     assert run.code == 0
     summary = json.loads(run.out)
-    assert list(summary) == ["status", "warnings", "nominal", "train", "validation"]
+    assert list(summary) == ["status", "warnings", "nominal", "train", "validation", "expected_mm"]
     assert summary["status"] == "converged"
     assert (summary["train"]["configurations"], summary["validation"]["configurations"]) == (28, 12)
     assert summary["nominal"]["configurations"] == 12
@@ -72,6 +73,7 @@ def test_calibrate_writes_its_files_and_prints_one_object(truearm: Truearm, smal
         "calibrated.yaml",
         "report.html",
         "result.json",
+        "truearm.manifest.json",
     ]
     result = json.loads((out / "result.json").read_text())
     assert {k: result[k] for k in summary} == summary
@@ -309,3 +311,22 @@ def test_a_model_that_cannot_tilt_parallel_axes_says_what_would(truearm: Truearm
         warnings = {w["code"]: w["message"] for w in json.loads(run.out)["warnings"]}
         assert "Joints 2 and 3 are parallel" in warnings["parallel-axes"]
         assert cure in warnings["parallel-axes"]
+
+
+def test_data_of_a_small_part_of_the_workspace_end_with_exit_code_3(truearm: Truearm, tmp_path: Path) -> None:
+    narrow = tmp_path / "narrow.yaml"
+    limits = ([5, 15], [15, 25], [5, 15], [15, 25], [35, 45], [5, 15])
+    text = (Path(package.__file__).parent / "library" / "irb120.yaml").read_text()
+    for number, pair in enumerate(limits, start=1):
+        text = re.sub(rf"(name: axis_{number},.*limits: )\[[^]]*\]", rf"\g<1>{pair}", text)
+    narrow.write_text(text)
+    data = tmp_path / "data.csv"
+    made = truearm("simulate", narrow, "--truth", "random", "--poses", 60, "--noise", 0.02, "--out", data)
+    assert made.code == 0, made.err
+    run = truearm("calibrate", "irb120", data, "--out", tmp_path / "out", "--json")
+    assert run.code == 3
+    summary = json.loads(run.out)
+    assert summary["status"] == "converged"
+    assert summary["warnings"][0]["code"] == "narrow-data"
+    assert summary["warnings"][0]["level"] == "error"
+    assert summary["expected_mm"]["mean"] > 3 * summary["validation"]["position_mm"]["mean"]

@@ -60,7 +60,7 @@ def test_all_branches_and_json(truearm: Truearm, poses: Path, tmp_path: Path) ->
     run = truearm("ik", "irb120", poses, "--branch", "all", "--out", tmp_path / "j.csv", "--json")
     assert run.code == 0
     summary = json.loads(run.out)
-    assert list(summary) == ["poses", "poses_reached", "rows", "status", "attention"]
+    assert list(summary) == ["poses", "poses_reached", "rows", "status", "attention", "warnings"]
     assert (summary["poses"], summary["poses_reached"]) == (2, 2)
     rows = _rows(tmp_path / "j.csv")
     assert len(rows) == summary["rows"] == sum(summary["status"].values()) == 16

@@ -81,7 +81,7 @@ def test_auto_and_a_calibrated_robot(truearm: Truearm, small: Path, tmp_path: Pa
     ("words", "message"),
     [
         (("--poses", "many"), "a number of poses belongs here"),
-        (("--poses", "0"), "--poses: the number is out of range; got 0; allowed: 1 to 1000000"),
+        (("--poses", "0"), "--poses: the number is out of range; got 0; allowed: 1 to 50000"),
         (("--poses", "20", "--model", "auto"), "no model of this name"),
         (("--poses", "20", "--objective", "O9"), "no objective of this name"),
         (("--poses", "auto", "--objective", "O2"), "only O1 can choose"),

@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from truearm.compensation import program_files as files_module
 from truearm.compensation.program_files import (
     ProgramFile,
     edited,
@@ -24,6 +23,7 @@ from truearm.compensation.program_files import (
 )
 from truearm.compensation.programs.program import Edit
 from truearm.errors import InputError
+from truearm.limits import VARIABLE
 
 POINT = b"  CONST robtarget p1:=[[1,2,3],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\r\n"
 MODULE = b"MODULE m\r\n  ! gr\xfc\xdfe\r\n" + POINT + b"ENDMODULE\r\n"
@@ -118,7 +118,7 @@ def test_what_is_no_program_is_refused(tmp_path: Path, name: str, content: bytes
 
 
 def test_a_program_that_is_too_large_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(files_module, "LARGEST", 50)
+    monkeypatch.setenv(VARIABLE, "program_size=50")
     with pytest.raises(InputError, match=r"too large to be corrected at once.*Split it"):
         program_files([write(tmp_path, "m.mod")])
 

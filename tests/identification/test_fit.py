@@ -217,6 +217,7 @@ def test_measuring_everything_twice_narrows_the_deviations() -> None:
         target=np.tile(data.target, 2),
         position=np.tile(data.position, (2, 1)),
         sigma=np.tile(data.sigma, 2),
+        visit=np.repeat([1, 2], len(data.target)),
     )
     a, b = (identify(load_robot("irb120"), d, GEOMETRIC).robot.parameters for d in (data, twice))
     for name in ("theta_offset_2", "a_3", "alpha_4"):

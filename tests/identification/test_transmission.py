@@ -71,7 +71,8 @@ def test_the_effect_takes_the_error_out() -> None:
     assert np.hypot(sine, cosine) == pytest.approx(2e-4, rel=0.05)
     assert np.arctan2(cosine, sine) == pytest.approx(0.7, abs=0.05)
     assert better.excess == 1.0
-    assert fit.excess > 1.5
+    assert fit.joint_error.max() > 4e-5
+    assert not better.joint_error.any()
 
 
 GEOMETRIC = next(model for model in MODELS if model.name == "geometric")

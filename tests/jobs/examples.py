@@ -200,6 +200,7 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "payload": "1kg,0mm,0mm,50mm",
         "strict": True,
         "split": 5e-5,
+        "accept": ["not-better-here"],
     },
     "revert": lambda folder: {"programs": [_corrected(folder)], "out": folder / "reverted"},
     "convert": lambda folder: {"robot": "irb120", "convention": "hayati", "out": _new(folder, "hayati.yaml")},

@@ -10,6 +10,7 @@ from tests.simulated import campaign
 
 import truearm
 from truearm.errors import InputError
+from truearm.manifest import MANIFEST
 from truearm.measurement.readers.canonical import csv_text
 from truearm.planning.constraints.constraints import Constraints
 
@@ -25,7 +26,7 @@ def test_objects_and_files_give_the_same_plan(tmp_path: Path) -> None:
     from_data = truearm.plan(truearm.load_robot("irb120"), poses=10, candidates_from=truearm.load_data(file))
     assert np.array_equal(from_file.joints, from_data.joints)
     assert set(from_file.labels) <= set(data.labels)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["data.csv", "plan.csv", "plan.html"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["data.csv", "plan.csv", "plan.html", MANIFEST]
     assert "truearm.plan(&#39;irb120&#39;, poses=10," in (tmp_path / "plan.html").read_text()
     saved = from_data.save(tmp_path / "again.csv")
     assert saved == (tmp_path / "again.csv", tmp_path / "again.html")

@@ -69,7 +69,7 @@ def test_a_truth_is_a_name_a_file_or_a_robot(tmp_path: Path) -> None:
         ({"truth": "li3.yaml"}, "truth", "there is no such file"),
         ({"truth": truearm.load_robot("li3")}, "truth", "other joints than irb120; got '3 joints'; allowed: 6"),
         ({"noise": 1e-12}, "noise", "too small to be plausible"),
-        ({"poses": 0}, "poses", "allowed: 1 to 1000000"),
+        ({"poses": 0}, "poses", "allowed: 1 to 50000"),
     ],
 )
 def test_what_cannot_be_simulated(given: dict[str, object], parameter: str, words: str) -> None:

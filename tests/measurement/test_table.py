@@ -275,19 +275,35 @@ def test_the_guides_examples_all_say_the_same(guide: Path) -> None:
         (POINTS, SPATIAL.replace("key: label", "key: lable"), ["map.yaml, joints.key", "Did you mean label?"]),
         (POINTS, SPATIAL.replace("  key: label\n", ""), ["joints.csv", "3 rows", "allowed: 2 rows", "a key"]),
         (LONG, MAP + "layout: {encoding: undefined}", ["not undefined text", "layout.encoding"]),
-        (LONG, MAP + "names: {column: ball, pattern: 'x{99999999999}'}", ["names.pattern", "not a regular"]),
-        (LONG, MAP.replace("y: Y", "y: X"), ["'X' is used twice, for readings[1].x and for readings[1].y"]),
-        (LONG, MAP.replace("q2]", "q1]"), ["'q1' is used twice, for joints.columns[1] and for joints.columns[2]"]),
-        (LONG, MAP.replace("q2]", "Z]"), ["'Z' is used twice, for readings[1].z and for joints.columns[2]"]),
-        (LONG, MAP.replace("z: Z", "z: Z, qw: w, qx: a, qy: a, qz: c"), ["'a' is used twice", "readings[1].qy"]),
+        (LONG, MAP + "names: {column: ball, pattern: 'x{1001}'}", ["names.pattern", "not a regular"]),
+        (
+            LONG,
+            MAP.replace("y: Y", "y: X"),
+            ["used twice, for readings[1].x and for readings[1].y; got 'X'"],
+        ),
+        (
+            LONG,
+            MAP.replace("q2]", "q1]"),
+            ["used twice, for joints.columns[1] and for joints.columns[2]; got 'q1'"],
+        ),
+        (
+            LONG,
+            MAP.replace("q2]", "Z]"),
+            ["used twice, for readings[1].z and for joints.columns[2]; got 'Z'"],
+        ),
+        (
+            LONG,
+            MAP.replace("z: Z", "z: Z, qw: w, qx: a, qy: a, qz: c"),
+            ["used twice", "got 'a'", "readings[1].qy"],
+        ),
         (
             LONG,
             MAP.replace("target_column: ball", "target: a").replace(
                 "joints:", "  - {target: b, x: Z, y: V, z: W}\njoints:"
             ),
-            ["'Z' is used twice, for readings[1].z and for readings[2].x"],
+            ["used twice, for readings[1].z and for readings[2].x; got 'Z'"],
         ),
-        (POINTS, SPATIAL.replace("[q1]", "[q1, q1]"), ["'q1' is used twice"]),
+        (POINTS, SPATIAL.replace("[q1]", "[q1, q1]"), ["used twice", "got 'q1'"]),
         (
             LONG,
             MAP.replace("target_column: ball", 'target: "a\\nb"'),

@@ -106,7 +106,7 @@ def with_effect(effect: str, name: str, unit: str, nominal: float = 0.0, value: 
         pytest.param(changed("a: 270", "a: '270'"), ["joints[3].a", "a number belongs here", "got '270'"], id="quoted"),
         pytest.param(
             changed("a: 270", "a: true"),
-            ["joints[3].a", "a number belongs here", "got True"],
+            ["joints[3].a", "a number belongs here", "got true"],
             id="true in a row",
         ),
         pytest.param(
@@ -115,7 +115,7 @@ def with_effect(effect: str, name: str, unit: str, nominal: float = 0.0, value: 
             id="text mass",
         ),
         pytest.param(
-            changed("mass: 4.2", "mass: true"), ["masses[1].mass", "a number belongs here", "got True"], id="true mass"
+            changed("mass: 4.2", "mass: true"), ["masses[1].mass", "a number belongs here", "got true"], id="true mass"
         ),
         pytest.param(
             changed("mass: 4.2", "mass: -1"),
@@ -197,9 +197,13 @@ def with_effect(effect: str, name: str, unit: str, nominal: float = 0.0, value: 
             id="infinite",
         ),
         pytest.param("  \n", ["the file is empty"], id="empty"),
-        pytest.param("# nothing\n", ["must hold named entries"], id="comment only"),
-        pytest.param("- a\n- b\n", ["must hold named entries", "got 'list'"], id="a list"),
-        pytest.param(PLAIN + "name: other\n", ["line 18", "duplicate key", "name"], id="duplicate key"),
+        pytest.param("# nothing\n", ["holds no entries, only comments"], id="comment only"),
+        pytest.param("- a\n- b\n", ["must hold named entries", "got [a, b]", "allowed: NAME: VALUE"], id="a list"),
+        pytest.param(
+            PLAIN + "name: other\n",
+            ["line 18: an entry is given twice; got 'name'. Keep one of them."],
+            id="duplicate key",
+        ),
         pytest.param(PLAIN + "joints: [\n", ["line 19", "not valid YAML"], id="invalid YAML"),
         pytest.param("a: b\n c: d: e\n", ["line 2", "not valid YAML", "mapping values"], id="bad nesting"),
         pytest.param(

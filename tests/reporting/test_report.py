@@ -14,6 +14,7 @@ from typing import Any, Final
 import numpy as np
 import pytest
 
+from truearm.identification.judging.expected_error import expected_error
 from truearm.identification.solving.fit import identify, place
 from truearm.identification.solving.losses import Loss
 from truearm.identification.solving.models import MODELS
@@ -89,6 +90,7 @@ def made(
         nominal=errors_of(place(robot, first).robot, judged),
         train=errors_of(fit.robot, first),
         validation=errors_of(fit.robot, judged) if len(held_out) else None,
+        expected=expected_error(fit),
         warnings=(Notice("odd", "Residuals are <i>odd</i> & large."),),
         command="truearm calibrate irb120 'cell <7>.csv' --seed 0",
         history="calibrated by truearm: 28 of 40 configurations of cell <7>.csv (sha256 0123456789ab)",
@@ -167,7 +169,8 @@ def test_every_place_has_its_figure() -> None:
     shown = page(made(poses=True))
     places = {a["id"] for t, a in shown.elements if t == "div" and a.get("class") == "figure"}
     assert places == set(shown.figures)
-    assert places == {"position-histogram", "orientation-histogram", "workspace", "residuals", "correlations"}
+    histograms = {"position-histogram", "orientation-histogram"}
+    assert places == {*histograms, "expected-error", "workspace", "residuals", "correlations"}
 
 
 def test_the_same_report_is_the_same_page() -> None:
@@ -253,6 +256,17 @@ def test_orientation_is_shown_in_mrad() -> None:
     assert re.search(r"orientation 0\.\d+ mrad rotation axis declared in the data", text)
 
 
+def test_the_error_to_expect_is_on_the_first_page_with_what_it_is_of() -> None:
+    found = made().expected
+    text = page(made()).text
+    assert f"{significant(found.overall.mean * 1e3)} mm" in text
+    assert "Mean position error to expect over the whole workspace" in text
+    assert "Targets 1, 2, 3 in the instrument's frame, no payload" in text
+    assert "A lower bound" not in text
+    bound = replace(made(), expected=replace(found, omissions=("values at a bound count as exact",)))
+    assert "A lower bound: values at a bound count as exact." in Page(report_html(bound)).text
+
+
 def test_held_out_readings_without_position() -> None:
     report = made(poses=True, model="offsets")
     hidden = np.isin(report.data.configuration, report.held_out)
@@ -266,7 +280,7 @@ def test_held_out_readings_without_position() -> None:
     )
     shown = Page(report_html(blind))
     assert "workspace" not in shown.figures
-    assert "Mean position error" not in shown.text
+    assert "Mean position error on the" not in shown.text
     assert "Mean orientation error" in shown.text
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from functools import cache
 from types import ModuleType
 from typing import Any
@@ -70,3 +71,34 @@ def test_pictures() -> None:
         truearm.InputError, match=r"picture: the calibration has no such picture.*Did you mean residuals"
     ):
         run(28).plot("residual")
+
+
+def test_the_error_to_expect_stands_beside_the_held_out_one() -> None:
+    found, shown = run(28).expected, run(28).summary()["expected_mm"]
+    overall = found.overall
+    assert list(shown) == ["mean", "p95", "interval_90", "lower_bound", "omissions", "targets", "frame", "payload"]
+    assert shown["mean"] == pytest.approx(1e3 * overall.mean)
+    assert shown["interval_90"] == pytest.approx([1e3 * end for end in overall.interval_90])
+    assert shown["interval_90"][0] < shown["mean"] < shown["interval_90"][1] < shown["p95"] * 2
+    assert (shown["lower_bound"], shown["omissions"]) == (False, [])
+    assert list(shown["targets"]) == ["1", "2", "3"]
+    assert list(shown["targets"]["2"]) == ["mean", "p95", "interval_90"]
+    assert (shown["frame"], shown["payload"]) == ("the instrument's frame", "no payload")
+    (line,) = (line for line in run(28).lines() if line.startswith("Expected over the workspace: mean 0.0"))
+    assert line.endswith(" mm; targets 1, 2, 3 in the instrument's frame, no payload")
+    assert repr(run()).count("Expected over the workspace") == 1
+
+
+def test_a_lower_bound_is_called_one() -> None:
+    bound = replace(run(28), expected=replace(run(28).expected, omissions=("values at a bound count as exact",)))
+    assert "  a lower bound: values at a bound count as exact" in bound.lines()
+    assert bound.summary()["expected_mm"]["lower_bound"] is True
+
+
+def test_the_map_of_the_error_to_expect() -> None:
+    shown = run(28).plot("expected-error")
+    assert [trace.type for trace in shown.data] == ["heatmap", "scatter"] * 2
+    assert len(shown.data[1].x) == 28 * 3
+    errors = [value for row in shown.data[0].z for value in row if value is not None]
+    assert 0.2 * run(28).expected.overall.mean * 1e3 < min(errors)
+    assert max(errors) < 10 * run(28).expected.overall.p95 * 1e3

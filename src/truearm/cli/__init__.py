@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Sequence
 from contextlib import suppress
-from typing import Annotated, NoReturn
+from typing import Annotated, NoReturn, TextIO
 
 import typer
 
@@ -30,6 +31,7 @@ from truearm.cli.study import HELP, study
 from truearm.cli.tolerance import tolerance
 from truearm.cli.validate import validate
 from truearm.errors import InputError
+from truearm.printable import is_one_line, printable
 from truearm.version import __version__
 
 # A calibration's matrices are small: a second BLAS thread gains nothing on a quiet machine and waits for its turn on
@@ -88,37 +90,68 @@ app.command()(demo)
 def main() -> None:
     """Run the command; what cannot be used ends with one message and exit code 2."""
     try:
+        _refuse_unprintable(sys.argv[1:])
         try:
             app(prog_name="truearm")
         finally:
             sys.stdout.flush()
     except (InputError, CommandError) as error:
-        _end(f"truearm: {error}")
-    except BrokenPipeError:  # whoever read the output has seen enough
-        _drop_output()
-        sys.exit(1)
+        _end(f"{error}")
+    except BrokenPipeError:
+        _end_of_pipe()
+    except SystemExit as stop:
+        if isinstance(stop.__context__, BrokenPipeError):  # Typer has its own exit code for it
+            _end_of_pipe()
+        raise
     except OSError as error:
-        _drop_output()
-        _end(f"truearm: {error.filename or 'output'}: {error.strerror or error}.")
+        _drop(sys.stdout)
+        _end(f"{error.filename or 'output'}: {error.strerror or error}.")
     except UnicodeError as error:
-        _end(f"truearm: a text cannot be written ({error}).")
+        _end(f"a text cannot be written ({error}).")
     except KeyboardInterrupt:
         sys.exit(130)
+    except MemoryError:
+        _end("there is not enough memory for this. Take less data at a time, or a larger computer.")
+    except RecursionError:
+        _end("something in the input is nested too deep. Look for very many brackets in its files.")
     except ValueError as error:
         from numpy.linalg import LinAlgError
 
         if not isinstance(error, LinAlgError):
             raise
-        _end(f"truearm: the equations cannot be solved ({error}). Look at the data with 'truearm check'.")
+        _end(f"the equations cannot be solved ({error}). Look at the data with 'truearm check'.")
+
+
+def _refuse_unprintable(words: Sequence[str]) -> None:
+    """Refuse what could not be written into results, before any long work, nor shown in messages."""
+    for word in filter(None, words):
+        if not is_one_line(word.replace(" ", "x")):
+            halved = any("\ud800" <= character <= "\udfff" for character in word)
+            raise InputError(
+                "this is not UTF-8 text" if halved else "this holds a control character",
+                where="command line",
+                came=word,
+                allowed="text that can be shown and written",
+                cure="Rename the file, or correct the word.",
+            )
 
 
 def _end(message: str) -> NoReturn:
-    print(message, file=sys.stderr)  # noqa: T201
+    try:
+        print(printable(f"truearm: {message}"), file=sys.stderr, flush=True)  # noqa: T201
+    except OSError:  # a pipe that nobody reads, a full disk: the exit code is all that is left
+        _drop(sys.stderr)
     sys.exit(2)
 
 
-def _drop_output() -> None:
+def _end_of_pipe() -> NoReturn:
+    """End as a program does whose reader has seen enough: quietly, with the exit code that shells have for it."""
+    _drop(sys.stdout)
+    _drop(sys.stderr)
+    sys.exit(141)
+
+
+def _drop(stream: TextIO) -> None:
     """Let go of output that could not be written: Python would try, and fail, once more when it ends."""
-    with suppress(OSError):  # where standard output is no file
-        output = sys.stdout.fileno()
-        os.dup2(os.open(os.devnull, os.O_WRONLY), output)
+    with suppress(OSError, ValueError):  # where it is no file, or closed
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())

@@ -7,12 +7,12 @@ from typing import Annotated
 
 import typer
 
-from truearm.cli.output import Json, end_on_error, print_json, print_record, progress
+from truearm.cli.output import Json, end_on_error, print_json, print_line, print_record, progress
 
 
 def axes(
-    data: Annotated[str, typer.Argument(metavar="DATA.csv", help="Measurements in which one joint moves at a time.")],
     robot: Annotated[str, typer.Argument(metavar="ROBOT", help="A library id, a robot file or a URDF.")],
+    data: Annotated[str, typer.Argument(metavar="DATA.csv", help="Measurements in which one joint moves at a time.")],
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the results.")],
     frame: Annotated[
         str,
@@ -35,5 +35,5 @@ def axes(
         print_json(found.summary())
     else:
         print_record(found)
-        typer.echo(f"Written to {out}: calibrated.yaml, joint-errors.yaml, axes.json")
+        print_line(f"Written to {out}: calibrated.yaml, joint-errors.yaml, axes.json")
     end_on_error(found.warnings)

@@ -9,7 +9,7 @@ import typer
 
 from truearm.cli.loading import GravityText, PayloadText, read_gravity
 from truearm.cli.options import command_line
-from truearm.cli.output import Json, print_json, print_record, progress
+from truearm.cli.output import Json, print_json, print_line, print_record, progress
 
 
 def calibrate(
@@ -83,7 +83,7 @@ def calibrate(
         print_json(calibration.summary())
     else:
         print_record(calibration)
-        typer.echo(f"Written to {out}: calibrated.yaml, result.json, report.html, calibrated.urdf")
+        print_line(f"Written to {out}: calibrated.yaml, result.json, report.html, calibrated.urdf")
     if not calibration.finished:
         raise typer.Exit(3)
 

@@ -9,7 +9,7 @@ import typer
 
 from truearm.cli.loading import PayloadText
 from truearm.cli.options import command_line
-from truearm.cli.output import Json, end_on_error, print_json, print_record, progress
+from truearm.cli.output import Json, end_on_error, print_json, print_line, print_record, progress
 
 
 def compensate(
@@ -47,6 +47,15 @@ def compensate(
     again: Annotated[
         bool, typer.Option("--again", help="Correct the originals of programs corrected before, anew.")
     ] = False,
+    accept: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="Accept what speaks against the calibration, as rank-loss, or against a target, not-better-here; "
+            "repeatable.",
+            show_default=False,
+        ),
+    ] = None,
     revert: Annotated[bool, typer.Option("--revert", help="Write the originals of corrected programs.")] = False,
     json: Json = False,
 ) -> None:
@@ -66,6 +75,7 @@ def compensate(
             split=split,
             strict=strict or None,
             again=again or None,
+            accept=accept or None,
         )
         return
     from truearm.jobs.compensate import compensate as run
@@ -82,6 +92,7 @@ def compensate(
             strict=strict,
             split=None if split is None else split / 1e3,
             again=again,
+            accept=accept or (),
             command=command_line(),
             progress=say,
         )
@@ -89,7 +100,7 @@ def compensate(
         print_json(correction.summary())
     else:
         print_record(correction)
-        typer.echo(f"Written to {out}, with the report {REPORT}")
+        print_line(f"Written to {out}, with the report {REPORT}")
     end_on_error(correction.warnings)
 
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from truearm.cli.output import Json, print_json
+from truearm.cli.output import Json, print_json, print_line
 
 
 def export(
@@ -33,6 +33,6 @@ def export(
         print_json(exported.summary())
         return
     written, *left_out = exported.lines()
-    typer.echo(written)
+    print_line(written)
     for message in left_out:
-        typer.echo(message, err=True)
+        print_line(message, err=True)

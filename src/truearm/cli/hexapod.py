@@ -9,7 +9,7 @@ import typer
 
 from truearm.cli.loading import read_lengths, read_numbers
 from truearm.cli.options import Commands
-from truearm.cli.output import Json, print_json, print_record
+from truearm.cli.output import Json, print_json, print_line, print_record
 
 if TYPE_CHECKING:
     from truearm.results.hexapod import (
@@ -84,7 +84,7 @@ def solve(
     )
     _print(found, json)
     if out is not None and not json:
-        typer.echo(f"Written to {out}")
+        print_line(f"Written to {out}")
 
 
 @app.command()
@@ -123,7 +123,7 @@ def plan(
     )
     _print(found, json)
     if not json:
-        typer.echo(f"Written to {', '.join(str(path) for path in (out, steps) if path is not None)}")
+        print_line(f"Written to {', '.join(str(path) for path in (out, steps) if path is not None)}")
 
 
 @app.command("world-frame")

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from truearm.cli.loading import GravityText, PayloadText, read_gravity
-from truearm.cli.output import Json, print_json, print_record
+from truearm.cli.output import Json, print_json, print_line, print_record
 from truearm.errors import InputError
 
 
@@ -70,7 +70,7 @@ def ik(
         print_json(found.summary())
     else:
         print_record(found)
-        typer.echo(f"Written to {out}")
+        print_line(f"Written to {out}")
     if not found.complete:
         raise typer.Exit(3)
 

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from truearm.cli.loading import read_lengths
-from truearm.cli.output import Json, print_json, print_record
+from truearm.cli.output import Json, print_json, print_line, print_record
 
 
 def lines(
@@ -57,4 +57,4 @@ def lines(
     print_record(found)
     if out is not None:
         said = "compensated" if found.compensated else "nominal"
-        typer.echo(f"{out}: {len(found.joints)} configurations, {said} joint positions.")
+        print_line(f"{out}: {len(found.joints)} configurations, {said} joint positions.")

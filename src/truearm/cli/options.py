@@ -36,6 +36,19 @@ class Command(TyperCommand):
         named = [str(p.metavar) for p in self.params if isinstance(p, TyperArgument) and p.metavar]
         return ["[OPTIONS]", *named]
 
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Return what is left of the words; a value that is no number is told as jobs tell it."""
+        try:
+            return super().parse_args(ctx, args)
+        except typer.BadParameter as error:
+            faults = getattr(error.__cause__, "errors", None)  # of pydantic, by which Typer checks values
+            if faults is None or error.param is None:
+                raise
+            from truearm.schemas import refused_value
+
+            option = error.param.metavar if isinstance(error.param, TyperArgument) else max(error.param.opts, key=len)
+            raise CommandError(str(refused_value(faults()[0], str(option)))) from error
+
     def invoke(self, ctx: Any) -> Any:
         """Run the command; a refusal of the job is told in the words of the command line."""
         mark = _running.set(ctx)

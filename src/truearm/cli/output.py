@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from truearm.cli.options import spelled
+from truearm.printable import printable, with_short_words
 
 if TYPE_CHECKING:
     from truearm.notices import Notice
@@ -27,13 +28,14 @@ def print_json(content: Any) -> None:
 def progress() -> Iterator[Callable[[str], None]]:
     """Show on standard error what is being done, where somebody is looking."""
     from rich.console import Console
+    from rich.text import Text
 
     console = Console(stderr=True)
     if not console.is_terminal:
         yield lambda _: None
         return
     with console.status("starting") as status:
-        yield lambda words: status.update(words)
+        yield lambda words: status.update(Text(with_short_words(printable(words))))
 
 
 def end_on_error(notices: Iterable[Notice]) -> None:
@@ -47,4 +49,9 @@ def end_on_error(notices: Iterable[Notice]) -> None:
 def print_record(record: Record) -> None:
     """Print a result in words and figures."""
     for line in record.lines():
-        typer.echo(spelled(line))
+        print_line(spelled(line))
+
+
+def print_line(line: str, *, err: bool = False) -> None:
+    """Print one line, whatever names of files and targets are in it."""
+    typer.echo(with_short_words(printable(line)), err=err)

@@ -9,7 +9,7 @@ import typer
 
 from truearm.cli.loading import GravityText, PayloadText, read_gravity
 from truearm.cli.options import command_line
-from truearm.cli.output import Json, print_json, print_record, progress
+from truearm.cli.output import Json, print_json, print_line, print_record, progress
 
 
 def plan(
@@ -79,7 +79,7 @@ def plan(
         print_json(planned.summary())
     else:
         print_record(planned)
-        typer.echo(f"Written: {out}, {out.with_suffix('.html')}")
+        print_line(f"Written: {out}, {out.with_suffix('.html')}")
 
 
 def _poses(text: str) -> Any:

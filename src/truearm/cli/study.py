@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from truearm.cli.options import command_line
-from truearm.cli.output import Json, print_json, print_record, progress
+from truearm.cli.output import Json, print_json, print_line, print_record, progress
 from truearm.studies import STUDIES
 
 HELP = "\n\n".join(
@@ -40,4 +40,4 @@ def study(
         print_json(finished.summary())
     else:
         print_record(finished)
-        typer.echo(f"Written to {out}: {', '.join(STUDY_FILES)}")
+        print_line(f"Written to {out}: {', '.join(STUDY_FILES)}")

@@ -10,12 +10,14 @@ from typing import Final
 import numpy as np
 
 from truearm.compensation.gauge import turns_between
-from truearm.compensation.program_correction import CorrectedPrograms, Frames
+from truearm.compensation.kept_targets import LARGEST_STEP, LIKELY
+from truearm.compensation.program_correction import CorrectedPrograms, Correction, Frames
 from truearm.compensation.split import MOST_SEGMENTS, ProgramSplit
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import NO_PAYLOAD
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
+from truearm.shown import listed
 
 #: Corrections of calibration errors are smaller [m]; a larger mean comes of a wrong tool, frame or robot.
 _LARGE_MEAN: Final = 0.02
@@ -49,6 +51,7 @@ def check_correction(
         made.append(
             Notice("targets-skipped", f"{_counted(skipped, 'target')} left unchanged, as listed with the reason.")
         )
+    made += _not_better(robot, result)
     unknown: Counter[str] = sum((Counter(one.program.unknown) for one in corrections), Counter())
     if unknown:
         words = ", ".join(f"{word} ({number})" for word, number in unknown.most_common(_LISTED))
@@ -61,13 +64,11 @@ def check_correction(
         )
     edges = [(one, row) for one in corrections for row in one.on_edge]
     if edges:
-        targets = [(one.program.sources, one.program.targets[row]) for one, row in edges[:_LISTED]]
-        lines = ", ".join(f"{sources[target.source].path.name} line {target.line}" for sources, target in targets)
         made.append(
             Notice(
                 "configuration-on-edge",
                 f"{_counted(len(edges), 'target')} moved across the edge of a quadrant or turn of the configuration "
-                f"by a joint that stands on it, as at 0: {lines}{', ..' if len(edges) > _LISTED else ''}. Controllers "
+                f"by a joint that stands on it, as at 0: {_lines(edges)}. Controllers "
                 "take the nearest posture there, but step through these first.",
             )
         )
@@ -106,6 +107,50 @@ def check_correction(
             )
         )
     return tuple(made)
+
+
+def _not_better(robot: Robot, result: CorrectedPrograms) -> list[Notice]:
+    """Say which targets are rather worse off with their correction, and what became of them."""
+    every = [(one, row) for one in result.corrections for row in one.not_better]
+    if not every:
+        return []
+    kept = [(one, row) for one, row in every if not one.corrected[row]]
+    share = f"{LIKELY:.0%}".replace("%", " %")
+    words = (
+        f"{_counted(len(every), 'target')} found whose correction makes the real error larger with a probability above "
+        f"{share}: {_lines(every)}. "
+    )
+    if kept:
+        words += (
+            f"{len(kept)} of them, and what belongs to their paths, stay as they were; a path may have a step of up to "
+            f"{LARGEST_STEP * 1e3:g} mm there."
+        )
+    if len(kept) < len(every):
+        words += f"{' ' if kept else ''}{len(every) - len(kept)} are corrected nevertheless"
+        words += ", because their path as a whole is rather better for it or `accept=not-better-here` asks for it."
+    outside = _joints_outside(robot, every)
+    words += (
+        f" They need {outside} outside of what was measured: measure there."
+        if outside
+        else " The corrections are small beside what is known of them: measure more configurations near the program."
+    )
+    return [Notice("not-better-here", words)]
+
+
+def _joints_outside(robot: Robot, targets: Sequence[tuple[Correction, int]]) -> str:
+    """Return the joints that are at some targets outside of what was measured."""
+    if robot.proof is None or not robot.proof.region:
+        return ""
+    low, high = np.array(robot.proof.region).T
+    joints = np.array([one.joints[row] for one, row in targets])
+    outside = ((joints < low) | (joints > high)).any(axis=0)
+    return listed([joint.name for joint, one in zip(robot.joints, outside.tolist(), strict=True) if one])
+
+
+def _lines(targets: Sequence[tuple[Correction, int]]) -> str:
+    shown = [(one.program.sources, one.program.targets[row]) for one, row in targets[:_LISTED]]
+    lines = ", ".join(f"{sources[target.source].path.name} line {target.line}" for sources, target in shown)
+    return f"{lines}{', ..' if len(targets) > _LISTED else ''}"
 
 
 def _assumed(frames: Frames, count: int) -> list[Notice]:

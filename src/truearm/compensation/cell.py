@@ -19,6 +19,7 @@ flange are called ``base`` and ``flange``.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Final, Literal
@@ -26,7 +27,7 @@ from typing import Annotated, Final, Literal
 import numpy as np
 from pydantic import AfterValidator, BaseModel, BeforeValidator, model_validator
 
-from truearm.errors import InputError
+from truearm.errors import InputError, refusals_at
 from truearm.files import read_yaml
 from truearm.modeling.formats.entries import STRICT, Number, Triple
 from truearm.modeling.orientations import (
@@ -54,15 +55,23 @@ _ORIENTATIONS: Final[dict[str, Orientation]] = {
 
 
 def _unit_length(q: tuple[float, ...]) -> tuple[float, ...]:
-    if abs(float(np.linalg.norm(q)) - 1.0) > 1e-3:
-        length = float(np.linalg.norm(q))
-        raise InputError(f"a quaternion (w, x, y, z) must have length 1, this one has {length:.6g}", came=list(q))
+    length = math.hypot(*q)
+    if abs(length - 1.0) > 1e-3:
+        raise InputError(
+            f"a quaternion (w, x, y, z) must have length 1, this one has {length:.6g}",
+            came=list(q),
+            cure="Divide its numbers by that length, or correct them.",
+        )
     return q
+
+
+#: No tool has a number of so many digits.
+_NO_NUMBER: Final = 10**18
 
 
 def _number_as_name(name: object) -> object:
     """Return the name of a tool that has a number, which YAML reads as one without quotes."""
-    return str(name) if type(name) is int else name
+    return str(name) if type(name) is int and abs(name) < _NO_NUMBER else name
 
 
 Name = Annotated[str, BeforeValidator(_number_as_name)]
@@ -195,7 +204,8 @@ def _tools(robot: Robot, path: Path, content: CellFile) -> dict[str, Placed]:
                 raise InputError("a target is on the identified flange", where=where, came="of: controller")
             if entry.model_fields_set & {"translation", *_ORIENTATIONS}:
                 raise InputError("the target says where the tool is", where=where, cure="Leave its numbers out.")
-            place = _of_target(robot, entry.target)
+            with refusals_at(f"{where}.target"):
+                place = _of_target(robot, entry.target)
         _add(made, name, "flange", _placed(entry.of, place, entry.controller, content.units, where), where)
     return made
 

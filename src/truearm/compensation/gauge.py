@@ -9,7 +9,7 @@ correction of the program is zero.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Final
 
 import numpy as np
@@ -57,6 +57,30 @@ def best_agreement(robot: Robot) -> tuple[Array, Array]:
         step, *_ = np.linalg.lstsq((rows * weight[:, None]).reshape(-1, 12), (missed * weight).ravel(), rcond=None)
         base, before_flange = _small(step[:6]) @ base, before_flange @ _small(step[6:])
     return base, np.asarray(np.linalg.inv(before_flange))
+
+
+def flange_rates(robot: Robot, names: Sequence[str]) -> Array:
+    """Return how the flange of :func:`best_agreement` moves with parameters of the identified robot.
+
+    Parameters
+    ----------
+    names
+        Of the parameters; those of the base count for nothing.
+
+    Returns
+    -------
+    rates
+        ``(6, parameters)``: translation and rotation vector of the flange in its own axes [m, rad per unit].
+    """
+    joints = robot.random_configurations(_CONFIGURATIONS, np.random.default_rng(0))
+    poses = matrices(robot, joints)
+    moved = np.concatenate(robot.jacobians(robot.forward_kinematics(joints), joints, names), axis=1)
+    moved[[robot.parameters[name].group == "base" for name in names]] = 0.0
+    weight = np.repeat([1.0, reach(nominal_robot(robot), None)], 3)
+    rows = np.concatenate([_by_base(poses), _by_flange(poses)], axis=2)
+    right = (np.moveaxis(moved, 2, 0) * weight).swapaxes(1, 2).reshape(-1, len(names))
+    explained, *_ = np.linalg.lstsq((rows * weight[:, None]).reshape(-1, 12), right, rcond=None)
+    return np.asarray(explained[6:])
 
 
 def base_shift(corrected: Callable[[Array], tuple[Array, Array]], start: Array) -> Array:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Final
 
@@ -17,8 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.compensation.cell import EMPTY_CELL, Cell
+from truearm.compensation.expected_errors import ExpectedErrors, TargetsReached, expected_errors
 from truearm.compensation.fake_targets import FakeTargets, fake_targets, matrices, nominal_robot
 from truearm.compensation.gauge import base_shift, best_agreement, turns_between
+from truearm.compensation.kept_targets import LIKELY, kept_targets, paths_of
 from truearm.compensation.program_places import Places, Provenance, provenance
 from truearm.compensation.program_poses import edits_of, joint_numbers, joints_of, place, pose_numbers, poses_of
 from truearm.compensation.programs.program import Configuration, Edit, Program, Skipped
@@ -30,6 +32,7 @@ from truearm.compensation.resolved_configurations import (
 )
 from truearm.errors import InputError
 from truearm.modeling.chain import Array
+from truearm.modeling.formats.robot_file import arm_is_known
 from truearm.modeling.inverse.solutions import PoseStatus
 from truearm.modeling.robot import Robot
 
@@ -67,6 +70,11 @@ class Correction:
     on_edge
         Corrected targets with a joint that leaves the ranges of its configuration, by less than controllers
         refuse.
+    expected
+        How far the real robot is expected to miss the targets before and after; None if nothing is known of that.
+    not_better
+        Targets whose correction would rather do harm: they stay as they are, unless the path that they belong to is
+        better corrected as a whole, or all were asked for.
     """
 
     program: Program
@@ -78,6 +86,8 @@ class Correction:
     tips: Array
     joints: Array
     on_edge: tuple[int, ...]
+    expected: ExpectedErrors | None = None
+    not_better: tuple[int, ...] = ()
 
     @cached_property
     def moved(self) -> Array:
@@ -132,7 +142,12 @@ class CorrectedPrograms:
 
 
 def corrected_programs(
-    robot: Robot, programs: Sequence[Program], cell: Cell, progress: Callable[[str], None] = lambda _: None
+    robot: Robot,
+    programs: Sequence[Program],
+    cell: Cell,
+    progress: Callable[[str], None] = lambda _: None,
+    *,
+    every: bool = False,
 ) -> CorrectedPrograms:
     """Correct programs.
 
@@ -146,6 +161,8 @@ def corrected_programs(
         Tools and frames, as far as they were given.
     progress
         Called with what is being done.
+    every
+        Correct also the targets that would rather get worse, see :mod:`truearm.compensation.kept_targets`.
 
     Raises
     ------
@@ -180,8 +197,17 @@ def corrected_programs(
 
         base = base_shift(corrected, base)
     progress("finding fake targets")
+    corrections = [one.correction(base, flange) for one in resolved]
+    if robot.proof is not None and arm_is_known(robot):
+        progress("judging the targets")
+        reached = [one.reached(made, flange) for one, made in zip(resolved, corrections, strict=True)]
+        expected = expected_errors(robot, robot.proof, reached, tools, frames)
+        corrections = [
+            one.judged(made, of_targets, every=every)
+            for one, made, of_targets in zip(resolved, corrections, expected, strict=True)
+        ]
     return CorrectedPrograms(
-        tuple(one.correction(base, flange) for one in resolved),
+        tuple(corrections),
         Frames(tools, frames, base, flange),
         tuple(one.guess for one in resolved if one.guess),
         tuple(partial(one.between, base, flange) for one in resolved),
@@ -284,13 +310,11 @@ class _ResolvedProgram:
         corrected = np.ones(count, dtype=bool)
         corrected[list(reasons)] = False
         after[~corrected], joints[~corrected] = self._poses[~corrected], self._resolved.joints[~corrected]
-        numbers = pose_numbers(program, self._poses, after, np.flatnonzero(corrected & ~self._joints_given))
-        numbers |= joint_numbers(self._nominal, program, joints, np.flatnonzero(corrected & self._joints_given))
         targets = program.targets
         left = [Skipped(targets[row].source, targets[row].line, reason) for row, reason in reasons.items()]
         return Correction(
             program=program,
-            edits=tuple(edits_of(program, numbers)),
+            edits=self._edits(after, joints, corrected),
             corrected=corrected,
             skipped=tuple(sorted((*program.skipped, *left), key=lambda s: (s.source, s.line))),
             before=self._poses,
@@ -298,6 +322,43 @@ class _ResolvedProgram:
             tips=self._base.nominal @ self._poses,
             joints=joints,
             on_edge=on_edge,
+        )
+
+    def _edits(self, after: Array, joints: Array, corrected: NDArray[np.bool_]) -> tuple[Edit, ...]:
+        program, given = self._program, self._joints_given
+        numbers = pose_numbers(program, self._poses, after, np.flatnonzero(corrected & ~given))
+        numbers |= joint_numbers(self._nominal, program, joints, np.flatnonzero(corrected & given))
+        return tuple(edits_of(program, numbers))
+
+    def reached(self, correction: Correction, flange: Array) -> TargetsReached:
+        """Return the corrected targets as the real robot shall reach them."""
+        rows = np.flatnonzero(correction.corrected)
+        shift = (correction.after - correction.before)[rows, :3, 3:]
+        return TargetsReached(
+            joints=correction.joints[rows],
+            tips=self._tool.real(rows, flange)[:, :3, 3],
+            shifts=(self._base.nominal[rows, :3, :3] @ shift)[:, :, 0],
+            groups=paths_of(self._program)[rows],
+        )
+
+    def judged(self, correction: Correction, expected: ExpectedErrors, *, every: bool) -> Correction:
+        """Return a correction with what is expected of it, without the targets that would rather get worse."""
+        rows = np.flatnonzero(correction.corrected)
+        known = expected.of_some(rows, len(correction.corrected))
+        worse = np.nan_to_num(known.worse) > LIKELY
+        kept = np.zeros_like(worse) if every else kept_targets(self._program, correction.moved, known)
+        corrected = correction.corrected & ~kept
+        after = np.where(kept[:, None, None], correction.before, correction.after)
+        joints = np.where(kept[:, None], self._resolved.joints, correction.joints)
+        return replace(
+            correction,
+            edits=self._edits(after, joints, corrected) if kept.any() else correction.edits,
+            corrected=corrected,
+            after=after,
+            joints=joints,
+            on_edge=tuple(row for row in correction.on_edge if corrected[row]),
+            expected=known,
+            not_better=tuple(np.flatnonzero(worse | kept).tolist()),
         )
 
     def between(

@@ -11,25 +11,39 @@ import gc
 import hashlib
 import json
 import os
+import re
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict
 
 from truearm.compensation.programs import LANGUAGES
 from truearm.compensation.programs.lines import replaced
 from truearm.compensation.programs.program import Edit, Language, Program, Source
 from truearm.errors import InputError
-from truearm.files import exists, read_bytes, refuse_overwriting, validated, write_files
+from truearm.files import exists, read_bytes
+from truearm.limits import limit, refuse_beyond
+from truearm.schemas import validated
+from truearm.writing import refuse_overwriting, write_files
 
 SCHEMA: Final = "truearm-corrected/1"
-#: A text of this size [bytes] and all that is made of it fit into the memory of a small computer.
-LARGEST: Final = 200_000_000
 
-Hash = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+
+def _of_a_file(text: str) -> str:
+    if not re.fullmatch("[0-9a-f]{64}", text):
+        raise InputError(
+            "this is not the SHA-256 of a file",
+            came=text,
+            allowed="64 digits, 0 to 9 and a to f",
+            cure="Restore the record as it was written.",
+        )
+    return text
+
+
+Hash = Annotated[str, AfterValidator(_of_a_file)]
 
 
 class CorrectionRecord(BaseModel):
@@ -172,8 +186,13 @@ def recorded(file: ProgramFile, corrected: bytes, language: str, applied: Mappin
     return json.dumps(content.model_dump(), indent=1) + "\n"
 
 
-def write_programs(folder: Path, inputs: Sequence[Path], files: Mapping[str, str | bytes]) -> None:
+def write_programs(
+    folder: Path, inputs: Sequence[Path], files: Mapping[str, str | bytes], command: str | None = None
+) -> None:
     """Write results into a folder, all of them or none. Records and reports replace earlier ones.
+
+    Records are put in place first: there is never a corrected program whose record is missing, and which could be
+    corrected once more.
 
     Raises
     ------
@@ -181,9 +200,10 @@ def write_programs(folder: Path, inputs: Sequence[Path], files: Mapping[str, str
         If a program would be overwritten that was read, or that truearm has not written itself, or one without a
         record would be written beside the record of another.
     """
+    read = [*inputs, *map(record_path, inputs)]
     for name, content in files.items():
         path = folder / name
-        refuse_overwriting(path, inputs)
+        refuse_overwriting(path, read)
         if name.endswith((".truearm.json", ".html")):
             continue
         if exists(record_path(path)) and f"{name}.truearm.json" not in files:
@@ -203,7 +223,8 @@ def write_programs(folder: Path, inputs: Sequence[Path], files: Mapping[str, str
                 where=str(path),
                 cure="Choose another `out`.",
             )
-    write_files(folder, files)
+    order = sorted(files, key=lambda name: not name.endswith(".truearm.json"))
+    write_files(folder, {name: files[name] for name in order}, command)
 
 
 # -- reading ----------------------------------------------------------------------------------------------
@@ -230,13 +251,21 @@ def _unchanged_original(path: Path, record: CorrectionRecord) -> bytes:
             where=str(path),
             cure=f"To take it as an original, remove {record_path(path).name}.",
         )
-    try:
-        original = zlib.decompress(base64.b64decode(record.original, validate=True))
-    except (ValueError, zlib.error):
-        original = b""
+    original = _unpacked(record.original, record_path(path))
     if _hash(original) != record.original_sha256:
         raise InputError("the original in this record is damaged", where=str(record_path(path)))
     return original
+
+
+def _unpacked(packed: str, record: Path) -> bytes:
+    """Return the original that a record holds packed, nothing if it is damaged; refuse one larger than programs are."""
+    unpacking = zlib.decompressobj()
+    try:
+        original = unpacking.decompress(base64.b64decode(packed, validate=True), limit("program_size") + 1)
+    except (ValueError, zlib.error):
+        return b""
+    refuse_beyond("program_size", len(original), where=f"{record}, original")
+    return original if unpacking.eof else b""
 
 
 def _record(path: Path) -> CorrectionRecord | None:
@@ -245,25 +274,18 @@ def _record(path: Path) -> CorrectionRecord | None:
     beside = record_path(path)
     if not exists(beside):
         return None
+    text = read_bytes(beside)
     try:
-        content = json.loads(read_bytes(beside))
+        content = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise InputError("this record cannot be read", where=str(beside), cure="Remove it, or restore it.") from error
     return validated(content, CorrectionRecord, str(beside))
 
 
 def _text_bytes(path: Path) -> bytes:
-    content = read_bytes(path)
+    content = read_bytes(path, "program_size")
     if not content.strip():
         raise InputError("the file is empty", where=str(path))
-    if len(content) > LARGEST:
-        raise InputError(
-            "the program is too large to be corrected at once",
-            where=str(path),
-            came=f"{len(content) / 1e6:.0f} MB",
-            allowed=f"{LARGEST / 1e6:.0f} MB, about two million targets",
-            cure="Split it into several files.",
-        )
     if b"\0" in content:
         wide = content[:2] in (b"\xff\xfe", b"\xfe\xff")
         raise InputError(

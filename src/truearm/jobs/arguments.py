@@ -6,28 +6,27 @@ import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from numbers import Integral, Real
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, TypeGuard, TypeVar
+from typing import TYPE_CHECKING, TypeGuard, TypeVar
 
 import numpy as np
 
 from truearm.arrays import finite_number, number_array
 from truearm.errors import InputError, did_you_mean, name_parameter, refusals_of, wrong_kind
-from truearm.files import new_file, output_file, output_folder, path_argument
+from truearm.files import path_argument
 from truearm.library import is_robot, load_robot, urdf_source
+from truearm.limits import limit, refuse_beyond
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.readers.canonical import read_csv
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
 from truearm.units import accepted_range, sized_si
+from truearm.writing import new_file, output_file, output_folder
 
 if TYPE_CHECKING:
     from truearm.simulation.devices import Device
 
 T = TypeVar("T")
-
-#: Most poses, candidates, trials or repetitions: each takes some kB of memory, and so many fit 24 GB.
-MOST: Final = 1_000_000
 
 
 def robot_argument(robot: object, parameter: str = "robot") -> Robot:
@@ -43,13 +42,13 @@ def robot_argument(robot: object, parameter: str = "robot") -> Robot:
     raise wrong_kind("a robot belongs here", robot, parameter, "a Robot, a library id, a robot file or a URDF")
 
 
-def refuse_swapped(robot: object, data: object, job: str = "") -> None:
+def refuse_swapped(robot: object, data: object, job: str) -> None:
     """Refuse a robot where measurements belong, and measurements in its place.
 
     Parameters
     ----------
     job
-        Named with both in their order, where its command has the same order.
+        Named with both in their order.
     """
     if not (isinstance(robot, str | Path) and isinstance(data, str | Path)):
         return
@@ -59,7 +58,7 @@ def refuse_swapped(robot: object, data: object, job: str = "") -> None:
             parameter="robot",
             came=str(robot),
             allowed="a library id, a robot file or a URDF",
-            cure=f"Write 'truearm {job} {data} {robot}'." if job else "Exchange them.",
+            cure=f"Write 'truearm {job} {data} {robot}'.",
         )
 
 
@@ -162,8 +161,11 @@ def whole_argument(value: object, parameter: str, lowest: int = 0, highest: int 
 
 
 def count_argument(value: object, parameter: str, lowest: int = 1) -> int:
-    """Return how many of something there shall be, no more than memory holds."""
-    return whole_argument(value, parameter, lowest, MOST)
+    """Return how many of something there shall be, no more than the limit of the parameter's name allows."""
+    most = limit(parameter)
+    if isinstance(value, Integral) and int(value) > most:
+        refuse_beyond(parameter, int(value), parameter=parameter)
+    return whole_argument(value, parameter, lowest, most)
 
 
 def length_argument(value: object, parameter: str, lowest: float = -math.inf) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from numbers import Integral
 from pathlib import Path
 from typing import Final, Literal, get_args
@@ -17,8 +18,11 @@ from truearm.identification.choosing.selection import AUTO, select
 from truearm.identification.judging.advice import check_fit
 from truearm.identification.judging.arrival_lag import check_arrival_lag
 from truearm.identification.judging.changes import check_changes
+from truearm.identification.judging.expected_error import as_residuals_allow, expected_error
 from truearm.identification.judging.implausible import check_plausible
 from truearm.identification.judging.left_over import LeftOver
+from truearm.identification.judging.narrow_data import check_narrow_data
+from truearm.identification.judging.one_sided import check_one_sided
 from truearm.identification.judging.sigma import check_sigma
 from truearm.identification.judging.transmission import check_transmission
 from truearm.identification.solving.bounds import Bounds, read_bounds
@@ -43,13 +47,17 @@ from truearm.jobs.arguments import (
     whole_argument,
 )
 from truearm.jobs.check import notices_of
+from truearm.jobs.validate import trained_on
 from truearm.library import urdf_source
-from truearm.measurement.checks import check_joints, copies
+from truearm.measurement.checks import check_joints
 from truearm.measurement.dataset import Dataset, IntArray
+from truearm.measurement.repeats import copies, revisits
 from truearm.measurement.statistics import Errors, errors_of
 from truearm.measurement.table_motion import without_table_motion
 from truearm.modeling.effects import EFFECTS
+from truearm.modeling.formats.robot_file import is_intact
 from truearm.modeling.parts import Payload
+from truearm.modeling.proof import Proof
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice, has_error
 from truearm.results.calibration import RESULT_FILES, Calibration
@@ -168,9 +176,9 @@ def calibrate(
             asked.free(asked.prepared(nominal_robot))
     progress("reading the data")
     readings = data_argument(data)
-    digest = ""
+    sha256 = None
     if isinstance(data, str | Path):
-        digest = f" (sha256 {hashlib.sha256(read_bytes(path_argument(data, 'data'))).hexdigest()[:12]})"
+        sha256 = hashlib.sha256(read_bytes(path_argument(data, "data"))).hexdigest()
     bounds_file = str(bounds) if isinstance(bounds, str | Path) else "bounds"
     if bounds is not None and not isinstance(bounds, Bounds):
         with refusals_of("bounds"):
@@ -225,10 +233,18 @@ def calibrate(
     judged = first if second is None else second
     validation = None if second is None else errors_of(fit.robot, second)
     before = errors_of(nominal.robot, judged)
+    train_errors = errors_of(fit.robot, first)
     # What the robust fit of the check could not explain, the fit itself may.
     noticed = tuple(notice for notice in noticed if notice.code != Status.IMPLAUSIBLE.value)
     unlike = check_plausible(fit, first, noticed)
+    expected = expected_error(as_residuals_allow(fit, first), plausible=not unlike)
+    narrow = (
+        []
+        if unlike
+        else check_narrow_data(fit, expected, first, validation or train_errors, held_out=validation is not None)
+    )
     left_over = LeftOver.of(fit, readings)
+    digest = "" if sha256 is None else f" (sha256 {sha256[:12]})"
     history = (
         f"calibrated by truearm {__version__}: model {' + '.join([chosen.name, *effects])},"
         f" {count} of {n} configurations of {Path(readings.source).name}{digest}, seed {seed}, loss {loss},"
@@ -237,16 +253,20 @@ def calibrate(
     calibration = Calibration(
         fit=fit,
         nominal=before,
-        train=errors_of(fit.robot, first),
+        train=train_errors,
         validation=validation,
+        expected=expected,
         warnings=(
             *(notice for notice in noticed if notice.level == "error"),
             *unlike,
             *_check_proof(before, validation),
             *_check_copies(readings, training, held_out),
+            *_check_trained_before(nominal_robot, sha256, (count, n, seed)),
             *moved,
-            *check_fit(fit, doubted=has_error([*unlike, *noticed])),
+            *check_fit(fit, expected, doubted=has_error([*unlike, *noticed])),
+            *narrow,
             *(notice for notice in noticed if notice.level != "error"),
+            *check_one_sided(fit, first),
             *check_sigma(left_over),
             *check_changes(left_over),
             *check_arrival_lag(left_over),
@@ -260,10 +280,18 @@ def calibrate(
         urdf=urdf,
         inputs=inputs,
         selection=selection,
+        known_before=_known_before(nominal_robot),
     )
     if folder is not None:
         calibration.save(folder, progress)
     return calibration
+
+
+def _known_before(robot: Robot) -> Proof | None:
+    """Return what is known of a robot already; of one whose values were changed since, only what speaks against it."""
+    if robot.proof is None or is_intact(robot):
+        return robot.proof
+    return replace(robot.proof, names=(), deviations=(), factor=())
 
 
 def _check_split(training: Dataset, held_out: Dataset) -> None:
@@ -323,17 +351,55 @@ def _train_count(train: object, n: int, where: str) -> int:
 
 
 def _check_copies(data: Dataset, training: IntArray, held_out: IntArray) -> list[Notice]:
-    """Say if the fit has seen copies of what was held out."""
+    """Say if the fit has seen what was held out: copies, or other readings at the same joint positions."""
     seen = copies(data, held_out, training)
-    if not seen:
+    known = set(seen)
+    again = [label for label in revisits(data, held_out, training) if label not in known]
+    if not seen and not again:
         return []
-    one = len(seen) == 1
+    told = []
+    if seen:
+        told.append(f"{len(seen)} {'is a copy' if len(seen) == 1 else 'are copies'} of training ones ({listed(seen)})")
+    if again:
+        told.append(
+            f"{len(again)} {'has' if len(again) == 1 else 'have'} the same joint positions as training ones "
+            f"({listed(again)})"
+        )
+    cures = ["Leave copies out; for a bootstrap, draw from the training configurations alone and use `train=all`."]
     return [
         Notice(
             "held-out-seen",
-            f"Of {counted(len(held_out), 'held-out configuration')} {len(seen)} {'is a copy' if one else 'are copies'} "
-            f"of training ones ({listed(seen)}): the fit has seen them, and the errors flatter it. Leave "
-            "copies out; for a bootstrap, draw from the training configurations alone and use `train=all`.",
+            f"Of {counted(len(held_out), 'held-out configuration')} {' and '.join(told)}: the fit has seen them, and "
+            f"the errors flatter it. "
+            + " ".join(
+                [
+                    *(cures if seen else []),
+                    *(["Judge it at other joint positions with 'truearm validate'."] if again else []),
+                ]
+            ),
+        )
+    ]
+
+
+def _check_trained_before(robot: Robot, sha256: str | None, split: tuple[int, int, int]) -> list[Notice]:
+    """Say if the robot to begin with has been trained on what is held out now.
+
+    Parameters
+    ----------
+    sha256
+        Of the data; None if they are no file.
+    split
+        How many configurations are trained on, of how many, and the seed.
+    """
+    before = None if sha256 is None else trained_on(robot, sha256)
+    if before is None or before == split or split[0] == split[1]:
+        return []
+    return [
+        Notice(
+            "training-data",
+            f"The robot to begin with was calibrated with this file already, on {before[0]} of its {before[1]} "
+            f"configurations (seed {before[2]}): what is held out now was partly seen then, and the held-out errors "
+            "flatter it. Begin with the nominal robot, or with the same `train` and `seed`.",
         )
     ]
 

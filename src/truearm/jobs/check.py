@@ -7,12 +7,15 @@ from pathlib import Path
 from truearm.errors import InputError, refusals_of
 from truearm.identification.judging.plausibility import check_against
 from truearm.jobs.arguments import data_argument, device_argument, refuse_swapped, robot_argument
+from truearm.limits import limit
 from truearm.measurement.checks import check_data, check_joints, check_range
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.table_motion import without_table_motion
+from truearm.measurement.thinning import thinned
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.results.data_check import DataCheck
+from truearm.shown import counted
 
 
 def check(
@@ -64,5 +67,29 @@ def notices_of(
         return (*ranged, *check_data(data))
     with refusals_of("data"):
         check_joints(robot, data)
-    against, suspects = check_against(robot, without_table_motion(data) if steady is None else steady)
-    return (*ranged, *check_data(data, suspects), *against)
+    still = without_table_motion(data) if steady is None else steady
+    part = thinned(still, len(robot.parameters), limit("derivatives") // 2)
+    if part is None:
+        return (*ranged, *check_data(data), _too_seldom(data))
+    against, suspects = check_against(robot, part)
+    left_out = () if part is still else (_in_part(part, still),)
+    return (*ranged, *check_data(data, suspects), *against, *left_out)
+
+
+def _too_seldom(data: Dataset) -> Notice:
+    return Notice(
+        "not-compared",
+        f"{counted(len(data.targets), 'target')} of {counted(data.configurations, 'configuration')} were not compared "
+        "with the robot: none was read at four configurations or more, so that nothing is said of the robot. Does "
+        "every reading have a name of its own? Readings of the same point on the tool have the same target.",
+    )
+
+
+def _in_part(part: Dataset, data: Dataset) -> Notice:
+    return Notice(
+        "compared-in-part",
+        f"The data are large: {part.configurations} of {counted(data.configurations, 'configuration')} and "
+        f"{len(part.targets)} of {counted(len(data.targets), 'target')} were compared with the robot, evenly spaced "
+        "and read most often. What is far off elsewhere was not looked for.",
+        "note",
+    )

@@ -18,6 +18,7 @@ from truearm.errors import InputError, refusals_of
 from truearm.files import path_argument
 from truearm.jobs.arguments import (
     command_argument,
+    files_of,
     flag_argument,
     folder_for,
     paths_argument,
@@ -26,9 +27,10 @@ from truearm.jobs.arguments import (
     python_call,
     robot_argument,
 )
+from truearm.jobs.proof import NOT_BETTER, accept_argument, changed_since, known_of, refuse_unaccepted
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
-from truearm.results.program_correction import FileCorrection, ProgramCorrection
+from truearm.results.program_correction import REPORT, FileCorrection, ProgramCorrection
 
 
 def compensate(
@@ -42,6 +44,7 @@ def compensate(
     strict: bool = False,
     split: float | None = None,
     again: bool = False,
+    accept: Sequence[str] = (),
     command: str | None = None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> ProgramCorrection:
@@ -67,6 +70,10 @@ def compensate(
         Split straight and circular moves where the correction between targets would deviate farther [m].
     again
         Take the originals of programs that were corrected already.
+    accept
+        What may speak against the robot's calibration or against a correction, by name: ``rank-loss``,
+        ``not-converged``, ``implausible``, or a notice of the level error that the calibration ended with; and
+        ``not-better-here`` to correct also the targets that would rather get worse.
     command
         How to do it again, for the report; None writes the call in Python.
     progress
@@ -75,8 +82,8 @@ def compensate(
     Raises
     ------
     InputError
-        If a program cannot be read or was corrected already, the robot is not calibrated, a tool or frame is not
-        defined, or with `strict` a target cannot be corrected.
+        If a program cannot be read or was corrected already, the robot is not calibrated or its calibration ended
+        badly, a tool or frame is not defined, or with `strict` a target cannot be corrected.
     """
     progress_argument(progress)
     paths = paths_argument(programs, "programs", "program")
@@ -87,7 +94,9 @@ def compensate(
     if split is not None:
         split = finite_number(split, "split")
         check_tolerance(split)
-    folder = None if out is None else folder_for((), out)
+    folder = None if out is None else folder_for((REPORT,), out, robot, tools, frames, *paths)
+    arm = robot_argument(robot).with_payload(payload)
+    accepted = accept_argument(accept, arm)
     invocation = command_argument(command) or python_call(
         "compensate",
         robot,
@@ -98,8 +107,9 @@ def compensate(
         strict=strict or None,
         split=split,
         again=again or None,
+        accept=list(accepted) or None,
     )
-    arm = robot_argument(robot).with_payload(payload)
+    refuse_unaccepted(arm, accepted)
     with refusals_of("tools"):
         tools_given = read_tools(arm, tool_file)
     with refusals_of("frames"):
@@ -110,7 +120,7 @@ def compensate(
         progress("reading the programs")
         read = read_programs(files)
     with refusals_of("robot"):
-        result = corrected_programs(arm, read, cell, progress)
+        result = corrected_programs(arm, read, cell, progress, every=NOT_BETTER in accepted)
     if strict:
         _refuse_skipped(result)
     language = language_called(read[0].language)
@@ -134,8 +144,9 @@ def compensate(
         files=tuple(corrected),
         result=result,
         splits=splits,
-        warnings=check_correction(arm, result, splits),
+        warnings=(*changed_since(robot), *known_of(arm), *check_correction(arm, result, splits)),
         command=invocation,
+        inputs=files_of(robot, tools, frames),
     )
     if folder is not None:
         with refusals_of("out"):

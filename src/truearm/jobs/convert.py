@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 from truearm.errors import refusals_of
-from truearm.files import write_new_text
 from truearm.jobs.arguments import choice_argument, new_file_for, robot_argument
 from truearm.modeling.conversion import CONVERSIONS, converted
 from truearm.modeling.formats.robot_file import robot_text
 from truearm.modeling.robot import Robot
 from truearm.results.converted_robot import ConvertedRobot
+from truearm.writing import write_new_text
 
 
 def convert(robot: Robot | str | Path, convention: str, *, out: str | Path | None = None) -> ConvertedRobot:

@@ -14,7 +14,7 @@ import numpy as np
 from truearm.compensation.gauge import best_agreement
 from truearm.compensation.program_correction import commanded
 from truearm.errors import InputError
-from truearm.files import exists, read_bytes, write_files
+from truearm.files import exists, read_bytes
 from truearm.identification.solving.fit import Status
 from truearm.jobs.arguments import folder_for, progress_argument
 from truearm.jobs.calibrate import calibrate
@@ -28,6 +28,7 @@ from truearm.results.program_correction import ProgramCorrection, SimulatedRun
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import Twin, measure
 from truearm.simulation.twin_joint import PERFECT
+from truearm.writing import write_files
 
 #: The program that is corrected, and where its work object is in the controller's base: the numbers it has itself.
 _PLATE: Final = "plate.mod"

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from truearm.errors import InputError
-from truearm.files import exists, read_yaml, write_files
+from truearm.files import exists, read_yaml
 from truearm.jobs.arguments import folder_for
 from truearm.jobs.new_robot import robot_template
 from truearm.measurement.readers.canonical import csv_text
@@ -17,6 +17,7 @@ from truearm.modeling.formats.robot_file import RobotFile, robot_from_file
 from truearm.results.example_session import ExampleSession
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import measure
+from truearm.writing import write_files
 
 _FILES: Final = ("my_robot.yaml", "measurements.csv", "check.csv", "session.sh")
 

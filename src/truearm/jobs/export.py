@@ -5,11 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 from truearm.errors import refusals_of
-from truearm.files import write_new_text
 from truearm.jobs.arguments import choice_argument, new_file_for, robot_argument
+from truearm.jobs.proof import told_of
 from truearm.modeling.formats.export import FORMATS
 from truearm.modeling.robot import Robot
 from truearm.results.exported_robot import ExportedRobot
+from truearm.writing import write_new_text
 
 
 def export(robot: Robot | str | Path, format: str, *, out: str | Path | None = None) -> ExportedRobot:
@@ -38,4 +39,4 @@ def export(robot: Robot | str | Path, format: str, *, out: str | Path | None = N
         made = exported(loaded)
     if file is not None:
         write_new_text(file, made.text)
-    return ExportedRobot(loaded, format, made.text, made.frames, made.left_out, file)
+    return ExportedRobot(loaded, format, made.text, made.frames, made.left_out, file, tuple(told_of(loaded)))

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from truearm.errors import InputError, refusals_of, wrong_kind
-from truearm.files import same_place, write_files
 from truearm.jobs.arguments import (
     array_argument,
     file_for,
@@ -29,6 +28,7 @@ from truearm.planning.hexapod.clearance import ARM_RADIUS
 from truearm.planning.hexapod.reachable import reachable
 from truearm.planning.hexapod.tool import with_cups
 from truearm.results.hexapod import HexapodPlan
+from truearm.writing import same_place, write_files
 
 
 def hexapod_plan(
@@ -92,7 +92,9 @@ def hexapod_plan(
         )
     plan = HexapodPlan(arm, found)
     files = {sheet: plan.sheet_text(), text: plan.steps_text()}
-    write_files(Path(), {str(file): content for file, content in files.items() if file is not None})
+    written = {file.absolute(): content for file, content in files.items() if file is not None}
+    if written:
+        write_files(next(iter(written)).parent, {str(file): content for file, content in written.items()})
     return plan
 
 

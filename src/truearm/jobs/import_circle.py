@@ -7,11 +7,11 @@ from pathlib import Path
 
 from truearm.arrays import finite_number
 from truearm.errors import InputError, refusals_of
-from truearm.files import write_text
 from truearm.jobs.arguments import deviation_argument, file_for, files_argument, numbers_argument
 from truearm.measurement.readers.canonical import csv_text
 from truearm.measurement.readers.drawn_circles import Page, read_drawn_circles
 from truearm.results.imported import ImportedCircles
+from truearm.writing import write_text
 
 
 def import_circle(

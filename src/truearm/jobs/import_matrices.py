@@ -6,11 +6,12 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from truearm.errors import refusals_of
-from truearm.files import path_argument, write_text
+from truearm.files import path_argument
 from truearm.jobs.arguments import file_for, files_argument, name_argument
 from truearm.measurement.readers.canonical import csv_text
 from truearm.measurement.readers.matrices import read_matrices
 from truearm.results.imported import Imported
+from truearm.writing import write_text
 
 
 def import_matrices(

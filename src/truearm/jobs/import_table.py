@@ -5,11 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 from truearm.errors import refusals_of
-from truearm.files import path_argument, write_text
+from truearm.files import path_argument
 from truearm.jobs.arguments import file_for
 from truearm.measurement.readers.canonical import csv_text
 from truearm.measurement.readers.table import files_read, read_table
 from truearm.results.imported import Imported
+from truearm.writing import write_text
 
 
 def import_table(file: str | Path, mapping: str | Path, *, out: str | Path | None = None) -> Imported:

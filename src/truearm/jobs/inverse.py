@@ -7,7 +7,7 @@ from pathlib import Path
 
 from truearm.arrays import axes
 from truearm.errors import InputError, refusals_of, wrong_kind
-from truearm.files import path_argument, write_text
+from truearm.files import path_argument
 from truearm.jobs.arguments import (
     array_argument,
     choice_argument,
@@ -16,6 +16,7 @@ from truearm.jobs.arguments import (
     payload_argument,
     robot_argument,
 )
+from truearm.jobs.proof import told_of
 from truearm.measurement.readers.poses import read_poses
 from truearm.modeling.chain import Array
 from truearm.modeling.formats.joint_table import joints_csv
@@ -26,6 +27,7 @@ from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import rotation_from_quaternion
 from truearm.results.joint_table import JointTable
+from truearm.writing import write_text
 
 
 def inverse(
@@ -105,7 +107,7 @@ def inverse(
         )
     if file is not None:
         write_text(file, joints_csv(solutions, labels, arm.joints))
-    return JointTable(labels, solutions)
+    return JointTable(labels, solutions, tuple(told_of(arm)))
 
 
 def _poses(poses: object, rotations: object) -> tuple[tuple[str, ...], Array, Array | None]:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from importlib.resources import files
 from pathlib import Path
 
-from truearm.files import write_new_text
 from truearm.jobs.arguments import new_file_for
 from truearm.results.example_session import RobotTemplate
+from truearm.writing import write_new_text
 
 
 def new_robot(file: str | Path) -> RobotTemplate:

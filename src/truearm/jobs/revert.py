@@ -28,7 +28,7 @@ def revert(programs: Sequence[str | Path], *, out: str | Path | None = None) -> 
         If a program has no record or was changed since, or a file would be overwritten.
     """
     paths = paths_argument(programs, "programs", "program")
-    folder = None if out is None else folder_for((), out)
+    folder = None if out is None else folder_for((path.name for path in paths), out, *paths)
     with refusals_of("programs"):
         made = RestoredPrograms(restored(paths))
     if folder is None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from truearm.arrays import finite_number
 from truearm.errors import InputError, refusals_of, wrong_kind
-from truearm.files import path_argument, write_text
+from truearm.files import path_argument
 from truearm.jobs.arguments import (
     count_argument,
     deviation_argument,
@@ -22,13 +22,15 @@ from truearm.jobs.arguments import (
     robot_argument,
     whole_argument,
 )
+from truearm.limits import refuse_beyond
 from truearm.measurement.readers.canonical import csv_text
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
 from truearm.results.simulation import Simulation
-from truearm.simulation.devices import measured_with
+from truearm.simulation.devices import in_view_of, measured_with
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import measure
+from truearm.writing import write_text
 
 
 def simulate(
@@ -95,6 +97,8 @@ def simulate(
     with refusals_of("truth"):
         twin = truth_twin(nominal, truth, rng)
     twin = replace(twin, robot=twin.robot.with_payload(payload_argument(payload), gravity_argument(gravity)))
+    seen = twin.robot if instrument is None else in_view_of(instrument, twin.robot)
+    refuse_beyond("readings", count * len(seen.targets), parameter="poses")
     progress(f"measuring {count} configurations")
     if instrument is None:
         data = measure(twin, nominal.random_configurations(count, rng), sigma, rng)

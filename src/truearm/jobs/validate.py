@@ -12,6 +12,7 @@ from truearm.errors import InputError, refusals_of
 from truearm.files import path_argument, read_bytes
 from truearm.identification.judging.target_names import check_names
 from truearm.jobs.arguments import data_argument, gravity_argument, payload_argument, refuse_swapped, robot_argument
+from truearm.jobs.proof import changed_since
 from truearm.measurement.checks import check_joints
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of
@@ -50,6 +51,7 @@ def validate(
     if isinstance(data, str | Path):
         digest = hashlib.sha256(read_bytes(path_argument(data, "data"))).hexdigest()
     data = data_argument(data)
+    changed = changed_since(robot)
     robot = as_measured(robot, data, payload, gravity)
     identified = {p.group for p in robot.parameters.values() if p.deviation is not None}
     if data.anchored and robot.fixtures and identified and "base" not in identified:
@@ -61,7 +63,7 @@ def validate(
             "'truearm distances'.",
         )
     errors = errors_of(robot, data)
-    warnings = (*check_names(robot, data, errors), *_seen_in_training(robot, data, digest))
+    warnings = (*changed, *check_names(robot, data, errors), *_seen_in_training(robot, data, digest))
     return Validation(data.source, errors, warnings)
 
 
@@ -69,22 +71,35 @@ def validate(
 _TRAINED: Final = re.compile(r"(\d+) of (\d+) configurations of .*?\(sha256 ([0-9a-f]+)\), seed (\d+)")
 
 
-def _seen_in_training(robot: Robot, data: Dataset, digest: str | None) -> list[Notice]:
-    """Say if the readings are from the file that the robot was calibrated with, and how many it was trained on."""
+def trained_on(robot: Robot, digest: str) -> tuple[int, int, int] | None:
+    """Return how many configurations of a file a robot was trained on, of how many, and the seed; None if on none.
+
+    Parameters
+    ----------
+    digest
+        SHA-256 of the file.
+    """
     for line in robot.history:
         found = _TRAINED.search(line)
-        if digest is None or found is None or found[3] != digest[: len(found[3])]:
-            continue
-        count, of = int(found[1]), int(found[2])
-        held_out = "; the rest was held out, and its errors are in the result of the calibration" if of > count else ""
-        return [
-            Notice(
-                "training-data",
-                f"The robot was calibrated with this file: {count} of its {of} configurations are those it was trained "
-                f"on{held_out}. These errors flatter it. Validate with measurements that were not used.",
-            )
-        ]
-    return []
+        if found is not None and found[3] == digest[: len(found[3])]:
+            return int(found[1]), int(found[2]), int(found[4])
+    return None
+
+
+def _seen_in_training(robot: Robot, data: Dataset, digest: str | None) -> list[Notice]:
+    """Say if the readings are from the file that the robot was calibrated with, and how many it was trained on."""
+    trained = None if digest is None else trained_on(robot, digest)
+    if trained is None:
+        return []
+    count, of, _ = trained
+    held_out = "; the rest was held out, and its errors are in the result of the calibration" if of > count else ""
+    return [
+        Notice(
+            "training-data",
+            f"The robot was calibrated with this file: {count} of its {of} configurations are those it was trained "
+            f"on{held_out}. These errors flatter it. Validate with measurements that were not used.",
+        )
+    ]
 
 
 def as_measured(robot: object, data: Dataset, payload: object, gravity: object) -> Robot:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from truearm.errors import InputError, nearest_names
-from truearm.files import exists
+from truearm.files import exists, path_argument
 from truearm.modeling.formats.robot_file import read_robot
 from truearm.modeling.robot import Robot
 
@@ -63,7 +63,7 @@ def load_robot(robot: str | Path) -> Robot:
         from truearm.modeling.formats.urdf import read_urdf
 
         return read_urdf(*source)
-    path = Path(text)
+    path = path_argument(text, "robot")
     if exists(path) or path.suffix or len(path.parts) > 1:
         return read_robot(path)
     near = nearest_names(text, library())

@@ -7,59 +7,29 @@ readings of a real instrument agree to the last digit.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from itertools import permutations
-from typing import Final, Literal, Protocol
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truearm.errors import InputError, nearest_names
-from truearm.measurement.dataset import Dataset, IntArray
-from truearm.measurement.dataset_fields import drawn_from
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.places import constellation, places_of
+from truearm.measurement.repeats import check_duplicates, repeated_joints, repeated_joints_notices
+from truearm.measurement.rigid_tool import DEVIATIONS, OTHER_REFLECTOR, SAME_POINT, UNMOVED, Suspect, rigid_suspects
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.shown import counted
 
-Suspicion = Literal["outliers", "targets-swapped", "target-mistaken"]
-
 #: Temperatures of working arms [degC].
 _COLDEST: Final = -30.0
 _WARMEST: Final = 80.0
-#: A distance, or a place, that holds better than this is never doubted [m].
-_UNMOVED: Final = 1e-4
-#: How many robust deviations a distance or a place may be off.
-_DEVIATIONS: Final = 10.0
-#: A reading this close to another known point was taken from it [m].
-_SAME_POINT: Final = 1e-3
-#: A reading this far off was taken from another reflector, even an unknown one [m].
-_OTHER_REFLECTOR: Final = 0.02
 _MOST_NAMED: Final = 6
 #: A target read at this share of the configurations at most may be another one's misspelt name.
 _FEW_SHARE: Final = 0.1
 #: A target read at this share of the configurations or more is one that is always read.
 _OFTEN_SHARE: Final = 0.8
-
-
-@dataclass(frozen=True)
-class Suspect:
-    """A reading that cannot be what it says.
-
-    Attributes
-    ----------
-    code
-        What it seems to be.
-    configuration, target
-        Label and name.
-    words
-        What it looks like, for example ``is target 2``.
-    """
-
-    code: Suspicion
-    configuration: str
-    target: str
-    words: str = ""
 
 
 def check_data(data: Dataset, suspects: Iterable[Suspect] | None = None) -> list[Notice]:
@@ -70,8 +40,12 @@ def check_data(data: Dataset, suspects: Iterable[Suspect] | None = None) -> list
     suspects
         Readings that are doubted for another reason as well, reported together with those found here.
     """
-    found = [*_misnamed(data), *_missing(data), *_duplicates(data)]
-    found += suspect_notices([*rigid_suspects(data), *reference_suspects(data), *(suspects or ())])
+    found = [*_misnamed(data), *_missing(data), *check_duplicates(data)]
+    pairs = repeated_joints(data)
+    known = {label for pair in pairs for label in pair}
+    doubted = [suspect for suspect in suspects or () if suspect.configuration not in known]
+    found += repeated_joints_notices(data, pairs)
+    found += suspect_notices([*rigid_suspects(data), *reference_suspects(data), *doubted])
     return found + _moved(data) + _temperatures(data)
 
 
@@ -156,109 +130,6 @@ def suspect_notices(suspects: Sequence[Suspect]) -> list[Notice]:
     return notices
 
 
-def constellation(data: Dataset) -> Array:
-    """Return positions by configuration and target, ``(configurations, targets, 3)``; NaN where there is none.
-
-    Of a target that was read more than once at a configuration, the mean.
-    """
-    total = np.zeros((data.configurations, len(data.targets), 3))
-    count = np.zeros((data.configurations, len(data.targets), 1))
-    there = data.has_position
-    place = (data.configuration[there], data.target[there])
-    np.add.at(total, place, data.position[there])
-    np.add.at(count, place, 1.0)
-    with np.errstate(invalid="ignore"):
-        return np.asarray(total / count)
-
-
-def rigid_suspects(data: Dataset) -> list[Suspect]:
-    """Doubt readings whose distances to the other targets of their configuration do not hold.
-
-    Three or more targets tell which reading is wrong; of two, both are doubted.
-    """
-    points = constellation(data)
-    count = len(data.targets)
-    if count < 2:
-        return []
-    distance = np.linalg.norm(points[:, :, None] - points[:, None], axis=3)
-    usual = _nanmedian(distance)
-    off = abs(distance - usual)
-    i, j = np.triu_indices(count, 1)
-    allowed = max(_UNMOVED, _DEVIATIONS * 1.4826 * float(_nanmedian(off[:, i, j].reshape(-1))))
-    known = _fixed_points(data)
-    suspects: list[Suspect] = []
-    for c in np.flatnonzero((off > allowed).any(axis=(1, 2))).tolist():
-        suspects += _blamed(data, points, c, off[c], usual, allowed, known)
-    return suspects
-
-
-def _blamed(
-    data: Dataset, points: Array, c: int, off: Array, usual: Array, allowed: float, known: dict[str, Array]
-) -> list[Suspect]:
-    here, label, names = points[c], data.labels[c], data.targets
-    seen = [t for t in range(len(names)) if np.isfinite(here[t]).all()]
-    swap = _swap(here, seen, usual, allowed)
-    if swap:
-        return [Suspect("targets-swapped", label, names[a], f"is target {names[b]}") for a, b in swap]
-    wrong = [t for t in seen if (off[t, [o for o in seen if o != t]] > allowed).all()]
-    if len(seen) > 2 and len(wrong) > 1:
-        wrong = [max(wrong, key=lambda t: float(np.sum(off[t, seen])))]
-    doubted = wrong or [t for t in seen if (off[t, seen] > allowed).any()]
-    others = {f"target {names[t]}": here[t] for t in seen if t not in doubted}
-    before = {f"target {names[t]} at the configuration before": points[c - 1, t] for t in doubted if c > 0}
-    suspects = []
-    for t in doubted:
-        size = float(np.max(off[t, seen]))
-        suspects.append(suspect(here[t], label, names[t], size, known | others | before))
-    return suspects
-
-
-def suspect(point: Array, label: str, target: str, size: float, known: dict[str, Array]) -> Suspect:
-    """Say what a wrong reading is: another known point, another reflector, or an outlier.
-
-    Parameters
-    ----------
-    point
-        The reading [m], ``(3,)``.
-    label, target
-        Its configuration and target.
-    size
-        How far it is off [m].
-    known
-        Points that it could have been taken from [m].
-    """
-    gaps = {name: float(np.linalg.norm(point - place)) for name, place in known.items() if np.isfinite(place).all()}
-    nearest = min(gaps, key=lambda name: gaps[name]) if gaps else None
-    if nearest is not None and gaps[nearest] < _SAME_POINT < size:
-        return Suspect("target-mistaken", label, target, f"is {nearest}")
-    if size > _OTHER_REFLECTOR:
-        return Suspect("target-mistaken", label, target, f"{size * 1e3:.0f} mm off")
-    return Suspect("outliers", label, target, f"{size * 1e3:.1f} mm off")
-
-
-def _swap(here: Array, seen: Sequence[int], usual: Array, allowed: float) -> list[tuple[int, int]]:
-    """Return the exchange of names under which all distances hold, fewest first; nothing if there is none."""
-    if not 3 <= len(seen) <= 6:
-        return []
-    orders = sorted(permutations(seen), key=lambda order: sum(a != b for a, b in zip(seen, order, strict=True)))
-    fitting = []
-    for order in orders[1:]:
-        points = here[list(order)]
-        distance = np.linalg.norm(points[:, None] - points[None], axis=2)
-        misfit = float(abs(distance - usual[np.ix_(seen, seen)]).max())
-        if misfit <= allowed:
-            # seen[k] really is the reading named order[k]
-            fitting.append((misfit, [(b, a) for a, b in zip(seen, order, strict=True) if a != b]))
-    return min(fitting, key=lambda entry: entry[0])[1] if fitting else []
-
-
-def _fixed_points(data: Dataset) -> dict[str, Array]:
-    if data.references is None:
-        return {}
-    usual = _nanmedian(constellation(data.references))
-    return {f"reference {name}": place for name, place in zip(data.references.targets, usual, strict=True)}
-
-
 # -- reference points --------------------------------------------------------------------------------------
 
 
@@ -280,20 +151,23 @@ def clean_references(data: Dataset) -> Array | None:
 def _mistaken_references(data: Dataset) -> list[tuple[int, int, Suspect]]:
     if data.references is None:
         return []
-    points, targets = constellation(data.references), constellation(data)
+    points, targets = constellation(data.references), places_of(data)
     usual, off, allowed = _places(points)
     names = data.references.targets
     found = []
-    for c, t in np.argwhere(off > max(allowed, _SAME_POINT)).tolist():
-        known = {f"target {n}": p for n, p in zip(data.targets, targets[c], strict=True)}
+    for c, t in np.argwhere(off > max(allowed, SAME_POINT)).tolist():
+        here = targets.at(c)
+        known = {
+            f"target {data.targets[n]}": targets.position[k] for k, n in enumerate(targets.target[here], here.start)
+        }
         known |= {f"reference {n}": p for k, (n, p) in enumerate(zip(names, usual, strict=True)) if k != t}
         gaps = {name: float(np.linalg.norm(points[c, t] - place)) for name, place in known.items()}
-        nearest = min(gaps, key=lambda name: gaps[name] if np.isfinite(gaps[name]) else np.inf)
+        nearest = min(gaps, key=lambda name: gaps[name] if np.isfinite(gaps[name]) else np.inf, default="")
         neighbours = [k for k in (c - 1, c + 1) if 0 <= k < data.configurations and np.isfinite(off[k, t])]
         alone = bool(neighbours) and all(off[k, t] <= allowed for k in neighbours)
-        if gaps[nearest] < _SAME_POINT:
+        if nearest and gaps[nearest] < SAME_POINT:
             found.append((c, t, Suspect("target-mistaken", data.labels[c], names[t], f"is {nearest}")))
-        elif alone and off[c, t] > _OTHER_REFLECTOR:
+        elif alone and off[c, t] > OTHER_REFLECTOR:
             words = f"{off[c, t] * 1e3:.0f} mm off"
             found.append((c, t, Suspect("target-mistaken", data.labels[c], names[t], words)))
     return found
@@ -303,7 +177,7 @@ def _places(points: Array) -> tuple[Array, Array, float]:
     """Return usual places, how far each reading is from them, and how far it may be."""
     usual = _nanmedian(points)
     off = np.linalg.norm(points - usual, axis=2)
-    return usual, off, max(_UNMOVED, _DEVIATIONS * float(_nanmedian(off.reshape(-1))))
+    return usual, off, max(UNMOVED, DEVIATIONS * float(_nanmedian(off.reshape(-1))))
 
 
 def _moved(data: Dataset) -> list[Notice]:
@@ -357,21 +231,23 @@ def check_joints(robot: Robot, data: Dataset) -> None:
 
 
 def _missing(data: Dataset) -> list[Notice]:
-    counts = {}
+    counts: dict[str, int] = {}
     for part in [data] if data.references is None else [data, data.references]:
-        empty = ~part.has_reading
-        read = set(zip(part.configuration.tolist(), part.target.tolist(), strict=True))
+        names = len(part.targets)
+        empty = np.bincount(part.target[~part.has_reading], minlength=names)
+        of, read = np.divmod(np.unique(part.configuration * max(names, 1) + part.target), max(names, 1))
+        times = np.bincount(read, minlength=names)
         # Against fixtures, and by several instruments, not every target is read at every configuration; nor where
-        # targets are measured in turn, one at each configuration.
-        in_turn = len(part.targets) > 1 and len(read) == len({c for c, _ in read})
-        everywhere = data.fixture is None and not in_turn
-        for t, name in enumerate(part.targets):
-            absent = part.configurations - sum((c, t) in read for c in range(part.configurations)) if everywhere else 0
-            counts[name] = int((empty & (part.target == t)).sum()) + absent
+        # targets are measured in turn, one at each configuration, or each once.
+        in_turn = names > 1 and len(read) == len(np.unique(of))
+        once = part.configurations > 1 and names > 1 and int(times.max()) == 1
+        everywhere = data.fixture is None and not in_turn and not once
+        absent = part.configurations - times if everywhere else np.zeros(names, dtype=np.intp)
+        counts |= dict(zip(part.targets, (empty + absent).tolist(), strict=True))
     total = sum(counts.values())
     if total == 0:
         return []
-    words = ", ".join(f"{name} {count}" for name, count in counts.items() if count)
+    words = _listed([f"{name} {count}" for name, count in counts.items() if count])
     left = "is missing ({}). It is left out" if total == 1 else "are missing ({}). They are left out"
     return [Notice("missing", f"{counted(total, 'reading')} {left.format(words)}; nothing needs to be done.")]
 
@@ -418,44 +294,6 @@ def _misnamed(data: Dataset) -> list[Notice]:
             "error",
         )
     ]
-
-
-def _duplicates(data: Dataset) -> list[Notice]:
-    found = []
-    for part in [data] if data.references is None else [data, data.references]:
-        first: dict[tuple[int, bytes], int] = {}
-        for reading in np.flatnonzero(part.has_position).tolist():
-            key = (int(part.target[reading]), part.position[reading].tobytes())
-            other = first.setdefault(key, reading)
-            a, b = (part.labels[part.configuration[r]] for r in (other, reading))
-            # A configuration that was drawn twice for a bootstrap counts twice because it shall.
-            if other != reading and (a == b or drawn_from(a) != drawn_from(b)):
-                found.append(f"{part.targets[key[0]]} at {a} and {b}")
-    if not found:
-        return []
-    return [
-        Notice(
-            "duplicates",
-            f"{counted(len(found), 'reading')} repeat{'s' if len(found) == 1 else ''} another one to the last digit "
-            f"(target at configurations): {_listed(found)}. Rows were copied, or the instrument stood still: remove "
-            f"{'it, it counts' if len(found) == 1 else 'them, they count'} twice.",
-        )
-    ]
-
-
-def copies(data: Dataset, some: IntArray, others: IntArray) -> list[str]:
-    """Return the labels of those of `some` configurations that are copies of one of the `others`.
-
-    Copies have the same joint positions and the same readings, all to the last digit.
-    """
-    values = [data.target[:, None], data.against[:, None], data.position]
-    values += [v.reshape(len(v), -1) for v in (data.quaternion, data.distance, data.height) if v is not None]
-    read: list[list[bytes]] = [[] for _ in data.labels]
-    for reading, row in zip(np.flatnonzero(data.has_reading), np.hstack(values)[data.has_reading], strict=True):
-        read[data.configuration[reading]].append(row.tobytes())
-    content = [(joints.tobytes(), *sorted(rows)) for joints, rows in zip(data.joints, read, strict=True)]
-    known = {content[c] for c in others if read[c]}
-    return [data.labels[c] for c in some if content[c] in known]
 
 
 def _are(things: Sequence[object]) -> str:

@@ -16,6 +16,7 @@ from truearm.measurement.dataset_fields import (
     checked_order,
     checked_selection,
     checked_sigma,
+    checked_visits,
     distinct_labels,
     refuse_other_lengths,
     refuse_unsound,
@@ -71,6 +72,9 @@ class Dataset:
         declares none.
     sigma_rot
         Declared standard deviation per rotation axis [rad], ``(readings,)``; None if the file declares none.
+    visit
+        Which visit of its configuration each reading was taken on, whole numbers, ``(readings,)``: the robot came anew
+        for each. None if it came once.
     approach
         Sign of the last move of each joint, ``(configurations, joints)``: 1, -1, or 0 where it is not known; None if
         the order of measurement is not known.
@@ -103,6 +107,7 @@ class Dataset:
     setup: Dataset | None = None
     sigma: Array | None = None
     sigma_rot: Array | None = None
+    visit: IntArray | None = None
     approach: Array | None = None
     number: Array | None = None
     temperature: Array | None = None
@@ -130,6 +135,7 @@ class Dataset:
             "standard deviations": self.sigma if self.sigma is not None else self.sigma_rot,
             "temperature": self.temperature,
             "external forces": self.wrench,
+            "visits": self.visit,
             "fixtures": self.fixtures or None,
             "reference points": self.references,
         }
@@ -157,6 +163,7 @@ class Dataset:
         quaternions: ArrayLike | None = None,
         sigma: ArrayLike | None = None,
         sigma_rot: ArrayLike | None = None,
+        visit: ArrayLike | None = None,
         order: ArrayLike | None = None,
         temperature: ArrayLike | None = None,
         joint_kinds: Sequence[str] | None = None,
@@ -181,6 +188,9 @@ class Dataset:
             Standard deviation of each coordinate [m]: a number, ``(n,)`` or ``(n, targets)``.
         sigma_rot
             Standard deviation about each axis of rotation [rad], likewise.
+        visit
+            Which visit of its configuration each target was read on, whole numbers, ``(n,)`` or ``(n, targets)``; all
+            on one if None.
         order
             Place of each configuration in the order of measurement, counted from 0 or 1, ``(n,)``; not known if None.
         temperature
@@ -226,6 +236,7 @@ class Dataset:
             quaternion=turned,
             sigma=None if sigma is None else checked_sigma(sigma, "sigma", each),
             sigma_rot=None if sigma_rot is None else checked_sigma(sigma_rot, "sigma_rot", each),
+            visit=None if visit is None else checked_visits(visit, each),
             approach=None if made is None else approach_of(q, made),
             number=None if made is None else np.asarray(made - min(int(made.min()), 1), float),
             temperature=None if temperature is None else _of_each(temperature, "temperature", n),
@@ -301,6 +312,7 @@ class Dataset:
             fixture=None if self.fixture is None else self.fixture[kept],
             sigma=part(self.sigma),
             sigma_rot=part(self.sigma_rot),
+            visit=None if self.visit is None else self.visit[kept],
         )
 
     def of_configurations(self, chosen: Sequence[int] | Sequence[bool] | IntArray | NDArray[np.bool_]) -> Dataset:

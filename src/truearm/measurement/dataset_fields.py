@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from truearm.arrays import LARGEST, axes, number_array, shape_text
 from truearm.errors import InputError, wrong_kind
-from truearm.files import is_one_line
 from truearm.modeling.chain import Array
+from truearm.printable import is_one_line
 from truearm.units import accepted_range
 
 if TYPE_CHECKING:
@@ -34,6 +34,8 @@ _REPEATED: Final = re.compile(r"(#([2-9]|[1-9][0-9]+))+$")
 _NO_CONFIGURATION: Final = ("",)
 #: What names can be: those that files can hold.
 NAMES: Final = "one line of text without control characters, not blank"
+#: What visits of a configuration are numbered with.
+VISITS: Final = "whole numbers, 0 or more"
 #: Lowest and highest standard deviation that is meant [m, rad].
 _DEVIATIONS: Final = {
     "sigma": accepted_range("m", deviation=True),
@@ -72,6 +74,11 @@ def refuse_unsound(data: Dataset) -> None:
             low, high = _DEVIATIONS[field]
             off = (deviation < low) | (deviation > high)
             _refuse(off, deviation, field, "the standard deviation is not plausible", f"{low:g} to {high:g} {unit}")
+    if data.visit is not None:
+        visits = _array(data.visit, "visit", (m,))
+        if visits.dtype.kind not in "iu":
+            raise InputError("visits must be whole numbers", parameter="visit", came=str(visits.dtype), allowed=VISITS)
+        _refuse((visits < 0) | (visits > _LAST), visits, "visit", "this is no number of a visit", VISITS)
     if data.approach is not None:
         _array(data.approach, "approach", data.joints.shape)
         signs = data.approach
@@ -169,6 +176,15 @@ def checked_sigma(sigma: ArrayLike, parameter: str, shape: tuple[int, ...]) -> A
     if given == 0 and np.isnan(found):
         raise InputError("NaN cannot be used here", parameter=parameter, allowed="above 0")
     return np.array(np.broadcast_to(found.reshape(found.shape + (1,) * (len(shape) - found.ndim)), shape)).ravel()
+
+
+def checked_visits(visit: ArrayLike, shape: tuple[int, ...]) -> IntArray:
+    """Return the number of the visit of each reading, from one for each configuration or for each reading."""
+    given = axes(visit)
+    found = number_array(visit, "visit", shape[:given] if 1 <= given <= len(shape) else shape, largest=_LAST)
+    whole = np.asarray(np.round(found), dtype=np.intp)
+    _refuse((found != whole) | (found < 0), found, "visit", "visits must be whole numbers", VISITS)
+    return np.array(np.broadcast_to(whole.reshape(whole.shape + (1,) * (len(shape) - whole.ndim)), shape)).ravel()
 
 
 def checked_order(order: ArrayLike, count: int) -> IntArray:

@@ -27,17 +27,19 @@ def without_table_motion(data: Dataset) -> Dataset:
     if points.shape[1] < 3 or not complete.any():
         return data
     usual = points[complete].mean(axis=0)
-    position = data.position.copy()
+    position, oriented = data.position.copy(), data.has_orientation
     quaternion = None if data.quaternion is None else data.quaternion.copy()
+    order = np.argsort(data.configuration, kind="stable")
+    first = np.searchsorted(data.configuration[order], np.arange(data.configurations + 1)).tolist()
     for c in np.flatnonzero(there.sum(axis=1) >= 3).tolist():
         seen = there[c]
         R, shift = rigid_motion(points[c, seen], usual[seen])
         misfit = np.linalg.norm(points[c, seen] @ R.T + shift - usual[seen], axis=1).max()
         if misfit > _UNMOVED:
             continue
-        mine = data.configuration == c
+        mine = order[first[c] : first[c + 1]]
         position[mine] = position[mine] @ R.T + shift
         if quaternion is not None:
-            turned = mine & data.has_orientation
+            turned = mine[oriented[mine]]
             quaternion[turned] = quaternion_from_rotation(R @ rotation_from_quaternion(quaternion[turned]))
     return replace(data, position=position, quaternion=quaternion)

@@ -19,6 +19,9 @@ from truearm.modeling.chain import Array
 Group = Literal["base", "joint zero", "geometry", "target", "fixture"]
 Unit = Literal["m", "rad", "1", "rad/(N m)", "m/N", "rad/(N m)^2", "rad/(N m)^3", "1/K"]
 
+#: Where things stand: nobody measured them before, and every fit finds them anew.
+PLACES: Final[tuple[Group, ...]] = ("base", "target", "fixture")
+
 #: What a nominal value is believed to be good for (one standard deviation) unless the robot file says otherwise.
 #: Machined links and mastered joints are good to about 1 mm and 0.1 deg; where robot and reflectors stand is unknown.
 PRIOR: Final[Mapping[tuple[str, str], float]] = {

@@ -49,6 +49,11 @@ class Joint:
     limits: tuple[float, float] | None = None
     transmission_periods: int | None = None
 
+    @property
+    def range(self) -> tuple[float, float]:
+        """Where it can be [rad or m]: within its limits, or a turn, or 1 m."""
+        return self.limits or ((-math.pi, math.pi) if self.kind == "revolute" else (-0.5, 0.5))
+
 
 @dataclass(frozen=True)
 class LinkMass:

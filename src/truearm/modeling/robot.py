@@ -88,6 +88,8 @@ class Robot(RobotData):
     ) -> Robot:
         """Return the robot with another payload, or mounted another way; None leaves what it has.
 
+        What is known of its calibration is about the arm and holds as before.
+
         Parameters
         ----------
         payload
@@ -100,11 +102,16 @@ class Robot(RobotData):
         InputError
             If the payload is none, or the gravity.
         """
-        return replace(
+        other = replace(
             self,
             payload=self.payload if payload is None else Payload.of(payload),
             gravity=self.gravity if gravity is None else checked_gravity(gravity),
         )
+        if self.proof is None or (other.payload, other.gravity) == (self.payload, self.gravity):
+            return other
+        from truearm.modeling.formats.robot_file import is_intact, sealed
+
+        return sealed(other, self.proof) if is_intact(self) else other
 
     def with_effects(self, names: Sequence[str]) -> Robot:
         """Return the robot with these joint effects added.
@@ -399,6 +406,5 @@ class Robot(RobotData):
             raise wrong_kind("a count belongs here", count, "count", "a whole number, 0 or more")
         if not isinstance(rng, np.random.Generator):
             raise wrong_kind("a random number generator belongs here", rng, "rng", "numpy.random.default_rng(seed)")
-        default = {"revolute": (-np.pi, np.pi), "prismatic": (-0.5, 0.5)}
-        low, high = np.array([j.limits or default[j.kind] for j in self.joints]).T
+        low, high = np.array([joint.range for joint in self.joints]).T
         return rng.uniform(low, high, (count, len(self.joints)))

@@ -29,6 +29,7 @@ from truearm.modeling.parts import (
     Tool,
     Truth,
 )
+from truearm.modeling.proof import Proof
 from truearm.modeling.robot_parameters import all_parameters
 from truearm.modeling.transform import IDENTITY, Transform, fixed_rotation
 from truearm.shown import as_html, counted, listed, short_text
@@ -84,6 +85,8 @@ class RobotData:
         For simulation.
     history
         One line for each thing done to the robot.
+    proof
+        What its calibration knew about it; None if it was not calibrated, or by an older version.
     """
 
     name: str
@@ -105,6 +108,7 @@ class RobotData:
     tools: Mapping[str, Tool] = field(default_factory=dict)
     truths: Mapping[str, Truth] = field(default_factory=dict)
     history: tuple[str, ...] = ()
+    proof: Proof | None = None
 
     def __repr__(self) -> str:
         changed = sum(p.value != p.nominal for p in self.parameters.values())

@@ -31,6 +31,8 @@ _ERROR_SCALE: Final = [[0.0, "#c3d5e3"], [0.5, "#2c6f9c"], [0.75, "#4b3a63"], [1
 _SIGNED_SCALE: Final = [[0.0, "#b3261e"], [0.5, "#ffffff"], [1.0, AFTER]]
 
 _BINS: Final = 40
+#: Cells of a map along the diameter of the workspace.
+_CELLS: Final = 30
 # Largest error over median error after, beyond which equal bins would crowd everything into the first one.
 _LOGARITHMIC: Final = 12.0
 
@@ -155,6 +157,83 @@ def workspace(part: Dataset, tips: Array, before: Array, after: Array) -> Figure
         updatemenus=[menu],
         margin={"l": 0, "r": 0, "t": 50, "b": 0},
     )
+
+
+def expected_error_map(places: Array, error: Array, measured: Array) -> Figure:
+    """Show the workspace from the side and from above, coloured by the error to expect, and where was measured.
+
+    Parameters
+    ----------
+    places, error
+        Where the targets can be, in the robot's base frame [m], ``(k, 3)``, and the error to expect there [m].
+    measured
+        Where they were in the training part, likewise, ``(readings, 3)``.
+    """
+    top = _colour_end(error * 1e3)
+    reach = float(np.abs(places).max()) * 1e3
+    views = (
+        (_from_the_side, "distance from the base's z axis", "z"),
+        (_from_above, "x", "y"),
+    )
+    traces: list[Figure] = []
+    axes: Figure = {}
+    for number, (seen, right, up) in enumerate(views, start=1):
+        points, dots = seen(places) * 1e3, seen(measured) * 1e3
+        low, high = np.floor(points.min(axis=0)), np.ceil(points.max(axis=0))
+        edges = [
+            np.linspace(a, b, max(2, round((b - a) / (2 * reach) * _CELLS) + 1)) for a, b in zip(low, high, strict=True)
+        ]
+        count = np.histogram2d(points[:, 0], points[:, 1], edges)[0]
+        total = np.histogram2d(points[:, 0], points[:, 1], edges, weights=error * 1e3)[0]
+        mean = total / np.where(count > 0, count, np.nan)
+        place = {"xaxis": f"x{number}", "yaxis": f"y{number}"}
+        traces.append(
+            {
+                "type": "heatmap",
+                **{letter: rounded_to((e[:-1] + e[1:]) / 2, 1) for letter, e in zip("xy", edges, strict=True)},
+                "z": [[None if np.isnan(v) else float(f"{v:.3g}") for v in row] for row in mean.T],
+                "coloraxis": "coloraxis",
+                "hovertemplate": f"{right} %{{x:.0f}} mm, {up} %{{y:.0f}} mm<br>%{{z:.3g}} mm to expect<extra></extra>",
+                **place,
+            }
+        )
+        traces.append(
+            {
+                "type": "scatter",
+                "mode": "markers",
+                "name": "measured in the training part",
+                "x": rounded_to(dots[:, 0], 1),
+                "y": rounded_to(dots[:, 1], 1),
+                "marker": {"size": 4, "color": "#ffffff", "line": {"color": "#000000", "width": 1}},
+                "hoverinfo": "skip",
+                "showlegend": number == 1,
+                **place,
+            }
+        )
+        left = 0.56 * (number - 1)
+        axes[f"xaxis{number}"] = {**axis(f"{right} [mm]"), "anchor": f"y{number}", "domain": [left, left + 0.44]}
+        axes[f"yaxis{number}"] = {
+            **axis(f"{up} [mm]"),
+            "anchor": f"x{number}",
+            "scaleanchor": f"x{number}",
+            "constrain": "domain",
+        }
+    bar = {"title": {"text": "expected error [mm]"}, "thickness": 14, "outlinewidth": 0}
+    return figure(
+        traces,
+        480,
+        **axes,
+        coloraxis={"colorscale": _ERROR_SCALE, "cmin": 0, "cmax": top, "colorbar": bar},
+    )
+
+
+def _from_the_side(points: Array) -> Array:
+    """Return distances from the z axis and heights, ``(n, 2)``."""
+    return np.column_stack([np.hypot(points[:, 0], points[:, 1]), points[:, 2]])
+
+
+def _from_above(points: Array) -> Array:
+    return points[:, :2]
 
 
 def residuals(

@@ -14,11 +14,14 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
+from truearm.printable import LONGEST_WORD, TURNING, printable, shortened, with_short_words
 from truearm.reporting.drawing import AFTER, BEFORE, Figure
 from truearm.version import __version__
 
 #: Characters that could end a script element or a line of JavaScript, as JSON escapes them.
 _UNSAFE: Final = {ord(c): f"\\u{ord(c):04x}" for c in "<>&\u2028\u2029"}
+#: Part of a text, and of nothing else that JSON has.
+_LONG_WORD: Final = re.compile(rf'[^\s"\\,:\[\]{{}}]{{{LONGEST_WORD + 1},}}')
 
 
 def page(template: str, figures: Mapping[str, Figure], **content: Any) -> str:
@@ -39,6 +42,7 @@ def page(template: str, figures: Mapping[str, Figure], **content: Any) -> str:
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
+        finalize=_shown,
     )
     environment.filters["with_code"] = with_code
     return environment.get_template(template).render(
@@ -57,15 +61,24 @@ def page(template: str, figures: Mapping[str, Figure], **content: Any) -> str:
     )
 
 
+def _shown(value: object) -> object:
+    """Return what a template puts on the page: of texts that come from files, only what can be seen."""
+    if isinstance(value, str) and not isinstance(value, Markup):
+        return with_short_words(printable(value))
+    return value
+
+
 def with_code(text: str) -> Markup:
     """Return a text for a page: what is in backticks, parameters and values, as code."""
-    plain = str(escape(text))
+    plain = str(escape(with_short_words(printable(text))))
     return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", plain))
 
 
 def json_for_script(value: object) -> str:
     """Return JSON that can stand inside a script element whatever its texts hold."""
-    return json.dumps(value, separators=(",", ":"), allow_nan=False, ensure_ascii=False).translate(_UNSAFE)
+    text = json.dumps(value, separators=(",", ":"), allow_nan=False, ensure_ascii=False)
+    text = _LONG_WORD.sub(lambda found: shortened(found[0], LONGEST_WORD), text)
+    return text.translate(_UNSAFE | {ord(c): f"\\\\u{ord(c):04x}" for c in TURNING})
 
 
 def _plotly() -> str:

@@ -17,7 +17,7 @@ from truearm.reporting.drawing import AFTER, BEFORE, CAMERA, COLOURS, Figure, ax
 from truearm.reporting.figures import histogram
 from truearm.reporting.numbers import rounded, rounded_to
 from truearm.reporting.page import page
-from truearm.results.program_correction import ProgramCorrection
+from truearm.results.program_correction import FileCorrection, ProgramCorrection
 from truearm.units import from_si
 
 #: Targets in a picture: more slow a browser down and show no more.
@@ -45,12 +45,18 @@ def program_html(correction: ProgramCorrection) -> str:
             "distance from the programmed path",
             "targets",
         )
+    known = [c for c in corrections if c.expected is not None and np.isfinite(c.expected.before).any()]
+    if known:
+        figures["expected"] = expected_figure(known)
+    not_better = [_not_better(file, row) for file in correction.files for row in file.not_better]
     every = [(file.name, one) for file in correction.files for one in file.skipped]
     return page(
         "program.html.jinja",
         figures,
         correction=correction,
         joints=_joint_rows(correction.robot.joints, corrections),
+        not_better=not_better[:_LISTED],
+        not_better_unlisted=max(len(not_better) - _LISTED, 0),
         skipped=every[:_LISTED],
         unlisted=max(len(every) - _LISTED, 0),
         corrected=sum(file.corrected for file in correction.files),
@@ -149,6 +155,54 @@ def along_figure(corrections: Sequence[Correction]) -> Figure:
         yaxis2=axis("turned [deg]")
         | {"rangemode": "tozero", "overlaying": "y", "side": "right", "showgrid": False, "tickmode": "auto"},
     )
+
+
+def expected_figure(corrections: Sequence[Correction]) -> Figure:
+    """Show how far the real robot is expected to be from each target, before and now, in the order of the program."""
+    traces: list[Figure] = []
+    start = 1
+    for number, correction in enumerate(corrections):
+        known = correction.expected
+        if known is None:
+            continue
+        order = _order(correction)
+        steps = _evenly(np.flatnonzero(np.isfinite(known.before[order])))
+        rows = order[steps]
+        targets = correction.program.targets
+        names = [f"{html.escape(targets[row].name or 'inline')}, line {targets[row].line}" for row in rows.tolist()]
+        now = np.where(correction.corrected, known.after, known.before)
+        for what, values, colour in (("before", known.before, BEFORE), ("now", now, AFTER)):
+            traces.append(
+                {
+                    "type": "scatter",
+                    "mode": "lines+markers" if len(rows) < 200 else "lines",
+                    "name": what,
+                    "legendgroup": what,
+                    "showlegend": number == 0,
+                    "x": (steps + start).tolist(),
+                    "y": rounded(values[rows] * 1e3, 4),
+                    "text": names,
+                    "line": {"color": colour, "width": 1.5},
+                    "marker": {"size": 5},
+                    "hovertemplate": f"%{{text}}: %{{y}} mm expected {what}<extra></extra>",
+                }
+            )
+        start += len(order)
+    return figure(
+        traces,
+        340,
+        xaxis=axis("step of the program, in the order of its text"),
+        yaxis=axis("expected distance [mm]") | {"rangemode": "tozero"},
+    )
+
+
+def _not_better(file: FileCorrection, row: int) -> tuple[str, int, str, str, str, str]:
+    """Return the row of a table: file, line, expected distances [mm] before and after, probability, what became."""
+    known = file.correction.expected
+    before, after, worse = (known.before[row], known.after[row], known.worse[row]) if known else (np.nan,) * 3
+    said = "corrected" if file.correction.corrected[row] else "kept"
+    line = file.correction.program.targets[row].line
+    return file.name, line, f"{before * 1e3:.3f}", f"{after * 1e3:.3f}", f"{worse:.0%}".replace("%", " %"), said
 
 
 def _order(correction: Correction) -> NDArray[np.intp]:

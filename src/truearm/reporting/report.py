@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Final
@@ -10,16 +10,18 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.identification.judging.expected_error import expected_map
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import Errors
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import GRAVITY
 from truearm.notices import worst_first
 from truearm.reporting.drawing import Figure
-from truearm.reporting.figures import correlation_map, histogram, residuals, workspace
+from truearm.reporting.figures import correlation_map, expected_error_map, histogram, residuals, workspace
 from truearm.reporting.page import page
 from truearm.reporting.tables import (
     SpreadRow,
+    expected_rows,
     noise_rows,
     noise_sentence,
     parameter_rows,
@@ -28,10 +30,13 @@ from truearm.reporting.tables import (
     strongest_pairs,
 )
 from truearm.results.calibration import Calibration
+from truearm.results.summaries import expected_of
 
 _FRAMES: Final = ("base", "target", "fixture")
 #: A reading is down-weighted if its weight is less than this share of the median weight.
 _DOWN_WEIGHTED: Final = 0.5
+#: Positions of the map of the error to expect.
+_MAPPED: Final = 4000
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +96,13 @@ class Report:
                 nominal.length_norms * 1e3, judged.length_norms * 1e3, "mm", "error of distances and heights"
             )
         if np.isfinite(_millimetres(judged)).any():
-            drawn["workspace"] = workspace(self.judged_part, self._tips(), _millimetres(nominal), _millimetres(judged))
+            drawn["workspace"] = workspace(
+                self.judged_part, self._tips(self.judged_part), _millimetres(nominal), _millimetres(judged)
+            )
+        drawn["expected-error"] = expected_error_map(
+            *expected_map(replace(run.fit, joint_error=run.expected.joint_error), _MAPPED),
+            self._tips(run.data.of_configurations(run.training)),
+        )
         parts = [("training", run.training, _millimetres(run.train))]
         if run.validation is not None:
             parts.append(("held out", run.held_out, _millimetres(run.validation)))
@@ -99,9 +110,9 @@ class Report:
         drawn["correlations"] = correlation_map(run.fit)
         return drawn
 
-    def _tips(self) -> Array:
-        """Return where the target of each judged reading is, in the robot's base frame [m], ``(readings, 3)``."""
-        part, robot = self.judged_part, self.calibration.fit.robot
+    def _tips(self, part: Dataset) -> Array:
+        """Return where the target of each reading is, in the robot's base frame [m], ``(readings, 3)``."""
+        robot = self.calibration.fit.robot
         seen = robot.loaded(part.postures)
         tips = np.array([robot.world_poses(seen, name)[0] for name in part.targets])
         base = robot.base
@@ -126,6 +137,9 @@ def report_html(calibration: Calibration) -> str:
         report.figures(),
         report=report,
         run=calibration,
+        expected=calibration.expected,
+        expected_of=expected_of(calibration.expected),
+        expected_rows=expected_rows(calibration.expected),
         notices=worst_first(calibration.warnings),
         fit=fit,
         source=Path(calibration.data.source).name,

@@ -8,9 +8,11 @@ from typing import Final
 
 import numpy as np
 
+from truearm.identification.judging.expected_error import ExpectedError
 from truearm.identification.solving.fit import Fit, ParameterStatus
 from truearm.measurement.statistics import Errors, Spread
 from truearm.reporting.numbers import significant
+from truearm.results.summaries import joint_error_text
 from truearm.units import SHOWN_AS, from_si
 
 #: Decimals of a parameter value: a micrometre, two micrometres at a metre, a millionth.
@@ -73,6 +75,26 @@ def spread_rows(nominal: Errors, train: Errors, validation: Errors | None, kind:
             figures = (spread.mean * 1e3, spread.rms * 1e3, spread.p95 * 1e3, spread.max * 1e3)
             rows.append(SpreadRow(part, robot, errors.configurations, len(norms), figures))
     return tuple(rows)
+
+
+@dataclass(frozen=True)
+class ExpectedRow:
+    """The error to expect over the workspace, as printed [mm]."""
+
+    targets: str
+    mean: str
+    low: str
+    high: str
+    p95: str
+
+
+def expected_rows(expected: ExpectedError) -> tuple[ExpectedRow, ...]:
+    """Return a row for all targets together, then one for each where there are several."""
+    parts = {"all": expected.overall, **(expected.targets if len(expected.targets) > 1 else {})}
+    return tuple(
+        ExpectedRow(name, *(significant(1e3 * figure) for figure in (of.mean, *of.interval_90, of.p95)))
+        for name, of in parts.items()
+    )
 
 
 @dataclass(frozen=True)
@@ -179,18 +201,34 @@ def noise_rows(fit: Fit) -> Sequence[NoiseRow]:
 
 
 def noise_sentence(fit: Fit) -> str:
-    """Say what the residuals tell about the noise."""
+    """Say what the residuals tell about the noise, and about what the readings of a configuration share."""
+    sentences = [_noise(fit)]
+    shared = joint_error_text(fit)
+    if shared:
+        sentences.append(
+            f"All readings of a configuration share an error of the joints, of {shared} each: repeatability plus what "
+            "the model leaves."
+        )
+    if fit.scattered:
+        sentences.append("The deviations of the parameters follow from the scatter of the configurations.")
+    return " ".join(sentences)
+
+
+def _noise(fit: Fit) -> str:
     if not fit.declared:
+        more = ", not only the noise of the instrument" if not fit.joint_error.any() else " and is not shared"
         return (
             "The file does not declare all deviations of its readings, so they were estimated from the training "
-            "residuals. They contain whatever the model cannot express, not only the noise of the instrument."
+            f"residuals. They contain whatever the model cannot express{more}."
         )
     if fit.excess > 1.0:
         return (
             f"The training residuals are {fit.excess:.2f} times as large as the declared deviations allow: the "
             f"robot does something that the {fit.model.name} model cannot express, or the declared deviations are "
-            "too small. The deviations of the parameters are widened by this factor."
+            "too small. The deviations of the parameters allow for it."
         )
+    if fit.joint_error.any() and not fit.scattered:
+        return "The training residuals are no larger than the declared deviations and errors of the joints allow."
     return "The training residuals are no larger than the declared deviations allow; nothing was widened."
 
 

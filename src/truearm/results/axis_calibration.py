@@ -12,7 +12,6 @@ from typing import Any, Final
 import numpy as np
 
 from truearm.errors import InputError
-from truearm.files import output_folder, write_files
 from truearm.identification.axes.analysis import TABLES, AxisAnalysis
 from truearm.identification.axes.circles import AxisCircle
 from truearm.identification.axes.fit import NORMAL_95, AxisFit
@@ -26,6 +25,7 @@ from truearm.modeling.transform import Transform
 from truearm.notices import Notice
 from truearm.results.record import Record, notice_lines, notice_summaries
 from truearm.units import SHOWN_AS, from_si
+from truearm.writing import output_folder, write_files
 
 #: What an axis-by-axis calibration writes into its folder.
 AXIS_FILES: Final = ("calibrated.yaml", "joint-errors.yaml", "axes.json")

@@ -13,19 +13,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.errors import InputError, did_you_mean
-from truearm.files import output_folder, write_files
 from truearm.identification.choosing.selection import Selection
+from truearm.identification.judging.expected_error import ExpectedError
+from truearm.identification.judging.repeatability import Repeatability, repeatability
 from truearm.identification.solving.fit import Fit, Status
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import Errors
-from truearm.modeling.formats.robot_file import robot_text
+from truearm.modeling.formats.robot_file import robot_text, sealed
+from truearm.modeling.proof import Proof
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice, has_error
+from truearm.results.calibration_proof import proof_of
 from truearm.results.record import Record, notice_lines, notice_summaries
 from truearm.results.residuals import Part, Residuals, residuals_of
-from truearm.results.summaries import error_line, errors_summary, selection_summary
+from truearm.results.summaries import (
+    error_line,
+    errors_summary,
+    expected_lines,
+    expected_summary,
+    noise_lines,
+    noise_summary,
+    selection_summary,
+)
 from truearm.shown import counted
 from truearm.units import SHOWN_AS, from_si
+from truearm.writing import output_folder, write_files
 
 #: What a calibration writes into its folder.
 RESULT_FILES: Final = ("calibrated.yaml", "result.json", "report.html", "calibrated.urdf")
@@ -46,6 +58,8 @@ class Calibration(Record):
         Errors of the calibrated robot on the training part.
     validation
         Errors of the calibrated robot on the held-out part; None if nothing was held out.
+    expected
+        The error of the targets' positions to expect over the workspace.
     warnings
         What to know about the result, in plain words.
     data
@@ -62,12 +76,15 @@ class Calibration(Record):
         How the model was chosen; None if it was named.
     inputs
         The files that were read: none of them is overwritten.
+    known_before
+        What was known of the robot from an earlier calibration; None if nothing was.
     """
 
     fit: Fit
     nominal: Errors
     train: Errors
     validation: Errors | None
+    expected: ExpectedError
     warnings: tuple[Notice, ...]
     data: Dataset
     training: NDArray[np.intp]
@@ -77,11 +94,20 @@ class Calibration(Record):
     urdf: bytes | None = None
     selection: Selection | None = None
     inputs: tuple[Path, ...] = ()
+    known_before: Proof | None = None
 
     @cached_property
     def robot(self) -> Robot:
-        """The calibrated robot, base and targets included."""
-        return replace(self.fit.robot, history=(*self.fit.robot.history, self.history), tools={}, truths={})
+        """The calibrated robot, base and targets included, with what the calibration knows about it."""
+        training = self.data.of_configurations(self.training)
+        proof = proof_of(self.fit, self.status, self.warnings, self.expected, training, self.known_before)
+        found = replace(self.fit.robot, history=(*self.fit.robot.history, self.history), tools={}, truths={})
+        return sealed(found, proof)
+
+    @cached_property
+    def repeatability(self) -> Repeatability | None:
+        """How well the robot comes back to a posture; None if too few were visited again."""
+        return repeatability(self.data, self.fit.sigma.get("position", 0.0))
 
     @property
     def status(self) -> Status:
@@ -102,6 +128,7 @@ class Calibration(Record):
             "nominal": errors_summary(self.nominal),
             "train": errors_summary(self.train),
             "validation": None if self.validation is None else errors_summary(self.validation),
+            "expected_mm": expected_summary(self.expected),
         }
 
     def result(self) -> dict[str, Any]:
@@ -112,6 +139,7 @@ class Calibration(Record):
             "command": self.command,
             "history": self.history,
             "model": {"name": self.fit.model.name, "effects": list(self.fit.model.effects)},
+            "noise": noise_summary(self.fit, self.repeatability),
             "parameters": list(self._parameters()),
             **({} if self.selection is None else {"selection": selection_summary(self.selection)}),
         }
@@ -128,6 +156,8 @@ class Calibration(Record):
             text.append(f"Nothing was held out; on the {counted(self.train.configurations, 'training configuration')}:")
             text.append(f"  nominal     {error_line(self.nominal)}")
         text.append(f"  calibrated  {error_line(self.train)}")
+        text += expected_lines(self.expected)
+        text += noise_lines(self.fit, self.repeatability)
         if self.selection is not None:
             text.append(f"Chosen model: {self.fit.model.summary}")
         if self.fit.model.name == "frames":
@@ -152,7 +182,7 @@ class Calibration(Record):
         Parameters
         ----------
         picture
-            ``residuals`` (configuration by configuration), ``workspace``, ``correlations``, and
+            ``residuals`` (configuration by configuration), ``expected-error``, ``workspace``, ``correlations``, and
             ``position-histogram``, ``orientation-histogram`` or ``length-histogram`` where such readings were held out.
 
         Raises
@@ -225,5 +255,5 @@ class Calibration(Record):
             "calibrated.urdf": urdf,
         }
         progress("writing the files")
-        write_files(folder, files)
+        write_files(folder, files, self.command)
         return tuple(folder / name for name in files)

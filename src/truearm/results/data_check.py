@@ -8,6 +8,7 @@ from typing import Any
 from truearm.measurement.dataset import Dataset
 from truearm.notices import Notice
 from truearm.results.record import Record, notice_lines, notice_summaries
+from truearm.shown import listed
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -36,5 +37,5 @@ class DataCheck(Record):
     def lines(self) -> list[str]:
         """Return what the command prints."""
         data = self.data
-        text = [f"{data.source}: {data.configurations} configurations, targets {', '.join(data.targets)}"]
+        text = [f"{data.source}: {data.configurations} configurations, targets {listed(data.targets)}"]
         return text + (notice_lines(self.warnings) or ["Nothing looks wrong."])

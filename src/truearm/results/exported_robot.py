@@ -8,7 +8,7 @@ from typing import Any
 
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
-from truearm.results.record import Record, notice_summaries
+from truearm.results.record import Record, notice_lines, notice_summaries
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -29,6 +29,8 @@ class ExportedRobot(Record):
         What the format cannot hold, one sentence each.
     file
         The file; None if none was written.
+    told
+        What speaks against the calibration of the robot.
     """
 
     robot: Robot
@@ -37,6 +39,12 @@ class ExportedRobot(Record):
     frames: str
     left_out: tuple[str, ...]
     file: Path | None = None
+    told: tuple[Notice, ...] = ()
+
+    @property
+    def warnings(self) -> tuple[Notice, ...]:
+        """What to know about it: what the format cannot hold, and what speaks against the calibration."""
+        return (*(Notice("left-out", message) for message in self.left_out), *self.told)
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it."""
@@ -44,10 +52,10 @@ class ExportedRobot(Record):
             "file": None if self.file is None else str(self.file),
             "format": self.format,
             "frames": self.frames,
-            "warnings": notice_summaries([Notice("left-out", message) for message in self.left_out]),
+            "warnings": notice_summaries(self.warnings),
         }
 
     def lines(self) -> list[str]:
         """Return what was written, and then what was left out."""
         text = f"{self.robot.name} as {self.format}. {self.frames}"
-        return [text if self.file is None else f"{self.file}: {text}", *self.left_out]
+        return [text if self.file is None else f"{self.file}: {text}", *self.left_out, *notice_lines(self.told)]

@@ -9,7 +9,6 @@ from typing import Any, Final
 import numpy as np
 
 from truearm.errors import InputError
-from truearm.files import output_file, write_text
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.hexapod.geometry import Design, side_names
 from truearm.measurement.hexapod.poses import HexapodPose
@@ -22,6 +21,7 @@ from truearm.modeling.robot import Robot
 from truearm.planning.hexapod.reachable import Reachable
 from truearm.planning.hexapod.steps import steps_text
 from truearm.results.record import Record
+from truearm.writing import output_file, write_text
 
 _CUPS: Final = ("t1", "t2", "t3")
 

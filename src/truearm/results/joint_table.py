@@ -8,7 +8,8 @@ from typing import Any, Final
 
 from truearm.modeling.chain import Array
 from truearm.modeling.inverse.solutions import JointSolutions, PoseStatus
-from truearm.results.record import Record
+from truearm.notices import Notice
+from truearm.results.record import Record, notice_lines, notice_summaries
 
 #: Poses explained one by one where a person reads.
 _EXPLAINED: Final = 10
@@ -24,10 +25,13 @@ class JointTable(Record):
         Name of each pose.
     solutions
         What was found, one row a pose, or one a pose and branch.
+    warnings
+        What speaks against the calibration of the robot.
     """
 
     labels: tuple[str, ...]
     solutions: JointSolutions
+    warnings: tuple[Notice, ...] = ()
 
     @property
     def joints(self) -> Array:
@@ -69,6 +73,7 @@ class JointTable(Record):
             "rows": len(found.status),
             "status": dict(Counter(status.value for status in found.status)),
             "attention": list(self.attention),
+            "warnings": notice_summaries(self.warnings),
         }
 
     def lines(self) -> list[str]:
@@ -81,4 +86,4 @@ class JointTable(Record):
             text.append(f"  {name}: {entry['status']}. {entry['advice']}")
         if len(self.attention) > _EXPLAINED:
             text.append(f"  and {len(self.attention) - _EXPLAINED} more; the JSON summary lists all")
-        return text
+        return text + notice_lines(self.warnings)

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from truearm.files import output_file, write_text
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.planning.poses.seven_lines import DIRECTIONS, SevenLines
 from truearm.results.record import Record
 from truearm.units import from_si
 from truearm.validation.line_test import LineErrors, reduction
+from truearm.writing import output_file, write_text
 
 
 @dataclass(frozen=True, eq=False, repr=False)

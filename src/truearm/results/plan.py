@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any, Final
 
 from truearm.errors import InputError
-from truearm.files import output_file, write_files
 from truearm.modeling.chain import Array
 from truearm.planning.choosing.measurement_plan import MeasurementPlan
 from truearm.planning.choosing.plan_table import plan_csv
 from truearm.results.record import Record
+from truearm.writing import output_file, write_files
 
 #: What the page beside a plan ends with.
 PAGE: Final = ".html"
@@ -117,5 +117,5 @@ class Plan(Record):
         if table.suffix == PAGE:
             raise InputError("the plan is a CSV file", parameter="file", came=table.name, allowed="PLAN.csv")
         page = output_file(table.with_suffix(PAGE), self.inputs)
-        write_files(table.parent, {table.name: plan_csv(self.made), page.name: plan_html(self)})
+        write_files(table.parent, {table.name: plan_csv(self.made), page.name: plan_html(self)}, self.command)
         return table, page

@@ -17,11 +17,11 @@ from truearm.compensation.program_correction import CorrectedPrograms, Correctio
 from truearm.compensation.program_files import ProgramFile, language_called, recorded, write_programs
 from truearm.compensation.programs.program import Program, Skipped, Source
 from truearm.compensation.split import ProgramSplit
-from truearm.files import output_folder
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.results.record import Record, notice_lines, notice_summaries
+from truearm.writing import output_folder
 
 #: The report beside the corrected programs.
 REPORT: Final = "compensation.html"
@@ -91,6 +91,25 @@ class FileCorrection(Record):
         return float(self.moved.max()) if self.corrected else 0.0
 
     @cached_property
+    def expected(self) -> tuple[Array, Array] | None:
+        """Expected mean distance from each target [m] before and as it is written now, ``(n,)`` each; None if unknown.
+
+        They are those of the targets that could be corrected. One that is kept has the same as before.
+        """
+        known = self.correction.expected
+        if known is None:
+            return None
+        rows = np.array([row for row in self.rows if np.isfinite(known.before[row])], dtype=int)
+        after = np.where(self.correction.corrected, known.after, known.before)
+        return (known.before[rows], after[rows]) if len(rows) else None
+
+    @cached_property
+    def not_better(self) -> tuple[int, ...]:
+        """Indices of the targets whose correction would rather do harm."""
+        found = set(self.correction.not_better)
+        return tuple(row for row in self.rows if row in found)
+
+    @cached_property
     def skipped(self) -> tuple[Skipped, ...]:
         """What stays as it is, and why."""
         return tuple(one for one in self.correction.skipped if one.source == self.source)
@@ -108,7 +127,39 @@ class FileCorrection(Record):
                 "mean": float(millimetres.mean()) if self.corrected else 0.0,
                 "max": float(millimetres.max()) if self.corrected else 0.0,
             },
+            "expected_mm": self._expected_summary(),
+            "not_better": [self._not_better_summary(row) for row in self.not_better],
         }
+
+    def _expected_summary(self) -> dict[str, dict[str, float]] | None:
+        if self.expected is None:
+            return None
+        return {
+            when: {"mean": float(values.mean()) * 1e3, "max": float(values.max()) * 1e3}
+            for when, values in zip(("before", "after"), self.expected, strict=True)
+        }
+
+    def _not_better_summary(self, row: int) -> dict[str, Any]:
+        known = self.correction.expected
+        if known is None:
+            return {}
+        return {
+            "line": self.correction.program.targets[row].line,
+            "kept": not self.correction.corrected[row],
+            "probability_worse": float(known.worse[row]),
+            "expected_mm": {"before": float(known.before[row]) * 1e3, "after": float(known.after[row]) * 1e3},
+        }
+
+    @property
+    def expected_line(self) -> str | None:
+        """What is expected of its targets, in words and figures; None if that is not known."""
+        if self.expected is None:
+            return None
+        (mean, most), (mean_now, most_now) = ((v.mean() * 1e3, v.max() * 1e3) for v in self.expected)
+        return (
+            f"  {self.name}, distance from its targets to expect: {mean:.3f} mm on average and {most:.3f} mm at most "
+            f"before, {mean_now:.3f} and {most_now:.3f} mm now"
+        )
 
     def lines(self) -> list[str]:
         """Return how many targets were corrected and by how much, and what was skipped."""
@@ -166,6 +217,8 @@ class ProgramCorrection(Record):
         How to do it again.
     simulated
         What a simulated robot does with the programs, where there is one.
+    inputs
+        The files that were read besides the programs: none of them is overwritten.
     """
 
     robot: Robot
@@ -175,11 +228,13 @@ class ProgramCorrection(Record):
     warnings: tuple[Notice, ...]
     command: str
     simulated: SimulatedRun | None = None
+    inputs: tuple[Path, ...] = ()
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it, lengths in mm."""
         return {
             "programs": [file.summary() for file in self.files],
+            "expected_is_lower_bound": self.lower_bound,
             "warnings": notice_summaries(self.warnings),
         }
 
@@ -189,6 +244,10 @@ class ProgramCorrection(Record):
         parts = [(file, file.lines()) for file in self.files]
         text = [f"{file.name:{width}}{head.removeprefix(file.name)}" for file, (head, *_) in parts]
         skipped = [line for _, (_, *lines) in parts for line in lines]
+        expected = [file.expected_line for file in self.files if file.expected_line is not None]
+        text += expected
+        if expected and self.lower_bound:
+            text.append("  These are lower bounds: the calibration cannot know all errors of the robot.")
         text += skipped[:_EXPLAINED]
         if len(skipped) > _EXPLAINED:
             text.append(f"  and {len(skipped) - _EXPLAINED} more; the JSON summary lists all")
@@ -198,6 +257,11 @@ class ProgramCorrection(Record):
                 text.append(f"  {moves} move{'s'[: moves > 1]} split by {more} more target{'s'[: more > 1]}")
         text += notice_lines(self.warnings)
         return text if self.simulated is None else [*text, *self.simulated.lines()]
+
+    @property
+    def lower_bound(self) -> bool:
+        """Whether the errors to expect may be larger, for a reason that the calibration knows."""
+        return self.robot.proof is not None and self.robot.proof.lower_bound
 
     @property
     def frame_words(self) -> list[str]:
@@ -210,6 +274,7 @@ class ProgramCorrection(Record):
         made: dict[str, Any] = {
             "robot": self.robot.name,
             "history": list(self.robot.history),
+            "proof": None if self.robot.proof is None else self.robot.proof.summary(),
             "payload_kg": payload.mass,
             "tools": frames.tools,
             "frames": frames.frames,
@@ -254,5 +319,5 @@ class ProgramCorrection(Record):
             files[f"{one.name}.truearm.json"] = recorded(one.file, one.text, one.language, self.applied())
         files[REPORT] = program_html(self)
         progress("writing the files")
-        write_programs(folder, [one.file.path for one in self.files], files)
+        write_programs(folder, [*(one.file.path for one in self.files), *self.inputs], files, self.command)
         return tuple(folder / name for name in files)

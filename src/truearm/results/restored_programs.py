@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from truearm.compensation.program_files import ProgramFile, write_programs
-from truearm.files import output_folder
 from truearm.results.record import Record
+from truearm.writing import output_folder
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from truearm.modeling.formats.controller_entry import controller_entry
+from truearm.modeling.formats.robot_file import is_intact
 from truearm.modeling.parts import GRAVITY
 from truearm.modeling.robot import Robot
 from truearm.results.record import Record
@@ -65,6 +66,7 @@ class RobotDescription(Record):
             "tools": list(robot.tools),
             "truths": list(truth_names(robot)),
             "targets": [target.name for target in robot.targets],
+            "proof": None if robot.proof is None else {**robot.proof.summary(), "intact": is_intact(robot)},
             "history": list(robot.history),
         }
 
@@ -93,6 +95,9 @@ class RobotDescription(Record):
         for key, label in (("effects", "Joint effects"), ("truths", "Truths for simulation"), ("targets", "Targets")):
             if content[key]:
                 text.append(f"{label}: {', '.join(content[key])}")
+        if content["proof"]:
+            words = ", ".join(dict.fromkeys([content["proof"]["status"], *content["proof"]["errors"]]))
+            text.append(f"Calibration: {words}{'' if content['proof']['intact'] else '; values were changed since'}")
         return text + [f"History: {line}" for line in robot.history]
 
 

@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from truearm.identification.choosing.selection import Selection
+from truearm.identification.judging.expected_error import Expectation, ExpectedError
+from truearm.identification.judging.repeatability import Repeatability
+from truearm.identification.solving.fit import Fit
+from truearm.measurement.observations import OBSERVATIONS
 from truearm.measurement.statistics import Errors, Spread
+from truearm.modeling.parts import Payload
+from truearm.shown import counted, listed
+from truearm.units import from_si
 
 
 def selection_summary(selection: Selection) -> dict[str, Any]:
@@ -39,6 +47,53 @@ def errors_summary(errors: Errors) -> dict[str, Any]:
     return made
 
 
+def joint_error_text(fit: Fit) -> str:
+    """Return what readings of a configuration share as an error of each joint, empty if nothing; by kind of joint."""
+    found = dict[str, list[float]]()
+    for joint, error in zip(fit.robot.joints, fit.joint_error.tolist(), strict=True):
+        if error > 0.0:
+            found.setdefault("deg" if joint.kind == "revolute" else "mm", []).append(error)
+    shown = [f"{from_si(max(errors), unit):.2g} {unit}" for unit, errors in found.items()]
+    return " and ".join(shown)
+
+
+def noise_summary(fit: Fit, again: Repeatability | None) -> dict[str, Any]:
+    """Return the deviations of readings and joints, as JSON holds them: mm, mrad and deg."""
+    units = {observation.name: observation.unit for observation in OBSERVATIONS}
+    units_shown = ["deg" if joint.kind == "revolute" else "mm" for joint in fit.robot.joints]
+    errors = fit.joint_error.tolist()
+    return {
+        "sigma": {f"{name}_{'mm' if units[name] == 'm' else 'mrad'}": value * 1e3 for name, value in fit.sigma.items()},
+        "declared": fit.declared,
+        "excess": fit.excess,
+        "joint_error": [
+            {"joint": k, "unit": unit, "deviation": from_si(error, unit)}
+            for k, (unit, error) in enumerate(zip(units_shown, errors, strict=True), 1)
+        ],
+        "scattered": fit.scattered,
+        "repeatability": None
+        if again is None
+        else {"rp_mm": again.rp * 1e3, "postures": again.postures, "visits": again.visits},
+    }
+
+
+def noise_lines(fit: Fit, again: Repeatability | None) -> list[str]:
+    """Return what readings of a configuration share, and how well the robot comes back, as lines."""
+    shared = joint_error_text(fit)
+    lines = []
+    if shared:
+        lines.append(
+            f"Shared by the readings of a configuration: errors of the joints of {shared}, repeatability plus what the "
+            "model leaves"
+        )
+    if again is not None:
+        lines.append(
+            f"Repeatability (RP of ISO 9283) at {counted(again.postures, 'posture')} visited again: "
+            f"{again.rp * 1e3:.2g} mm"
+        )
+    return lines
+
+
 def _scaled(spread: Spread, scale: float) -> dict[str, float]:
     return {
         "mean": spread.mean * scale,
@@ -57,3 +112,46 @@ def error_line(errors: Errors) -> str:
             mean, rms, p95, largest = (value * 1e3 for value in (spread.mean, spread.rms, spread.p95, spread.max))
             parts.append(f"mean {mean:.3f}  rms {rms:.3f}  95 % {p95:.3f}  max {largest:.3f} {unit}")
     return "   ".join(parts) if parts else "no readings"
+
+
+def expected_summary(expected: ExpectedError) -> dict[str, Any]:
+    """Return the error to expect over the workspace in mm, as JSON holds it."""
+    return {
+        **_expectation(expected.overall),
+        "lower_bound": expected.lower_bound,
+        "omissions": list(expected.omissions),
+        "targets": {name: _expectation(of_target) for name, of_target in expected.targets.items()},
+        "frame": expected.frame,
+        "payload": payload_words(expected.payload),
+    }
+
+
+def _expectation(of: Expectation) -> dict[str, Any]:
+    return {"mean": of.mean * 1e3, "p95": of.p95 * 1e3, "interval_90": [end * 1e3 for end in of.interval_90]}
+
+
+def expected_lines(expected: ExpectedError) -> list[str]:
+    """Return the error to expect over the workspace in words."""
+    mean, p95, low, high = (
+        figure * 1e3 for figure in (expected.overall.mean, expected.overall.p95, *expected.overall.interval_90)
+    )
+    places = max(3, -math.floor(math.log10(max(mean, 1e-6))) + 1)
+    lines = [
+        f"Expected over the workspace: mean {mean:.{places}f} mm (90 %: {low:.{places}f} to {high:.{places}f}), "
+        f"95 % below {p95:.{places}f} mm; {expected_of(expected)}"
+    ]
+    if expected.lower_bound:
+        lines.append(f"  a lower bound: {'; '.join(expected.omissions)}")
+    return lines
+
+
+def expected_of(expected: ExpectedError) -> str:
+    """Return what the error to expect is one of: targets, frame and payload."""
+    names = [*expected.targets]
+    targets = f"{'target' if len(names) == 1 else 'targets'} {listed(names)}"
+    return f"{targets} in {expected.frame}, {payload_words(expected.payload)}"
+
+
+def payload_words(payload: Payload) -> str:
+    """Return what the robot carries."""
+    return f"payload {payload.mass:g} kg" if payload.mass else "no payload"

@@ -162,4 +162,4 @@ def at_station(robot: Robot, tool: Tool) -> Robot:
     moved: Array = R @ np.array(base.translation) + np.array(STATION.translation)
     placed = robot.with_frames(Transform.from_matrix(R @ base.rotation, moved), tool.targets)
     payload = Payload(tool.mass, tool.cog) if robot.payload == NO_PAYLOAD else robot.payload
-    return replace(placed, payload=payload, history=(*robot.history, "simulated truth"))
+    return replace(placed, payload=payload, history=(*robot.history, "simulated truth"), proof=None)

@@ -9,10 +9,10 @@ from pathlib import Path
 from statistics import median
 from typing import Any, Literal
 
-from truearm.files import output_folder, write_files
 from truearm.reporting.drawing import Figure
 from truearm.reporting.page import page
 from truearm.results.record import Record
+from truearm.writing import output_folder, write_files
 
 #: What a study writes into its folder.
 STUDY_FILES = ("report.html", "study.json")
@@ -214,7 +214,7 @@ class Study(Record):
         """
         folder = output_folder(folder)
         text = json.dumps(self.summary(), indent=2, allow_nan=False) + "\n"
-        write_files(folder, dict(zip(STUDY_FILES, (self.html(), text), strict=True)))
+        write_files(folder, dict(zip(STUDY_FILES, (self.html(), text), strict=True)), self.command or None)
         return tuple(folder / name for name in STUDY_FILES)
 
 

@@ -21,7 +21,7 @@ def decimals_of(text: str) -> int:
     found = _PARTS.fullmatch(text)
     if found is None:
         raise ValueError(f"{text!r} is no number")
-    return min(max(len(found[1]) - int(found[2] or 0), 0), _MOST)
+    return int(min(max(len(found[1]) - float(found[2] or 0), 0), _MOST))  # an exponent may have 5000 digits
 
 
 def rewritten(text: str, value: float, fewest: int) -> str:

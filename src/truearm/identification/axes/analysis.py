@@ -83,7 +83,7 @@ class AxisAnalysis:
         made = robot.with_frames(robot.base, places)
         kept = {n: p for n, p in robot.parameters.items() if p.group in ("geometry", "joint zero")}
         said = f"calibrated axis by axis on {len(self.found.circles)} circles of {self.data.source}"
-        return replace(made.with_parameters(kept.values()), history=(*robot.history, said))
+        return replace(made.with_parameters(kept.values()), history=(*robot.history, said), proof=None)
 
     @cached_property
     def base(self) -> tuple[Transform, float, float]:

@@ -6,10 +6,8 @@ import math
 from itertools import combinations
 from typing import Final
 
-import numpy as np
-
+from truearm.identification.judging.expected_error import ExpectedError
 from truearm.identification.solving.fit import Fit, Status
-from truearm.identification.solving.redundancy import gauge_motion_removed
 from truearm.modeling.conventions import parallel_joints_without_beta
 from truearm.modeling.effects import EFFECTS, NON_NEGATIVE
 from truearm.modeling.loads import has_weight
@@ -24,15 +22,15 @@ _NEGATIVE_DEVIATIONS: Final = 4.0
 #: Share of the prior variance that the data should remove, and of parameters of effects that may fall short of it.
 _LEAST_INFORMED: Final = 0.5
 _LARGEST_UNINFORMED_SHARE: Final = 0.05
-#: Configurations at which positions are asked for.
-_CONFIGURATIONS: Final = 200
 
 
-def check_fit(fit: Fit, *, doubted: bool = False) -> list[Notice]:
+def check_fit(fit: Fit, expected: ExpectedError, *, doubted: bool = False) -> list[Notice]:
     """Return what a fit says about its model, its data and its parameters.
 
     Parameters
     ----------
+    expected
+        Of the fit, over the workspace.
     doubted
         Whether the data are known to be wrong: wider priors are no cure then.
     """
@@ -75,7 +73,7 @@ def check_fit(fit: Fit, *, doubted: bool = False) -> list[Notice]:
             unknown += " and scale"
         words += (
             " The held-out error is one of readings. Predicted positions are accurate to about "
-            f"{_expected_position_error(fit) * 1e3:.2g} mm on average, up to the unknown {unknown}."
+            f"{expected.overall.mean * 1e3:.2g} mm on average, up to the unknown {unknown}."
         )
         if fit.unobservable_combinations:
             held = "; ".join(fit.unobservable_combinations)
@@ -112,13 +110,15 @@ def check_fit(fit: Fit, *, doubted: bool = False) -> list[Notice]:
                 f"this order.{'' if doubted else ' If it is, enter wider priors in the robot file.'}",
             )
         )
+    shared = fit.joint_error.any() and not fit.scattered
     if fit.excess > 1.0:
         found.append(
             Notice(
                 "residuals-exceed-sigma",
-                f"The residuals are {fit.excess:.1f} times what the declared deviations allow. Either the robot does "
-                f"something that the {fit.model.name} model cannot express, or sigma is too small. The deviations of "
-                "the parameters are widened by that factor.",
+                f"The residuals are {fit.excess:.1f} times what the declared deviations"
+                f"{', and errors of the joints that readings of a configuration share,' if shared else ''} allow. "
+                f"Either the robot does something that the {fit.model.name} model cannot express, or sigma is too "
+                "small. The deviations of the parameters allow for it.",
             )
         )
     found += _check_effects(fit)
@@ -221,24 +221,3 @@ def _negative(fit: Fit) -> list[str]:
         ):
             found[i] = f"the sum of {names[i]} and {names[j]}"
     return [found[place] for place in sorted(found)]
-
-
-def _expected_position_error(fit: Fit, seed: int = 0) -> float:
-    """Return the mean error of the targets' positions that the covariance lets expect at random configurations [m].
-
-    The gauge freedoms, the pose of the base and perhaps the size of everything, are removed.
-    """
-    robot, names = fit.robot, fit.free.names
-    q = robot.loaded(robot.random_configurations(_CONFIGURATIONS, np.random.default_rng(seed)))
-    lengths = []
-    for target in robot.targets:
-        kinematics = robot.forward_kinematics(q, target.name)
-        (moved,) = gauge_motion_removed(
-            fit.gauge_freedoms,
-            robot,
-            kinematics,
-            [robot.position_jacobian(kinematics, q, names).reshape(len(names), -1).T],
-        )
-        variance = np.sum((moved @ fit.covariance) * moved, axis=1).reshape(3, -1).mean(axis=0)
-        lengths.append(math.sqrt(8.0 / math.pi) * np.sqrt(np.maximum(variance, 0.0)))
-    return float(np.mean(lengths))

@@ -13,10 +13,7 @@ from typing import Final
 import numpy as np
 
 from truearm.identification.judging.left_over import LeftOver, chi_squared_tail
-from truearm.identification.solving.fit import Fit
-from truearm.identification.solving.problem import Block
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.sighting import Sighting
 from truearm.modeling.chain import Array
 from truearm.notices import Notice
 from truearm.units import from_si
@@ -61,12 +58,11 @@ def arrival_lag(left_over: LeftOver) -> ArrivalLag | None:
 
     None where too few readings are left, or where the order of measurement is not known.
     """
-    data = left_over.problem.data
+    data, problem = left_over.problem.data, left_over.problem
     if data.number is None:
         return None
-    arrived = _last_moves(data, data.number).T[:, None, :]
-    blocks = left_over.problem.blocks
-    H = np.concatenate([_by_arrival(left_over.fit, block, arrived) for block in blocks], axis=1).T
+    here = problem.at(np.array([problem.robot.values[name] for name in problem.free.names]))
+    H = here.by_joints * _last_moves(data, data.number)[left_over.configuration]
     free = left_over.freedom
     if free < 4 * H.shape[1]:
         return None
@@ -86,24 +82,6 @@ def _last_moves(data: Dataset, number: Array) -> Array:
     moves = np.zeros_like(data.joints)
     moves[order[1:]] = np.sign(np.diff(data.joints[order], axis=0))
     return moves
-
-
-def _by_arrival(fit: Fit, block: Block, arrived: Array) -> Array:
-    """Return how the whitened residuals of a block move with the lag of each joint, ``(joints, rows)``."""
-    robot = fit.robot
-    kinematics = robot.forward_kinematics(block.data.postures, block.target)
-    seen = Sighting(
-        kinematics, block.configurations, None if block.fixture is None else robot.fixture_kinematics(block.fixture)
-    )
-    by_joint, turned = (
-        (kinematics.position_jacobian, seen.position_jacobian)
-        if block.observation.velocity == "linear"
-        else (kinematics.orientation_jacobian, seen.orientation_jacobian)
-    )
-    velocity = turned(by_joint(robot.moving[: len(robot.joints)]) * arrived, ())
-    residual = block.observation.residual(seen, block.data, block.readings)
-    moved = block.observation.jacobian(seen, residual, velocity) / block.sigma[:, None]
-    return np.asarray(moved.reshape(len(moved), -1))
 
 
 def check_arrival_lag(left_over: LeftOver) -> list[Notice]:

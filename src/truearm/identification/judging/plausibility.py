@@ -14,9 +14,10 @@ from truearm.identification.solving.fit import Fit, identify
 from truearm.identification.solving.models import named_model
 from truearm.identification.solving.problem import Problem
 from truearm.identification.start_values.from_readings import start_from_readings
-from truearm.measurement.checks import Suspect, Suspicion, constellation, suspect
 from truearm.measurement.dataset import Dataset, IntArray
 from truearm.measurement.observations import OBSERVATIONS
+from truearm.measurement.places import places_of
+from truearm.measurement.rigid_tool import Suspect, Suspicion, fixed_points, suspect
 from truearm.measurement.statistics import errors_of
 from truearm.modeling.chain import Array
 from truearm.modeling.parameters import FreeParameters
@@ -154,7 +155,8 @@ def _far_off(fit: Fit, data: Dataset, off: Array) -> tuple[list[Notice], list[Su
     if len(doubted) == 0:
         return [], []
     predicted = np.stack([fit.robot.world_poses(data.postures, name)[0] for name in data.targets], axis=1)
-    points = constellation(data)
+    points = places_of(data)
+    known = fixed_points(data)
     mistaken = _joints_of_others(data, predicted, doubted, allowed)
     suspects = []
     for c in dict.fromkeys(data.configuration[doubted].tolist()):
@@ -170,17 +172,14 @@ def _far_off(fit: Fit, data: Dataset, off: Array) -> tuple[list[Notice], list[Su
             name = data.targets[t]
             if nearest != t and gaps[nearest] <= allowed:
                 other = data.targets[nearest]
-                exchanged = np.linalg.norm(points[c, nearest] - predicted[c, t]) <= allowed
+                there = points.of(c, nearest)
+                exchanged = there is not None and np.linalg.norm(there - predicted[c, t]) <= allowed
                 code: Suspicion = "targets-swapped" if exchanged else "target-mistaken"
                 suspects.append(Suspect(code, label, name, f"is target {other}"))
                 continue
-            known = {}
-            if c > 0:
-                known[f"target {name} at the configuration before"] = points[c - 1, t]
-            if data.references is not None:
-                usual = np.nanmedian(constellation(data.references), axis=0)
-                known |= {f"reference {n}": p for n, p in zip(data.references.targets, usual, strict=True)}
-            suspects.append(suspect(at, label, name, float(off[reading]), known))
+            before = points.of(c - 1, t)
+            before_it = {} if before is None else {f"target {name} at the configuration before": before}
+            suspects.append(suspect(at, label, name, float(off[reading]), before_it | known))
     if not mistaken:
         return [], suspects
     words = [f"{data.labels[c]} (those of {data.labels[k]})" for c, k in mistaken.items()]

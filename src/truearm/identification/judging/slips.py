@@ -53,6 +53,10 @@ _ALIKE: Final = 0.8
 _TURNED_WITHIN: Final = 0.1
 #: Largest ratio of the stretches along three axes that is still called a scale.
 _MOST_UNEVEN: Final = 1.2
+#: No target is farther from the flange [m].
+_LARGEST_TOOL: Final = 2.0
+#: Cosine between two axes of an instrument that are still called square.
+_SQUARE: Final = 0.1
 #: No instrument reads a robot from farther away [m].
 _FARTHEST: Final = 1e4
 #: Weight of readings against priors where slips are judged by a fit [m or rad].
@@ -98,7 +102,7 @@ def slips_in_positions(robot: Robot, data: Dataset) -> list[Notice]:
         best = _best(robot, some, _simple_slips(robot, rest), lambda: [*_sign_slips(some, 2), *_sign_slips(some, 3)])
         if best is not None:
             return [best.notice]
-        return turned or _unrelated(robot, some)
+        return turned or _beyond_reach(robot, some) or _unrelated(robot, some)
     # The other targets fit with the same joints, so these are right.
     found = []
     for t in bad:
@@ -267,14 +271,32 @@ def _scale_slips(robot: Robot, data: Dataset) -> Iterator[Slip]:
         rows[mine, :, 9 + 3 * column : 12 + 3 * column] = -R[where[mine]]
     rows[:, :, -3:] = -np.eye(3)
     found = np.linalg.lstsq(rows.reshape(-1, unknowns), p[where].reshape(-1), rcond=1e-10)[0]
-    stretch = np.linalg.svd(found[:9].reshape(3, 3), compute_uv=False)
-    if stretch[2] <= 0.0 or stretch[0] > _MOST_UNEVEN * stretch[2]:
+    onto = np.asarray(found[:9].reshape(3, 3), dtype=float)
+    stretch = np.linalg.svd(onto, compute_uv=False)
+    if stretch[2] <= 0.0:
+        return
+    if stretch[0] > _MOST_UNEVEN * stretch[2]:
+        yield from _column_slips(data, onto)
         return
     factor = float(np.prod(stretch)) ** (1 / 3)
     size = f"{1 / factor:.4g} times too large" if factor < 1 else f"{factor:.4g} times too small"
     yield Slip(
         "unit-length", f"The positions are {size} for this robot. Mend them or their unit", _scaled(data, factor)
     )
+
+
+def _column_slips(data: Dataset, onto: Array) -> Iterator[Slip]:
+    """Try single columns of positions in another unit, from the linear map that takes readings onto the robot."""
+    stretch = np.linalg.norm(onto, axis=0)
+    turned = onto / stretch
+    off = np.abs(stretch - 1.0) > _MOST_UNEVEN - 1.0
+    if np.abs(turned.T @ turned - np.eye(3)).max() > _SQUARE or off.all():
+        return
+    sizes = [f"{1 / by:.4g} times too large" if by < 1 else f"{by:.4g} times too small" for by in stretch.tolist()]
+    words = " and ".join(f"the column {axis} of the positions is {sizes[i]}" for i, axis in enumerate("xyz") if off[i])
+    mended = data.position * np.where(off, stretch, 1.0)
+    words = f"For this robot {words}. Mend the unit in the header, or the numbers"
+    yield Slip("unit-length", words, replace(data, position=mended))
 
 
 def _mirrored(data: Dataset) -> Iterator[Slip]:
@@ -331,6 +353,23 @@ def _shifted(data: Dataset) -> Iterator[Slip]:
         joints = np.roll(data.joints, by, axis=0)
         said = f"The readings of each configuration fit the joint positions of the one {words} it: the columns are "
         yield Slip("rows-shifted", said + "shifted by one row. Shift them back", _some(replace(data, joints=joints)))
+
+
+def _beyond_reach(robot: Robot, data: Dataset) -> list[Notice]:
+    """Say if readings lie so far apart that no arm of this size was read, in whatever frame."""
+    reach = float(np.linalg.norm(robot.with_frames(Transform(), {}).world_poses(data.postures)[0], axis=1).max())
+    read = data.position[data.has_position]
+    apart = float(np.linalg.norm(read - np.median(read, axis=0), axis=1).max())
+    if apart <= 2.0 * (reach + _LARGEST_TOOL):
+        return []
+    return [
+        Notice(
+            "unit-length",
+            f"The positions lie up to {apart:.3g} m from the middle of all, where the arm reaches {reach:.2g} m. Some "
+            "of their numbers are in another unit, or lost their decimal point or comma.",
+            "error",
+        )
+    ]
 
 
 def _unrelated(robot: Robot, data: Dataset) -> list[Notice]:

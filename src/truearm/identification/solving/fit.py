@@ -7,10 +7,11 @@ from enum import Enum
 from typing import Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from truearm.identification.solving.arrivals import Arrivals
 from truearm.identification.solving.bounds import Bounds
-from truearm.identification.solving.losses import Loss
+from truearm.identification.solving.cluster_covariance import cluster_covariance
+from truearm.identification.solving.losses import Loss, pulls
 from truearm.identification.solving.models import FRAMES, Model
 from truearm.identification.solving.problem import SETUP, Problem
 from truearm.identification.solving.redundancy import (
@@ -20,7 +21,15 @@ from truearm.identification.solving.redundancy import (
     in_words,
     unobservable_parameters,
 )
-from truearm.identification.solving.rounds import Redundant, Solved, excess_of, find_parameters, noise_found
+from truearm.identification.solving.rounds import (
+    Redundant,
+    Solved,
+    bound_by,
+    excess_of,
+    factors_of,
+    find_parameters,
+    noise_found,
+)
 from truearm.identification.solving.solver import SMALL
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
@@ -30,10 +39,6 @@ from truearm.modeling.robot import Robot
 #: ``uninformed``: the data removed less than 5 % of the prior variance, so the value is still a belief.
 ParameterStatus = Literal["identified", "uninformed", "at-bound", "not-determined", "dropped", "fixed"]
 _UNINFORMED: Final = 0.05
-
-# Spatial median in three dimensions against the mean, for normal noise (Brown 1983), and the median of single numbers.
-_L1_EFFICIENCY: Final = 0.849
-_L1_EFFICIENCY_OF_ONE: Final = 2.0 / np.pi
 
 
 class Status(Enum):
@@ -99,6 +104,9 @@ class Fit:
     joint_error
         Standard deviation of the error of each joint that all readings of an arrival share, ``(joints,)`` [rad or m]:
         repeatability plus what the model leaves. Zero where none was found.
+    scattered
+        Whether the covariance follows from the scatter of the arrivals: for losses other than the linear one, and where
+        errors of the joints do not explain how the residuals of an arrival hang together.
     weight
         What the loss left of each reading, ``(readings,)``, in the order of the dataset; NaN where none was used.
         For ``l1``, which has no full weight, relative to the median reading.
@@ -121,6 +129,7 @@ class Fit:
     declared: bool
     excess: float
     joint_error: Array
+    scattered: bool
     weight: Array
     steps: int
 
@@ -204,20 +213,24 @@ def place(robot: Robot, data: Dataset, loss: Loss = "linear") -> Fit:
 def _fit(solved: Solved, model: Model, loss: Loss) -> Fit:
     problem, solution, start, limits = solved.problem, solved.solution, solved.start, solved.limits
     free, x = problem.free, solution.vector
-    at_bound = np.zeros(len(x), dtype=bool)
-    if limits is not None:
-        near = 1e-9 * free.prior
-        at_bound = (x <= limits[0] + near) | (x >= limits[1] - near)
-    weighted = np.ones_like(solution.weight) if loss == "l1" else solution.weight
-    A = solution.jacobian * free.prior * np.repeat(np.sqrt(weighted), problem.components)[:, None]
+    at_bound = bound_by(solution, free, limits)
+    components, joint_error = solved.components, np.zeros(len(start.joints))
     noise = noise_found(problem, solution, loss)
     declared = {problem.kind(b) for b in problem.blocks if b.declared} - {SETUP}
-    excess = excess_of({name: noise[name] for name in noise if name in declared}) if declared else 1.0
-    single = float(np.sum(problem.components == 1)) / problem.rows
-    efficiency = single * _L1_EFFICIENCY_OF_ONE + (1.0 - single) * _L1_EFFICIENCY
-    spread = excess / np.sqrt(efficiency) if loss == "l1" else excess
-    excess *= problem.widened
-    covariance = _covariance(A / spread, ~at_bound, problem.priors) * np.outer(free.prior, free.prior)
+    if components is None:
+        excess = excess_of({name: noise[name] for name in noise if name in declared}) if declared else 1.0
+        excess *= problem.widened
+    else:
+        excess, joint_error = problem.widened, np.sqrt(components.likeliest.joints)
+    scattered = components is None or not components.holds
+    if components is not None and not scattered:
+        covariance = components.covariance
+    else:
+        pull, rows = pulls(loss, solution.residual, solution.jacobian, problem.components)
+        covariance = cluster_covariance(
+            rows * free.prior, pull * free.prior, Arrivals(problem.arrivals), ~at_bound, problem.priors
+        )
+    covariance = covariance * np.outer(free.prior, free.prior)
     deviation = np.sqrt(np.diag(covariance))
     informed = np.clip(1.0 - (deviation / free.prior) ** 2, 0.0, 1.0)
     identified = [
@@ -248,9 +261,14 @@ def _fit(solved: Solved, model: Model, loss: Loss) -> Fit:
     else:
         status = Status.CONVERGED
     sigma = {}
+    names, _ = factors_of(problem)
     for name in noise:
         values = np.concatenate([b.sigma for b in problem.blocks if problem.kind(b) == name])
         sigma[name] = float(np.sqrt(np.mean(values**2)))
+        if name in declared:
+            sigma[name] /= problem.widened
+        elif components is not None:
+            sigma[name] *= float(np.sqrt(components.likeliest.factors[names.index(name)]))
     return Fit(
         robot=robot,
         start=start,
@@ -266,7 +284,8 @@ def _fit(solved: Solved, model: Model, loss: Loss) -> Fit:
         sigma=sigma,
         declared=declared == set(noise),
         excess=excess,
-        joint_error=np.zeros(len(robot.joints)),
+        joint_error=joint_error,
+        scattered=scattered,
         weight=weight,
         steps=solution.steps,
     )
@@ -280,20 +299,3 @@ def _unobservable_combinations(problem: Problem, vector: Array) -> tuple[str, ..
         for redundancy in find_redundancies(problem, vector)
     ]
     return tuple(in_words(members, problem.free) for members in own if members)
-
-
-def _covariance(A: Array, uncertain: NDArray[np.bool_], priors: bool) -> Array:
-    """Return the covariance of parameters scaled by their priors, zero for those that are not uncertain.
-
-    Parameters
-    ----------
-    A
-        Whitened Jacobian per prior, ``(rows, parameters)``.
-    """
-    count = int(uncertain.sum())
-    rows = np.concatenate([A[:, uncertain], np.eye(count)]) if priors else A[:, uncertain]
-    _, s, Vt = np.linalg.svd(np.asarray(np.linalg.qr(rows, mode="r"), dtype=np.float64))
-    spread = Vt.T / np.maximum(s, 1e-12 * s[0])
-    covariance = np.zeros((A.shape[1], A.shape[1]))
-    covariance[np.ix_(uncertain, uncertain)] = spread @ spread.T
-    return covariance

@@ -22,6 +22,8 @@ MEDIAN_NORM: Final = 1.5382
 _OF_ONE: Final = 2.7955 / 1.9600
 #: The median of one, times that.
 _MEDIAN_OF_ONE: Final = 0.6745 * _OF_ONE
+#: Share of the median below which an l1 reading counts as met.
+_L1_MET: Final = 1e-4
 # Where a loss starts to doubt a reading, in robust deviations of one coordinate: beyond the 95th percentile of the
 # norm of three normal components for Huber, at its root mean square and a bit for Cauchy.
 _HUBER: Final = 2.80
@@ -69,3 +71,46 @@ def weights(loss: Loss, norms: Array, scale: float) -> Array:
     if loss == "l1":
         return 1.0 / np.maximum(norms, scale)
     return np.ones_like(norms)
+
+
+def pulls(loss: Loss, residual: Array, jacobian: Array, components: NDArray[np.intp]) -> tuple[Array, Array]:
+    """Return what each equation pulls the parameters with, and the square root of what it tells of them.
+
+    The first is its residual times its weight times its derivative. The second squared is the derivative of that
+    by the parameters: a reading that a loss holds back follows the parameters across the line to its prediction, and
+    along it less or not at all. Where a loss pushes a reading away (Cauchy), it counts as not following. For ``l1`` and
+    readings of one number, whose pull only jumps, it is the density of the residuals at zero, of a normal distribution
+    with their median.
+
+    Parameters
+    ----------
+    residual, jacobian
+        Whitened, ``(rows,)`` and ``(rows, parameters)``.
+    components
+        Number of consecutive rows of each reading.
+
+    Returns
+    -------
+    pull, root
+        Each ``(rows, parameters)``.
+    """
+    if loss == "linear":
+        return residual[:, None] * jacobian, jacobian
+    norms = norms_of(residual, components)
+    scale = max(robust_scale(norms, components), 1e-300)
+    across = weights(loss, norms, scale if loss != "l1" else _L1_MET * float(np.median(norms)) + 1e-300)
+    if loss == "huber":
+        along = np.where(norms < _HUBER * scale, 1.0, 0.0)
+    elif loss == "cauchy":
+        far = (norms / (_CAUCHY * scale)) ** 2
+        along = np.maximum(1.0 - far, 0.0) / (1.0 + far) ** 2
+    else:
+        one = components == 1
+        along = np.where(one, np.sqrt(2.0 / np.pi) / (_OF_ONE * scale), 0.0)
+    first = np.concatenate([[0], np.cumsum(components)[:-1]])
+    length = np.sqrt(np.add.reduceat(residual**2, first))
+    towards = residual / np.repeat(np.maximum(length, 1e-300), components)
+    radial = np.repeat(np.add.reduceat(towards[:, None] * jacobian, first, axis=0), components, axis=0)
+    more = np.repeat(np.sqrt(along) - np.sqrt(across), components)
+    root = np.repeat(np.sqrt(across), components)[:, None] * jacobian + (more * towards)[:, None] * radial
+    return (np.repeat(across, components) * residual)[:, None] * jacobian, root

@@ -239,6 +239,7 @@ def _poses(
         quaternion=None,
         sigma=None if data.sigma is None else data.sigma[kept],
         sigma_rot=None,
+        visit=None,
         references=None,
     )
     return _Poses(robot, of_target, tuple(names), target, unit)
@@ -282,4 +283,4 @@ def _with_set(robot: Robot, names: Sequence[str], vector: Array, how: str) -> Ro
         replace(robot.parameters[n], value=float(v), deviation=None, informed=None)
         for n, v in zip(names, vector, strict=True)
     )
-    return replace(robot.with_parameters(known), history=(*robot.history, how))
+    return replace(robot.with_parameters(known), history=(*robot.history, how), proof=None)

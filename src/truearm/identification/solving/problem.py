@@ -6,6 +6,7 @@ one more row, (value - nominal) / deviation.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.errors import InputError
+from truearm.limits import refuse_beyond
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.observations import Observation, compared
 from truearm.measurement.sighting import Sighting
@@ -131,6 +133,27 @@ class Problem:
         """Number of equations from readings."""
         return sum(block.rows for block in self.blocks)
 
+    @cached_property
+    def arrivals(self) -> NDArray[np.intp]:
+        """Index of the arrival that each equation belongs to, ``(rows,)``.
+
+        Readings of one configuration, and of one visit of it where visits are told apart, are of one arrival. What is
+        known of a fixture is of none, and stands alone.
+        """
+        data = self.data
+        visited = data.configuration
+        if data.visit is not None:
+            visited = np.unique(np.stack([visited, data.visit]), axis=1, return_inverse=True)[1].reshape(-1)
+        found, first = [], int(visited.max(initial=-1)) + 1
+        for block in self.blocks:
+            if block.data is data:
+                of_readings = visited[block.readings]
+            else:
+                of_readings = first + np.arange(len(block.readings))
+                first += len(block.readings)
+            found.append(np.repeat(of_readings, block.observation.components))
+        return np.unique(np.concatenate(found), return_inverse=True)[1].reshape(-1) if found else np.zeros(0, np.intp)
+
     def at(self, vector: Array) -> Evaluation:
         """Compare the robot with the readings at a vector ``(parameters,)``, or at one for each of many trials."""
         return Evaluation(self, vector)
@@ -181,7 +204,10 @@ class Evaluation:
         """Derivative of the residual, ``(rows, parameters)``."""
         names = self.problem.free.names
         # Parameter by parameter in memory: as forward kinematics gives it, and as QR decompositions take it.
-        J = np.empty((*self.vector.shape[:-1], len(names), self.problem.rows))
+        shape = (*self.vector.shape[:-1], len(names), self.problem.rows)
+        refuse_beyond("parameters", len(names), where=self.problem.data.source)
+        refuse_beyond("derivatives", math.prod(shape), where=self.problem.data.source)
+        J = np.empty(shape)
         by_parameter = np.moveaxis(J, -2, 0)
         for block, rows in self._rows():
             observation, sigma = block.observation, block.sigma[:, None]
@@ -192,6 +218,28 @@ class Evaluation:
             moved = observation.jacobian(seen, raw, turned(velocity, names))
             np.divide(moved, sigma, out=self._by_reading(by_parameter[..., rows], block))
         return np.swapaxes(J, -1, -2)
+
+    @cached_property
+    def by_joints(self) -> Array:
+        """Derivative of the residual by errors of the joints, behind all their deflections, ``(rows, joints)``.
+
+        Zero for what is known of fixtures.
+        """
+        robot = self.problem.robot
+        joints = robot.moving[: len(robot.joints)]
+        by_joint = np.zeros((len(joints), self.problem.rows))
+        for block, rows in self._rows():
+            if block.data is not self.problem.data:
+                continue
+            observation, sigma = block.observation, block.sigma[:, None]
+            kinematics, seen = self._kinematics[block.target], self._sightings[rows.start]
+            raw = self._by_reading(self.residual[rows], block) * sigma
+            if observation.velocity == "linear":
+                velocity = seen.position_jacobian(kinematics.position_jacobian(joints), ())
+            else:
+                velocity = seen.orientation_jacobian(kinematics.orientation_jacobian(joints), ())
+            np.divide(observation.jacobian(seen, raw, velocity), sigma, out=self._by_reading(by_joint[:, rows], block))
+        return by_joint.T
 
     def _rows(self) -> Iterator[tuple[Block, slice]]:
         """Go through the blocks, with the equations of the problem that each of them is."""

@@ -241,19 +241,26 @@ def gauge_motion_removed(
     moved
         How it moves [m], and turns if that is asked too, by each parameter, ``(3 n, parameters)`` each.
     """
-    base = [f"base_{axis}" for axis in ("x", "y", "z", "rx", "ry", "rz")]
-    places = [kinematics.places[name] for name in base]
-    columns = [
-        part.reshape(6, -1).T
-        for part in (kinematics.position_jacobian(places), kinematics.orientation_jacobian(places))[: len(moved)]
-    ]
-    if "size" in gauge:
-        grown = (kinematics.position - np.array(robot.base.translation)[:, None]).reshape(-1, 1)
-        columns = [np.column_stack([c, g]) for c, g in zip(columns, (grown, np.zeros_like(grown)), strict=False)]
+    columns = gauge_motions(gauge, robot, kinematics)[: len(moved)]
     together = np.concatenate(columns)
     Q = np.linalg.qr(together)[0]
     every = np.concatenate(moved)
     return [every - Q @ (Q.T @ every)]
+
+
+def gauge_motions(gauge: Sequence[str], robot: Robot, kinematics: ForwardKinematics) -> tuple[Array, Array]:
+    """Return how a motion of the whole robot moves a target [m], and turns it, ``(3 n, motions)`` each.
+
+    Parameters are those of :func:`gauge_motion_removed`.
+    """
+    base = [f"base_{axis}" for axis in ("x", "y", "z", "rx", "ry", "rz")]
+    places = [kinematics.places[name] for name in base]
+    moved = kinematics.position_jacobian(places).reshape(6, -1).T
+    turned = kinematics.orientation_jacobian(places).reshape(6, -1).T
+    if "size" in gauge:
+        grown = (kinematics.position - np.array(robot.base.translation)[:, None]).reshape(-1, 1)
+        return np.column_stack([moved, grown]), np.column_stack([turned, np.zeros_like(grown)])
+    return moved, turned
 
 
 def _unit_noise(data: Dataset) -> Dataset:

@@ -10,14 +10,22 @@ from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truearm.errors import InputError
+from truearm.identification.solving.arrivals import Arrivals, WhitenedProblem, Whitening
 from truearm.identification.solving.bounds import Bounds, bound_vectors
 from truearm.identification.solving.losses import Loss, norms_of, robust_scale
 from truearm.identification.solving.models import Model
 from truearm.identification.solving.problem import SETUP, Problem, check_circumstances, check_solvable
 from truearm.identification.solving.redundancy import Redundancy, find_redundancies
 from truearm.identification.solving.solver import SMALL, Solution, solve
+from truearm.identification.solving.variance_components import (
+    Components,
+    Linearised,
+    beyond_chance,
+    variance_components,
+)
 from truearm.identification.start_values.from_readings import start_from_readings, unanchored
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.observations import OBSERVATIONS
@@ -30,8 +38,12 @@ Redundant = Literal["prior", "drop"]
 #: Noise assumed for readings that declare none, until their own residuals say better [m, rad].
 _FIRST_NOISE: Final = {observation.name: 1e-4 for observation in OBSERVATIONS}
 _NOISE_FLOOR: Final = 1e-9
+_LEAST_WIDENED: Final = 1e-12
+#: What the variances of readings with declared deviations are counted under.
+DECLARED: Final = "declared"
 #: Rounds until deviations and loads agree with the solution; each leaves a hundredth of the loads' error or less.
 _ROUNDS: Final = 6
+_SETTLED: Final = 0.02  # largest relative change of a deviation that changes nothing
 _LOADS_AGREE: Final = 1e-4  # of the last step, in the joints' deflections [rad or m]
 
 
@@ -51,6 +63,8 @@ class Solved:
         Parameters held because the data cannot tell them apart.
     limits
         Lowest and highest value of every free parameter [SI], where there are bounds.
+    components
+        Variances of the readings and of the joints' errors at the solution; None for losses other than the linear one.
     """
 
     start: Robot
@@ -58,6 +72,7 @@ class Solved:
     solution: Solution
     redundancies: tuple[Redundancy, ...]
     limits: tuple[Array, Array] | None
+    components: Components | None
 
     @property
     def robot(self) -> Robot:
@@ -99,7 +114,7 @@ def find_parameters(
             _check_held(held, free, check_bounds, bounds_file)
         kept = problem.free.without(held)
         limits = None if check_bounds is None else _limits_of(check_bounds, free, kept)
-        solution, reduced = _solve_with_noise(replace(problem, free=kept), loss, limits, small)
+        solution, reduced, components = _solve_with_noise(replace(problem, free=kept), loss, limits, small)
         steps += solution.steps
         if redundancy == "prior":
             break
@@ -113,7 +128,7 @@ def find_parameters(
     else:
         solution = replace(solution, converged=False)
         dropped = tuple(r for r in dropped if r.dropped in held)
-    return Solved(start, reduced, replace(solution, steps=steps), dropped, limits)
+    return Solved(start, reduced, replace(solution, steps=steps), dropped, limits, components)
 
 
 def _check_held(held: list[str], free: FreeParameters, limits: tuple[Array, Array], where: str) -> None:
@@ -133,43 +148,138 @@ def _limits_of(limits: tuple[Array, Array], free: FreeParameters, kept: FreePara
 
 def _solve_with_noise(
     problem: Problem, loss: Loss, limits: tuple[Array, Array] | None, small: float
-) -> tuple[Solution, Problem]:
+) -> tuple[Solution, Problem, Components | None]:
     """Solve; then again with what the solution says of deviations and of the loads at every joint.
 
-    Deviations are estimated where they are not declared. Declared ones are widened by what the residuals say where
-    there is no anchor: believed to the letter, readings of a closed loop that the model cannot follow would overrule
-    every prior, for the sake of directions that they hardly observe.
+    Deviations are estimated where they are not declared. Declared ones are widened where the residuals are larger than
+    they, and errors of the joints that an arrival's readings share, allow: believed to the letter, readings that the
+    model cannot follow would overrule every prior, for the sake of directions that they hardly observe.
     """
     solution = solve(problem, loss, limits, small)
-    undeclared = {problem.kind(b) for b in problem.blocks if not b.declared}
     steps = solution.steps
-    settled = False
+    joints = np.zeros(len(problem.robot.joints))
+    components = None
     for _ in range(_ROUNDS):
-        noise = {**problem.noise}
-        found_noise = noise_found(problem, solution, loss)
-        known = {name: found_noise[name] for name in found_noise if name not in undeclared}
-        wider = excess_of(known) if known and not problem.data.anchored else 1.0
-        for name, (estimate, _) in found_noise.items():
-            if name in undeclared:
-                noise[name] = max(estimate * noise[name], _NOISE_FLOOR)
-        change = max((abs(np.log(noise[n] / problem.noise[n])) for n in undeclared), default=0.0)
+        if loss == "linear":
+            components = components_found(problem, solution, limits, components)
+            there, change, joints = _with_components(problem, components, joints)
+        else:
+            there, change = _with_scale(problem, solution, loss)
         found = dict(zip(problem.free.names, map(float, solution.vector), strict=True))
         started = FreeParameters(tuple(replace(p, value=found[p.name]) for p in problem.free.parameters))
-        there = replace(
-            problem,
-            robot=problem.robot.with_values(found),
-            noise=noise,
-            free=started,
-            widened=problem.widened * wider,
-        )
-        shift = _load_shift(problem, there)
-        if (settled and shift < _LOADS_AGREE * small) or (not undeclared and shift == 0.0 and wider == 1.0):
+        there = replace(there, robot=problem.robot.with_values(found), free=started)
+        if change < _SETTLED and _load_shift(problem, there) < _LOADS_AGREE * small:
             break
-        settled = change < 0.02 and wider < 1.02
         problem = there
-        solution = solve(problem, loss, limits, small)
+        solution = _solved(problem, joints, loss, limits, small)
         steps += solution.steps
-    return replace(solution, steps=steps), problem
+    return replace(solution, steps=steps), problem, components
+
+
+def _solved(problem: Problem, joints: Array, loss: Loss, limits: tuple[Array, Array] | None, small: float) -> Solution:
+    """Solve with the variances of the joints' errors as they are; residual and Jacobian are the readings' own."""
+    if not joints.any():
+        return solve(problem, loss, limits, small)
+    shared = problem.at(problem.free.start).by_joints * np.sqrt(joints)
+    whitening = Whitening(Arrivals(problem.arrivals), shared)
+    solution = solve(WhitenedProblem(problem, whitening), loss, limits, small)
+    residual, jacobian = whitening.undone(solution.residual), whitening.undone(solution.jacobian)
+    return replace(solution, residual=residual, jacobian=jacobian)
+
+
+def components_found(
+    problem: Problem, solution: Solution, limits: tuple[Array, Array] | None, before: Components | None = None
+) -> Components:
+    """Estimate the variances of readings and joints at a solution, those of :func:`factors_of` and of joints alike.
+
+    Declared deviations are widened if residuals are larger than chance allows (1 in 1000), or were before.
+    """
+    names, of_row = factors_of(problem)
+    uncertain = ~bound_by(solution, problem.free, limits)
+    prior = problem.free.prior
+    at = Linearised(
+        residual=solution.residual,
+        by_parameters=solution.jacobian[:, uncertain] * prior[uncertain],
+        by_joints=problem.at(solution.vector).by_joints,
+        offset=((solution.vector - problem.free.nominal) / prior)[uncertain],
+        priors=problem.priors,
+        arrivals=Arrivals(problem.arrivals),
+        factor=of_row,
+    )
+    kinds = np.array([joint.kind for joint in problem.robot.joints])
+    alike = [np.flatnonzero(kinds == kind) for kind in dict.fromkeys(kinds.tolist())]
+    free = [name not in (DECLARED, SETUP) for name in names]
+    least = np.array(
+        [(_NOISE_FLOOR / problem.noise[n]) ** 2 if f else _LEAST_WIDENED for f, n in zip(free, names, strict=True)]
+    )
+    if before is not None:
+        found = variance_components(at, before.estimated, least, alike, before)
+    else:
+        found = variance_components(at, free, least, alike)
+        if DECLARED in names:
+            place = names.index(DECLARED)
+            if beyond_chance(float(found.squares[place]), max(float(found.freedom[place]), 1e-3)):
+                free[place] = True
+                found = variance_components(at, free, least, alike)
+    covariance = np.zeros((len(prior), len(prior)))
+    covariance[np.ix_(uncertain, uncertain)] = found.covariance
+    return replace(found, covariance=covariance)
+
+
+def factors_of(problem: Problem) -> tuple[list[str], NDArray[np.intp]]:
+    """Return what the variances of readings are counted under, and the index of that for each equation.
+
+    Each observation without declared deviations, all that are declared together, and what is known of fixtures.
+    """
+    of_block = [
+        DECLARED if block.declared and problem.kind(block) != SETUP else problem.kind(block) for block in problem.blocks
+    ]
+    names = list(dict.fromkeys(of_block))
+    sizes = [block.rows for block in problem.blocks]
+    return names, np.repeat(np.array([names.index(name) for name in of_block], dtype=np.intp), sizes)
+
+
+def bound_by(solution: Solution, free: FreeParameters, limits: tuple[Array, Array] | None) -> NDArray[np.bool_]:
+    """Return which parameters stopped at a bound, ``(parameters,)``."""
+    if limits is None:
+        return np.zeros(len(solution.vector), dtype=bool)
+    near = 1e-9 * free.prior
+    return np.asarray((solution.vector <= limits[0] + near) | (solution.vector >= limits[1] - near))
+
+
+def _with_components(problem: Problem, found: Components, joints: Array) -> tuple[Problem, float, Array]:
+    """Return the problem with the deviations found, how much these changed, and the variances of the joints' errors."""
+    names, _ = factors_of(problem)
+    noise, widened = dict(problem.noise), problem.widened
+    for name, factor in zip(names, found.weighing.factors.tolist(), strict=True):
+        if name == DECLARED:
+            widened = max(1.0, widened * factor**0.5)
+        elif name != SETUP:
+            noise[name] = max(noise[name] * factor**0.5, _NOISE_FLOOR)
+    there = replace(problem, noise=noise, widened=widened)
+    before, after = np.sqrt(joints), np.sqrt(found.weighing.joints)
+    change = float(np.max(np.abs(after - before) / np.maximum(np.maximum(after, before), 1e-300), initial=0.0))
+    return there, max(change, _noise_change(problem, there)), found.weighing.joints
+
+
+def _with_scale(problem: Problem, solution: Solution, loss: Loss) -> tuple[Problem, float]:
+    """Return the problem with the robust deviations of the residuals, and how much these changed."""
+    undeclared = {problem.kind(b) for b in problem.blocks if not b.declared}
+    noise = dict(problem.noise)
+    found = noise_found(problem, solution, loss)
+    known = {name: found[name] for name in found if name not in undeclared}
+    wider = excess_of(known) if known and not problem.data.anchored else 1.0
+    for name, (estimate, _) in found.items():
+        if name in undeclared:
+            noise[name] = max(estimate * noise[name], _NOISE_FLOOR)
+    there = replace(problem, noise=noise, widened=problem.widened * wider)
+    return there, _noise_change(problem, there)
+
+
+def _noise_change(before: Problem, after: Problem) -> float:
+    """Return the largest relative change of a deviation."""
+    changes = [abs(float(np.log(after.noise[name] / before.noise[name]))) for name in before.noise]
+    return max(*changes, after.widened / before.widened - 1.0, 0.0)
 
 
 def _load_shift(before: Problem, after: Problem) -> float:
@@ -211,12 +321,7 @@ def _informed_rows(problem: Problem, solution: Solution) -> float:
 
 
 def excess_of(noise: dict[str, tuple[float, float]]) -> float:
-    """Return the ratio of residuals to declared deviations if it is too large for chance (1 in 1000), else 1.
-
-    The quantile of chi squared is Wilson and Hilferty's (1931).
-    """
+    """Return the ratio of residuals to declared deviations if it is too large for chance (1 in 1000), else 1."""
     freedom = sum(dof for _, dof in noise.values())
     ratio = sum(deviation**2 * dof for deviation, dof in noise.values()) / freedom
-    k = 2.0 / (9.0 * freedom)
-    allowed = (1.0 - k + 3.09 * np.sqrt(k)) ** 3
-    return float(np.sqrt(ratio)) if ratio > allowed else 1.0
+    return float(np.sqrt(ratio)) if beyond_chance(ratio * freedom, freedom) else 1.0

@@ -16,6 +16,7 @@ from functools import cache
 import numpy as np
 
 from truearm.errors import InputError
+from truearm.limits import refuse_beyond
 from truearm.measurement.dataset import Dataset, IntArray
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
@@ -45,8 +46,10 @@ def initial_frames(robot: Robot, data: Dataset) -> Robot:
     with_position = data.has_position
     if not with_position.any():
         raise InputError("there is no position reading", where=data.source, cure="Fill in x, y and z.")
-    seen = [t for t in range(len(data.targets)) if (with_position & (data.target == t)).any()]
     readings = np.flatnonzero(with_position)
+    seen = np.unique(data.target[readings]).tolist()
+    refuse_beyond("parameters", 3 * len(seen) + 3, where=data.source)
+    refuse_beyond("derivatives", len(readings) * 3 * (3 * len(seen) + 3), where=data.source)
     where, what = data.configuration[readings], data.target[readings]
     centre = data.position[readings].mean(axis=0)
     y = data.position[readings] - centre

@@ -190,6 +190,7 @@ def _triangulated(data: Dataset, setup: Dataset) -> Iterator[Dataset]:
             setup=None,
             sigma=None,
             sigma_rot=None,
+            visit=None,
         )
 
 

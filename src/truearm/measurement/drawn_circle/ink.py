@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.limits import refuse_beyond
 from truearm.measurement.drawn_circle.page import Page
 from truearm.modeling.chain import Array
 
@@ -23,6 +24,7 @@ _DARKEST_PAPER: Final = 0.6
 #: Darkness that is no ink, nor noise larger than usual.
 _FAINTEST: Final = 0.08
 _NOISE: Final = 5.0
+_ROWS_AT_ONCE: Final = 256
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,8 +63,14 @@ class Ink:
 
     def everywhere(self) -> Array:
         """Return the darkness of all dots, ``(rows, columns)``."""
-        rows, columns = (np.asarray(places, dtype=np.float64) for places in np.indices(self.brightness.shape))
-        return np.asarray(1 - self.brightness / self._paper_at(rows, columns))
+        made = np.empty(self.brightness.shape)
+        for first in range(
+            0, len(made), _ROWS_AT_ONCE
+        ):  # the places of all dots would take much more memory than these
+            part = self.brightness[first : first + _ROWS_AT_ONCE]
+            rows, columns = (np.asarray(places, dtype=np.float64) for places in np.indices(part.shape))
+            made[first : first + _ROWS_AT_ONCE] = 1 - part / self._paper_at(rows + first, columns)
+        return made
 
     def _paper_at(self, rows: Array, columns: Array) -> Array:
         from scipy.ndimage import map_coordinates
@@ -76,6 +84,7 @@ def ink_of(page: Page) -> tuple[Ink, Ink]:
     from scipy.ndimage import median_filter
 
     x, y = (max(1, int(_COARSE / pitch)) for pitch in page.pitch)
+    refuse_beyond("dots", (page.brightness.shape[0] // y) * (page.brightness.shape[1] // x), where=page.source)
     coarse = _blocks(page.brightness, x, y).mean(axis=(1, 3), dtype=np.float64)
     pitch = (x * page.pitch[0], y * page.pitch[1])
     across, along = (max(1, round(_BLOCK / edge)) for edge in pitch)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from truearm.errors import InputError
 from truearm.files import read_bytes
+from truearm.limits import LIMITS, refuse_beyond
 from truearm.units import to_si
 
 if TYPE_CHECKING:
@@ -103,19 +104,21 @@ def _opened(path: Path) -> tuple[Image, tuple[float, float] | None]:
     content = read_bytes(path)
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            warnings.simplefilter("error", Image.DecompressionBombWarning)
+            warnings.simplefilter("ignore")  # that there are many dots is refused below, by the same count
             image = Image.open(io.BytesIO(content), formats=_FORMATS)
+            refuse_beyond("pixels", image.width * image.height, where=str(path))
             pages = getattr(image, "n_frames", 1)
             image.load()
             orientation = image.getexif().get(0x0112, 1)
             declared = image.info.get("dpi")
             upright = ImageOps.exif_transpose(image)
-    except (Image.DecompressionBombWarning, Image.DecompressionBombError) as error:
+    except InputError:
+        raise
+    except Image.DecompressionBombError as error:  # beyond twice Pillow's own limit, whatever ours is
         raise InputError(
-            f"the image has more than {(Image.MAX_IMAGE_PIXELS or 0) / 1e6:.0f} million dots",
+            f"the image has more than {2 * (Image.MAX_IMAGE_PIXELS or 0) / 1e6:.0f} million dots",
             where=str(path),
-            cure="Scan at 300 to 600 dpi; more does not show a pencil line better.",
+            cure=LIMITS["pixels"].cure,
         ) from error
     except Exception as error:  # Pillow's decoders fail in many ways on damaged files
         raise InputError(
@@ -145,5 +148,8 @@ def _brightness(image: Image, path: Path) -> NDArray[np.uint8]:
             cure="Scan in grey or colour, 8 bits.",
         )
     if image.has_transparency_data:
-        image = Image.alpha_composite(Image.new("RGBA", image.size, "white"), image.convert("RGBA"))
+        seen = image if image.mode in ("RGBA", "LA") else image.convert("RGBA")
+        page = Image.new("L", image.size, 255)
+        page.paste(seen.convert("L"), mask=seen.getchannel("A"))
+        return np.asarray(page)
     return np.asarray(image.convert("L"))

@@ -24,7 +24,7 @@ from truearm.measurement.dataset import Dataset, IntArray
 from truearm.measurement.hexapod.geometry import DEVICE, Design, Device, designs, side_names
 from truearm.measurement.hexapod.kinematics import SOLUTIONS, tool_cups
 from truearm.measurement.readers.canonical import refuse_other_separators
-from truearm.measurement.readers.cells import Cells, Layout, read_cells
+from truearm.measurement.readers.cells import Cells, Layout, lines_of, read_cells
 from truearm.measurement.readers.rows import Configurations, found_configurations
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import Joint
@@ -121,7 +121,7 @@ def read_sheet(path: Path, device: Device = DEVICE) -> Sheet:
         range; with line and column.
     """
     text = read_text(path)
-    header = 1 + next(number for number, line in enumerate(io.StringIO(text, newline="")) if line.strip())
+    header = 1 + next(number for number, line in enumerate(lines_of(text)) if line.strip())
     refuse_other_separators(text, f"{path}, line {header}")
     cells = read_cells(text, str(path), Layout(header=header))
     columns = _columns(cells)

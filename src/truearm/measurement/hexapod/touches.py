@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import re
 from pathlib import Path
 from typing import Final
@@ -12,7 +11,7 @@ import numpy as np
 from truearm.errors import InputError
 from truearm.files import read_text
 from truearm.measurement.readers.canonical import refuse_other_separators
-from truearm.measurement.readers.cells import Layout, read_cells
+from truearm.measurement.readers.cells import Layout, lines_of, read_cells
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.units import ANGLE_UNITS, LENGTH_UNITS, checked_unit
@@ -30,7 +29,7 @@ def read_touches(path: Path, robot: Robot) -> Array:
         If the file does not hold each cup once with all joints of the robot.
     """
     text = read_text(path)
-    header = 1 + next(number for number, line in enumerate(io.StringIO(text, newline="")) if line.strip())
+    header = 1 + next(number for number, line in enumerate(lines_of(text)) if line.strip())
     refuse_other_separators(text, f"{path}, line {header}")
     cells = read_cells(text, str(path), Layout(header=header))
     wanted = ("cup", *(f"joint_{number}" for number in range(1, len(robot.joints) + 1)))

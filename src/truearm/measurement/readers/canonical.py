@@ -17,8 +17,9 @@ import numpy as np
 
 from truearm.errors import InputError, nearest_names
 from truearm.files import read_text
-from truearm.measurement.dataset import Dataset
-from truearm.measurement.readers.cells import Cells, Layout, read_cells
+from truearm.measurement.dataset import Dataset, IntArray
+from truearm.measurement.dataset_fields import VISITS
+from truearm.measurement.readers.cells import Cells, Layout, lines_of, read_cells
 from truearm.measurement.readers.fixtures import check_lengths, read_setup
 from truearm.measurement.readers.rows import Readings, dataset_of, found_configurations, same_everywhere
 from truearm.modeling.chain import Array
@@ -36,11 +37,11 @@ _UNITS: Final[dict[str, tuple[str, ...]]] = (
     | dict.fromkeys(_FORCE, ("N",))
     | dict.fromkeys(_MOMENT, ("N m",))
 )
-_PLAIN: Final = ("configuration", "target", "role", "fixture", *_QUATERNION)
+_PLAIN: Final = ("configuration", "target", "role", "fixture", "visit", *_QUATERNION)
 #: Every column as one writes it, for messages.
 _SHOWN: Final = (
     {"configuration": "configuration", "joint_1": "joint_1 [deg]", "target": "target", "role": "role"}
-    | {"fixture": "fixture", "distance": "distance [mm]", "height": "height [mm]"}
+    | {"visit": "visit", "fixture": "fixture", "distance": "distance [mm]", "height": "height [mm]"}
     | {axis: f"{axis} [mm]" for axis in _POSITION}
     | {part: part for part in _QUATERNION}
     | {"sigma": "sigma [mm]", "sigma_rot": "sigma_rot [mrad]", "temperature": "temperature [degC]"}
@@ -49,7 +50,7 @@ _SHOWN: Final = (
 )
 _ALLOWED: Final = ", ".join(_SHOWN.values()).replace("[deg]", "[deg] ..")
 _HEADING: Final = re.compile(r"(?P<name>[^\[]*?)\s*(?:\[(?P<unit>[^\]]*)\])?")
-_JOINT: Final = re.compile(r"joint_([1-9][0-9]*)")
+_JOINT: Final = re.compile(r"joint_([1-9][0-9]{0,3})")
 _SEPARATORS: Final = {";": "semicolons", "\t": "tabs", "|": "vertical bars"}
 
 
@@ -71,7 +72,7 @@ def read_csv(path: Path) -> Dataset:
         Configurations in order of first appearance; rows of the role ``reference`` are in ``references``.
     """
     text = read_text(path)
-    header = 1 + next(number for number, line in enumerate(io.StringIO(text, newline="")) if line.strip())
+    header = 1 + next(number for number, line in enumerate(lines_of(text)) if line.strip())
     refuse_other_separators(text, f"{path}, line {header}")
     cells = read_cells(text, str(path), Layout(header=header))
     columns = _columns(cells)
@@ -108,6 +109,7 @@ def read_csv(path: Path) -> Dataset:
         fixture=cells.texts(columns["fixture"].place, missing=True) if "fixture" in columns else None,
         distance=numbers("distance")[:, 0] if "distance" in columns else None,
         height=numbers("height")[:, 0] if "height" in columns else None,
+        visit=_visits(cells, columns["visit"].place) if "visit" in columns else None,
     )
     check_lengths(cells, readings, {name: column.place for name, column in columns.items()})
 
@@ -131,7 +133,7 @@ def read_csv(path: Path) -> Dataset:
 
 def refuse_other_separators(text: str, where: str) -> None:
     """Refuse a text whose header is not separated by commas; `where` names the header."""
-    heading = text.lstrip().splitlines()[0]
+    heading = next(line for line in lines_of(text) if line.strip())
     seen = next((name for sign, name in _SEPARATORS.items() if sign in heading), None)
     if seen is None and "," not in heading and len(heading.split()) > 3:
         seen = "blanks"
@@ -186,8 +188,9 @@ def _columns(cells: Cells) -> dict[str, _Column]:
 def _refuse_missing(cells: Cells, columns: dict[str, _Column]) -> None:
     where = f"{cells.source}, line {cells.header}"
     numbers = _joint_numbers(columns)
+    there_are = set(numbers)
     for number in range(1, max(numbers, default=1) + 1):
-        if number not in numbers:
+        if number not in there_are:
             raise InputError(
                 f"the column joint_{number} is missing",
                 where=where,
@@ -248,6 +251,14 @@ def _roles(cells: Cells, columns: dict[str, _Column]) -> tuple[str, ...]:
     return roles
 
 
+def _visits(cells: Cells, place: int) -> IntArray:
+    """Return the number of the visit that each row was read on."""
+    for line, text in enumerate(texts := cells.texts(place)):
+        if not re.fullmatch("[0-9]{1,9}", text):
+            raise InputError("this is no number of a visit", where=cells.place(line, place), came=text, allowed=VISITS)
+    return np.array([int(text) for text in texts], dtype=np.intp)
+
+
 def _joint_numbers(columns: Iterable[str]) -> list[int]:
     return sorted(int(match[1]) for name in columns if (match := _JOINT.fullmatch(name)))
 
@@ -274,6 +285,7 @@ def csv_text(dataset: Dataset, length_unit: str = "mm", angle_unit: str = "deg")
         circumstances |= dict(zip((*_FORCE, *_MOMENT), dataset.wrench.T, strict=True))
     units = [angle_unit if kind == "revolute" else length_unit for kind in dataset.joint_kinds]
     setup = dataset.setup
+    with_visits = any(part.visit is not None for part in parts)
     with_roles = references is not None or setup is not None
     every = [part for part in (*parts, setup) if part is not None]
     lengths = [name for name in _LENGTHS if any(getattr(part, name) is not None for part in every)]
@@ -284,6 +296,7 @@ def csv_text(dataset: Dataset, length_unit: str = "mm", angle_unit: str = "deg")
         *(f"joint_{number} [{unit}]" for number, unit in enumerate(units, 1)),
         "target",
         *(["role"] if with_roles else []),
+        *(["visit"] if with_visits else []),
         *(["fixture"] if any(part.fixtures for part in every) else []),
         *(f"{axis} [{length_unit}]" for axis in (_POSITION if positions else ())),
         *(_QUATERNION if oriented else ()),
@@ -297,6 +310,9 @@ def csv_text(dataset: Dataset, length_unit: str = "mm", angle_unit: str = "deg")
 
     def reading_cells(part: Dataset, role: str, reading: int) -> list[str]:
         row = [part.targets[part.target[reading]], *([role] if with_roles else [])]
+        if with_visits:
+            once = "" if role == "fixture" else "1"
+            row.append(once if part.visit is None else str(int(part.visit[reading])))
         if "fixture" in heading:
             other = int(part.against[reading])
             row.append(part.fixtures[other] if other >= 0 else "")

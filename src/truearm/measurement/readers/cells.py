@@ -7,7 +7,6 @@ file, the line and the column.
 from __future__ import annotations
 
 import csv
-import io
 import math
 import re
 from collections.abc import Iterator, Sequence
@@ -18,13 +17,15 @@ from typing import Final
 import numpy as np
 
 from truearm.errors import InputError
-from truearm.files import is_one_line
+from truearm.limits import limit, refuse_beyond
 from truearm.modeling.chain import Array
+from truearm.printable import is_one_line
 from truearm.units import as_number, sized_si
 
 _WITH_COMMA: Final = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
 #: Makes a decimal comma a point, and a point what is no part of a number.
 _SWAPPED: Final = str.maketrans(".,", ",.")
+_LINE: Final = re.compile(r"[^\r\n]*+(?:\r\n?|\n)|[^\r\n]++")
 _NOT_FINITE: Final = re.compile(r"[+-]?(?:nan|inf|infinity)", re.IGNORECASE)
 
 
@@ -183,16 +184,23 @@ def read_cells(text: str, source: str, layout: Layout) -> Cells:
     Blank lines and comment lines are skipped; all other lines must have as many cells as the header, or as
     the first row where there is no header.
     """
+    refuse_long(text, source, layout.delimiter)
     records = _records(text, source, layout)
     first = next(records, None)
     if first is None:
         raise _no_header(source, layout.header)
     if layout.header is None:
         names = tuple(str(number) for number in range(1, len(first[1]) + 1))
-        rows = [first, *records]
+        rows = [first]
     else:
         names = tuple(first[1])
-        rows = list(records)
+        rows = []
+    refuse_beyond("columns", len(names), where=f"{source}, line {first[0]}")
+    room = limit("cells") // len(names)
+    for record in records:
+        rows.append(record)
+        if len(rows) > room:
+            refuse_beyond("cells", len(rows) * len(names), where=f"{source}, line {record[0]}")
     if not rows:
         raise InputError("the file holds a header and no rows", where=source, cure="Check that it was exported whole.")
     for line, row in rows:
@@ -206,6 +214,23 @@ def read_cells(text: str, source: str, layout: Layout) -> Cells:
         columns=tuple(zip(*(row for _, row in rows), strict=True)),
         decimal=layout.decimal,
     )
+
+
+def refuse_long(text: str, source: str, delimiter: str | None) -> None:
+    """Refuse the text of a table that has too many lines, or too many cells as far as its delimiters tell."""
+    refuse_beyond("rows", text.count("\n") + text.count("\r") - text.count("\r\n"), where=source)
+    if delimiter is not None:
+        refuse_beyond("cells", text.count(delimiter), where=source)
+
+
+def lines_of(text: str) -> Iterator[str]:
+    """Yield lines with what ends them: unlike those of `str.splitlines` not at a form feed and its like."""
+    return (found[0] for found in _LINE.finditer(text))
+
+
+def split_line(line: str) -> list[str]:
+    """Return what blanks separate in a line; of a line that is far too long more pieces than there may be columns."""
+    return line.split(maxsplit=limit("columns"))
 
 
 def _no_header(source: str, line: int | None) -> InputError:
@@ -236,7 +261,7 @@ def _records(text: str, source: str, layout: Layout) -> Iterator[tuple[int, list
 
     def lines() -> Iterator[str]:
         nonlocal current
-        for number, line in enumerate(io.StringIO(text, newline=""), 1):
+        for number, line in enumerate(lines_of(text), 1):
             is_comment = layout.comment is not None and line.lstrip().startswith(layout.comment)
             if number == layout.header:
                 current = number
@@ -249,7 +274,7 @@ def _records(text: str, source: str, layout: Layout) -> Iterator[tuple[int, list
                 yield line
 
     if layout.delimiter is None:
-        yield from ((current, cells) for line in lines() if (cells := line.split()))
+        yield from ((current, cells) for line in lines() if (cells := split_line(line)))
         return
     reader = csv.reader(lines(), delimiter=layout.delimiter, skipinitialspace=True, strict=True)
     try:
@@ -258,6 +283,13 @@ def _records(text: str, source: str, layout: Layout) -> Iterator[tuple[int, list
             if len(cells) > 1 or (cells and cells[0]):
                 yield current, cells
     except csv.Error as error:
+        if "field larger" in str(error):
+            raise InputError(
+                "a cell is too long",
+                where=f"{source}, line {current}",
+                allowed=f"{csv.field_size_limit()} characters",
+                cure="Check for a quote that is opened and not closed.",
+            ) from error
         raise InputError(
             f"the quotes do not fit together ({error})",
             where=f"{source}, line {current}",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,7 +21,7 @@ from truearm.measurement.readers.cells import Cells, Layout, read_cells
 from truearm.measurement.readers.rows import Configurations, found_configurations, in_order
 from truearm.units import ANGLE_UNITS, LENGTH_UNITS, checked_unit
 
-_HEADING: Final = re.compile(r"(configuration|joint_[1-9][0-9]*|angle|height)\s*(?:\[([^\]]*)\])?")
+_HEADING: Final = re.compile(r"(configuration|joint_[1-9][0-9]{0,3}|angle|height)\s*(?:\[([^\]]*)\])?")
 _ALLOWED: Final = "configuration, joint_1 [deg] .., angle [deg], height [mm]"
 #: How well the middle of a circle lies in its paper [m].
 _PAPER_DEVIATION: Final = 1e-5
@@ -122,7 +123,7 @@ def _page(page: Page, dpi: float | tuple[float, float] | None) -> tuple[Configur
     labels = cells.texts(columns["configuration"][0])
     found = found_configurations(cells, labels, [place for place, _ in joints], [unit for _, unit in joints])
     if len(found.labels) < len(labels):
-        again = next(label for k, label in enumerate(labels) if label in labels[:k])
+        again = Counter(labels).most_common(1)[0][0]
         raise InputError(
             "a configuration appears twice",
             where=f"{page.points}, column configuration",

@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import codecs
-import re
-from typing import Annotated, Literal
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints, model_validator
 from pydantic import field_validator as validator_of
 
 from truearm.errors import InputError
-from truearm.files import is_one_line
 from truearm.measurement.readers.cells import Layout
+from truearm.printable import is_one_line
 from truearm.shown import counted
 
 _DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "whitespace": None}
 
 
 def _number_as_text(value: object) -> object:
-    return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
+    return str(value) if type(value) is int and abs(value) < 10**18 else value
 
 
 def _none_as_null(value: object) -> object:
@@ -35,7 +34,7 @@ Text = Annotated[str, StringConstraints(min_length=1, strip_whitespace=True)]
 PointName = Annotated[Text, AfterValidator(_on_one_line)]
 #: A column by its name; by its number, counted from 1, where the file has no header.
 Column = Annotated[Text, BeforeValidator(_number_as_text)]
-Line = Annotated[int, Field(ge=1, strict=True)]
+Line = Annotated[int, Field(ge=1, le=10**9, strict=True)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=True)]
 
 
@@ -58,7 +57,7 @@ class LayoutEntry(_Entry):
     def _known(cls, name: str) -> str:
         try:
             return codecs.lookup(name).name
-        except LookupError:
+        except (LookupError, ValueError):  # ValueError: half a character, a zero byte
             raise InputError(
                 "there is no such encoding", came=name, allowed="utf-8, utf-16, cp1252, latin-1 and others of Python"
             ) from None
@@ -66,7 +65,11 @@ class LayoutEntry(_Entry):
     @model_validator(mode="after")
     def _header_first(self) -> LayoutEntry:
         if self.first_row is not None and self.first_row <= (self.header or 0):
-            raise ValueError("first_row must be below the header")
+            raise InputError(
+                "first_row must be below the header",
+                came=f"header {self.header}, first_row {self.first_row}",
+                allowed=f"{(self.header or 0) + 1} or more for first_row",
+            )
         return self
 
     @property
@@ -89,6 +92,32 @@ class ConfigurationEntry(_Entry):
         return self
 
 
+#: What a compiled pattern may take [bytes]; one for names takes a few thousand.
+_PATTERN_MEMORY: Final = 1 << 15
+
+
+def name_pattern(pattern: str) -> Any:
+    r"""Return a pattern that finds what it finds in a time that grows with the text alone, whatever the pattern is.
+
+    RE2 knows no look-ahead, look-behind and repeated groups (``\1``), which take a time without bound.
+    """
+    import re2
+
+    options = re2.Options()
+    options.log_errors = False
+    options.max_mem = _PATTERN_MEMORY
+    try:
+        return re2.compile(pattern, options)
+    except re2.error as error:
+        reason = error.args[0] if error.args else ""
+        reason = reason.decode("utf-8", "replace") if isinstance(reason, bytes) else str(reason)
+        raise InputError(
+            f"this is not a regular expression that can be used ({reason})",
+            came=pattern,
+            allowed="the syntax of RE2: no look-ahead, no look-behind, no reference to a group",
+        ) from None
+
+
 class NamesEntry(_Entry):
     """A column whose text holds the label of the configuration, the name of the target, or both."""
 
@@ -99,10 +128,7 @@ class NamesEntry(_Entry):
     @validator_of("pattern")
     @classmethod
     def _compiles(cls, pattern: str) -> str:
-        try:
-            groups = set(re.compile(pattern).groupindex)
-        except (re.error, OverflowError, RecursionError) as error:
-            raise ValueError(f"this is not a regular expression ({error})") from None
+        groups = set(name_pattern(pattern).groupindex)
         if not groups or groups - {"configuration", "target"}:
             raise InputError(
                 "the pattern has other named groups",
@@ -114,7 +140,7 @@ class NamesEntry(_Entry):
     @property
     def groups(self) -> tuple[str, ...]:
         """Return what the pattern finds."""
-        return tuple(re.compile(self.pattern).groupindex)
+        return tuple(name_pattern(self.pattern).groupindex)
 
 
 class ReadingEntry(_Entry):
@@ -163,7 +189,11 @@ class JointsEntry(_Entry):
         if (self.unit is None) == (self.units is None):
             raise ValueError("give either unit: for all joints, or units: with one for each joint")
         if self.units is not None and len(self.units) != len(self.columns):
-            raise ValueError(f"there are {counted(len(self.columns), 'column')} and {counted(len(self.units), 'unit')}")
+            raise InputError(
+                f"there are {counted(len(self.columns), 'column')} and {counted(len(self.units), 'unit')}",
+                came=", ".join(self.units),
+                allowed="units with one for each column, or unit for all of them",
+            )
         if self.file is None and (self.key is not None or self.layout is not None):
             raise ValueError("key and layout belong to a second file; name it with file:")
         return self
@@ -237,5 +267,9 @@ class MappingFile(_Entry):
             first: dict[str, str] = {}
             for column, entry in group:
                 if column in first:
-                    raise ValueError(f"the column {column!r} is used twice, for {first[column]} and for {entry}")
+                    raise InputError(
+                        f"a column is used twice, for {first[column]} and for {entry}",
+                        came=column,
+                        cure="Name the right column for one of them.",
+                    )
                 first[column] = entry

@@ -9,10 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from truearm.errors import InputError
-from truearm.files import is_one_line, read_text
+from truearm.files import read_text
+from truearm.limits import refuse_beyond
 from truearm.measurement.dataset import Dataset, IntArray
+from truearm.measurement.readers.cells import lines_of, refuse_long, split_line
 from truearm.modeling.chain import Array
 from truearm.modeling.postures import approach_of
+from truearm.printable import is_one_line
 from truearm.shown import counted
 from truearm.units import ANGLE_UNITS, LENGTH_UNITS, checked_unit, sized_si
 
@@ -104,11 +107,15 @@ def _matrix(path: Path, width: int | None, unit: str, *, missing: bool) -> Array
     """Return a matrix of numbers in SI units, ``(rows, columns)``; missing readings are rows of NaN."""
     rows: list[list[float]] = []
     first = 0
-    for line, text in enumerate(read_text(path).splitlines(), 1):
-        cells = text.partition("#")[0].split()
+    whole = read_text(path)
+    refuse_long(whole, str(path), None)
+    for line, text in enumerate(lines_of(whole), 1):
+        cells = split_line(text.partition("#")[0])
         if not cells:
             continue
         where = f"{path}, line {line}"
+        refuse_beyond("columns", len(cells), where=where)
+        refuse_beyond("cells", (len(rows) + 1) * len(cells), where=where)
         row = [_number(cell, unit, f"{where}, column {c}", missing=missing) for c, cell in enumerate(cells, 1)]
         first = first or line
         wanted = width or (len(rows[0]) if rows else len(row))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +12,7 @@ import numpy as np
 from truearm.errors import InputError, nearest_names
 from truearm.files import read_text
 from truearm.measurement.readers.canonical import refuse_other_separators
-from truearm.measurement.readers.cells import Cells, Layout, read_cells
+from truearm.measurement.readers.cells import Cells, Layout, lines_of, read_cells
 from truearm.measurement.readers.rows import unit_quaternions
 from truearm.modeling.chain import Array
 from truearm.units import LENGTH_UNITS, checked_unit
@@ -50,7 +49,7 @@ def read_poses(path: Path) -> Poses:
     No cell may be empty. Quaternions must have length 1 within 1e-3 and are then normalised.
     """
     text = read_text(path)
-    header = 1 + next(number for number, line in enumerate(io.StringIO(text, newline="")) if line.strip())
+    header = 1 + next(number for number, line in enumerate(lines_of(text)) if line.strip())
     refuse_other_separators(text, f"{path}, line {header}")
     cells = read_cells(text, str(path), Layout(header=header))
     columns = _columns(cells)

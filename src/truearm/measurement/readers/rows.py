@@ -120,6 +120,8 @@ class Readings:
         Name of the fixture that each is measured against, empty for none; None if the file names none.
     distance, height
         From, or over, the fixture [m], ``(readings,)``, NaN where missing; None if the file has none.
+    visit
+        Which visit of its configuration each was taken on, ``(readings,)``; None if the file does not say.
     """
 
     source: str
@@ -134,6 +136,7 @@ class Readings:
     fixture: Sequence[str] | None = None
     distance: Array | None = None
     height: Array | None = None
+    visit: IntArray | None = None
 
 
 def dataset_of(readings: Readings, configurations: Configurations) -> Dataset:
@@ -189,6 +192,7 @@ def _part(
         quaternion = quaternion[rows] if has_orientation[rows].any() else None
     beside = [""] * len(rows) if readings.fixture is None else [readings.fixture[row] for row in rows.tolist()]
     fixtures = tuple(dict.fromkeys(name for name in beside if name))
+    index = {name: number for number, name in enumerate(fixtures)}
 
     def lengths_of(values: Array | None) -> Array | None:
         return None if values is None or np.isnan(values[rows]).all() else values[rows]
@@ -206,9 +210,10 @@ def _part(
         distance=lengths_of(readings.distance),
         height=lengths_of(readings.height),
         fixtures=fixtures,
-        fixture=np.array([fixtures.index(n) if n else -1 for n in beside], dtype=np.intp) if fixtures else None,
+        fixture=np.array([index.get(n, -1) for n in beside], dtype=np.intp) if fixtures else None,
         sigma=_declared(readings, rows, readings.sigma, has_length, "sigma"),
         sigma_rot=_declared(readings, rows, readings.sigma_rot, has_orientation, "sigma_rot"),
+        visit=None if readings.visit is None else readings.visit[rows],
     )
 
 

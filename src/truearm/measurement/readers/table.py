@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from itertools import compress
 from pathlib import Path
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 
 from truearm.errors import InputError, nearest_names
 from truearm.files import read_bytes, read_yaml
+from truearm.limits import refuse_beyond
 from truearm.measurement.dataset import Dataset, IntArray
 from truearm.measurement.readers.cells import Cells, read_cells
 from truearm.measurement.readers.mapping import (
@@ -21,6 +21,7 @@ from truearm.measurement.readers.mapping import (
     NamesEntry,
     SigmaEntry,
     SigmaRotEntry,
+    name_pattern,
 )
 from truearm.measurement.readers.rows import Configurations, Readings, dataset_of, found_configurations
 from truearm.modeling.chain import Array
@@ -124,8 +125,9 @@ def _columns(cells: Cells, columns: dict[str, str], unit: str, mapping: Path, en
 def _split_names(cells: Cells, entry: NamesEntry, mapping: Path) -> tuple[Cells, dict[str, list[str]]]:
     """Return what the pattern finds in each name, and the rows without those to be skipped."""
     place = _place(cells, entry.column, mapping, "names.column")
-    pattern = re.compile(entry.pattern)
+    pattern = name_pattern(entry.pattern)
     texts = cells.texts(place)
+    refuse_beyond("steps", pattern.programsize * sum(map(len, texts)), where=f"{mapping}, names.pattern")
     matches = [pattern.fullmatch(text) for text in texts]
     whole = [
         match is not None and all((found or "").strip() for found in match.groupdict().values()) for match in matches
@@ -220,7 +222,7 @@ def _everywhere(sigma: SigmaEntry | SigmaRotEntry | None, count: int, where: str
 
 
 def _is_reference(targets: list[str], references: list[str], where: str) -> NDArray[np.bool_]:
-    known = list(dict.fromkeys(targets))
+    known = dict.fromkeys(targets)
     for name in references:
         if name not in known:
             near = nearest_names(name, known, 1)

@@ -93,6 +93,7 @@ def converted(robot: Robot, convention_name: str) -> Robot:
         masses=(),
         truths={},
         known=stay,
+        proof=None,
     )
     if moved and links.base is not None:
         x, y, z = (round(float(v), _DECIMALS) + 0.0 for v in links.base[:3, :3].T @ base[:3, :3] @ robot.gravity)

@@ -15,6 +15,7 @@ from typing import Final
 
 from truearm.errors import InputError
 from truearm.files import read_text
+from truearm.limits import refuse_beyond
 from truearm.modeling.conventions import JOINT, JointKind
 from truearm.modeling.formats.dh_table import DHRow, DHTable, TableConvention
 from truearm.modeling.transform import Transform
@@ -62,12 +63,17 @@ def read_dh_csv(path: Path, convention_name: TableConvention) -> DHTable:
     convention_name
         The form the numbers are in; no table says it of itself.
     """
-    uncommented = ("" if line.startswith("#") else line for line in read_text(path).splitlines())
-    lines = [
-        (f"{path}, line {number}", [cell.strip() for cell in cells])
-        for number, cells in enumerate(csv.reader(uncommented), 1)
-        if any(cell.strip() for cell in cells)
-    ]
+    text = read_text(path)
+    refuse_beyond("entries", text.count("\n") + text.count("\r") + text.count(","), where=str(path))
+    uncommented = ("" if line.startswith("#") else line for line in text.splitlines())
+    try:
+        lines = [
+            (f"{path}, line {number}", [cell.strip() for cell in cells])
+            for number, cells in enumerate(csv.reader(uncommented), 1)
+            if any(cell.strip() for cell in cells)
+        ]
+    except csv.Error as error:
+        raise InputError(f"the table cannot be read ({error})", where=str(path)) from error
     if not lines:
         raise InputError("the file holds comments and no table", where=str(path))
     known = _columns(convention_name)

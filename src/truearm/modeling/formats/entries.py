@@ -13,8 +13,8 @@ from truearm.modeling.transform import IDENTITY, Transform
 from truearm.units import sized_si, written
 
 #: What a robot and a joint may be called.
-NAME: Final = r"[A-Za-z0-9][A-Za-z0-9_.-]*"
-NAME_IN_WORDS: Final = "letters, digits, _ . and -, starting with a letter or digit"
+NAME: Final = r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}"
+NAME_IN_WORDS: Final = "up to 100 letters, digits, _ . and -, starting with a letter or digit"
 
 #: Of an entry that has known keys only.
 STRICT: Final = ConfigDict(extra="forbid", frozen=True)
@@ -37,7 +37,9 @@ Name = Annotated[str, StringConstraints(strict=True), AfterValidator(_name)]
 def _unit_length(q: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
     if abs(math.hypot(*q) - 1.0) > 1e-6:
         raise InputError(
-            f"a quaternion (w, x, y, z) must have length 1, this one has {math.hypot(*q):.6g}", came=list(q)
+            f"a quaternion (w, x, y, z) must have length 1, this one has {math.hypot(*q):.6g}",
+            came=list(q),
+            cure="Divide its numbers by that length, or correct them.",
         )
     return q
 

@@ -17,6 +17,7 @@ from xml.parsers import expat
 import numpy as np
 
 from truearm.errors import InputError, did_you_mean
+from truearm.limits import refuse_beyond
 from truearm.modeling.chain import Array, Chain, Element
 from truearm.modeling.conventions import JointKind, convention
 from truearm.units import as_number, sized_si
@@ -128,6 +129,7 @@ def _parse(content: bytes, where: str) -> Tag:
     parser = expat.ParserCreate()
     top: list[Tag] = []
     stack: list[Tag] = []
+    count = 0
 
     def start(name: str, attributes: dict[str, str]) -> None:
         if name.startswith("xacro:") or any("${" in value for value in attributes.values()):
@@ -136,6 +138,9 @@ def _parse(content: bytes, where: str) -> Tag:
                 where=f"{where}, line {parser.CurrentLineNumber}",
                 cure="Run it through xacro first: xacro FILE.xacro > FILE.urdf",
             )
+        nonlocal count
+        count += 1 + len(attributes)
+        refuse_beyond("entries", count, where=f"{where}, line {parser.CurrentLineNumber}")
         tag = Tag(name, attributes, parser.CurrentLineNumber, parser.CurrentByteIndex)
         (stack[-1].children if stack else top).append(tag)
         stack.append(tag)
@@ -225,7 +230,8 @@ def _root(tree: Tree) -> str:
     reached = list(roots)
     for link in reached:
         reached += tree.children(link)
-    lost = [link for link in tree.links if link not in reached]
+    found = set(reached)
+    lost = [link for link in tree.links if link not in found]
     if lost:
         raise InputError("the links form a loop that no root leads to", where=tree.where, came=", ".join(lost))
     if not roots:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from truearm.errors import InputError
 from truearm.identification.solving.problem import Problem
 from truearm.identification.solving.redundancy import gauge_motion_removed, independent_columns
+from truearm.limits import refuse_beyond
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.observations import OBSERVATIONS
 from truearm.modeling.chain import Array
@@ -85,6 +86,9 @@ def sensitivity(
         If the robot has no targets, or an effect of the model needs to know more than the postures tell.
     """
     check_known(robot, postures)
+    refuse_beyond(
+        "derivatives", len(postures) * 3 * len(robot.targets) * len(free.parameters), where=f"{robot.name}, candidates"
+    )
     loaded = robot.loaded(postures)
     by_target = []
     for target in robot.targets:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from truearm.errors import InputError
+from truearm.errors import InputError, refusals_at
 from truearm.files import read_yaml
 from truearm.modeling.chain import Array
 from truearm.modeling.loads import joint_loads
@@ -228,7 +228,8 @@ def _visible(
     rotation = robot.world_poses(postures)[1]
     kept = {}
     for name, direction in rule.targets.items():
-        robot.target(name)
+        with refusals_at(f"{where}, targets"):
+            robot.target(name)
         looks = rotation @ (np.array(direction) / np.linalg.norm(direction))
         sight = instrument - robot.world_poses(postures, name)[0]
         cosine = np.einsum("ni,ni->n", looks, sight) / np.linalg.norm(sight, axis=1)

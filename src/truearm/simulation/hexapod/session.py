@@ -144,7 +144,7 @@ def joined(a: Dataset, b: Dataset) -> Dataset:
     where = f"{a.source} and {b.source}"
     if (a.targets, a.joint_kinds) != (b.targets, b.joint_kinds):
         raise InputError("the sessions are not of one robot with one tool", where=where, cure="Name the cups alike.")
-    for name in ("quaternion", "sigma_rot", "references"):
+    for name in ("quaternion", "sigma_rot", "visit", "references"):
         if getattr(a, name) is not None or getattr(b, name) is not None:
             raise InputError(f"sessions with {name} cannot be joined", where=where, allowed="positions")
 

@@ -8,7 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from truearm.measurement.checks import clean_references, constellation
+from truearm.measurement.checks import clean_references
+from truearm.measurement.places import constellation
 from truearm.studies.irb120_faro.remainder import FOLDS, Cause, Remainder
 from truearm.studies.irb120_faro.run import PLAIN, Run
 from truearm.studies.study import Row, Table

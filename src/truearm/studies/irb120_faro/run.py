@@ -14,8 +14,8 @@ from truearm.identification.choosing.selection import select
 from truearm.identification.solving.fit import identify
 from truearm.identification.solving.models import FRAMES, Model, named_model
 from truearm.library import load_robot
-from truearm.measurement.checks import constellation
 from truearm.measurement.dataset import Dataset, IntArray
+from truearm.measurement.places import constellation
 from truearm.measurement.readers.matrices import read_matrices
 from truearm.measurement.statistics import Spread, errors_of
 from truearm.measurement.table_motion import without_table_motion

@@ -29,7 +29,7 @@ from typing import Final, Literal
 from truearm.compensation.programs.program import Configuration
 
 _PAIRS: Final = ("NF", "LR", "UD", "TB")
-_TURN: Final = re.compile(r"[+-]?\d{1,2}")
+_TURN: Final = re.compile(r"[ \t]*[+-]?\d{1,2}[ \t]*", re.ASCII)
 
 
 @lru_cache(maxsize=1024)
@@ -39,7 +39,7 @@ def configuration(text: str) -> Configuration | None:
     letters = "".join(first.split())
     if any(letters.count(one) + letters.count(other) > 1 for one, other in _PAIRS):
         return None
-    if not set(letters) <= set("".join(_PAIRS)) or not all(_TURN.fullmatch(turn.strip()) for turn in turns):
+    if not set(letters) <= set("".join(_PAIRS)) or not all(_TURN.fullmatch(turn) for turn in turns):
         return None
     shoulder: Literal["front", "back"] | None = "front" if "T" in letters else "back" if "B" in letters else None
     elbow: Literal["up", "down"] | None = None

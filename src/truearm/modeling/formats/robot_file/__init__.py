@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from truearm.modeling.formats.robot_file.reading import read_robot, robot_from_file
 from truearm.modeling.formats.robot_file.schema import RobotFile
+from truearm.modeling.formats.robot_file.seal import arm_is_known, is_intact, sealed
 from truearm.modeling.formats.robot_file.writing import robot_text
 
-__all__ = ["RobotFile", "read_robot", "robot_from_file", "robot_text"]
+__all__ = ["RobotFile", "arm_is_known", "is_intact", "read_robot", "robot_from_file", "robot_text", "sealed"]

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from truearm.errors import InputError, did_you_mean
-from truearm.files import read_yaml, shown_entry
+from truearm.errors import InputError, did_you_mean, name_place
+from truearm.files import read_yaml
 from truearm.modeling.conventions import convention
 from truearm.modeling.effects import EFFECTS, NON_NEGATIVE
 from truearm.modeling.fixtures import Fixture
-from truearm.modeling.formats.robot_file.schema import JointEntry, RobotFile
+from truearm.modeling.formats.robot_file.schema import JointEntry, ProofEntry, RobotFile
 from truearm.modeling.parameters import Parameter
 from truearm.modeling.parts import NO_PAYLOAD, Inertia, Joint, LinkMass, Payload, Target, Tool, Truth
+from truearm.modeling.proof import Proof
 from truearm.modeling.robot import Robot
-from truearm.units import SHOWN_AS, sized_si, to_si
+from truearm.notices import Notice
+from truearm.schemas import shown_entry
+from truearm.shown import counted, listed
+from truearm.units import SHOWN_AS, as_number, sized_si, to_si
 
 
 def read_robot(path: Path) -> Robot:
@@ -25,6 +30,15 @@ def read_robot(path: Path) -> Robot:
 
 def robot_from_file(content: RobotFile, where: str) -> Robot:
     """Build the robot that a checked file describes; `where` names the file in messages."""
+    try:
+        return _robot(content, where)
+    except InputError as error:  # of the robot's parts, which know nothing of the file
+        if not (error.where or "").startswith(where):
+            name_place(error, f"{where}, {error.where}" if error.where else where)
+        raise
+
+
+def _robot(content: RobotFile, where: str) -> Robot:
     length, angle = content.units.length, content.units.angle
 
     def si(value: float, unit: str, entry: str, *, deviation: bool = False) -> float:
@@ -114,7 +128,13 @@ def _with_values(robot: Robot, content: RobotFile, where: str) -> Robot:
         for effect in EFFECTS:
             if name in [p.name for p in effect(robot.layout).parameters]:
                 cure = f"It belongs to the joint effect {effect.name}: add that to the entry effects."
-        raise InputError("the robot has no such parameter", where=f"{where}, {entry}", came=name, cure=cure)
+        raise InputError(
+            "the robot has no such parameter",
+            where=f"{where}, {entry}",
+            came=name,
+            allowed=listed(list(robot.parameters)),
+            cure=cure,
+        )
 
     truths = {
         truth_name: Truth(
@@ -156,7 +176,62 @@ def _with_values(robot: Robot, content: RobotFile, where: str) -> Robot:
                 informed=entry.informed,
             )
         )
-    return replace(robot, truths=truths, known={p.name: p for p in parameters})
+    robot = replace(robot, truths=truths, known={p.name: p for p in parameters})
+    return robot if content.proof is None else replace(robot, proof=_proof(robot, content.proof, shown, where))
+
+
+def _proof(robot: Robot, entry: ProofEntry, shown: Mapping[str, str], where: str) -> Proof:
+    """Return what a calibration knew about its result, in SI units."""
+    cure = "Leave the entry proof as calibration wrote it, or take it out: the robot is then unproven."
+    joints = [shown["rad" if joint.kind == "revolute" else "m"] for joint in robot.joints]
+    for name, rows in (("region", entry.region), ("joint_error", entry.joint_error)):
+        if rows and len(rows) != len(joints):
+            raise InputError(
+                "one entry belongs here for each joint",
+                where=f"{where}, proof.{name}",
+                came=counted(len(rows), "entry"),
+                allowed=str(len(joints)),
+                cure=cure,
+            )
+    unknown = next((name for name in entry.deviations if name not in robot.parameters), None)
+    if unknown is not None:
+        raise InputError("the robot has no such parameter", where=f"{where}, proof.deviations", came=unknown, cure=cure)
+    if len(entry.correlations) != len(entry.deviations):
+        raise InputError(
+            "one row belongs here for each of the deviations",
+            where=f"{where}, proof.correlations",
+            came=counted(len(entry.correlations), "row"),
+            allowed=str(len(entry.deviations)),
+            cure=cure,
+        )
+    return Proof(
+        status=entry.status,
+        errors=tuple(Notice(error.code, error.message, "error") for error in entry.errors),
+        region=tuple((to_si(low, u), to_si(high, u)) for (low, high), u in zip(entry.region, joints, strict=False)),
+        joint_error=tuple(to_si(value, u) for value, u in zip(entry.joint_error, joints, strict=False)),
+        names=tuple(entry.deviations),
+        deviations=tuple(to_si(v, shown[robot.parameters[n].unit]) for n, v in entry.deviations.items()),
+        factor=tuple(
+            _row(row, number, f"{where}, proof.correlations[{number}]", cure)
+            for number, row in enumerate(entry.correlations, 1)
+        ),
+        lower_bound=entry.lower_bound,
+        digest=entry.sha256,
+    )
+
+
+def _row(text: str, count: int, where: str, cure: str) -> tuple[float, ...]:
+    numbers = [as_number(word) for word in text.split()]
+    known = tuple(number for number in numbers if number is not None and abs(number) <= 1.0)
+    if len(known) != count or len(numbers) != count:
+        raise InputError(
+            "numbers from -1 to 1 belong here, one more than in the row before",
+            where=where,
+            came=text,
+            allowed=counted(count, "number"),
+            cure=cure,
+        )
+    return known
 
 
 def _joint(content: RobotFile, number: int, entry: JointEntry, where: str) -> Joint:
@@ -177,7 +252,7 @@ def _joint(content: RobotFile, number: int, entry: JointEntry, where: str) -> Jo
                 where=where,
                 came=column,
                 allowed=", ".join(["name", "type", "limits", "transmission_periods", *allowed]),
-                cure=did_you_mean(column, allowed),
+                cure=did_you_mean(column, ["name", "type", "limits", "transmission_periods", *allowed]),
             )
         row[column] = sized_si(_number(value, f"{where}.{column}"), shown[units[column]], f"{where}.{column}")
     fault = table.fault(row, entry.type)

@@ -9,12 +9,12 @@ import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
 
 from truearm.errors import InputError, did_you_mean
-from truearm.files import is_one_line
 from truearm.modeling.effects import EFFECTS
 from truearm.modeling.fixtures import FixtureKind
 from truearm.modeling.formats.controller_entry import ControllerEntry
 from truearm.modeling.formats.entries import STRICT, Name, NotNegative, Number, Place, Positive, Quaternion, Triple
 from truearm.modeling.parts import GRAVITY, POINT_MASS, Inertia
+from truearm.printable import is_one_line
 
 SCHEMA: Final = "truearm-robot/1"
 
@@ -142,7 +142,7 @@ class ParameterEntry(_Entry):
     value: Number
     prior: Positive
     unit: str
-    deviation: Number | None = None
+    deviation: NotNegative | None = None
     informed: Number | None = None
 
 
@@ -151,6 +151,26 @@ class PriorsEntry(_Entry):
 
     length: Positive | None = None
     angle: Positive | None = None
+
+
+class ErrorEntry(_Entry):
+    """A notice of the level error."""
+
+    code: Name
+    message: str
+
+
+class ProofEntry(_Entry):
+    """What the calibration knew about its result; `correlations` are the rows of a lower triangular factor."""
+
+    status: Literal["converged", "at-bound", "rank-loss", "not-converged", "implausible"]
+    errors: list[ErrorEntry] = []
+    lower_bound: Annotated[bool, Field(strict=True)] = False
+    region: list[tuple[Number, Number]] = []
+    joint_error: list[NotNegative] = []
+    deviations: dict[str, NotNegative] = {}
+    correlations: list[Annotated[str, StringConstraints(strict=True)]] = []
+    sha256: Annotated[str, StringConstraints(strict=True, pattern="^[0-9a-f]{64}$")]
 
 
 class RobotFile(_Entry):
@@ -189,4 +209,5 @@ class RobotFile(_Entry):
     targets: list[TargetEntry] = []
     fixtures: list[FixtureEntry] = []
     parameters: dict[str, ParameterEntry] = {}
+    proof: ProofEntry | None = None
     history: list[str] = []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from truearm.modeling.controller import AS_THE_MODEL
@@ -13,6 +13,7 @@ from truearm.modeling.formats.entries import NAME, place_entry
 from truearm.modeling.formats.robot_file.schema import SCHEMA
 from truearm.modeling.parameters import Parameter
 from truearm.modeling.parts import GRAVITY, NO_PAYLOAD, Joint
+from truearm.modeling.proof import Proof
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 from truearm.units import SHOWN_AS, written
@@ -21,6 +22,17 @@ from truearm.units import SHOWN_AS, written
 def robot_text(robot: Robot) -> str:
     """Return the robot as the text of a robot file, in mm and degrees."""
     from ruamel.yaml import YAML
+
+    yaml = YAML()
+    yaml.width = 4096
+    yaml.indent(mapping=2, sequence=4, offset=2)
+    stream = io.StringIO()
+    yaml.dump(file_content(robot), stream)
+    return stream.getvalue()
+
+
+def file_content(robot: Robot) -> dict[str, Any]:
+    """Return the entries of a robot file, as its writer takes them."""
     from ruamel.yaml.comments import CommentedMap, CommentedSeq
     from ruamel.yaml.scalarstring import DoubleQuotedScalarString
 
@@ -125,14 +137,11 @@ def robot_text(robot: Robot) -> str:
         content["parameters"] = {
             text(name): flow(_parameter(robot.known[name], shown)) for name in robot.parameters if name in robot.known
         }
+    if robot.proof is not None:
+        content["proof"] = _proof(robot, robot.proof, flow, listed, text)
     if robot.history:
         content["history"] = list(robot.history)
-    yaml = YAML()
-    yaml.width = 4096
-    yaml.indent(mapping=2, sequence=4, offset=2)
-    stream = io.StringIO()
-    yaml.dump(content, stream)
-    return stream.getvalue()
+    return content
 
 
 def _parameter(p: Parameter, shown: Mapping[str, str]) -> dict[str, Any]:
@@ -147,4 +156,32 @@ def _parameter(p: Parameter, shown: Mapping[str, str]) -> dict[str, Any]:
         made["deviation"] = written(p.deviation, unit)
     if p.informed is not None:
         made["informed"] = p.informed
+    return made
+
+
+def _proof(
+    robot: Robot,
+    proof: Proof,
+    flow: Callable[[Mapping[str, Any]], Any],
+    listed: Callable[[list[Any]], Any],
+    text: Callable[[str], str],
+) -> dict[str, Any]:
+    """Return the entry of a proof; of a robot that has other joints or parameters by now, without what needs them."""
+    made: dict[str, Any] = {"status": proof.status}
+    if proof.errors:
+        made["errors"] = [{"code": error.code, "message": text(error.message)} for error in proof.errors]
+    if proof.lower_bound:
+        made["lower_bound"] = True
+    if len(proof.region) == len(robot.joints) and all(name in robot.parameters for name in proof.names):
+        units = ["deg" if joint.kind == "revolute" else "mm" for joint in robot.joints]
+        made["region"] = [listed([written(v, u) for v in one]) for one, u in zip(proof.region, units, strict=True)]
+        made["joint_error"] = listed([written(v, u) for v, u in zip(proof.joint_error, units, strict=True)])
+        made["deviations"] = flow(
+            {
+                text(name): written(deviation, SHOWN_AS[robot.parameters[name].unit])
+                for name, deviation in zip(proof.names, proof.deviations, strict=True)
+            }
+        )
+        made["correlations"] = [text(" ".join(f"{v:.7g}" for v in row)) for row in proof.factor]
+    made["sha256"] = proof.digest
     return made

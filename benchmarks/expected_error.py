@@ -1,0 +1,122 @@
+"""Holds the error to expect over the workspace against the true one of simulated robots.
+
+An IRB 120 is measured within a few degrees of one posture, calibrated, and judged at 300 configurations of its full
+range. Arguments: robots for each case (40) and full-range campaigns (100). Writes benchmarks/expected_error.json.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from truearm.identification.judging.expected_error import as_residuals_allow, expected_error
+from truearm.identification.judging.narrow_data import check_narrow_data
+from truearm.identification.solving.fit import Status, identify
+from truearm.identification.solving.models import named_model
+from truearm.library import load_robot
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.statistics import errors_of
+from truearm.modeling.robot import Robot
+from truearm.simulation.truths import truth_twin
+from truearm.simulation.twin import Twin, measure
+
+CENTRE = np.array([10.0, 20.0, 10.0, 20.0, 40.0, 10.0])
+WIDTHS = (1.0, 5.0, 15.0, 40.0, None)
+SCALES = (1.0, 0.3, 3.0)
+POSES, NOISE, JUDGED = 60, 0.02e-3, 300
+GEOMETRIC = named_model("geometric")
+nominal = load_robot("irb120")
+
+
+def narrowed(width: float | None) -> Robot:
+    """Return the robot with limits of `width` degrees about the centre; its own without."""
+    if width is None:
+        return nominal
+    about = zip(np.radians(CENTRE - width).tolist(), np.radians(CENTRE + width).tolist(), strict=True)
+    limits = [
+        (max(low, j.limits[0]), min(high, j.limits[1])) for j, (low, high) in zip(nominal.joints, about, strict=True)
+    ]
+    return replace(
+        nominal, joints=tuple(replace(j, limits=pair) for j, pair in zip(nominal.joints, limits, strict=True))
+    )
+
+
+def simulated(rng: np.random.Generator, width: float | None, targets: int, scale: float) -> tuple[Twin, Dataset]:
+    """Draw a truth of `scale` times the priors, and measure it with some of the three targets."""
+    drawn = [p for p in nominal.parameters.values() if p.group in ("geometry", "joint zero")]
+    twin = truth_twin(nominal.with_parameters(replace(p, prior=scale * p.prior) for p in drawn), "random", rng)
+    tool = {t.name: [twin.robot.values[t.parameter(a)] for a in "xyz"] for t in twin.robot.targets[:targets]}
+    twin = replace(twin, robot=twin.robot.with_frames(twin.robot.base, tool))
+    return twin, measure(twin, narrowed(width).random_configurations(POSES, rng), NOISE, rng)
+
+
+def judged(rng: np.random.Generator, width: float | None, targets: int, scale: float) -> list[float]:
+    """Calibrate one robot as `truearm calibrate` does.
+
+    Returns true, expected, lowest, highest and held-out error [mm], 1 for a warning of narrow data and 2 for an error,
+    and 1 if the fit converged.
+    """
+    twin, data = simulated(rng, width, targets, scale)
+    order = np.random.default_rng(0).permutation(POSES)
+    training, held_out = (data.of_configurations(part) for part in np.split(order, [round(0.7 * POSES)]))
+    fit = identify(nominal, training, GEOMETRIC)
+    after = errors_of(fit.robot, held_out)
+    expected = expected_error(as_residuals_allow(fit, training))
+    notices = check_narrow_data(fit, expected, training, after, held_out=True)
+    # The truth has no effects that the twin alone would know.
+    q = nominal.random_configurations(JUDGED, rng)
+    apart = [fit.robot.world_poses(q, t.name)[0] - twin.robot.world_poses(q, t.name)[0] for t in fit.robot.targets]
+    true = float(np.linalg.norm(apart, axis=2).mean())
+    of, known = expected.overall, after.position_norms.mean()
+    noticed = max(({"warning": 1.0, "error": 2.0}[notice.level] for notice in notices), default=0.0)
+    converged = float(fit.status is Status.CONVERGED)
+    return [*(1e3 * length for length in (true, of.mean, *of.interval_90, known)), noticed, converged]
+
+
+def cases(robots: int) -> Iterator[tuple[dict[str, Any], np.ndarray]]:
+    """Go through scales, targets and widths, with new robots for each."""
+    for k, (scale, targets, width) in enumerate((s, t, w) for s in SCALES for t in (1, 3) for w in WIDTHS):
+        rows = [judged(np.random.default_rng((k, seed)), width, targets, scale) for seed in range(robots)]
+        yield {"scale": scale, "targets": targets, "width_deg": width}, np.array(rows)
+
+
+def figures(rows: np.ndarray) -> dict[str, float]:
+    """Summarise robots: how often the interval holds, true over expected error, and the notice."""
+    true, mean, low, high, held, noticed, converged = rows.T
+    lies = true > 3.0 * held
+    return {
+        "inside": float(np.mean((low <= true) & (true <= high))),
+        "ratio_median": float(np.median(true / mean)),
+        "ratio_least": float(np.min(true / mean)),
+        "ratio_most": float(np.max(true / mean)),
+        "true_mm": float(np.median(true)),
+        "expected_mm": float(np.median(mean)),
+        "held_out_mm": float(np.median(held)),
+        "true_above_3_held_out": int(lies.sum()),
+        "of_these_noticed": int((noticed[lies] > 0).sum()),
+        "noticed": int((noticed > 0).sum()),
+        "errors": int((noticed == 2).sum()),
+        "converged": int(converged.sum()),
+    }
+
+
+def main() -> None:
+    robots, campaigns = (int(sys.argv[i]) if len(sys.argv) > i else n for i, n in ((1, 40), (2, 100)))
+    record: dict[str, Any] = {"robots": robots, "cases": []}
+    for case, rows in cases(robots):
+        record["cases"].append({**case, **figures(rows)})
+        print(json.dumps(record["cases"][-1]), flush=True)  # noqa: T201
+    full = [judged(np.random.default_rng((99, seed)), None, 3 if seed % 2 else 1, 1.0) for seed in range(campaigns)]
+    record["full_range"] = {"campaigns": campaigns, **figures(np.array(full))}
+    print(json.dumps(record["full_range"]))  # noqa: T201
+    (Path(__file__).parent / "expected_error.json").write_text(json.dumps(record, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()

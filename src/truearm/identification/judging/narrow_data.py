@@ -1,0 +1,114 @@
+"""Notice a workspace that is known much worse than the held-out error says.
+
+Held-out configurations are like those that were measured. Where the joints moved little, the error there stays small
+and says nothing about the rest of the workspace: the expected error does.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from truearm.identification.judging.expected_error import ExpectedError, PositionErrors, expected_map
+from truearm.identification.solving.fit import Fit
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.statistics import Errors
+from truearm.notices import Notice
+from truearm.units import SHOWN_AS, from_si
+
+#: Expected over known error from which the result is an error. It is a warning where the error may be as large, and is
+#: expected to be so many times the known one.
+_ERROR: Final = 3.0
+_WARNING: Final = 2.0
+#: Below this no instrument sees a robot move, and simulated readings without noise would be doubted [m].
+_NEGLIGIBLE: Final = 2e-6
+#: Mean length of an error of three normal coordinates over the mean size of one.
+_OF_ONE: Final = 2.0
+#: Share of its limits (of a full turn, where they allow more) below which a joint has moved little.
+_LITTLE: Final = 0.5
+#: Configurations at which the largest errors are looked for, and the percentile from which they are large.
+_PLACES: Final = 300
+_DRAWS: Final = 100
+_WORST: Final = 90.0
+
+
+def check_narrow_data(
+    fit: Fit, expected: ExpectedError, measured: Dataset, judged: Errors, *, held_out: bool
+) -> list[Notice]:
+    """Say if the workspace is known much worse than the readings that judge the fit say.
+
+    Parameters
+    ----------
+    measured
+        The training part.
+    judged
+        Errors of the calibrated robot: held out, or of the training part if nothing was.
+    """
+    of_readings = judged.position or judged.length
+    if of_readings is None:
+        return []
+    fit = replace(fit, joint_error=expected.joint_error)
+    known = of_readings.mean
+    low, high = expected.overall.interval_90
+    mean = expected.overall.mean
+    if (judged.position is None or fit.gauge_freedoms) and mean > _NEGLIGIBLE:
+        # Such readings see positions badly wherever the arm is, and a length is one coordinate of three.
+        known = max(known if judged.position else _OF_ONE * known, _expected_where_measured(fit, measured))
+    if mean <= max(_WARNING * known, _NEGLIGIBLE) or high <= _ERROR * known:
+        return []
+    few = _joints_that_moved_little(fit, measured)
+    if fit.gauge_freedoms and not few:
+        return []
+    part = "held-out" if held_out else "training"
+    words = (
+        f"Over the workspace the targets are expected to be off by {_mm(mean)} mm on average (90 %: {_mm(low)} to "
+        f"{_mm(high)}), where the {part} {'error' if judged.position else 'error of lengths'} is "
+        f"{_mm(of_readings.mean)} mm: that one says how good the robot is where it was measured, not elsewhere. "
+    )
+    if few:
+        words += f"Measure configurations in which these joints move further: {'; '.join(few)}."
+    else:
+        words += f"Measure more configurations, also {_least_known(fit)}."
+    return [Notice("narrow-data", words, "error" if mean > _ERROR * known else "warning")]
+
+
+def _expected_where_measured(fit: Fit, measured: Dataset) -> float:
+    """Return the mean error to expect at the configurations of the training part [m]."""
+    some = np.linspace(0, measured.configurations - 1, min(measured.configurations, _PLACES)).round().astype(np.intp)
+    return float(PositionErrors(fit, _DRAWS).at(measured.joints[some]).mean())
+
+
+def _joints_that_moved_little(fit: Fit, measured: Dataset) -> list[str]:
+    """Return the joints that moved over less than half of what their limits allow, in words, the worst first."""
+    found = []
+    for number, joint in enumerate(fit.robot.joints):
+        low, high = joint.range
+        seen = measured.joints[:, number]
+        allowed = high - low if joint.kind == "prismatic" else min(high - low, math.tau)
+        share = float(np.ptp(seen)) / allowed
+        if share < _LITTLE:
+            unit = SHOWN_AS["m" if joint.kind == "prismatic" else "rad"]
+            texts = [f"{from_si(value, unit):.0f}" for value in (seen.min(), seen.max(), low, high)]
+            limits = f"limits {texts[2]} to {texts[3]}" if joint.limits else "no limits"
+            found.append((share, f"{joint.name} (measured {texts[0]} to {texts[1]} {unit}, {limits})"))
+    return [text for _, text in sorted(found)]
+
+
+def _least_known(fit: Fit) -> str:
+    """Say where the largest errors are to be expected."""
+    places, error = expected_map(fit, _PLACES)
+    worst = places[error >= np.percentile(error, _WORST)]
+    radius = float(np.median(np.hypot(worst[:, 0], worst[:, 1])))
+    height = float(np.median(worst[:, 2]))
+    return (
+        f"with targets about {radius * 1e3:.0f} mm from the z axis of the robot's base and {height * 1e3:.0f} mm above "
+        f"it, where {_mm(float(np.percentile(error, _WORST)))} mm and more are expected"
+    )
+
+
+def _mm(length: float) -> str:
+    """Write a length with two digits [mm]."""
+    return f"{float(f'{length * 1e3:.2g}'):g}"

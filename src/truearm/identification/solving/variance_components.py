@@ -1,0 +1,473 @@
+"""How large the noise of the readings and the error of the joints are, by restricted maximum likelihood.
+
+The residuals of a linearised fit are ``z = A u + G e + n``: parameters u with their Gaussian priors, errors e of the
+joints that all readings of an arrival share, and noise n of the readings. With ``V = D + G S G'``, the parameters
+integrated out, ``z`` is normal with the precision ``P = V^-1 - V^-1 A (A' V^-1 A + K)^-1 A' V^-1``, K the information
+of the priors. That is the restricted likelihood of Patterson and Thompson (1971) where priors are wide. Its maximum is
+found by Newton steps in the logarithms of the variances, with the average of the observed and the expected information
+(Gilmour, Thompson and Cullis 1995). All it needs of the readings are products of few numbers by arrival, formed once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.identification.solving.arrivals import Arrivals, Whitening
+from truearm.modeling.chain import Array
+
+#: Twice the gain in log-likelihood from which joint errors are believed.
+_SIGNIFICANT: Final = 5.41
+_STEPS: Final = 40
+_LARGEST_STEP: Final = 2.0  # in the logarithm of a variance
+_FURTHER: Final = 4.0  # how many times longer than the information says
+_SETTLED: Final = 1e-5  # what a step may still gain in twice the log-likelihood
+#: Least excess of a variance without errors of the joints that a difference of the parameters is judged by.
+_LEAST_DIFFERENCE: Final = 0.05
+#: Of the logarithm of a variance: what is known of it beforehand.
+_LEAST_INFORMATION: Final = 0.05
+#: Share of the readings' variance below which a variance of the joints is none.
+_LEAST: Final = 1e-8
+
+
+@dataclass(frozen=True, eq=False)
+class Linearised:
+    """A fit linearised at its solution.
+
+    Attributes
+    ----------
+    residual
+        Divided by the deviations assumed so far, ``(rows,)``.
+    by_parameters
+        Its derivative, per prior, ``(rows, parameters)``.
+    by_joints
+        Its derivative by the errors of the joints, ``(rows, joints)``.
+    offset
+        How far the parameters are from the centres of their priors, in priors, ``(parameters,)``.
+    priors
+        Whether they have any.
+    arrivals
+        Which equations share a draw of the joints' errors.
+    factor
+        Index of the factor by which the variance of each equation may differ from the one assumed, ``(rows,)``.
+    """
+
+    residual: Array
+    by_parameters: Array
+    by_joints: Array
+    offset: Array
+    priors: bool
+    arrivals: Arrivals
+    factor: NDArray[np.intp]
+
+    @cached_property
+    def directions(self) -> Array:
+        """Directions of the parameters, per prior, that the readings as assumed know to one, ``(parameters, p)``."""
+        A = self.by_parameters
+        rows = np.concatenate([A, np.eye(A.shape[1])]) if self.priors else A
+        _, s, Vt = np.linalg.svd(np.asarray(np.linalg.qr(rows, mode="r"), dtype=np.float64), full_matrices=False)
+        return np.asarray(Vt.T / np.maximum(s, 1e-12 * s[:1]))
+
+
+class _Moments:
+    """Products of the equations by arrival and factor: all that the likelihood needs of them."""
+
+    def __init__(self, at: Linearised, factors: int) -> None:
+        self.at = at
+        Q = at.by_parameters @ at.directions
+        z = (at.by_parameters @ at.offset if at.priors else 0.0) - at.residual
+        self.known = at.directions.T @ at.directions if at.priors else np.zeros((Q.shape[1], Q.shape[1]))
+        self.rows = np.bincount(at.factor, minlength=factors).astype(float)
+        self.Q, self.z = Q, z
+        every = np.column_stack([at.by_joints, Q, z])
+        k = at.by_joints.shape[1]
+        by_arrival, whole = [], []
+        for index in range(factors):
+            mine = every if factors == 1 else np.where((at.factor == index)[:, None], every, 0.0)
+            by_arrival.append(at.arrivals.products(mine[:, :k], mine))
+            whole.append(mine[:, k:].T @ mine[:, k:])
+        products, sums = np.stack(by_arrival), np.stack(whole)
+        self.M = products[..., :k]  # (factors, arrivals, joints, joints)
+        self.T = products[..., k:-1]  # (factors, arrivals, joints, parameters)
+        self.t = products[..., -1]
+        self.C, self.c, self.q = sums[:, :-1, :-1], sums[:, :-1, -1], sums[:, -1, -1]
+
+
+class _State:
+    """The likelihood at some variances, with its slopes."""
+
+    def __init__(self, of: _Moments, factors: Array, joints: Array) -> None:
+        self.of, self.factors, self.joints = of, factors, joints
+        by = 1.0 / factors
+        self.M, self.T, self.t = (np.tensordot(by, part, 1) for part in (of.M, of.T, of.t))
+        root = np.sqrt(joints)
+        inner = np.eye(len(joints)) + root[:, None] * self.M * root
+        self.E = root[:, None] * np.linalg.inv(inner) * root
+        ET = self.E @ self.T
+        p = self.T.shape[2]
+        whole = np.tensordot(by, of.C, 1) - self.T.reshape(-1, p).T @ ET.reshape(-1, p)
+        self.whole = whole
+        self._curvatures: dict[int | tuple[int, ...], Array] = {}
+        try:
+            self.L = np.linalg.cholesky(whole + of.known)
+        except np.linalg.LinAlgError:  # variances so far apart that rounding is all there is
+            self.likelihood = -np.inf
+            return
+        b = by @ of.c - np.einsum("akp,ak->p", ET, self.t)
+        self.found = np.linalg.solve(self.L.T, np.linalg.solve(self.L, b))
+        self.ET = ET
+        left = float(by @ of.q - np.einsum("ak,akl,al->", self.t, self.E, self.t) - b @ self.found)
+        logs = float(of.rows @ np.log(factors)) + float(np.linalg.slogdet(inner)[1].sum())
+        self.likelihood = -0.5 * (logs + 2.0 * float(np.log(np.diag(self.L)).sum()) + left)
+
+    @cached_property
+    def inverse(self) -> Array:
+        """Covariance of the parameters, in the directions that the moments are counted in, ``(p, p)``."""
+        root = np.linalg.solve(self.L, np.eye(len(self.L)))
+        return np.asarray(root.T @ root)
+
+    @cached_property
+    def _parts(self) -> tuple[Array, Array, Array, Array]:
+        u = self.t - self.T @ self.found
+        e = (self.E @ u[..., None])[..., 0]
+        Lm = np.eye(len(self.joints)) - self.M @ self.E
+        return e, (Lm @ u[..., None])[..., 0], Lm @ self.M, Lm @ self.T
+
+    def curvature(self, kind: NDArray[np.intp] | int) -> Array:
+        """Return ``A' V^-1 V_i V^-1 A`` for the variance of joints, or that of a factor, ``(p, p)``."""
+        key = kind if isinstance(kind, int) else tuple(kind.tolist())
+        if key not in self._curvatures:
+            self._curvatures[key] = self._curvature(kind)
+        return self._curvatures[key]
+
+    def _curvature(self, kind: NDArray[np.intp] | int) -> Array:
+        of, p = self.of, self.T.shape[2]
+        if not isinstance(kind, int):
+            N = self._parts[3][:, kind].reshape(-1, p)
+            return np.asarray(N.T @ N)
+        if len(self.factors) == 1:  # all of them, each times its variance, are the information
+            rest = self.whole
+            for variance in np.unique(self.joints[self.joints > 0.0]).tolist():
+                rest = rest - variance * self.curvature(np.flatnonzero(self.joints == variance))
+            return np.asarray(rest / self.factors[0])
+        cross = of.T[kind].reshape(-1, p).T @ self.ET.reshape(-1, p)
+        inner = self.ET.reshape(-1, p).T @ (of.M[kind] @ self.ET).reshape(-1, p)
+        return np.asarray((of.C[kind] - cross - cross.T + inner) / self.factors[kind] ** 2)
+
+    def slopes(self, kinds: Sequence[NDArray[np.intp] | int]) -> tuple[Array, Array, Array]:
+        """Return ``z' P V_i P z`` and ``tr(P V_i)`` for variances, each ``(m,)``, and the information ``(m, m)``.
+
+        Half their difference is the slope of the likelihood.
+
+        Parameters
+        ----------
+        kinds
+            Joints that share a variance, or the index of a factor.
+        """
+        of, count = self.of, len(kinds)
+        e, g, LM, N = self._parts
+        squares, traces = np.empty(count), np.empty(count)
+        shifts = np.empty((count, self.T.shape[2]))  # A' V^-1 V_i P z
+        inner = np.empty((count, *g.shape))  # G' V^-1 V_i P z
+        inside: dict[int, Array] = {}
+        for i, kind in enumerate(kinds):
+            if isinstance(kind, int):
+                v = self.factors[kind]
+                h = (of.t[kind] - of.T[kind] @ self.found - (of.M[kind] @ e[..., None])[..., 0]) / v**2
+                r = float(of.q[kind] - 2.0 * of.c[kind] @ self.found + self.found @ of.C[kind] @ self.found) / v**2
+                r -= float(np.sum(e * (h + (of.t[kind] - of.T[kind] @ self.found) / v**2)))
+                squares[i] = r
+                traces[i] = of.rows[kind] / v - float(np.sum(self.E * of.M[kind])) / v**2
+                shifts[i] = (of.c[kind] - of.C[kind] @ self.found - np.einsum("akp,ak->p", of.T[kind], e)) / v**2
+                shifts[i] -= np.einsum("akp,ak->p", self.ET, h)
+                inner[i] = h - (self.M @ (self.E @ h[..., None]))[..., 0]
+                inside[i] = h
+            else:
+                squares[i] = float(np.sum(g[:, kind] ** 2))
+                traces[i] = float(np.sum(LM[:, kind, kind]))
+                shifts[i] = np.einsum("akp,ak->p", N[:, kind], g[:, kind])
+                inner[i] = np.einsum("akl,al->ak", LM[:, :, kind], g[:, kind])
+            traces[i] -= float(np.sum(self.inverse * self.curvature(kind)))
+        information = np.empty((count, count))
+        moved = np.linalg.solve(self.L, shifts.T)
+        for i, kind in enumerate(kinds):
+            for j, other in enumerate(kinds):
+                if not isinstance(other, int):
+                    value = float(np.sum(inner[i][:, other] * g[:, other]))
+                elif not isinstance(kind, int):
+                    value = float(np.sum(inner[j][:, kind] * g[:, kind]))
+                else:
+                    value = -float(np.einsum("ak,akl,al->", inside[i], self.E, inside[j]))
+                    value += squares[i] / self.factors[kind] if kind == other else 0.0
+                information[i, j] = 0.5 * (value - float(moved[:, i] @ moved[:, j]))
+        return squares, traces, information
+
+
+@dataclass(frozen=True, eq=False)
+class Variances:
+    """Variances of readings and of joints.
+
+    Attributes
+    ----------
+    factors
+        What the variance of the equations of each factor is, by the variance assumed, ``(factors,)``.
+    joints
+        Variance of the error of each joint that the readings of an arrival share [rad^2 or m^2], ``(joints,)``.
+    """
+
+    factors: Array
+    joints: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Components:
+    """Variances, and what the parameters are worth with them.
+
+    Attributes
+    ----------
+    likeliest
+        The variances with the largest likelihood.
+    weighing
+        Those that readings are to be weighed by: the same where errors of the joints explain how residuals of an
+        arrival hang together, else the likeliest ones without errors of the joints.
+    estimated
+        Whether the variance of each factor was.
+    holds
+        Whether the residuals look as they do with the variances that readings are weighed by.
+    covariance
+        Of the parameters, per prior, ``(parameters, parameters)``, with the uncertainty of these variances.
+    squares, freedom
+        Sum of the squared residuals of each factor, divided by these variances, and what to expect of it,
+        ``(factors,)``.
+    """
+
+    likeliest: Variances
+    weighing: Variances
+    estimated: tuple[bool, ...]
+    holds: bool
+    covariance: Array
+    squares: Array
+    freedom: Array
+
+
+def variance_components(
+    at: Linearised,
+    estimated: Sequence[bool],
+    least: Array,
+    kinds: Sequence[NDArray[np.intp]],
+    before: Components | None = None,
+) -> Components:
+    """Estimate the variances of the readings and of the joints' errors.
+
+    Errors of the joints are believed where they raise the likelihood by more than chance would in 1 of 100 cases
+    without any (half of the time such a variance is estimated as zero; Self and Liang 1987). The covariance of the
+    parameters contains what the variances are uncertain by: an interval of 1.96 deviations holds what one of Student's
+    t with the degrees of freedom of Satterthwaite (1946) would, see :func:`_widened`.
+
+    Parameters
+    ----------
+    estimated
+        Whether the variance of each factor is free; else it is as assumed.
+    least
+        What each factor is at least, ``(factors,)``: readings without noise leave but rounding.
+    kinds
+        Joints that share one variance; of joints that are in none it is zero.
+    before
+        What was found at a solution nearby, with the same factors, by whose variances readings are now weighed. Whether
+        there are errors of the joints, and whether they explain the residuals, is as it was.
+    """
+    moments = _Moments(at, len(estimated))
+    start = np.ones(len(estimated))
+    for index in np.flatnonzero(estimated).tolist():
+        start[index] = max(float(np.mean(at.residual[at.factor == index] ** 2)), float(least[index]))
+    noise = [index for index, free in enumerate(estimated) if free and start[index] > least[index]]
+    if before is None:
+        alone, best = _with_and_without(moments, start, kinds, noise)
+        likeliest = Variances(best.factors, best.joints)
+        holds = (best is alone or _agree(alone, best)) and _independent(best)
+        best = best if holds else alone
+    else:
+        best = _State(moments, np.where(start > least, 1.0, start), before.weighing.joints)
+        best = _maximised(moments, best, [kind for kind in kinds if best.joints[kind].any()], noise)
+        holds, likeliest = before.holds, Variances(best.factors, best.joints)
+        if before.likeliest is not before.weighing:
+            factors = before.likeliest.factors / before.weighing.factors * best.factors
+            likeliest = Variances(factors, before.likeliest.joints)
+    taken = [kind for kind in kinds if best.joints[kind].any()]
+    squares, traces, _ = best.slopes(range(len(estimated)))
+    inverse = np.asarray(np.linalg.solve(best.L, np.eye(len(best.L))), dtype=np.float64)
+    turned = at.directions @ inverse.T
+    covariance = turned @ _widened(best, inverse, [*taken, *noise]) @ turned.T
+    weighing = Variances(best.factors, best.joints)
+    return Components(
+        weighing if holds else likeliest,
+        weighing,
+        tuple(estimated),
+        holds,
+        covariance,
+        squares * best.factors,
+        traces * best.factors,
+    )
+
+
+def _with_and_without(
+    moments: _Moments, start: Array, kinds: Sequence[NDArray[np.intp]], noise: Sequence[int]
+) -> tuple[_State, _State]:
+    """Return the largest likelihood without errors of the joints and with them; the first twice if they gain little."""
+    alone = _maximised(moments, _State(moments, start, np.zeros(moments.M.shape[-1])), [], noise)
+    best = alone
+    for _ in kinds:
+        waiting = [kind for kind in kinds if not best.joints[kind].any()]
+        if not waiting:
+            break
+        squares, traces, information = best.slopes([*waiting])
+        steps = 0.5 * (squares - traces) / np.maximum(np.diag(information), 1e-300)
+        rising = [(kind, step) for kind, step in zip(waiting, steps.tolist(), strict=True) if step > 0.0]
+        if not rising:
+            break
+        joints = best.joints.copy()
+        for kind, step in rising:
+            joints[kind] = step
+        taken = [kind for kind in kinds if joints[kind].any()]
+        best = _maximised(moments, _State(moments, best.factors, joints), taken, noise)
+    return alone, best if 2.0 * (best.likelihood - alone.likelihood) >= _SIGNIFICANT else alone
+
+
+def _agree(alone: _State, best: _State) -> bool:
+    """Return whether the parameters with and without errors of the joints differ by no more than chance allows.
+
+    With them both are right, and one is better (Hausman 1978): the covariance of the difference is the difference of
+    the covariances.
+    """
+    of, by = best.of, 1.0 / alone.factors
+    T = np.tensordot(by, of.T, 1)
+    p = T.shape[2]
+    scattered = (T * best.joints[:, None]).reshape(-1, p).T @ T.reshape(-1, p)
+    spread = np.tensordot(best.factors * by**2, of.C, 1) + of.known + scattered
+    turned = np.asarray(np.linalg.solve(alone.L, best.L), dtype=np.float64)
+    turned = np.asarray(np.linalg.solve(alone.L.T, turned), dtype=np.float64)
+    values, vectors = np.linalg.eigh(turned.T @ spread @ turned - np.eye(p))
+    differ = values > _LEAST_DIFFERENCE
+    if not differ.any():
+        return True
+    apart = vectors[:, differ].T @ (best.L.T @ (alone.found - best.found)) / np.sqrt(values[differ])
+    return not beyond_chance(float(apart @ apart), float(differ.sum()))
+
+
+def _independent(state: _State) -> bool:
+    """Return whether the pulls of arrivals on the parameters are no larger than those of independent ones.
+
+    The sum of their squares, in deviations of the parameters, is what an estimate from the scatter of the arrivals
+    finds of the parameters' variance, by what the variances say (the idea of White 1982).
+    """
+    of, at = state.of, state.of.at
+    root = np.sqrt(state.factors)[at.factor]
+    whitening = Whitening(at.arrivals, at.by_joints * np.sqrt(state.joints) / root[:, None])
+    X = np.asarray(np.linalg.solve(state.L, whitening.applied(of.Q / root[:, None]).T).T, dtype=np.float64)
+    r = whitening.applied((of.z - of.Q @ state.found) / root)
+    pulls = at.arrivals.products(X, r[:, None])
+    expected = variance = 0.0
+    for _, rows in at.arrivals.alike:
+        part = X[rows]
+        few = part if part.shape[1] > part.shape[2] else np.swapaxes(part, 1, 2)
+        gram = np.swapaxes(few, 1, 2) @ few
+        left = gram - gram @ gram
+        expected += float(np.trace(left, axis1=1, axis2=2).sum())
+        variance += 2.0 * float(np.sum(left**2))
+    if variance <= 0.0:
+        return True
+    freedom = 2.0 * expected**2 / variance
+    return not beyond_chance(float(np.sum(pulls**2)) / expected * freedom, freedom)
+
+
+def beyond_chance(squares: float, freedom: float) -> bool:
+    """Return whether chi squared is larger than chance allows, 1 in 1000, by Wilson and Hilferty (1931)."""
+    k = 2.0 / (9.0 * freedom)
+    return squares / freedom > (1.0 - k + 3.09 * float(np.sqrt(k))) ** 3
+
+
+def _maximised(moments: _Moments, start: _State, kinds: Sequence[NDArray[np.intp]], noise: Sequence[int]) -> _State:
+    """Climb to the largest likelihood from some variances, all of them above zero."""
+    here, kinds = start, list(kinds)
+    size = np.trace(moments.M.sum(axis=(0, 1))) / moments.rows.sum()
+    before: tuple[Array, Array] | None = None
+    for _ in range(_STEPS):
+        free: list[NDArray[np.intp] | int] = [*kinds, *noise]
+        if not free:
+            break
+        value = np.array([here.factors[i] if isinstance(i, int) else here.joints[i[0]] for i in free])
+        squares, traces, information = here.slopes(free)
+        slope = 0.5 * (squares - traces) * value
+        bent = information * np.outer(value, value)
+        step = np.linalg.solve(bent + 1e-9 * (1.0 + float(np.trace(bent))) * np.eye(len(free)), slope)
+        if float(slope @ step) < _SETTLED:
+            break
+        if before is not None:  # as much further as the last step fell short: the information is but an average
+            last, then = before
+            gain, fall = float(then @ last), float((then - slope) @ last)
+            step *= _FURTHER if gain > max(0.0, _FURTHER * fall) else 0.3 if fall <= 0.0 else max(0.3, gain / fall)
+        step *= min(1.0, _LARGEST_STEP / float(np.abs(step).max() + 1e-300))
+        for _ in range(12):
+            there = _at(moments, here, free, value * np.exp(step))
+            if there.likelihood >= here.likelihood - 1e-9 * abs(here.likelihood):
+                break
+            step *= 0.4
+        else:
+            break
+        here, before = there, (step, slope)
+        gone = [kind for kind in kinds if here.joints[kind[0]] * size < _LEAST * here.factors.min()]
+        for kind in gone:
+            here, before = _at(moments, here, [kind], np.zeros(1)), None
+        kinds = [kind for kind in kinds if not any(kind is other for other in gone)]
+    return here
+
+
+def _at(moments: _Moments, here: _State, kinds: Sequence[NDArray[np.intp] | int], values: Array) -> _State:
+    """Return the state with some variances changed."""
+    factors, joints = here.factors.copy(), here.joints.copy()
+    for kind, value in zip(kinds, values.tolist(), strict=True):
+        if isinstance(kind, int):
+            factors[kind] = value
+        else:
+            joints[kind] = value
+    return _State(moments, factors, joints)
+
+
+def _widened(state: _State, inverse: Array, kinds: Sequence[NDArray[np.intp] | int]) -> Array:
+    """Return what the covariance of the parameters is multiplied by, in directions where that is one.
+
+    The variance f of a combination of parameters is itself estimated, with the variance Var(f) that follows from the
+    information W on the variances. Satterthwaite's degrees of freedom are ``2 f^2 / Var(f)``, and an interval of
+    Student's t is ``t / 1.96`` times as wide. That is no covariance: each combination has its own factor. This is the
+    smallest one that is quadratic and nowhere narrower: with ``E_i`` the relative change of the covariance by a
+    variance, ``Var(f) / f <= c' (sum_ij W^-1_ij E_i E_j) c`` by Cauchy and Schwarz.
+    """
+    count = len(inverse)
+    if not kinds:
+        return np.eye(count)
+    _, _, information = state.slopes(kinds)
+    value = np.array([state.factors[i] if isinstance(i, int) else state.joints[i[0]] for i in kinds])
+    relative = np.linalg.inv(information * np.outer(value, value) + _LEAST_INFORMATION * np.eye(len(kinds)))
+    changes = []
+    for kind, size in zip(kinds, value.tolist(), strict=True):
+        changes.append(size * inverse @ state.curvature(kind) @ inverse.T)
+    weighted = [sum(relative[i, j] * changes[j] for j in range(len(kinds))) for i in range(len(kinds))]
+    spread = sum(change @ other for change, other in zip(changes, weighted, strict=True))
+    spread = 0.5 * (spread + spread.T)
+    largest = float(np.linalg.eigvalsh(spread)[-1])
+    if largest <= 0.0:
+        return np.eye(count)
+    freedom = max(2.0 / largest, 1.0)
+    return np.asarray(np.eye(count) + (widening(freedom) ** 2 - 1.0) / largest * spread)
+
+
+def widening(freedom: float) -> float:
+    """Return how many times wider an interval of Student's t is than one of the normal distribution, for 95 %."""
+    from scipy.special import stdtrit
+
+    return float(stdtrit(freedom, 0.975)) / 1.959963984540054

@@ -1,0 +1,104 @@
+"""What stands twice in a campaign: readings and joint positions that were copied, postures that were visited again."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from truearm.measurement.dataset import Dataset, IntArray
+from truearm.measurement.dataset_fields import drawn_from
+from truearm.notices import Notice
+from truearm.shown import counted, listed
+
+#: Readings at the same joint positions agree within this, whatever loads the arm and from wherever it came [m].
+_LARGEST_CHANGE: Final = 5e-3
+#: A joint comes back to a posture within this [rad or m]: a hundredth of a degree or of a millimetre.
+_SAME_ANGLE: Final = math.radians(0.01)
+_SAME_LENGTH: Final = 1e-5
+
+
+def check_duplicates(data: Dataset) -> list[Notice]:
+    """Say which readings repeat another one to the last digit."""
+    found = []
+    for part in [data] if data.references is None else [data, data.references]:
+        first: dict[tuple[int, bytes], int] = {}
+        for reading in np.flatnonzero(part.has_position).tolist():
+            key = (int(part.target[reading]), part.position[reading].tobytes())
+            other = first.setdefault(key, reading)
+            a, b = (part.labels[part.configuration[r]] for r in (other, reading))
+            # A configuration that was drawn twice for a bootstrap counts twice because it shall.
+            if other != reading and (a == b or drawn_from(a) != drawn_from(b)):
+                found.append(f"{part.targets[key[0]]} at {a} and {b}")
+    if not found:
+        return []
+    return [
+        Notice(
+            "duplicates",
+            f"{counted(len(found), 'reading')} repeat{'s' if len(found) == 1 else ''} another one to the last digit "
+            f"(target at configurations): {listed(found)}. Rows were copied, or the instrument stood still: remove "
+            f"{'it, it counts' if len(found) == 1 else 'them, they count'} twice.",
+        )
+    ]
+
+
+def copies(data: Dataset, some: IntArray, others: IntArray) -> list[str]:
+    """Return the labels of those of `some` configurations that are copies of one of the `others`.
+
+    Copies have the same joint positions and the same readings, all to the last digit.
+    """
+    values = [data.target[:, None], data.against[:, None], data.position]
+    values += [v.reshape(len(v), -1) for v in (data.quaternion, data.distance, data.height) if v is not None]
+    read: list[list[bytes]] = [[] for _ in data.labels]
+    for reading, row in zip(np.flatnonzero(data.has_reading), np.hstack(values)[data.has_reading], strict=True):
+        read[data.configuration[reading]].append(row.tobytes())
+    content = [(joints.tobytes(), *sorted(rows)) for joints, rows in zip(data.joints, read, strict=True)]
+    known = {content[c] for c in others if read[c]}
+    return [data.labels[c] for c in some if content[c] in known]
+
+
+def revisits(data: Dataset, some: IntArray, others: IntArray) -> list[str]:
+    """Return the labels of those of `some` configurations at which the joints stand as at one of the `others`."""
+    if len(some) == 0 or len(others) == 0:
+        return []
+    same = np.array([_SAME_ANGLE if kind == "revolute" else _SAME_LENGTH for kind in data.joint_kinds])
+    scaled = data.joints / same
+    return [data.labels[c] for c in some.tolist() if (np.abs(scaled[others] - scaled[c]).max(axis=1) <= 1.0).any()]
+
+
+def repeated_joints(data: Dataset) -> list[tuple[str, str]]:
+    """Return the labels of configurations with the same joint positions to the last digit, and readings far apart."""
+    first: dict[bytes, int] = {}
+    pairs = [(first.setdefault(data.joints[c].tobytes(), c), c) for c in range(data.configurations)]
+    found = []
+    for a, b in pairs:
+        if a != b and _apart(data, a, b) > _LARGEST_CHANGE:
+            found.append((data.labels[a], data.labels[b]))
+    return found
+
+
+def _apart(data: Dataset, a: int, b: int) -> float:
+    """Return how far apart the readings of a target are at two configurations, the farthest [m]; 0 if none is."""
+    read = [(data.configuration == c) & data.has_position for c in (a, b)]
+    gaps = [0.0]
+    for reading in np.flatnonzero(read[0]).tolist():
+        other = read[1] & (data.target == data.target[reading]) & (data.against == data.against[reading])
+        gaps += np.linalg.norm(data.position[other] - data.position[reading], axis=1).tolist()
+    return max(gaps)
+
+
+def repeated_joints_notices(data: Dataset, pairs: list[tuple[str, str]]) -> list[Notice]:
+    """Say which joint positions were copied from another configuration."""
+    if not pairs:
+        return []
+    words = [f"{b} (those of {a})" for a, b in pairs]
+    return [
+        Notice(
+            "joints-repeated",
+            f"{counted(len(pairs), 'configuration')} of {data.source} {'has' if len(pairs) == 1 else 'have'} the joint "
+            f"positions of another one to the last digit, and readings more than {_LARGEST_CHANGE * 1e3:g} mm from "
+            f"its readings: {listed(words)}. The joint positions were copied: mend them, or leave these configurations "
+            "out.",
+        )
+    ]

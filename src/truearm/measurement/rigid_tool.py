@@ -1,0 +1,205 @@
+"""Targets on a rigid tool keep their distances: readings that do not are doubted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import permutations
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.measurement.dataset import Dataset, IntArray
+from truearm.measurement.places import Places, grouped_medians, places_of
+from truearm.modeling.chain import Array
+
+Suspicion = Literal["outliers", "targets-swapped", "target-mistaken"]
+
+#: A distance, or a place, that holds better than this is never doubted [m].
+UNMOVED: Final = 1e-4
+#: How many robust deviations a distance or a place may be off.
+DEVIATIONS: Final = 10.0
+#: A reading this close to another known point was taken from it [m].
+SAME_POINT: Final = 1e-3
+#: A reading this far off was taken from another reflector, even an unknown one [m].
+OTHER_REFLECTOR: Final = 0.02
+#: To how many of the next targets of a configuration distances are taken: of up to nine targets that is all of them.
+_PARTNERS: Final = 8
+#: So many of the distances of a wrong reading are off; across its error a distance hardly changes.
+_WRONG_SHARE: Final = 0.75
+#: Among so many targets of a configuration exchanged names are looked for.
+_EXCHANGED: Final = (3, 6)
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """A reading that cannot be what it says.
+
+    Attributes
+    ----------
+    code
+        What it seems to be.
+    configuration, target
+        Label and name.
+    words
+        What it looks like, for example ``is target 2``.
+    """
+
+    code: Suspicion
+    configuration: str
+    target: str
+    words: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class _Distances:
+    """Distances between targets of the same configuration, and how far off they are.
+
+    Attributes
+    ----------
+    places
+        Of all targets.
+    pairs, usual
+        The pairs of targets, as one number each and in order, with the median of their distances [m], ``(pairs,)``.
+    allowed
+        How far off a distance may be [m].
+    share
+        Of the distances of each place how many are off by more, ``(places,)``.
+    most, total
+        How far off the distances of each place are [m], ``(places,)``.
+    """
+
+    places: Places
+    pairs: IntArray
+    usual: Array
+    allowed: float
+    share: Array
+    most: Array
+    total: Array
+
+    def usual_between(self, targets: IntArray) -> Array:
+        """Return the usual distances of a few targets, all of them read together once, ``(n, n)``."""
+        low, high = np.minimum(targets[:, None], targets), np.maximum(targets[:, None], targets)
+        found = np.minimum(np.searchsorted(self.pairs, low * self.places.targets + high), len(self.pairs) - 1)
+        return np.where(low == high, 0.0, self.usual[found])
+
+
+def rigid_suspects(data: Dataset) -> list[Suspect]:
+    """Doubt readings whose distances to the other targets of their configuration do not hold.
+
+    Three or more targets tell which reading is wrong; of two, both are doubted. Of many targets each is compared with
+    the next few alone, so that time and memory grow with the readings and not with their square.
+    """
+    places = places_of(data)
+    one, other = _compared(places)
+    if not len(one):
+        return []
+    apart = np.linalg.norm(places.position[one] - places.position[other], axis=1)
+    pair = places.target[one] * places.targets + places.target[other]
+    pairs, usual = grouped_medians(pair, apart)
+    off = np.abs(apart - usual[np.searchsorted(pairs, pair)])
+    allowed = max(UNMOVED, DEVIATIONS * 1.4826 * float(np.median(off)))
+    doubtful = np.unique(places.configuration[one[off > allowed]]).tolist()
+    if not doubtful:
+        return []
+    count, ends, twice = len(places.target), np.concatenate([one, other]), np.concatenate([off, off])
+    compared = np.maximum(np.bincount(ends, minlength=count), 1)
+    share = np.asarray(np.bincount(ends[twice > allowed], minlength=count) / compared, dtype=np.float64)
+    most, total = np.zeros(count), np.asarray(np.bincount(ends, twice, count), dtype=np.float64)
+    np.maximum.at(most, ends, twice)
+    distances = _Distances(places, pairs, usual, allowed, share, most, total)
+    known = fixed_points(data)
+    suspects: list[Suspect] = []
+    for c in doubtful:
+        suspects += _blamed(data, distances, c, known)
+    return suspects
+
+
+def _compared(places: Places) -> tuple[IntArray, IntArray]:
+    """Return pairs of places of the same configuration, the first of the lower target, ``(pairs,)``."""
+    count = len(places.configuration)
+    pairs: list[tuple[IntArray, IntArray]] = []
+    for step in range(1, min(_PARTNERS, count - 1) + 1):
+        first = np.flatnonzero(places.configuration[step:] == places.configuration[:-step])
+        pairs.append((first, first + step))
+    if not pairs:
+        return np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.intp)
+    one, other = zip(*pairs, strict=True)
+    return np.concatenate(one), np.concatenate(other)
+
+
+def _blamed(data: Dataset, distances: _Distances, c: int, known: dict[str, Array]) -> list[Suspect]:
+    places, allowed = distances.places, distances.allowed
+    mine = places.at(c)
+    here, seen, label, names = places.position[mine], places.target[mine], data.labels[c], data.targets
+    swap = _swap(here, distances.usual_between(seen), allowed) if _EXCHANGED[0] <= len(seen) <= _EXCHANGED[1] else []
+    if swap:
+        return [Suspect("targets-swapped", label, names[seen[a]], f"is target {names[seen[b]]}") for a, b in swap]
+    wrong: NDArray[np.bool_] = distances.share[mine] >= _WRONG_SHARE
+    if len(seen) > 2 and wrong.sum() > 1:
+        wrong = np.arange(len(seen)) == np.argmax(np.where(wrong, distances.total[mine], -1.0))
+    doubted = wrong if wrong.any() else distances.most[mine] > allowed
+    others = np.flatnonzero(~doubted)
+    suspects = []
+    for k in np.flatnonzero(doubted).tolist():
+        name, near = names[seen[k]], dict(known)
+        if len(others):
+            nearest = others[np.argmin(np.linalg.norm(here[others] - here[k], axis=1))]
+            near[f"target {names[seen[nearest]]}"] = here[nearest]
+        before = places.of(c - 1, int(seen[k]))
+        if before is not None:
+            near[f"target {name} at the configuration before"] = before
+        suspects.append(suspect(here[k], label, name, float(distances.most[mine][k]), near))
+    return suspects
+
+
+def suspect(point: Array, label: str, target: str, size: float, known: dict[str, Array]) -> Suspect:
+    """Say what a wrong reading is: another known point, another reflector, or an outlier.
+
+    Parameters
+    ----------
+    point
+        The reading [m], ``(3,)``.
+    label, target
+        Its configuration and target.
+    size
+        How far it is off [m].
+    known
+        Points that it could have been taken from [m].
+    """
+    gaps = {name: float(np.linalg.norm(point - place)) for name, place in known.items() if np.isfinite(place).all()}
+    nearest = min(gaps, key=lambda name: gaps[name]) if gaps else None
+    if nearest is not None and gaps[nearest] < SAME_POINT < size:
+        return Suspect("target-mistaken", label, target, f"is {nearest}")
+    if size > OTHER_REFLECTOR:
+        return Suspect("target-mistaken", label, target, f"{size * 1e3:.0f} mm off")
+    return Suspect("outliers", label, target, f"{size * 1e3:.1f} mm off")
+
+
+def _swap(here: Array, usual: Array, allowed: float) -> list[tuple[int, int]]:
+    """Return the exchange of names under which all distances hold best; nothing if there is none.
+
+    Parameters
+    ----------
+    here
+        Readings of a configuration [m], ``(n, 3)``.
+    usual
+        Distances of their targets [m], ``(n, n)``.
+    """
+    orders = np.array(list(permutations(range(len(here)))))[1:]
+    orders = orders[np.argsort((orders != np.arange(len(here))).sum(axis=1), kind="stable")]
+    points = here[orders]
+    misfit = np.abs(np.linalg.norm(points[:, :, None] - points[:, None], axis=3) - usual).max(axis=(1, 2))
+    best = int(np.argmin(misfit))
+    if misfit[best] > allowed:
+        return []
+    # the kth really is the reading named order[k]
+    return [(b, a) for a, b in enumerate(orders[best].tolist()) if a != b]
+
+
+def fixed_points(data: Dataset) -> dict[str, Array]:
+    """Return the usual places of the reference points [m], ``(3,)`` each."""
+    if data.references is None:
+        return {}
+    usual = places_of(data.references).usual()
+    return {f"reference {name}": place for name, place in zip(data.references.targets, usual, strict=True)}

@@ -1,0 +1,127 @@
+"""What a calibration knows about its own result, kept by the robot that it made and by that robot's file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final, Self
+
+import numpy as np
+
+from truearm.modeling.chain import Array
+from truearm.modeling.parameters import Parameter
+from truearm.notices import Notice
+from truearm.units import SHOWN_AS, from_si, to_si
+
+#: Digits of deviations, and decimals of the rows of the factor: a prediction changes by less than a thousandth of its
+#: own deviation.
+_DIGITS: Final = 9
+_DECIMALS: Final = 7
+
+
+@dataclass(frozen=True)
+class Proof:
+    """What a calibration knows about its own result.
+
+    It is about certain values, of which it keeps a hash: whether a robot still has them is asked with
+    :func:`truearm.modeling.formats.robot_file.is_intact`.
+
+    Attributes
+    ----------
+    status
+        How the fit ended, in the word of files: ``converged``, ``rank-loss``.
+    errors
+        Notices of the level error.
+    region
+        Lowest and highest position of each joint at which it was measured [rad or m].
+    joint_error
+        Standard deviation of the error of each joint that readings of an arrival share [rad or m].
+    names
+        The parameters that were identified.
+    deviations
+        Their standard deviations [SI].
+    factor
+        Rows of the lower triangular factor of their correlation matrix, each one longer than the one before; zero for
+        parameters that are not uncertain.
+    lower_bound
+        Whether the error may be larger than covariance and joint error say, for a reason that is known.
+    digest
+        SHA-256 of the values that it is about; empty if it is about none yet.
+    """
+
+    status: str
+    errors: tuple[Notice, ...]
+    region: tuple[tuple[float, float], ...]
+    joint_error: tuple[float, ...]
+    names: tuple[str, ...]
+    deviations: tuple[float, ...]
+    factor: tuple[tuple[float, ...], ...]
+    lower_bound: bool = False
+    digest: str = ""
+
+    @classmethod
+    def of(
+        cls,
+        status: str,
+        errors: Sequence[Notice],
+        region: Sequence[tuple[float, float]],
+        joint_error: Array,
+        parameters: Sequence[Parameter],
+        covariance: Array,
+        *,
+        lower_bound: bool = False,
+    ) -> Self:
+        """Make the proof of a calibration, rounded to what a file holds of it.
+
+        Parameters
+        ----------
+        parameters
+            That were identified.
+        covariance
+            Of these parameters [SI], ``(parameters, parameters)``.
+        """
+        deviation = np.sqrt(np.diag(covariance))
+        units = [SHOWN_AS[p.unit] for p in parameters]
+        return cls(
+            status,
+            tuple(errors),
+            tuple(region),
+            tuple(joint_error.tolist()),
+            tuple(p.name for p in parameters),
+            tuple(
+                to_si(float(f"{from_si(d, unit):.{_DIGITS}g}"), unit)
+                for d, unit in zip(deviation.tolist(), units, strict=True)
+            ),
+            tuple(
+                tuple(round(v, _DECIMALS) + 0.0 for v in row[: number + 1])
+                for number, row in enumerate(_factor(covariance, deviation).tolist())
+            ),
+            lower_bound,
+        )
+
+    def summary(self) -> dict[str, Any]:
+        """Return how the calibration ended, and what it is about, as JSON holds it."""
+        return {"status": self.status, "errors": [error.code for error in self.errors], "sha256": self.digest}
+
+    @property
+    def root(self) -> Array:
+        """Lower triangular ``L`` of the covariance ``L L^T`` of the parameters [SI], ``(parameters, parameters)``."""
+        root = np.zeros((len(self.names), len(self.names)))
+        for number, row in enumerate(self.factor):
+            root[number, : number + 1] = row
+        return np.asarray(root * np.reshape(self.deviations, (-1, 1)))
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance of the parameters [SI], ``(parameters, parameters)``."""
+        root = self.root
+        return np.asarray(root @ root.T)
+
+
+def _factor(covariance: Array, deviation: Array) -> Array:
+    """Return the lower triangular factor of the correlations, of a covariance that may be singular."""
+    safe = np.where(deviation > 0.0, deviation, 1.0)
+    size, axes = np.linalg.eigh(covariance / np.outer(safe, safe))
+    upper = np.linalg.qr((axes * np.sqrt(np.maximum(size, 0.0))).T, mode="r")
+    signs = np.where(np.diag(upper) < 0.0, -1.0, 1.0)
+    return np.asarray((signs[:, None] * upper).T)

@@ -1,0 +1,64 @@
+"""What a calibration writes into its robot about itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from truearm.identification.judging.expected_error import ExpectedError, covariance_root
+from truearm.identification.solving.fit import Fit, Status
+from truearm.measurement.dataset import Dataset
+from truearm.modeling.parameters import PLACES
+from truearm.modeling.proof import Proof
+from truearm.notices import Notice
+
+_SOUND: Final = (Status.CONVERGED.value, Status.AT_BOUND.value)
+
+
+def proof_of(
+    fit: Fit,
+    status: Status,
+    warnings: Sequence[Notice],
+    expected: ExpectedError,
+    training: Dataset,
+    before: Proof | None = None,
+) -> Proof:
+    """Return what a calibration knows about its result.
+
+    Parameters
+    ----------
+    fit
+        Of the training part.
+    status
+        How it ended, or that what it found cannot be this robot.
+    warnings
+        All notices of the calibration.
+    expected
+        The error to expect over the workspace.
+    training
+        The training part.
+    before
+        What was known of the robot already. It holds for the parameters of the arm that this fit has not touched, as
+        where only base and targets are found anew; and if there are any, so does what spoke against them.
+    """
+    ended, joint_error = status.value, expected.joint_error
+    errors = [notice for notice in warnings if notice.level == "error"]
+    lower_bound = expected.lower_bound
+    names, root = covariance_root(fit)
+    parameters, covariance = [fit.robot.parameters[name] for name in names], root @ root.T
+    region = list(zip(training.joints.min(axis=0).tolist(), training.joints.max(axis=0).tolist(), strict=True))
+    if before is not None:
+        arm = {n: p for n, p in fit.robot.parameters.items() if p.group not in PLACES}
+        kept = [i for i, name in enumerate(before.names) if name in arm and name not in names]
+        if kept or not any(name in arm for name in names):
+            ended = before.status if ended in _SOUND else ended
+            errors += [error for error in before.errors if error.code not in [e.code for e in errors]]
+            parameters += [arm[before.names[i]] for i in kept]
+            region = [(min(a, c), max(b, d)) for (a, b), (c, d) in zip(region, before.region or region, strict=True)]
+            joint_error = np.maximum(joint_error, before.joint_error or 0.0)
+            lower_bound = lower_bound or before.lower_bound
+            beside = np.zeros((len(covariance), len(kept)))
+            covariance = np.block([[covariance, beside], [beside.T, before.covariance[np.ix_(kept, kept)]]])
+    return Proof.of(ended, errors, region, joint_error, parameters, covariance, lower_bound=lower_bound)

@@ -1,0 +1,125 @@
+"""What a correction is expected to do, against robots drawn from what its calibration leaves uncertain."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.simulated import campaign
+
+from truearm.compensation.cell import Cell, Placed
+from truearm.compensation.expected_errors import ExpectedErrors
+from truearm.compensation.program_correction import Correction, corrected_programs
+from truearm.compensation.programs.program import Program, Source
+from truearm.compensation.programs.rapid import RAPID
+from truearm.jobs.calibrate import calibrate
+from truearm.modeling.formats.robot_file import sealed
+from truearm.modeling.robot import Robot
+from truearm.modeling.transform import Transform
+
+DRAWS = 25
+
+
+def program() -> Program:
+    """Return the plate's program, a tenth of its targets and a posture by joints among them."""
+    text = (files("truearm.examples") / "plate.mod").read_text()
+    lines = [line for line in text.splitlines() if not line.startswith("    Move") or "Circle" in line]
+    jumps = [f"    MoveJ pHole{i},v20,fine,tProbe\\WObj:=wobjPlate;" for i in (1, 6, 8)]
+    at = next(i for i, line in enumerate(lines) if "PROC main" in line)
+    return RAPID.read([Source(Path("plate.mod"), "\n".join([*lines[: at + 1], *jumps, *lines[at + 1 :], ""]))])
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    """A robot calibrated with so few configurations that half a millimetre is left uncertain."""
+    made = calibrate("irb120", campaign("irb120", 7, 5e-5, 4)[1], train="all").robot
+    assert made.proof is not None
+    return made
+
+
+def cell_of(robot: Robot, stands: np.ndarray) -> Cell:
+    """Return the plate where it stands in the world, and the tool on target 1."""
+    in_base = np.linalg.inv(robot.base.matrix) @ stands
+    x, y, z = (robot.values[f"target_1_{axis}"] for axis in "xyz")
+    return Cell(
+        {"tprobe": Placed(None, Transform((x, y, z)))},
+        {"wobjplate": Placed(None, Transform.from_matrix(in_base[:3, :3], in_base[:3, 3]))},
+    )
+
+
+@pytest.mark.parametrize("measured", [True, False])
+def test_robots_drawn_from_the_covariance_miss_as_expected(robot: Robot, measured: bool) -> None:
+    """The right correction of such a robot is where the targets should have gone."""
+    proof, one = robot.proof, program()
+    assert proof is not None
+    stands = robot.base.matrix @ one.frames["wobjPlate"].matrix
+    found = corrected(robot, one, cell_of(robot, stands) if measured else Cell({}, {}))
+    expected = found.expected
+    assert expected is not None
+    poses = np.array([target.form.kind == "pose" for target in one.targets]) & found.corrected
+    rng = np.random.default_rng(1)
+    values = {name: robot.values[name] for name in proof.names}
+    before, after = [], []
+    for _ in range(DRAWS):
+        moved = proof.root @ rng.standard_normal(len(values))
+        other = robot.with_values({n: v + float(d) for (n, v), d in zip(values.items(), moved, strict=True)})
+        right = corrected(other, one, cell_of(other, stands) if measured else Cell({}, {})).after
+        before.append(np.linalg.norm((right - found.before)[poses, :3, 3], axis=1))
+        after.append(np.linalg.norm((right - found.after)[poses, :3, 3], axis=1))
+    said = ExpectedErrors(expected.before[poses], expected.after[poses], expected.worse[poses], expected.before[poses])
+    assert np.mean(after) == pytest.approx(said.after.mean(), rel=0.2)
+    assert np.mean(before) == pytest.approx(said.before.mean(), rel=0.2)
+    np.testing.assert_allclose(np.mean(after, axis=0), said.after, rtol=0.5)
+    worse = np.mean(np.array(after) > np.array(before))
+    assert worse == pytest.approx(said.worse.mean(), abs=0.05)
+
+
+def corrected(robot: Robot, one: Program, cell: Cell) -> Correction:
+    return corrected_programs(robot, [one], cell, every=True).corrections[0]
+
+
+def test_the_error_of_the_joints_counts(robot: Robot) -> None:
+    proof, one = robot.proof, program()
+    assert proof is not None
+    shaky = sealed(robot, replace(proof, joint_error=(2e-4,) * 6))
+    steady = sealed(robot, replace(proof, joint_error=(0.0,) * 6))
+    errors = [corrected(made, one, Cell({}, {})).expected for made in (steady, shaky)]
+    assert errors[0] is not None
+    assert errors[1] is not None
+    # Joints that err by 0.2 mrad at arms of some 0.4 m.
+    joined = np.sqrt(np.nanmean(errors[1].after ** 2) - np.nanmean(errors[0].after ** 2))
+    assert 0.05e-3 < joined < 0.25e-3
+    assert (errors[1].worse >= errors[0].worse - 1e-12)[np.isfinite(errors[0].worse)].all()
+
+
+def test_what_is_not_known_is_not_said(robot: Robot) -> None:
+    proof, one = robot.proof, program()
+    assert proof is not None
+    edited = robot.with_values({"a_3": robot.values["a_3"] + 1e-5})
+    place = [name for name in proof.names if name.startswith(("base", "target"))]
+    placed = replace(
+        proof,
+        names=tuple(place),
+        deviations=(1e-5,) * len(place),
+        factor=tuple((0.0,) * i + (1.0,) for i in range(len(place))),
+    )
+    for other in (replace(robot, proof=None), edited, sealed(robot, placed)):
+        found = corrected(other, one, Cell({}, {}))
+        assert found.expected is None
+        assert found.not_better == ()
+
+
+def test_one_target_alone_has_no_correction_that_could_do_harm(robot: Robot) -> None:
+    text = (files("truearm.examples") / "plate.mod").read_text()
+    lines = [line for line in text.splitlines() if "Move" not in line and "CONST" not in line]
+    pose = "[[20,20,0],[-0.069237,-0.008501,0.990128,0.121572],[-1,0,-1,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
+    move = f"    MoveJ {pose},v20,fine,tProbe\\WObj:=wobjPlate;"
+    at = next(i for i, line in enumerate(lines) if "PROC main" in line)
+    one = RAPID.read([Source(Path("m.mod"), "\n".join([*lines[: at + 1], move, *lines[at + 1 :], ""]))])
+    found = corrected_programs(robot, [one], Cell({}, {})).corrections[0]
+    assert found.expected is not None
+    assert (found.expected.worse[0], found.not_better, found.corrected[0]) == (0.0, (), True)
+    assert found.expected.after[0] < 1e-9

@@ -1,0 +1,162 @@
+"""Every reader of files, with what is checked of what it read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from truearm.compensation.cell import read_frames, read_tools
+from truearm.compensation.program_files import program_files, read_programs, restored
+from truearm.errors import InputError
+from truearm.identification.solving.bounds import read_bounds
+from truearm.jobs.load_robot import load_robot
+from truearm.library import load_robot as of_library
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.hexapod.sheet import read_sheet
+from truearm.measurement.hexapod.touches import read_touches
+from truearm.measurement.readers.canonical import csv_text, read_csv
+from truearm.measurement.readers.drawn_circles import Page, read_drawn_circles
+from truearm.measurement.readers.matrices import read_matrices
+from truearm.measurement.readers.poses import read_poses
+from truearm.measurement.readers.table import read_table
+from truearm.modeling.formats.dh_csv import complete_dh_csv, read_dh_csv
+from truearm.modeling.formats.robot_file import robot_text
+from truearm.modeling.robot import Robot
+from truearm.planning.constraints.constraints import read_constraints
+
+
+@dataclass(frozen=True)
+class Reader:
+    """A reader.
+
+    Attributes
+    ----------
+    files
+        Sample of each file that it reads, by the name that it has in the folder of the case.
+    read
+        Reads them, and checks what was read.
+    """
+
+    files: Mapping[str, str]
+    read: Callable[[Path], object]
+
+
+def _dataset(data: Dataset, folder: Path) -> None:
+    """Check that data have numbers, and are the same again when they were written."""
+    assert np.isfinite(data.joints).all(), "joints are not finite"
+    assert not np.isinf(data.position).any(), "a position is infinite"
+    assert repr(data)
+    try:
+        text = csv_text(data)
+    except InputError:
+        return
+    (folder / "again.csv").write_text(text, encoding="utf-8", newline="")
+    again = read_csv(folder / "again.csv")
+    assert again.labels == data.labels, "labels change when written"
+    assert np.allclose(again.joints, data.joints, rtol=1e-14, atol=0.0), "joints change when written"
+    assert csv_text(again) == text, "what was written is not what is read"
+
+
+def _robot(robot: Robot, folder: Path) -> None:
+    """Check that a robot stands somewhere, and at the same place when it was written."""
+    at, turned = robot.forward(np.zeros(len(robot.joints)))
+    assert np.isfinite(at).all(), "the flange is nowhere"
+    assert np.isfinite(turned).all(), "the flange has no orientation"
+    assert repr(robot)
+    (folder / "again.yaml").write_text(robot_text(robot), encoding="utf-8")
+    again = load_robot(folder / "again.yaml")
+    size = float(np.abs(at).max())
+    assert np.allclose(again.forward(np.zeros(len(robot.joints)))[0], at, rtol=1e-9, atol=1e-9 + 1e-9 * size), (
+        "the flange moves when the robot is written"
+    )
+
+
+def _data_file(name: str) -> Reader:
+    return Reader({"data.csv": name}, lambda folder: _dataset(read_csv(folder / "data.csv"), folder))
+
+
+def _robot_file(name: str) -> Reader:
+    end = Path(name).suffix
+    return Reader({f"arm{end}": name}, lambda folder: _robot(load_robot(folder / f"arm{end}"), folder))
+
+
+def _table(table: str, mapping: str, **more: str) -> Reader:
+    given = {"table.csv": table, "map.yaml": mapping, **{f"{name}.csv": f"{file}.csv" for name, file in more.items()}}
+    return Reader(given, lambda folder: _dataset(read_table(folder / "table.csv", folder / "map.yaml"), folder))
+
+
+def _matrices(folder: Path) -> None:
+    targets, references = {"1": folder / "points.txt"}, {"base": folder / "points.txt"}
+    _dataset(read_matrices(folder / "joints.txt", targets, references, "deg", "mm")[0], folder)
+
+
+def _dh_table(name: str, convention: Any) -> Reader:
+    return Reader({"dh.csv": name}, lambda folder: complete_dh_csv(read_dh_csv(folder / "dh.csv", convention), []))
+
+
+def _programs(language: str, *names: str) -> Reader:
+    def read(folder: Path) -> None:
+        for program in read_programs(program_files([folder / Path(name).name for name in names])):
+            for target in program.targets:
+                assert np.isfinite(target.values).all(), "a target is not finite"
+
+    return Reader({Path(name).name: f"{language}/{name}" for name in names}, read)
+
+
+def _record(folder: Path) -> None:
+    read_programs(restored([folder / "done.mod"]))
+
+
+READERS: Final[Mapping[str, Reader]] = {
+    "canonical": _data_file("data.csv"),
+    "fixtures": _data_file("fixtures.csv"),
+    "axis-runs": _data_file("axes.csv"),
+    "table": _table("table.csv", "mapping.yaml"),
+    "spatial": _table("points.csv", "spatial.yaml", joints="joints"),
+    "matrices": Reader({"joints.txt": "joints.txt", "points.txt": "points.txt"}, _matrices),
+    "poses": Reader({"poses.csv": "poses.csv"}, lambda folder: read_poses(folder / "poses.csv")),
+    "drawn-circle": Reader(
+        {"page.csv": "page.csv", "page.png": "page.png"},
+        lambda folder: _dataset(
+            read_drawn_circles({"a": Page(folder / "page.png", folder / "page.csv")}, 300.0, 2e-5), folder
+        ),
+    ),
+    "hexapod-sheet": Reader(
+        {"sheet.csv": "sheet.csv"}, lambda folder: _dataset(read_sheet(folder / "sheet.csv").dataset(), folder)
+    ),
+    "hexapod-touches": Reader(
+        {"touches.csv": "touches.csv"}, lambda folder: read_touches(folder / "touches.csv", of_library("irb120"))
+    ),
+    "robot-new": _robot_file("robot.yaml"),
+    "robot-irb120": _robot_file("irb120.yaml"),
+    "robot-kr5": _robot_file("kr5.yaml"),
+    "robot-calibrated": _robot_file("calibrated.yaml"),
+    "robot-joint-errors": _robot_file("joint-errors.yaml"),
+    "urdf": _robot_file("arm.urdf"),
+    "dh": _dh_table("dh.csv", "standard-dh"),
+    "mdh": _dh_table("mdh.csv", "modified-dh"),
+    "hayati": _dh_table("hayati.csv", "hayati"),
+    "bounds": Reader({"bounds.yaml": "bounds.yaml"}, lambda folder: read_bounds(folder / "bounds.yaml")),
+    "constraints": Reader({"limits.yaml": "constraints.yaml"}, lambda folder: read_constraints(folder / "limits.yaml")),
+    "tools": Reader({"cell.yaml": "cell.yaml"}, lambda folder: read_tools(of_library("irb120"), folder / "cell.yaml")),
+    "frames": Reader(
+        {"cell.yaml": "cell.yaml"}, lambda folder: read_frames(of_library("irb120"), folder / "cell.yaml")
+    ),
+    "rapid": _programs("rapid", "polish.mod"),
+    "rapid-cell": _programs("rapid/cell", "MainModule.mod", "Data.sys"),
+    "krl": _programs("krl", "milling.src"),
+    "krl-cell": _programs("krl/cell", "cell.src", "cell.dat", "$config.dat"),
+    "fanuc": _programs("fanuc_ls", "bracket.ls"),
+    "fanuc-seam": _programs("fanuc_ls", "seam.ls", "wipe.ls"),
+    "urscript": _programs("urscript", "milling.script"),
+    "urscript-pallet": _programs("urscript", "palletizing.script", "handling.urscript"),
+    "jbi": _programs("jbi", "weld.jbi"),
+    "jbi-cell": _programs("jbi/cell", "main.jbi", "track.jbi"),
+    "val3": _programs("val3/cell", "cell.pjx", "cell.dtx", "start.pgx", "pick.pgx"),
+    "val3-points": _programs("val3", "points.dtx"),
+    "record": Reader({name: name for name in ("done.mod", "done.mod.truearm.json")}, _record),
+}

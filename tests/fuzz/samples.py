@@ -1,0 +1,103 @@
+"""Sound files of every kind that truearm reads, small: what is damaged."""
+
+from __future__ import annotations
+
+import tempfile
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+from tests.jobs.examples import EXAMPLES
+from tests.measurement.test_fixture_rows import MIXED
+from tests.measurement.test_table import JOINTS, POINTS, SPATIAL
+
+import truearm
+from truearm.library import load_robot
+from truearm.measurement.hexapod.geometry import triangle
+from truearm.measurement.hexapod.poses import poses
+from truearm.measurement.hexapod.sheet import PlannedRow, sheet_csv
+from truearm.modeling.parts import Joint
+from truearm.simulation.hexapod.simulated import ballbar, measured_legs, measured_sides
+
+PROGRAMS = Path(__file__).parents[1] / "compensation" / "programs" / "samples"
+
+BOUNDS = """\
+truearm: truearm-bounds/1
+units: {length: mm, angle: deg}
+within: {theta_offset: 2, d: 5, a_3: 0.05}
+between: {alpha_4: [-90.2, -89.8]}
+"""
+CONSTRAINTS = """\
+truearm: truearm-constraints/1
+units: {length: mm, angle: deg}
+limits: {1: [-90, 90]}
+moments: {2: positive}
+box: {of: targets, x: [0, 900]}
+floor: 50
+visibility:
+  within: 60
+  instrument: [2500, 0, 500]
+  targets: {"1": [0, 0, 1]}
+clearance: 60
+"""
+
+
+@cache
+def folder() -> Path:
+    """Return a folder with all of them, made once."""
+    place = Path(tempfile.mkdtemp(prefix="truearm-fuzz-"))
+    for job in ("calibrate", "import_table", "import_matrices", "import_circle", "tolerance", "compensate", "revert"):
+        EXAMPLES[job](place)
+    _rename(place, {"result/calibrated.yaml": "calibrated.yaml", "axes/joint-errors.yaml": "joint-errors.yaml"})
+    _rename(place, {"corrected/plate.mod": "done.mod", "corrected/plate.mod.truearm.json": "done.mod.truearm.json"})
+    for name in ("irb120", "kr5"):
+        (place / f"{name}.yaml").write_text((files("truearm.library") / f"{name}.yaml").read_text())
+    truearm.new_robot(place / "robot.yaml")
+    for form, name in (("urdf", "arm.urdf"), ("dh", "dh.csv"), ("mdh", "mdh.csv"), ("hayati", "hayati.csv")):
+        truearm.export("puma560" if form == "mdh" else "irb1600" if form == "dh" else "irb120", form, out=place / name)
+    at = load_robot("irb120").forward_kinematics(np.radians([[10.0, 20.0, -30.0, 40.0, 50.0, 60.0]]))
+    numbers = ",".join(f"{v:.9g}" for v in (*(at.position[:, 0] * 1e3), 0.5, 0.5, 0.5, 0.5))
+    texts = {
+        "poses.csv": f"pose,x [mm],y [mm],z [mm],qw,qx,qy,qz\na,{numbers}\nb,{numbers}\n",
+        "fixtures.csv": MIXED,
+        "points.csv": POINTS,
+        "spatial.yaml": SPATIAL,
+        "joints.csv": JOINTS,
+        "bounds.yaml": BOUNDS,
+        "constraints.yaml": CONSTRAINTS,
+        "sheet.csv": _sheet(),
+        "touches.csv": _touches(),
+    }
+    for name, text in texts.items():
+        (place / name).write_text(text)
+    return place
+
+
+@cache
+def content(name: str) -> bytes:
+    """Return what a sample holds, or a program of the samples (``rapid/polish.mod``)."""
+    path = PROGRAMS / name if "/" in name else folder() / name
+    return path.read_bytes()
+
+
+def _rename(place: Path, names: dict[str, str]) -> None:
+    for old, new in names.items():
+        (place / new).write_bytes((place / old).read_bytes())
+
+
+def _sheet() -> str:
+    found, bar, base = poses(), ballbar(np.random.default_rng(0)), triangle([0.3] * 3, "B")
+    rows, lengths = [], []
+    for label, number in (("a", 5), ("b", 40), ("c", 66)):
+        pose = found[number - 1]
+        rows.append(PlannedRow(label, "front-up-flip", number, pose.design, pose.solution, np.full(6, 0.1)))
+        lengths.append(measured_legs(bar, pose.design, base, pose.cups))
+    lengths[0] |= measured_sides(bar, base, "B") | measured_sides(bar, found[0].cups, "T")
+    return sheet_csv(rows, [Joint(f"axis_{n}", "revolute", {}) for n in range(1, 7)], lengths)
+
+
+def _touches() -> str:
+    joints = np.degrees(EXAMPLES["hexapod_world_frame"](Path())["touches"])
+    rows = [f"{cup},{','.join(f'{v:.6f}' for v in row)}" for cup, row in zip(("B1", "B2", "B3"), joints, strict=True)]
+    return "\n".join([f"cup,{','.join(f'joint_{n} [deg]' for n in range(1, 7))}", *rows]) + "\n"

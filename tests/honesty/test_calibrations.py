@@ -1,0 +1,174 @@
+"""Figures of a calibration hold, or the page says why they may not."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import pytest
+from tests.honesty.telling import Told, told, written
+from tests.simulated import campaign, more_of
+
+import truearm
+from truearm.library import load_robot
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.statistics import errors_of
+from truearm.modeling.transform import IDENTITY
+from truearm.simulation.truths import truth_twin
+from truearm.simulation.twin import Twin, measure
+
+NOISE: Final = 2e-5
+#: Middle of the joints in a narrow campaign [deg].
+MIDDLE: Final = (10.0, 20.0, 10.0, 20.0, 40.0, 10.0)
+
+
+@cache
+def made(half_width: float | None) -> tuple[Twin, Dataset]:
+    """Return a robot and its readings, over its limits or so many degrees about the middle."""
+    twin, full = campaign("irb120", 60, NOISE, 11)
+    if half_width is None:
+        return twin, full
+    rng = np.random.default_rng(11)
+    joints = np.radians(np.array(MIDDLE) + rng.uniform(-half_width, half_width, (60, 6)))
+    return twin, measure(twin, joints, NOISE, rng)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("calibrations")
+
+
+@cache
+def calibrated(half_width: float | None, folder: Path) -> Told:
+    """Return what calibration says; its folder is named after the width."""
+    file = written(folder, made(half_width)[1], f"{half_width}.csv")
+    return told("calibrate", "irb120", file, "--out", folder / str(half_width))
+
+
+def true_error(half_width: float | None, folder: Path) -> float:
+    """Return the mean error of the calibrated robot over all it can reach [mm]."""
+    calibrated(half_width, folder)
+    robot = truearm.load_robot(folder / str(half_width) / "calibrated.yaml")
+    position = errors_of(robot, more_of(made(half_width)[0], 300, 0.0, 99)).position
+    assert position is not None
+    return position.mean * 1e3
+
+
+@pytest.mark.parametrize("half_width", [1.0, 5.0])
+def test_a_narrow_campaign_says_so(half_width: float, folder: Path) -> None:
+    found = calibrated(half_width, folder)
+    held_out = found.summary["validation"]["position_mm"]["mean"]
+    assert true_error(half_width, folder) > 3.0 * held_out
+    assert found.says("narrow-data", "error", "joint|axis"), found
+    assert found.code == 3
+    low, high = found.summary["expected_mm"]["interval_90"]
+    assert 0.5 * low < true_error(half_width, folder) < 2.0 * high
+
+
+def test_a_campaign_over_the_workspace_does_not(folder: Path) -> None:
+    found = calibrated(None, folder)
+    assert (found.code, found.levels) == (0, {})
+    low, high = found.summary["expected_mm"]["interval_90"]
+    assert low < true_error(None, folder) < high
+
+
+def test_another_robot_is_not_this_one(folder: Path) -> None:
+    file = written(folder, made(None)[1])
+    found = told("calibrate", "lrmate200ic", file, "--out", folder / "lrmate")
+    assert found.code == 3
+    assert found.summary["status"] == "implausible"
+    assert found.says("implausible", "error", "Check that it is this robot")
+
+
+def test_three_configurations_determine_no_robot(folder: Path) -> None:
+    file = written(folder, made(None)[1])
+    found = told("calibrate", "irb120", file, "--train", 3, "--out", folder / "three")
+    assert found.code == 3
+    assert found.says("rank-loss", "error")
+
+
+# -- intervals -------------------------------------------------------------------------------------------------
+
+
+def of_many_targets(seed: int, repeatability: float, decimals: int | None = None) -> tuple[Twin, Dataset]:
+    """Return a robot with ten targets, whose joints stop beside their readings, by chance or by rounding [deg]."""
+    rng = np.random.default_rng(seed)
+    targets = {str(n): tuple(rng.uniform(0.0, 0.2, 3).tolist()) for n in range(10)}
+    nominal = load_robot("irb120").with_frames(IDENTITY, targets)
+    twin = truth_twin(nominal, "random", rng)
+    joints = nominal.random_configurations(40, rng)
+    read = joints if decimals is None else np.radians(np.degrees(joints).round(decimals))
+    data = measure(twin, joints + np.radians(repeatability) * rng.standard_normal(joints.shape), NOISE, rng)
+    return twin, replace(data, joints=read, sigma=None)
+
+
+@pytest.mark.parametrize("repeatability", [0.0, 0.02])
+def test_intervals_hold_where_targets_share_the_error_of_the_joints(repeatability: float) -> None:
+    off, found = [], []
+    for seed in range(3):
+        twin, data = of_many_targets(seed, repeatability)
+        calibration = truearm.calibrate("irb120", data, train="all")
+        found += np.degrees(calibration.fit.joint_error).tolist()
+        for name in calibration.fit.free.names:
+            p = calibration.robot.parameters[name]
+            if p.group in ("geometry", "joint zero") and p.deviation and (p.informed or 0.0) >= 0.5:
+                off.append(abs(p.value - twin.robot.values[name]) / p.deviation)
+    assert len(off) > 40
+    assert np.mean(np.array(off) < 1.96) > 0.85
+    assert np.mean(found) == pytest.approx(repeatability, abs=0.004)
+
+
+def test_joints_with_one_decimal_are_as_uncertain_as_that() -> None:
+    _, data = of_many_targets(5, 0.0, 1)
+    calibration = truearm.calibrate("irb120", data)
+    assert np.degrees(calibration.fit.joint_error) == pytest.approx(np.full(6, 0.1 / np.sqrt(12.0)), rel=0.3)
+    assert "errors of the joints of 0.0" in "\n".join(calibration.lines())
+
+
+# -- validation ------------------------------------------------------------------------------------------------
+
+
+def test_training_data_prove_nothing(folder: Path) -> None:
+    calibrated(None, folder)
+    robot = folder / "None" / "calibrated.yaml"
+    assert told("validate", robot, folder / "None.csv").says("training-data", "warning")
+    fresh = told("validate", robot, written(folder, more_of(made(None)[0], 10, NOISE, 5), "fresh.csv"))
+    assert (fresh.code, fresh.levels) == (0, {})
+
+
+def test_a_second_calibration_with_the_same_data_proves_nothing(folder: Path) -> None:
+    calibrated(None, folder)
+    robot = folder / "None" / "calibrated.yaml"
+    again = told("calibrate", robot, folder / "None.csv", "--seed", 1, "--out", folder / "again")
+    assert again.says("training-data", "warning", "held.out"), again
+    fresh = written(folder, more_of(made(None)[0], 30, NOISE, 6), "later.csv")
+    assert "training-data" not in told("calibrate", robot, fresh, "--out", folder / "later").levels
+
+
+def test_targets_that_took_other_names(folder: Path) -> None:
+    calibrated(None, folder)
+    fresh = more_of(made(None)[0], 10, NOISE, 5)
+    renamed = replace(fresh, targets=(fresh.targets[1], fresh.targets[0], *fresh.targets[2:]))
+    found = told("validate", folder / "None" / "calibrated.yaml", written(folder, renamed, "renamed.csv"))
+    assert found.says("targets-renamed", "error"), found
+    assert found.code == 3
+
+
+# -- folders ---------------------------------------------------------------------------------------------------
+
+
+def test_a_folder_of_two_results_says_so(folder: Path, tmp_path: Path) -> None:
+    calibrated(None, folder)
+    calibrated(5.0, folder)
+    mixed = tmp_path / "mixed"
+    shutil.copytree(folder / "None", mixed)
+    data = written(tmp_path, more_of(made(None)[0], 4, NOISE, 5))
+    assert "changed-since-written" not in told("validate", mixed / "calibrated.yaml", data).levels
+    shutil.copy(folder / "5.0" / "calibrated.yaml", mixed)
+    assert told("validate", mixed / "calibrated.yaml", data).says("changed-since-written", "warning", "result.json")
+    shutil.copy(mixed / "calibrated.yaml", tmp_path)
+    assert "changed-since-written" not in told("validate", tmp_path / "calibrated.yaml", data).levels

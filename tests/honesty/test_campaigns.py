@@ -1,0 +1,253 @@
+"""What careless hands do to a campaign is told, by a name that helps; the same campaign without it is not doubted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import pytest
+from tests.honesty.telling import Told, told, written
+from tests.simulated import campaign
+
+from truearm.measurement.dataset import Dataset
+from truearm.modeling.chain import Array
+from truearm.simulation.twin import Twin, measure
+
+CONFIGURATIONS: Final = 30
+HALF: Final = CONFIGURATIONS // 2
+NOISE: Final = 2e-5
+
+Change = Callable[[Dataset], Dataset]
+
+
+@cache
+def honest() -> tuple[Twin, Dataset]:
+    """Return a robot, three targets on it, and what a tracker read of them."""
+    return campaign("irb120", CONFIGURATIONS, NOISE, 3)
+
+
+def as_it_is(data: Dataset) -> Dataset:
+    return data
+
+
+@dataclass(frozen=True)
+class Lie:
+    """Something that went wrong with a campaign.
+
+    Attributes
+    ----------
+    change
+        Does it to honest data.
+    command
+        The command that has to tell, ``check`` or ``calibrate``.
+    code, level, words
+        Of the notice.
+    ends
+        Exit code.
+    twin
+        What makes the honest data like it: a column that is right here and wrong there.
+    """
+
+    change: Change
+    command: str
+    code: str
+    level: str
+    words: str = ""
+    ends: int = 0
+    twin: Change = as_it_is
+
+
+def with_positions(change: Callable[[Array, Dataset], Array]) -> Change:
+    return lambda data: replace(data, position=change(data.position.copy(), data))
+
+
+def with_joints(change: Callable[[Array], Array]) -> Change:
+    return lambda data: replace(data, joints=change(data.joints.copy()), approach=None, number=None)
+
+
+def with_sigma(sigma: float) -> Change:
+    return lambda data: replace(data, sigma=np.full(len(data.target), sigma))
+
+
+def with_temperature(value: float) -> Change:
+    return lambda data: replace(data, temperature=value + np.linspace(0.0, 2.0, data.configurations))
+
+
+def late(data: Dataset) -> Array:
+    """Return which readings are of the second half, as a column of 0 and 1."""
+    return np.asarray(data.configuration >= HALF, dtype=float)[:, None]
+
+
+def of_one_target(factor: float) -> Change:
+    return with_positions(lambda p, data: np.where((data.target == 1)[:, None], p * factor, p))
+
+
+def pasted_readings(p: Array, data: Dataset) -> Array:
+    """Copy the readings of five configurations over those of five others."""
+    p[np.isin(data.configuration, range(10, 15))] = p[np.isin(data.configuration, range(5))]
+    return p
+
+
+def stuck(p: Array, data: Dataset) -> Array:
+    """Repeat the readings of one configuration at the next five."""
+    p[np.isin(data.configuration, range(10, 15))] = np.tile(p[data.configuration == 9], (5, 1))
+    return p
+
+
+def pasted_joints(q: Array) -> Array:
+    q[10:15] = q[:5]
+    return q
+
+
+def two_robots(data: Dataset) -> Dataset:
+    """Return data whose second half is of another robot of that make."""
+    other, _ = campaign("irb120", 2, NOISE, 4)
+    theirs = measure(other, data.joints, NOISE, np.random.default_rng(1))
+    return replace(data, position=np.where(late(data) > 0, theirs.position, data.position))
+
+
+def names_exchanged(data: Dataset) -> Dataset:
+    """Exchange the names of two targets in the second half."""
+    mixed = np.where(late(data)[:, 0] > 0, np.array([1, 0, 2])[data.target], data.target)
+    return replace(data, target=np.asarray(mixed, dtype=np.intp))
+
+
+def each_twice(data: Dataset, *, own_readings: bool) -> Dataset:
+    """Return data in which every configuration stands twice, read anew or copied with fewer digits."""
+    twin, _ = honest()
+    again = measure(twin, data.joints, NOISE, np.random.default_rng(7)).position if own_readings else data.position
+    return Dataset.of(
+        np.concatenate([data.joints, data.joints]),
+        np.concatenate([data.position, again.round(6)]).reshape(-1, len(data.targets), 3),
+        sigma=NOISE,
+        source="twice",
+    )
+
+
+def lagging(q: Array) -> Array:
+    """Return joint positions of a moment before: two per cent of the way is still to go."""
+    return np.concatenate([q[:1], q[1:] - 0.02 * np.diff(q, axis=0)])
+
+
+def as_thousands(p: Array, _: Dataset) -> Array:
+    """Return lengths whose decimal comma was dropped: 1234,5 mm became 12345."""
+    return np.array([int(f"{v * 1e3:.3f}".replace(".", "").rstrip("0") or "0") * 1e-3 for v in p.flat]).reshape(p.shape)
+
+
+#: The lies of data, each under the name that a metrologist would give it.
+LIES: Final[dict[str, Lie]] = {
+    # units
+    "millimetres-called-metres": Lie(
+        with_positions(lambda p, _: p * 1e3), "calibrate", "implausible", "error", "unit-length", 3
+    ),
+    "one-target-in-inches": Lie(of_one_target(1 / 25.4), "check", "unit-length", "error", "Target 2", 3),
+    "one-column-in-micrometres": Lie(
+        with_positions(lambda p, _: p * [1.0, 1.0, 1e3]), "check", "unit-length", "error", "column z", 3
+    ),
+    "decimal-commas-dropped": Lie(with_positions(as_thousands), "check", "unit-length", "error", "decimal", 3),
+    "degrees-called-radians": Lie(with_joints(np.degrees), "check", "unit-angle", "error", "", 3),
+    "temperature-in-kelvin": Lie(
+        with_temperature(294.0), "check", "temperature-unlikely", "warning", "kelvin", 0, with_temperature(21.0)
+    ),
+    # deviations
+    "micrometres-called-millimetres-in-sigma": Lie(
+        with_sigma(20e-3), "calibrate", "sigma-too-large", "error", "", 3, with_sigma(NOISE)
+    ),
+    "three-sigma-called-sigma": Lie(
+        with_sigma(3 * NOISE), "calibrate", "sigma-too-large", "warning", "", 0, with_sigma(NOISE)
+    ),
+    "a-third-of-sigma": Lie(
+        with_sigma(NOISE / 3), "calibrate", "residuals-exceed-sigma", "warning", "", 0, with_sigma(NOISE)
+    ),
+    # axes and signs
+    "left-handed-instrument": Lie(with_positions(lambda p, _: p * [1, -1, 1]), "check", "mirrored", "error", "", 3),
+    "columns-x-and-y-exchanged": Lie(with_positions(lambda p, _: p[:, [1, 0, 2]]), "check", "mirrored", "error", "", 3),
+    "sign-of-joint-6": Lie(
+        with_joints(lambda q: q * [1, 1, 1, 1, 1, -1]), "check", "joint-sign", "error", "joint 6", 3
+    ),
+    "sign-of-joint-2": Lie(
+        with_joints(lambda q: q * [1, -1, 1, 1, 1, 1]), "check", "joint-sign", "error", "joint 2", 3
+    ),
+    "joints-4-and-6-exchanged": Lie(
+        with_joints(lambda q: q[:, [0, 1, 2, 5, 4, 3]]), "check", "joint-sign", "error", "4 and 6", 3
+    ),
+    "joint-3-counted-from-joint-2": Lie(
+        with_joints(lambda q: q + q[:, 1:2] * np.eye(6)[2]), "check", "implausible", "error", "", 3
+    ),
+    # rows
+    "joints-shifted-by-a-row": Lie(
+        with_joints(lambda q: np.roll(q, 1, axis=0)), "check", "rows-shifted", "error", "", 3
+    ),
+    "one-joint-shifted-by-a-row": Lie(
+        with_joints(lambda q: np.column_stack([q[:, :2], np.roll(q[:, 2], 1), q[:, 3:]])),
+        "check",
+        "implausible",
+        "error",
+        "",
+        3,
+    ),
+    "joints-sorted": Lie(with_joints(lambda q: q[np.argsort(q[:, 0])]), "check", "rows-unrelated", "error", "", 3),
+    "joints-of-a-moment-before": Lie(with_joints(lagging), "calibrate", "joints-not-settled", "warning", "", 3),
+    "block-of-readings-pasted": Lie(with_positions(pasted_readings), "check", "joints-mistaken", "warning", "11 "),
+    "block-of-joints-pasted": Lie(with_joints(pasted_joints), "check", "joints-repeated", "warning", "11 "),
+    "instrument-stuck": Lie(with_positions(stuck), "check", "duplicates", "warning", "11"),
+    "each-configuration-read-twice": Lie(
+        lambda data: each_twice(data, own_readings=True),
+        "calibrate",
+        "held-out-seen",
+        "warning",
+        "same joint positions",
+    ),
+    "copies-with-fewer-digits": Lie(
+        lambda data: each_twice(data, own_readings=False), "calibrate", "held-out-seen", "warning", ""
+    ),
+    # half-way
+    "instrument-moved": Lie(
+        with_positions(lambda p, data: p + late(data) * [2e-3, 0.0, 0.0]),
+        "calibrate",
+        "instrument-moved",
+        "error",
+        rf"\b{HALF + 1}\b",
+        3,
+    ),
+    "probe-bent": Lie(
+        with_positions(lambda p, data: p + late(data) * (data.target == 1)[:, None] * [0.0, 0.0, 3e-3]),
+        "check",
+        "outliers",
+        "warning",
+        "/2",
+    ),
+    "targets-exchanged": Lie(names_exchanged, "check", "implausible", "error", "targets", 3),
+    "another-robot": Lie(two_robots, "calibrate", "residuals-exceed-sigma", "warning", "times"),
+}
+
+
+@cache
+def said(command: str, data: Change, folder: Path) -> Told:
+    file = written(folder, data(honest()[1]))
+    return told("check", "irb120", file) if command == "check" else told("calibrate", "irb120", file, "--out", folder)
+
+
+@pytest.mark.parametrize("lie", LIES)
+def test_it_is_told(lie: str, tmp_path: Path) -> None:
+    case = LIES[lie]
+    found = said(case.command, case.change, tmp_path)
+    assert found.says(case.code, case.level, case.words), found
+    assert found.code == case.ends, found
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("honest")
+
+
+@pytest.mark.parametrize("lie", LIES)
+def test_the_honest_twin_is_not_doubted(lie: str, folder: Path) -> None:
+    case = LIES[lie]
+    found = said(case.command, case.twin, folder)
+    assert case.code not in found.levels, found
+    assert found.code == 0, found

@@ -1,0 +1,287 @@
+"""The error to expect over the workspace: closed forms, true errors of simulated robots, and the notice it raises."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.simulated import campaign
+
+from truearm.identification.judging.expected_error import as_residuals_allow, expected_error, expected_map
+from truearm.identification.solving.fit import Fit, Status, identify
+from truearm.identification.solving.models import FRAMES, MODELS, Model
+from truearm.jobs.calibrate import calibrate
+from truearm.library import load_robot
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.statistics import errors_of
+from truearm.modeling.robot import Robot
+from truearm.results.calibration import Calibration
+from truearm.simulation.devices import measured_with, named_device
+from truearm.simulation.truths import truth_twin
+from truearm.simulation.twin import Twin, measure
+
+MODEL: Mapping[str, Model] = {m.name: m for m in (FRAMES, *MODELS)}
+IRB120 = load_robot("irb120")
+ARM = """truearm: truearm-robot/1
+name: arm
+units: {length: mm, angle: deg}
+convention: standard-dh
+joints:
+  - {name: turn, a: 500, alpha: 0, d: 0, theta_offset: 0}
+tools: {tip: {targets: {tip: [0, 0, 0]}}}
+"""
+SLIDE = ARM.replace(
+    "{name: turn, a: 500, alpha: 0, d: 0, theta_offset: 0}",
+    "{name: slide, type: prismatic, limits: [0, 800], a: 0, alpha: 0, d: 0, theta_offset: 0}",
+)
+
+
+def fitted(text: str, folder: Path) -> Fit:
+    """Return the fit of an arm of one joint whose parameters are known exactly."""
+    path = folder / "arm.yaml"
+    path.write_text(text)
+    robot = load_robot(path)
+    rng = np.random.default_rng(0)
+    data = measure(truth_twin(robot, "nominal", rng), robot.random_configurations(20, rng), 1e-5, rng)
+    fit = identify(robot, data, MODEL["geometric"])
+    return replace(fit, covariance=np.zeros_like(fit.covariance), declared=True)
+
+
+def uncertain(fit: Fit, **deviations: float) -> Fit:
+    """Return a fit that knows some parameters only to so much [SI]."""
+    return replace(fit, covariance=np.diag([deviations.get(name, 0.0) ** 2 for name in fit.free.names]))
+
+
+def test_a_turn_of_one_joint_moves_its_target_by_the_arm(tmp_path: Path) -> None:
+    found = expected_error(uncertain(fitted(ARM, tmp_path), theta_offset_1=1e-4)).overall
+    assert found.mean == pytest.approx(0.5e-4 * np.sqrt(2 / np.pi), rel=0.1)
+    assert found.interval_90[0] == pytest.approx(0.5e-4 * 0.0627, rel=0.4)
+    assert found.interval_90[1] == pytest.approx(0.5e-4 * 1.960, rel=0.15)
+    assert found.p95 == pytest.approx(found.mean, rel=1e-3)
+
+
+def test_a_place_known_alike_in_all_directions(tmp_path: Path) -> None:
+    found = expected_error(uncertain(fitted(ARM, tmp_path), base_x=1e-4, base_y=1e-4, base_z=1e-4)).overall
+    assert found.mean == pytest.approx(1e-4 * np.sqrt(8 / np.pi), rel=0.1)
+    np.testing.assert_allclose(found.interval_90, [0.593e-4, 2.795e-4], rtol=0.2)
+
+
+def test_a_sliding_joint(tmp_path: Path) -> None:
+    fit = fitted(SLIDE, tmp_path)
+    found = expected_error(uncertain(fit, d_1=1e-4)).overall
+    assert found.mean == pytest.approx(1e-4 * np.sqrt(2 / np.pi), rel=0.1)
+
+
+def test_large_angles_go_round_instead_of_straight_on(tmp_path: Path) -> None:
+    found = expected_error(uncertain(fitted(ARM, tmp_path), theta_offset_1=1.0)).overall
+    angles = np.random.default_rng(1).standard_normal(100_000)
+    assert found.mean == pytest.approx(float(np.mean(np.abs(np.sin(angles / 2)))), rel=0.1)
+    assert found.interval_90[1] <= 1.0
+
+
+def test_an_error_of_every_arrival_is_in_the_error_to_expect_and_makes_it_a_lower_bound(tmp_path: Path) -> None:
+    found = expected_error(replace(fitted(ARM, tmp_path), joint_error=np.array([1e-4])))
+    assert found.remainder == pytest.approx(0.5e-4, rel=1e-3)
+    assert found.overall.mean == pytest.approx(0.5e-4 * np.sqrt(2 / np.pi), rel=0.02)
+    assert found.overall.p95 == pytest.approx(0.5e-4 * 1.960, rel=0.05)
+    low, high = found.overall.interval_90
+    assert found.overall.mean * 0.85 < low < high < found.overall.mean * 1.15
+    assert found.lower_bound
+    assert "the model cannot express" in found.omissions[0]
+
+
+def test_joint_errors_count_as_far_as_the_residuals_allow() -> None:
+    """Errors of an arrival in all joints, found ten times too large."""
+    twin, data = campaign("irb120", 40, 0.02e-3, 1)
+    rng = np.random.default_rng(0)
+    repeatability = np.radians(0.01)
+    jogged = measure(twin, data.joints + repeatability * rng.standard_normal(data.joints.shape), 0.02e-3, rng)
+    data = replace(data, position=jogged.position)
+    fit = identify(IRB120, data, MODEL["geometric"])
+    true = replace(fit, joint_error=np.full(6, repeatability), sigma={"position": 0.02e-3})
+    np.testing.assert_allclose(as_residuals_allow(true, data).joint_error, repeatability, rtol=0.25)
+    large = replace(true, joint_error=10 * true.joint_error)
+    np.testing.assert_allclose(as_residuals_allow(large, data).joint_error, repeatability, rtol=0.35)
+    assert not as_residuals_allow(replace(large, sigma={"position": 1.0}), data).joint_error.any()
+
+
+def test_noise_that_was_estimated_widens_the_interval(tmp_path: Path) -> None:
+    fit = uncertain(fitted(ARM, tmp_path), base_x=1e-4, base_y=1e-4, base_z=1e-4)
+    few = replace(fit, declared=False, weight=fit.weight[:4])
+    known, estimated = (expected_error(f).overall.interval_90 for f in (fit, few))
+    assert estimated[1] > 1.05 * known[1]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"status": Status.NOT_CONVERGED}, "did not converge"),
+        ({"model": FRAMES}, "geometry counts as exact"),
+        ({"at_bound": ("a_1",)}, "values at a bound"),
+        ({"excess": 2.0}, "the model cannot express"),
+    ],
+)
+def test_what_makes_it_a_lower_bound(change: dict[str, object], words: str, tmp_path: Path) -> None:
+    fit = uncertain(fitted(ARM, tmp_path), base_x=1e-4)
+    assert not expected_error(fit).lower_bound
+    (omission,) = expected_error(replace(fit, **change)).omissions  # type: ignore[arg-type]
+    assert words in omission
+
+
+def test_what_cannot_be_this_robot_is_no_more_than_a_lower_bound() -> None:
+    _, data = campaign("irb120", 30, 0.02e-3, 1)
+    found = calibrate(IRB120, replace(data, position=data.position * 1e3))
+    assert found.status is Status.IMPLAUSIBLE
+    assert "what was fitted cannot be this robot" in found.expected.omissions
+    assert "narrow-data" not in {n.code for n in found.warnings}
+
+
+def narrowed(degrees: float) -> Robot:
+    """Return an IRB 120 that stays within so much of one posture."""
+    centre = np.array([10.0, 20.0, 10.0, 20.0, 40.0, 10.0])
+    limits = np.radians([centre - degrees, centre + degrees]).T
+    joints = zip(IRB120.joints, limits.tolist(), strict=True)
+    return replace(IRB120, joints=tuple(replace(joint, limits=tuple(pair)) for joint, pair in joints))
+
+
+@cache
+def read_narrowly(degrees: float, seed: int) -> tuple[Twin, Dataset]:
+    rng = np.random.default_rng(seed)
+    twin = truth_twin(IRB120, "random", rng)
+    return twin, measure(twin, narrowed(degrees).random_configurations(60, rng), 0.02e-3, rng)
+
+
+def true_error(fit: Fit, twin: Twin) -> float:
+    rng = np.random.default_rng(99)
+    position = errors_of(fit.robot, measure(twin, IRB120.random_configurations(100, rng), 0.0, rng)).position
+    assert position is not None
+    return position.mean
+
+
+@pytest.mark.parametrize("degrees", [5.0, 40.0])
+def test_true_errors_are_as_expected(degrees: float) -> None:
+    ratios, inside = [], []
+    for seed in range(10):
+        twin, data = read_narrowly(degrees, seed)
+        fit = identify(IRB120, data, MODEL["geometric"])
+        found, true = expected_error(fit).overall, true_error(fit, twin)
+        ratios.append(true / found.mean)
+        inside.append(found.interval_90[0] <= true <= found.interval_90[1])
+    assert 0.7 < np.median(ratios) < 1.4
+    assert np.mean(inside) >= 0.7
+
+
+def test_parameters_that_were_held_are_uncertain_too() -> None:
+    ratios = []
+    for seed in range(4):
+        twin, data = read_narrowly(5.0, seed)
+        fit = identify(IRB120, data, MODEL["geometric"], redundancy="drop")
+        ratios.append(true_error(fit, twin) / expected_error(fit).overall.mean)
+    assert 0.4 < np.median(ratios) < 2.5
+
+
+def test_each_target_has_its_own_figures_and_all_are_in_the_overall_one() -> None:
+    _, data = read_narrowly(40.0, 0)
+    found = expected_error(identify(IRB120, data, MODEL["geometric"]))
+    assert list(found.targets) == ["1", "2", "3"]
+    assert np.mean([target.mean for target in found.targets.values()]) == pytest.approx(found.overall.mean)
+    assert found.frame == "the instrument's frame"
+    assert found.overall.interval_90[0] < found.overall.mean < min(found.overall.interval_90[1], found.overall.p95)
+
+
+def test_a_map_is_dark_where_nothing_was_measured() -> None:
+    _, data = read_narrowly(15.0, 0)
+    fit = identify(IRB120, data, MODEL["geometric"])
+    places, error = expected_map(fit, 900)
+    assert places.shape == (900, 3)
+    assert error.shape == (900,)
+    measured = fit.robot.forward(data.joints, target="2")[0].mean(axis=0)
+    near = np.argsort(np.linalg.norm(places - measured, axis=1))
+    assert error[near[:50]].mean() < 0.8 * error[near[-200:]].mean()
+
+
+def calibrated(degrees: float | None, train: str | None = None) -> Calibration:
+    data = read_narrowly(degrees, 3)[1] if degrees else campaign("irb120", 60, 0.02e-3, 3)[1]
+    return calibrate(IRB120, data, train=train)  # type: ignore[arg-type]
+
+
+def test_narrow_data_are_an_error_that_names_the_joints() -> None:
+    found = calibrated(5.0)
+    (notice,) = (n for n in found.warnings if n.code == "narrow-data")
+    assert notice.level == "error"
+    assert not found.finished
+    assert found.status is Status.CONVERGED
+    assert "where the held-out error is 0.03" in notice.message
+    for joint in IRB120.joints:
+        assert f"{joint.name} (measured " in notice.message
+    assert "axis_2 (measured 16 to 24 deg, limits -110 to 110)" in notice.message
+
+
+def test_narrow_data_without_a_held_out_part_are_held_against_the_training_error() -> None:
+    (notice,) = (n for n in calibrated(5.0, "all").warnings if n.code == "narrow-data")
+    assert "where the training error is 0.0" in notice.message
+
+
+def test_less_narrow_data_are_a_warning() -> None:
+    rng = np.random.default_rng(3)
+    twin = truth_twin(IRB120, "random", rng)
+    one = replace(twin, robot=twin.robot.with_frames(twin.robot.base, {"1": (0.0, 0.0, 0.125)}))
+    data = measure(one, narrowed(40.0).random_configurations(60, rng), 0.02e-3, rng)
+    found = calibrate(IRB120, data)
+    (notice,) = (n for n in found.warnings if n.code == "narrow-data")
+    assert notice.level == "warning"
+    assert found.finished
+
+
+def test_data_of_one_orientation_name_a_region() -> None:
+    """All joints move over half of their limits, but always so that the targets look the same way."""
+    rng = np.random.default_rng(3)
+    twin = truth_twin(IRB120, "random", rng)
+    q = IRB120.random_configurations(10_000, rng)
+    places, turned = IRB120.forward(q)
+    near = np.argsort(-np.einsum("nij,ij->n", turned, turned[0]))[:80]
+    alike = IRB120.inverse(places[near], np.repeat(turned[:1], len(near), axis=0), seed=q[near]).joints
+    alike = alike[np.isfinite(alike).all(axis=1)][:60]
+    assert (np.ptp(alike, axis=0) > 0.5 * np.minimum(2 * np.pi, [np.ptp(j.range) for j in IRB120.joints])).all()
+    found = calibrate(IRB120, measure(twin, alike, 0.02e-3, rng))
+    (notice,) = (n for n in found.warnings if n.code == "narrow-data")
+    assert "also with targets about" in notice.message
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_data_of_the_whole_workspace_are_not_called_narrow(seed: int) -> None:
+    found = calibrate(IRB120, campaign("irb120", 60, 0.02e-3, seed)[1])
+    assert "narrow-data" not in {n.code for n in found.warnings}
+    assert found.validation is not None
+    assert found.validation.position is not None
+    assert found.expected.overall.mean < found.validation.position.mean
+
+
+def test_readings_without_noise_are_not_called_narrow() -> None:
+    found = calibrate(IRB120, campaign("irb120", 40, 0.0, 1)[1])
+    assert "narrow-data" not in {n.code for n in found.warnings}
+
+
+def test_base_and_targets_alone_leave_the_geometry_out() -> None:
+    found = calibrate(IRB120, campaign("irb120", 30, 0.02e-3, 1, "nominal")[1], model="frames").expected
+    assert found.lower_bound
+    assert found.omissions[0] == "the robot's own geometry counts as exact"
+
+
+def test_a_closed_loop_is_expected_up_to_its_gauge_freedoms() -> None:
+    rng = np.random.default_rng(0)
+    twin = truth_twin(IRB120, "random", rng)
+    found = calibrate(IRB120, measured_with(named_device("gauges"), IRB120, twin, 60, rng))
+    assert found.expected.frame.startswith("the robot's base frame, up to its pose")
+    (notice,) = (n for n in found.warnings if n.code == "closed-loop")
+    assert f"accurate to about {found.expected.overall.mean * 1e3:.2g} mm" in notice.message
+    assert "narrow-data" not in {n.code for n in found.warnings}
+
+
+def test_a_motion_of_everything_does_not_count_in_a_closed_loop(tmp_path: Path) -> None:
+    fit = uncertain(fitted(ARM, tmp_path), theta_offset_1=1e-4)
+    assert expected_error(replace(fit, gauge_freedoms=("base",))).overall.mean < 1e-12

@@ -1,0 +1,189 @@
+"""No job overwrites what it reads, under whatever name and by whatever path that was given."""
+
+from __future__ import annotations
+
+import inspect
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.jobs.examples import EXAMPLES
+
+import truearm
+from truearm.errors import InputError
+from truearm.jobs import JOBS
+from truearm.manifest import MANIFEST, UNFINISHED
+from truearm.modeling.formats.robot_file import robot_text
+from truearm.results.axis_calibration import AXIS_FILES
+from truearm.results.calibration import RESULT_FILES
+from truearm.results.program_correction import REPORT
+
+#: How a job refuses it; a program that is called as a record is no program to begin with.
+REFUSED = r"would be overwritten|not overwritten|of this name itself|no robot language has files of this kind"
+#: Parameters that name what a job writes.
+OUTPUTS = ("out", "steps", "file", "folder")
+Arguments = dict[str, Any]
+
+
+def _written(path: Path, text: str) -> Path:
+    path.write_text(text)
+    return path
+
+
+def _robot(folder: Path) -> Path:
+    return _written(folder / "given.yaml", robot_text(truearm.load_robot("irb120")))
+
+
+_UNITS = "units: {length: mm, angle: deg}\n"
+
+
+#: What each job can read, all of it as files; the rest is as in the examples.
+READ: dict[str, Callable[[Path], Arguments]] = {
+    "calibrate": lambda folder: {
+        "robot": _robot(folder),
+        "bounds": _written(folder / "bounds.yaml", f"truearm: truearm-bounds/1\n{_UNITS}within: {{d_1: 5}}\n"),
+    },
+    "plan": lambda folder: {
+        "robot": _robot(folder),
+        "candidates_from": EXAMPLES["load_data"](folder)["data"],
+        "device": None,
+        "constraints": _written(
+            folder / "c.yaml", f"truearm: truearm-constraints/1\n{_UNITS}limits: {{1: [-99, 99]}}\n"
+        ),
+    },
+    "simulate": lambda folder: {"robot": _robot(folder), "truth": EXAMPLES["validate"](folder)["robot"]},
+    "inverse": lambda folder: {
+        "robot": _robot(folder),
+        "poses": _written(folder / "p.csv", "pose,x [mm],y [mm],z [mm],qw,qx,qy,qz\n1,300,0,500,0,0,1,0\n"),
+        "rotations": None,
+        "seed": None,
+    },
+    "lines": lambda folder: {
+        "robot": _written(folder / "k.yaml", robot_text(truearm.load_robot("kr5"))),
+        "truth": EXAMPLES["tolerance"](folder)["robot"],
+        "joint_errors": EXAMPLES["tolerance"](folder)["robot"],
+    },
+    "axes": lambda folder: {"robot": _written(folder / "k.yaml", robot_text(truearm.load_robot("kr5")))},
+    "hexapod_plan": lambda folder: {"robot": _robot(folder), "steps": None},
+    "hexapod_solve": lambda folder: {"sheet": _written(folder / "filled.csv", "a\n"), "pose": None, "legs": None},
+    "convert": lambda folder: {"robot": _robot(folder)},
+    "export": lambda folder: {"robot": _robot(folder)},
+    "compensate": lambda folder: {
+        "tools": shutil.copy(EXAMPLES["compensate"](folder)["tools"], folder / "tools.yaml"),
+    },
+}
+#: What is no file that a job reads and overwrites: a folder of data whose files have names of their own.
+FOLDERS = (("study", "data"), ("lines", "data"))
+
+
+#: The names of what a job writes into the folder `out`.
+INTO_FOLDERS = {
+    "calibrate": RESULT_FILES,
+    "axes": AXIS_FILES,
+    "compensate": ("plate.mod", "plate.mod.truearm.json", REPORT),
+    "revert": ("plate.mod",),
+}
+#: The names of what a job writes where `out` is one of them, or the parameter beside it.
+BESIDE = {
+    "plan": {"plan.csv": {"out": "plan.csv"}, "plan.html": {"out": "plan.csv"}},
+    "hexapod_plan": {
+        "sheet.csv": {"out": "sheet.csv", "steps": "steps.txt"},
+        "steps.txt": {"out": "sheet.csv", "steps": "steps.txt"},
+    },
+}
+#: Jobs that overwrite nothing at all, and those that read no files of a person's.
+NEVER = ("new_robot", "example", "demo", "study")
+
+
+def read_by(job: str) -> list[str]:
+    """Return the parameters of a job that take files to read."""
+    named = inspect.signature(getattr(truearm, job)).parameters.values()
+    return [
+        p.name
+        for p in named
+        if "Path" in str(p.annotation)
+        and (p.name not in OUTPUTS or (job, p.name) == ("import_table", "file"))
+        and (job, p.name) not in FOLDERS
+    ]
+
+
+WRITING = [job for job in JOBS if {*inspect.signature(getattr(truearm, job)).parameters} & {*OUTPUTS}]
+CASES = [(job, name) for job in WRITING if job not in NEVER for name in read_by(job)]
+
+
+@pytest.fixture(scope="module")
+def examples(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder in which everything has been made once that the calls read."""
+    folder = tmp_path_factory.mktemp("examples")
+    for job in dict.fromkeys(job for job, _ in CASES):
+        given(job, folder)
+    return folder
+
+
+def given(job: str, folder: Path) -> Arguments:
+    return EXAMPLES[job](folder) | (READ[job](folder) if job in READ else {})
+
+
+def paths(value: object) -> list[Path]:
+    """Return the files that an argument names."""
+    if isinstance(value, str | Path):
+        return [Path(value)] if Path(value).is_file() else []
+    if isinstance(value, dict):
+        return [path for entry in value.values() for path in paths(entry)]
+    return [path for entry in value for path in paths(entry)] if isinstance(value, list) else []
+
+
+def instead(value: Any, old: Path, new: Path) -> Any:
+    """Return an argument that names another file instead of one."""
+    if isinstance(value, dict):
+        return {key: instead(entry, old, new) for key, entry in value.items()}
+    if isinstance(value, list):
+        return [instead(entry, old, new) for entry in value]
+    return new if value == old else value
+
+
+def outputs(job: str, path: Path) -> list[tuple[str, Arguments]]:
+    """Return what a job writes that reads a file: the names in a folder, and with what arguments; `.` is the folder."""
+    if job in INTO_FOLDERS:
+        return [(name, {"out": "."}) for name in (*INTO_FOLDERS[job], MANIFEST, UNFINISHED)]
+    if job in BESIDE:
+        return [*BESIDE[job].items(), *((name, {"out": "any.csv"}) for name in (MANIFEST, UNFINISHED))]
+    return [(path.name, {"out": path.name}), (MANIFEST, {"out": MANIFEST})]
+
+
+@pytest.mark.parametrize(("job", "parameter"), CASES)
+def test_no_job_overwrites_what_it_reads(job: str, parameter: str, examples: Path, tmp_path: Path) -> None:
+    work = shutil.copytree(examples, tmp_path / "work")
+    arguments = given(job, work)
+    sources = paths(arguments[parameter])
+    assert sources, f"no file is tried for {parameter}"
+    refused = 0
+    for source in sources:
+        before = source.read_bytes()
+        for name, places in outputs(job, source):
+            for way in ("the file itself", "a hard link", "a link"):
+                out = tmp_path / "out"
+                shutil.rmtree(out, ignore_errors=True)
+                out.mkdir()
+                target = out / name
+                call = arguments | {key: out / place for key, place in places.items()}
+                if way == "the file itself":
+                    target.write_bytes(before)
+                    call = instead(call, source, target)
+                elif way == "a hard link":
+                    os.link(source, target)
+                else:
+                    target.symlink_to(source)
+                with pytest.raises(InputError, match=REFUSED):
+                    getattr(truearm, job)(**call)
+                assert target.read_bytes() == source.read_bytes() == before
+                assert [path.name for path in out.iterdir()] == [name]
+                refused += 1
+    assert refused >= 3
+
+
+def test_every_job_that_writes_is_tried_or_overwrites_nothing() -> None:
+    assert {job for job, _ in CASES} | {*NEVER} == {*WRITING}

@@ -1,0 +1,190 @@
+"""What is refused, accepted and told of robots whose calibration ended badly, was edited, or is not known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.simulated import campaign
+
+import truearm
+from truearm import InputError, Robot
+from truearm.modeling.formats.robot_file import sealed
+from truearm.notices import Notice
+from truearm.results.program_correction import ProgramCorrection
+from truearm.results.robot_description import RobotDescription
+
+NARROW = Notice("narrow-data", "Over the workspace it is worse.", "error")
+SIGNS = Notice("joint-sign", "Joint 6 turns the other way.", "error")
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return truearm.calibrate("irb120", campaign("irb120", 20, 2e-5, 1)[1], model="offsets").robot
+
+
+@pytest.fixture
+def program(tmp_path: Path) -> Path:
+    path = tmp_path / "plate.mod"
+    path.write_text((files("truearm.examples") / "plate.mod").read_text())
+    return path
+
+
+def ended(robot: Robot, status: str = "converged", *errors: Notice) -> Robot:
+    assert robot.proof is not None
+    return sealed(robot, replace(robot.proof, status=status, errors=errors))
+
+
+def codes(correction: ProgramCorrection) -> dict[str, str]:
+    return {notice.code: notice.level for notice in correction.warnings}
+
+
+@pytest.mark.parametrize("status", ["rank-loss", "not-converged", "implausible"])
+def test_an_unsound_fit_corrects_no_program_unless_accepted(robot: Robot, program: Path, status: str) -> None:
+    unsound = ended(robot, status)
+    with pytest.raises(InputError, match=f"got '{status}'.*give `accept={status}`") as refusal:
+        truearm.compensate(unsound, [program])
+    assert refusal.value.parameter == "robot"
+    done = truearm.compensate(unsound, [program], accept=[status])
+    assert codes(done)[status] == "warning"
+    assert f"accept=['{status}']" in done.command
+    assert done.applied()["proof"]["status"] == status
+
+
+def test_an_error_of_the_calibration_is_told_with_its_words(robot: Robot, program: Path) -> None:
+    unsound = ended(robot, "rank-loss", SIGNS)
+    with pytest.raises(
+        InputError, match=r"rank-loss.*also ended with joint-sign.*`accept=rank-loss` and `accept=joint-sign`"
+    ):
+        truearm.compensate(unsound, [program])
+    with pytest.raises(InputError, match="Joint 6 turns the other way"):
+        truearm.compensate(unsound, [program], accept=["rank-loss"])
+    assert {"rank-loss", "joint-sign"} <= set(
+        codes(truearm.compensate(unsound, [program], accept=["rank-loss", "joint-sign"]))
+    )
+
+
+def test_narrow_data_are_judged_target_by_target(robot: Robot, program: Path) -> None:
+    narrow = ended(robot, "converged", NARROW)
+    assert codes(truearm.compensate(narrow, [program]))["narrow-data"] == "warning"
+    edited = narrow.with_values({"theta_offset_2": 0.001})
+    with pytest.raises(InputError, match="got 'narrow-data'"):
+        truearm.compensate(edited, [program])
+    assert "edited-by-hand" in codes(truearm.compensate(edited, [program], accept=["narrow-data"]))
+
+
+def test_only_known_names_are_accepted(robot: Robot, program: Path) -> None:
+    known = "allowed: rank-loss, not-converged, implausible, narrow-data, not-better-here"
+    with pytest.raises(InputError, match=known) as refusal:
+        truearm.compensate(robot, [program], accept=["rank-lost"])
+    assert refusal.value.parameter == "accept"
+    with pytest.raises(InputError, match="joint-sign, not-better-here"):
+        truearm.compensate(ended(robot, "converged", SIGNS), [program], accept=["joint-signs"])
+    assert codes(truearm.compensate(robot, [program], accept=["rank-loss"])) == codes(
+        truearm.compensate(robot, [program])
+    )
+
+
+def test_an_unproven_robot_is_corrected_with_a_note(robot: Robot, program: Path) -> None:
+    done = truearm.compensate(replace(robot, proof=None), [program])
+    assert codes(done)["unproven"] == "note"
+    assert done.summary()["programs"][0]["expected_mm"] is None
+    assert done.applied()["proof"] is None
+    assert not any("to expect" in line for line in done.lines())
+    with pytest.raises(InputError, match="not calibrated"):
+        truearm.compensate("irb120", [program])
+
+
+def test_a_payload_leaves_the_proof(robot: Robot, program: Path) -> None:
+    done = truearm.compensate(robot, [program], payload="1kg,0mm,0mm,50mm")
+    assert "edited-by-hand" not in codes(done)
+    assert done.summary()["programs"][0]["expected_mm"] is not None
+
+
+def test_an_edited_robot_is_not_cleared_of_how_its_fit_ended(robot: Robot, program: Path) -> None:
+    edited = ended(robot, "rank-loss").with_values({"theta_offset_2": 0.001})
+    with pytest.raises(InputError, match="rank-loss"):
+        truearm.compensate(edited, [program])
+    done = truearm.compensate(edited, [program], accept=["rank-loss"])
+    assert codes(done)["edited-by-hand"] == "warning"
+    assert done.summary()["programs"][0]["expected_mm"] is None
+
+
+def test_joints_for_poses_and_exports_are_made_with_a_warning(robot: Robot, tmp_path: Path) -> None:
+    unsound = ended(robot, "rank-loss", SIGNS).with_values({"theta_offset_2": 0.001})
+    position, rotation = robot.forward(np.zeros((1, 6)))
+    table = truearm.inverse(unsound, position, rotation)
+    exported = truearm.export(unsound, "json", out=tmp_path / "robot.json")
+    for warnings, lines, summary in (
+        (table.warnings, table.lines(), table.summary()),
+        (exported.warnings, exported.lines(), exported.summary()),
+    ):
+        told = {notice.code: notice.level for notice in warnings if notice.code != "left-out"}
+        assert told == dict.fromkeys(("rank-loss", "joint-sign", "edited-by-hand"), "warning")
+        assert "Joint 6 turns the other way." in "\n".join(lines)
+        assert {"rank-loss", "joint-sign", "edited-by-hand"} <= {notice["code"] for notice in summary["warnings"]}
+    assert truearm.inverse(robot, position, rotation).warnings == ()
+    assert truearm.inverse("irb120", position, rotation).warnings == ()
+
+
+def test_the_description_of_a_robot_says_how_its_calibration_ended(robot: Robot) -> None:
+    unsound = ended(robot, "rank-loss", SIGNS)
+    assert "Calibration: rank-loss, joint-sign" in RobotDescription(unsound).lines()
+    edited = RobotDescription(unsound.with_values({"theta_offset_2": 0.001}))
+    assert "Calibration: rank-loss, joint-sign; values were changed since" in edited.lines()
+    assert edited.summary()["proof"]["intact"] is False
+    assert RobotDescription(truearm.load_robot("irb120")).summary()["proof"] is None
+
+
+def test_what_is_expected_is_told(robot: Robot, program: Path, tmp_path: Path) -> None:
+    done = truearm.compensate(robot, [program], out=tmp_path / "out")
+    (file,) = done.files
+    assert file.expected is not None
+    before, now = file.expected
+    assert len(before) == len(now) == 44
+    assert 0.0 < now.mean() < before.mean()
+    (told,) = done.summary()["programs"]
+    assert told["expected_mm"]["before"]["max"] == pytest.approx(1e3 * before.max())
+    assert told["expected_mm"]["after"]["mean"] == pytest.approx(1e3 * now.mean())
+    assert any(f"{1e3 * before.mean():.3f} mm on average" in line and "plate.mod" in line for line in done.lines())
+    page = (tmp_path / "out" / "compensation.html").read_text()
+    assert 'id="expected"' in page
+    assert f'<td class="n">{1e3 * now.mean():.3f}</td>' in page
+
+
+def test_a_lower_bound_is_called_one(robot: Robot, program: Path) -> None:
+    assert robot.proof is not None
+    for bound in (True, False):
+        done = truearm.compensate(sealed(robot, replace(robot.proof, lower_bound=bound)), [program])
+        assert done.summary()["expected_is_lower_bound"] is bound
+        assert any("lower bounds" in line for line in done.lines()) is bound
+
+
+def test_targets_that_rather_get_worse_are_kept_and_listed(robot: Robot, program: Path, tmp_path: Path) -> None:
+    proof = robot.proof
+    assert proof is not None
+    vague = sealed(robot, replace(proof, deviations=tuple(50.0 * d for d in proof.deviations)))
+    done = truearm.compensate(vague, [program], out=tmp_path / "out")
+    (file,) = done.files
+    kept = [row for row in file.not_better if not file.correction.corrected[row]]
+    assert kept
+    assert codes(done)["not-better-here"] == "warning"
+    told = done.summary()["programs"][0]
+    assert told["corrected"] == 44 - len(kept)
+    assert len(told["not_better"]) == len(file.not_better)
+    assert all(row["probability_worse"] > 0.1 or row["kept"] for row in told["not_better"])
+    np.testing.assert_array_equal(file.correction.after[kept], file.correction.before[kept])
+    again = done.as_written()[0].targets
+    for row in kept:
+        assert again[row].values == file.correction.program.targets[row].values
+    page = (tmp_path / "out" / "compensation.html").read_text()
+    assert 'id="not-better"' in page
+    assert page.count("<td>kept</td>") == len(kept)
+    all_of_them = truearm.compensate(vague, [program], accept=["not-better-here"])
+    assert all_of_them.files[0].corrected == 44
+    (notice,) = [notice for notice in all_of_them.warnings if notice.code == "not-better-here"]
+    assert "corrected nevertheless" in notice.message
+    assert {row["kept"] for row in all_of_them.summary()["programs"][0]["not_better"]} == {False}

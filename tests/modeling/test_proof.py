@@ -1,0 +1,205 @@
+"""What a calibration knows about its result stays with the robot and its file, and only as long as it is about them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.simulated import campaign
+
+from truearm.errors import InputError
+from truearm.jobs.calibrate import calibrate
+from truearm.modeling.conversion import converted
+from truearm.modeling.formats.robot_file import arm_is_known, is_intact, read_robot, robot_text, sealed
+from truearm.modeling.parameters import Parameter
+from truearm.modeling.parts import Payload
+from truearm.modeling.proof import Proof
+from truearm.modeling.robot import Robot
+from truearm.modeling.transform import IDENTITY
+from truearm.notices import Notice
+from truearm.results.calibration import Calibration
+
+
+@pytest.fixture(scope="module")
+def calibration() -> Calibration:
+    return calibrate("irb120", campaign("irb120", 20, 2e-5, 1)[1], model="geometric", effects=["compliance"])
+
+
+def read(text: str, tmp_path: Path) -> Robot:
+    path = tmp_path / "calibrated.yaml"
+    path.write_text(text, encoding="utf-8")
+    return read_robot(path)
+
+
+def refusal(text: str, tmp_path: Path) -> str:
+    with pytest.raises(InputError) as caught:
+        read(text, tmp_path)
+    return str(caught.value)
+
+
+def test_it_says_how_the_fit_ended_and_what_it_saw(calibration: Calibration) -> None:
+    proof = calibration.robot.proof
+    assert proof is not None
+    assert proof.status == "converged"
+    assert proof.names == calibration.fit.free.names
+    training = calibration.data.joints[calibration.training]
+    np.testing.assert_array_equal(np.array(proof.region).T, [training.min(axis=0), training.max(axis=0)])
+    np.testing.assert_array_equal(proof.joint_error, calibration.fit.joint_error)
+
+
+def test_a_file_is_the_same_after_it_was_read(calibration: Calibration, tmp_path: Path) -> None:
+    text = robot_text(calibration.robot)
+    robot = read(text, tmp_path)
+    ours, theirs = robot.proof, calibration.robot.proof
+    assert ours is not None
+    assert theirs is not None
+    assert replace(ours, region=(), joint_error=()) == replace(theirs, region=(), joint_error=())
+    np.testing.assert_allclose(ours.region, theirs.region, rtol=5e-16)
+    np.testing.assert_allclose(ours.joint_error, theirs.joint_error, rtol=5e-16)
+    assert robot_text(robot) == text
+    assert is_intact(robot)
+    assert is_intact(calibration.robot)
+
+
+def test_the_rounded_covariance_predicts_as_the_fit_does(calibration: Calibration) -> None:
+    robot, fit = calibration.robot, calibration.fit
+    assert robot.proof is not None
+    joints = robot.random_configurations(50, np.random.default_rng(0))
+    J = robot.position_jacobian(robot.forward_kinematics(joints, "1"), joints, fit.free.names)
+    exact, kept = (np.einsum("pxn,pq,qxn->n", J, C, J) for C in (fit.covariance, robot.proof.covariance))
+    np.testing.assert_allclose(kept, exact, rtol=1e-3)
+
+
+def test_a_covariance_without_full_rank_is_kept() -> None:
+    parameters = [Parameter.plain(name, "m", "geometry", 0.0, 1e-3) for name in "abc"]
+    root = np.array([[1e-3], [-2e-4], [0.0]])
+    proof = Proof.of("at-bound", [], [], np.zeros(0), parameters, root @ root.T)
+    np.testing.assert_allclose(proof.covariance, root @ root.T, atol=1e-13)
+    assert proof.deviations == (1e-3, 2e-4, 0.0)
+
+
+def test_what_spoke_against_it_is_kept(calibration: Calibration, tmp_path: Path) -> None:
+    unlike = Notice("implausible", 'Signs of "joint 6": wrong.', "error")
+    doubted = replace(calibration, warnings=(*calibration.warnings, unlike)).robot
+    robot = read(robot_text(doubted), tmp_path)
+    assert robot.proof is not None
+    assert robot.proof.status == "implausible"
+    assert robot.proof.errors == (unlike,)
+    assert is_intact(robot)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "about"),
+    [
+        ("title: ", "title: my ", True),
+        ("name: irb120", "name: cell_3", True),
+        ("history:\n", "history:\n  - moved to cell 3\n", True),
+        ("a: 270.0", "a: 270.1", False),
+        ("status: converged", "status: at-bound", False),
+        ("correlations:\n    - '1'", "correlations:\n    - '0.5'", False),
+        ("convention: modified-hayati\n", "convention: modified-hayati\ngravity: [0.0, 0.0, 9.81]\n", False),
+        ("payload:", "payload: {mass: 3.0, cog: [0.0, 0.0, 0.0]} #", False),
+    ],
+)
+def test_it_is_about_what_moves_the_robot(
+    calibration: Calibration, tmp_path: Path, old: str, new: str, about: bool
+) -> None:
+    text = robot_text(calibration.robot.with_payload("1kg,0mm,0mm,50mm"))
+    assert old in text
+    robot = read(text.replace(old, new, 1), tmp_path)
+    assert is_intact(robot) == arm_is_known(robot) == about
+
+
+def test_a_value_in_the_file_cannot_be_edited_unnoticed(calibration: Calibration, tmp_path: Path) -> None:
+    text = robot_text(calibration.robot)
+    line = next(line for line in text.splitlines() if line.strip().startswith("a_3: {unit: mm"))
+    value = line.partition("value: ")[2].partition(",")[0]
+    assert not is_intact(read(text.replace(line, line.replace(value, f"{float(value) + 1e-9:.12f}")), tmp_path))
+    assert is_intact(read(text.replace(line, line.replace(value, f"{value}0")), tmp_path))
+
+
+def test_changed_copies(calibration: Calibration) -> None:
+    robot = calibration.robot
+    assert is_intact(robot.with_payload(Payload(2.0, (0.0, 0.0, 0.1)), (0.0, 9.81, 0.0)))
+    assert is_intact(robot.with_values({"a_3": robot.values["a_3"]}))
+    for other in (
+        robot.with_values({"a_3": 0.2701}),
+        robot.with_effects(["gain"]),
+        robot.with_frames(IDENTITY, {"1": (0.0, 0.0, 0.1)}),
+    ):
+        assert other.proof is not None
+        assert not is_intact(other)
+        assert not is_intact(other.with_payload("1kg,0mm,0mm,50mm"))
+
+
+def test_a_robot_with_other_targets_is_written_so_that_it_can_be_read(calibration: Calibration, tmp_path: Path) -> None:
+    other = calibration.robot.with_frames(IDENTITY, {"ball": (0.0, 0.0, 0.1)})
+    text = robot_text(other)
+    robot = read(text, tmp_path)
+    assert robot.proof is not None
+    assert (robot.proof.status, robot.proof.names) == ("converged", ())
+    assert robot_text(robot) == text
+    assert not is_intact(robot)
+
+
+def test_another_convention_has_other_parameters(calibration: Calibration) -> None:
+    assert converted(calibration.robot, "zero-reference").proof is None
+
+
+def test_older_files_have_none(calibration: Calibration, tmp_path: Path) -> None:
+    head, tail = robot_text(calibration.robot).split("proof:\n")
+    robot = read(head + tail[tail.index("history:") :], tmp_path)
+    assert robot.proof is None
+    assert not is_intact(robot)
+    assert robot.values == read(robot_text(calibration.robot), tmp_path).values
+
+
+def test_only_base_and_targets_found_anew(calibration: Calibration) -> None:
+    known = calibration.robot.proof
+    assert known is not None
+    before = sealed(calibration.robot, replace(known, status="rank-loss"))
+    again = calibrate(before, campaign("irb120", 12, 2e-5, 1)[1], model="frames")
+    proof = again.robot.proof
+    assert again.status.value == "converged"
+    assert proof is not None
+    assert proof.status == "rank-loss"
+    assert is_intact(again.robot)
+    assert before.proof is not None
+    was, now = (dict(zip(p.names, p.deviations, strict=True)) for p in (before.proof, proof))
+    assert now["a_3"] == pytest.approx(was["a_3"], rel=1e-6)
+    assert now["base_x"] != was["base_x"]
+    assert proof.region[0][0] <= before.proof.region[0][0]
+    edited = calibrate(before.with_values({"a_3": 0.2703}), again.data, model="frames").robot.proof
+    assert edited is not None
+    assert (edited.status, "a_3" in edited.names) == ("rank-loss", False)
+    anew = calibrate(before, campaign("irb120", 20, 2e-5, 1)[1], effects=["compliance"]).robot.proof
+    assert anew is not None
+    assert anew.status == "converged"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "parts"),
+    [
+        (
+            "    - '1'\n",
+            "    - one\n",
+            ["proof.correlations[1]", "numbers from -1 to 1", "got 'one'", "allowed: 1 number"],
+        ),
+        ("    - '1'\n", "", ["proof.correlations", "one row belongs here for each", "allowed: "]),
+        ("joint_error: [", "joint_error: [0.0, ", ["proof.joint_error", "one entry belongs here for each joint", "7"]),
+        ("deviations: {base_x:", "deviations: {base_q:", ["proof.deviations", "no such parameter", "got 'base_q'"]),
+        ("status: converged", "status: fine", ["proof.status", "converged"]),
+        ("sha256: ", "sha256: no", ["proof.sha256"]),
+        ("  region:", "  regions:", ["regions", "Did you mean region"]),
+    ],
+)
+def test_a_damaged_entry_is_refused(
+    calibration: Calibration, tmp_path: Path, old: str, new: str, parts: list[str]
+) -> None:
+    text = robot_text(calibration.robot)
+    assert old in text
+    message = refusal(text.replace(old, new, 1), tmp_path)
+    for part in ["calibrated.yaml", *parts]:
+        assert part in message

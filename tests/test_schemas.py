@@ -1,0 +1,261 @@
+"""Entries that do not fit are refused in plain words: by name, with what came, what is allowed and the cure."""
+
+from __future__ import annotations
+
+import datetime
+import re
+from collections.abc import Iterator
+from typing import Any, Final
+
+import pytest
+from pydantic import BaseModel
+
+from truearm.compensation.cell import CellFile
+from truearm.compensation.program_files import CorrectionRecord
+from truearm.errors import InputError
+from truearm.identification.solving.bounds import Bounds
+from truearm.measurement.readers.mapping import MappingFile
+from truearm.modeling.formats.robot_file import RobotFile, robot_from_file
+from truearm.planning.constraints.constraints import Constraints
+from truearm.schemas import validated
+
+UNITS: Final = {"length": "mm", "angle": "deg"}
+BOUNDS: Final[dict[object, object]] = {"truearm": "truearm-bounds/1", "units": UNITS}
+ALLOWED: Final[dict[object, object]] = {"truearm": "truearm-constraints/1", "units": UNITS}
+UPRIGHT: Final = [1.0, 0.0, 0.0, 0.0]
+ABOVE: Final = [0.0, 0.0, 1.0]
+
+
+@pytest.mark.parametrize(
+    ("schema", "content", "said"),
+    [
+        (Bounds, BOUNDS | {"units": 3}, "units: named entries belong here; got 3; allowed: NAME: VALUE"),
+        (Bounds, BOUNDS | {"within": [1]}, "within: named entries belong here; got [1]; allowed: NAME: VALUE"),
+        (Bounds, BOUNDS | {"within": {"d_1": None}}, "within.d_1: a number belongs here; got nothing"),
+        (Bounds, BOUNDS | {"within": {"d_1": 10**400}}, "within.d_1: a number belongs here; got a number of very"),
+        (Bounds, BOUNDS | {"within": {"d_1": float("inf")}}, "within.d_1: the number is not finite; got inf"),
+        (
+            Bounds,
+            BOUNDS | {"within": {"d_1": -1.0}},
+            "within.d_1: the number is too small; got -1.0; allowed: 0 or more",
+        ),
+        (Bounds, BOUNDS | {"within": {5: 1.0}}, "within.5: a text belongs here, as the name of the entry; got 5"),
+        (Bounds, BOUNDS | {"between": {"d_1": [1]}}, "between.d_1: there are too few entries; got 1; allowed: 2."),
+        (Bounds, BOUNDS | {"between": {"d_1": []}}, "between.d_1: there are too few entries; got 0; allowed: 2."),
+        (
+            Bounds,
+            BOUNDS | {"between": {"d_1": [1, 2, 3]}},
+            "between.d_1: there are too many entries; got 3; allowed: 2.",
+        ),
+        (Bounds, BOUNDS | {"between": {"d_1": 3}}, "between.d_1: a list belongs here; got 3; allowed: entries in"),
+        (
+            Bounds,
+            BOUNDS | {"between": {"d_1": [1, [10**5000]]}},
+            "between.d_1[2]: a number belongs here; got a list of 1 entries",
+        ),
+        (Bounds, BOUNDS | {5: 1}, "5: the name of an entry must be a text; got 5; allowed: a name"),
+        (
+            Bounds,
+            BOUNDS | {"withn": {}},
+            "withn: this entry is not known here; allowed: truearm, units, within, between. D",
+        ),
+        (
+            Bounds,
+            BOUNDS | {"units": {"length": "mm", "angle": "deg", "time": "s"}},
+            "units.time: this entry is not known here; allowed: length, angle.",
+        ),
+        (Constraints, ALLOWED | {"limits": {"a": [1, 2]}}, "limits.a: a whole number belongs here, as the name of"),
+        (Constraints, ALLOWED | {"limits": {0: [1, 2]}}, "limits.0: the number is too small, as the name of the entry"),
+        (
+            Constraints,
+            ALLOWED | {"visibility": {"within": 1.0, "targets": {}}},
+            "visibility.targets: there are too few entries; got 0; allowed: at least 1",
+        ),
+        (
+            Constraints,
+            ALLOWED | {"visibility": {"within": 1.0, "targets": {"1": [0.0, 0.0, 0.0]}}},
+            "visibility: a direction cannot be zero; got '1: [0.0, 0.0, 0.0]'",
+        ),
+        (
+            Constraints,
+            ALLOWED | {"moments": {1: "up"}},
+            "moments.1: this value is not known; got 'up'; allowed: positive",
+        ),
+        (
+            CorrectionRecord,
+            {"truearm": "truearm-corrected/1", "original_sha256": "x"},
+            "program: this entry is missing",
+        ),
+    ],
+)
+def test_entries_that_do_not_fit_are_told_in_plain_words(
+    schema: type[BaseModel], content: dict[object, object], said: str
+) -> None:
+    with pytest.raises(InputError) as caught:
+        validated(content, schema, "f.yaml")
+    assert str(caught.value).startswith(f"f.yaml, {said}")
+
+
+#: A whole file of each kind, with every entry that there is.
+FILES: Final[dict[type[BaseModel], dict[object, object]]] = {
+    RobotFile: {
+        "truearm": "truearm-robot/1",
+        "name": "arm",
+        "title": "An arm",
+        "source": "its maker",
+        "units": UNITS,
+        "convention": "urdf",
+        "joints": [{"name": "a", "type": "revolute", "x": 1.0, "limits": [-1.0, 1.0], "transmission_periods": 40}],
+        "flange": {"translation": ABOVE, "quaternion": UPRIGHT},
+        "controller": {
+            "source": "its manual",
+            "joints": [{"joint": "a", "sign": 1, "zero": 1.0, "coupling": {}, "pulses_per_degree": 5.0}],
+            "base": {"translation": ABOVE},
+            "flange": {"quaternion": UPRIGHT},
+        },
+        "masses": [{"link": 1, "mass": 1.0, "cog": ABOVE, "inertia": [1.0, 1.0, 1.0, 0.0, 0.0, 0.0]}],
+        "payload": {"mass": 1.0, "cog": ABOVE},
+        "gravity": [0.0, 0.0, -9.81],
+        "tools": {"t": {"targets": {"1": ABOVE}, "mass": 1.0, "cog": ABOVE}},
+        "truths": {"x": {"source": "", "values": {"z_1": 1.0}, "compliance": {1: 0.1}}},
+        "priors": {"length": 1.0, "angle": 1.0},
+        "effects": ["gain"],
+        "base_quaternion": UPRIGHT,
+        "targets": [{"name": "1", "quaternion": UPRIGHT}],
+        "fixtures": [{"name": "p", "kind": "plane", "quaternion": UPRIGHT}],
+        "parameters": {
+            "z_1": {"nominal": 0.0, "value": 0.1, "prior": 1.0, "unit": "mm", "deviation": 0.1, "informed": 0.5}
+        },
+        "history": ["made"],
+    },
+    CellFile: {
+        "truearm": "truearm-cell/1",
+        "units": UNITS,
+        "tools": {"t": {"of": "flange", "target": "1", "abc": ABOVE, "controller": {"wpr": ABOVE}}},
+        "frames": {"f": {"of": "world", "translation": ABOVE, "quaternion": UPRIGHT}},
+    },
+    Bounds: {**BOUNDS, "within": {"a": 1.0}, "between": {"b": [1.0, 2.0]}},
+    Constraints: {
+        **ALLOWED,
+        "limits": {1: [0.0, 1.0]},
+        "moments": {1: "positive"},
+        "box": {"of": "flange", "x": [0.0, 1.0]},
+        "floor": 0.0,
+        "visibility": {"within": 1.0, "targets": {"1": ABOVE}, "instrument": ABOVE},
+        "clearance": 1.0,
+    },
+    MappingFile: {
+        "truearm": "truearm-mapping/1",
+        "layout": {
+            "delimiter": "comma",
+            "decimal": "point",
+            "header": 1,
+            "first_row": 2,
+            "comment": "#",
+            "encoding": "utf-8",
+        },
+        "configuration": {"column": "pose"},
+        "names": {"column": "ball", "pattern": "(?P<target>.*)", "others": "skip"},
+        "length_unit": "mm",
+        "readings": [{"x": "X", "y": "Y", "z": "Z", "qw": "a", "qx": "b", "qy": "c", "qz": "d"}],
+        "references": ["r"],
+        "joints": {"columns": ["q1"], "unit": "mm"},
+        "sigma": {"value": 0.01, "unit": "mm"},
+        "sigma_rot": {"value": 0.01, "unit": "mrad"},
+    },
+    CorrectionRecord: {
+        "truearm": "truearm-corrected/1",
+        "program": "p",
+        "language": "krl",
+        "original_sha256": "0" * 64,
+        "corrected_sha256": "0" * 64,
+        "applied": {},
+        "original": "",
+    },
+}
+
+HUGE: Final = 10**5000
+ITSELF: Final[list[object]] = []
+ITSELF.append(ITSELF)
+#: Entries of every kind that somebody may write in place of the right one.
+OTHERS: Final[list[Any]] = [
+    *(None, True, 7, -3, 0, 0.5, 1e300, float("nan"), float("inf"), HUGE, datetime.date(2020, 1, 1)),
+    *("word", "", "two words", "3", "MM", "\x1b[31m", "a\u202eb", "\ud800", "x" * 5000),
+    *([], [1], [[1] * 9], [1.0] * 7, ["x"], [None], [float("nan")] * 3, ITSELF),
+    *({}, {"word": 1}, {5: 1}, {HUGE: 1}),
+]
+
+
+def damaged(value: object) -> Iterator[object]:
+    """Return a file with one entry after the other replaced, removed, doubled or under another name."""
+    yield from OTHERS
+    if isinstance(value, dict):
+        yield from (value | {name: 1} for name in ("unheard_of", 5, None, HUGE, "\x1b[1m" + "y" * 400))
+        for name, entry in value.items():
+            rest = {key: kept for key, kept in value.items() if key != name}
+            yield rest
+            if isinstance(name, str):
+                yield from (rest | {other: entry} for other in (name.upper(), name[:-1] or "word"))
+            yield from ({**value, name: other} for other in damaged(entry))
+    if isinstance(value, list):
+        yield from (value * 2, value[:-1])
+        for number, entry in enumerate(value):
+            yield from ([*value[:number], other, *value[number + 1 :]] for other in damaged(entry))
+
+
+#: What only programmers call so, and what pydantic says.
+FORBIDDEN: Final = re.compile(
+    r"\b(tuple|dict|dictionary|str|int|NoneType|None|True|False|bool|instance|class|object|validation|valid|input|"
+    r"Input|codec|digits\)|Exceeds|unprintable|list_type|Value|surrogates|Error|_[A-Z]\w+)\b"
+)
+#: The place, what is wrong, what came, what is allowed, the cure.
+FORM: Final = re.compile(r"f\.yaml(, [^:]+)?: [a-z][^;]+(; got [^;]+)?(; allowed: .+)?\.( [A-Z].+[.?])?")
+#: Of what says itself what would be right, no more need be said.
+SAYS_IT: Final = re.compile(r"\b(give|must|none may|needs?|would have|twice|belong|is given|cannot be zero)\b")
+
+
+def read(content: object, schema: type[BaseModel]) -> None:
+    made = validated(content, schema, "f.yaml")
+    if isinstance(made, RobotFile):
+        robot_from_file(made, "f.yaml")
+
+
+@pytest.mark.parametrize("schema", FILES)
+def test_every_damaged_entry_is_told_in_the_form_of_the_house(schema: type[BaseModel]) -> None:
+    read(FILES[schema], schema)
+    refused = 0
+    for content in damaged(FILES[schema]):
+        try:
+            read(content, schema)
+        except InputError as error:
+            refused += 1
+            message = str(error)
+            said = message.partition("; got ")[0] + message.rpartition("; allowed: ")[2]
+            assert FORM.fullmatch(message), message
+            assert message.isprintable(), message
+            assert not FORBIDDEN.search(said.replace("named groups", "")), message
+            assert "; got " in message or "; allowed: " in message or SAYS_IT.search(message), message
+            assert len(message) < 900, message
+    assert refused > 100
+
+
+@pytest.mark.parametrize(
+    ("schema", "content", "said"),
+    [
+        (Bounds, None, "f.yaml: the file holds no entries, only comments or nothing; allowed: NAME: VALUE"),
+        (Bounds, [1, 2], "f.yaml: the file must hold named entries; got [1, 2]; allowed: NAME: VALUE"),
+        (Bounds, {**BOUNDS, "units": {"Length": "mm", "angle": "deg"}}, "It may be the entry Length, which is not"),
+        (Bounds, {"truearm": "truearm-bounds/1"}, "units: this entry is missing; allowed: named entries (length, "),
+        (Bounds, {**BOUNDS, "Within": {}}, "allowed: truearm, units, within, between. Did you mean within?"),
+        (Bounds, {**BOUNDS, "x": 1}, "x: this entry is not known here; allowed: truearm, units, within, between. Corr"),
+        (Bounds, {**BOUNDS, "within": {"a": True}}, "within.a: a number belongs here; got true; allowed: a number"),
+        (Bounds, {**BOUNDS, "within": {"a": [None, "x"]}}, "within.a: a number belongs here; got [null, x]; allowed"),
+        (Bounds, {**BOUNDS, "within": {"a": {"b": 1}}}, "within.a: a number belongs here; got {b: 1}; allowed"),
+        (Bounds, {**BOUNDS, "within": {"a": float("nan")}}, "within.a: this is not a number; got nan; allowed: a n"),
+        (Bounds, {**BOUNDS, "within": {"\ud800": 1.0}}, "within: the text holds half a character; got '\\ud800'"),
+    ],
+)
+def test_what_is_said_of_a_file(schema: type[BaseModel], content: object, said: str) -> None:
+    with pytest.raises(InputError) as caught:
+        validated(content, schema, "f.yaml")
+    assert said in str(caught.value)

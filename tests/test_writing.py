@@ -1,0 +1,75 @@
+"""Writing files: all of them or none, and nothing that is no plain file is replaced."""
+
+from __future__ import annotations
+
+import os
+import socket
+from pathlib import Path
+
+import pytest
+
+from truearm.errors import InputError
+from truearm.manifest import MANIFEST
+from truearm.writing import write_files, write_text
+
+
+def test_what_is_no_plain_file_is_not_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(InputError, match="this is a folder, and a file must be written here"):
+        write_files(tmp_path, {"new": "", "folder": ""})
+    monkeypatch.chdir(tmp_path)  # the path of a socket must be short
+    with socket.socket(socket.AF_UNIX) as pipe:
+        pipe.bind("pipe")
+        with pytest.raises(InputError, match="this is a device or a pipe"):
+            write_text(tmp_path / "pipe", "")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["folder", "pipe"]
+
+
+def test_a_name_as_long_as_may_be_is_written(tmp_path: Path) -> None:
+    write_text(tmp_path / ("x" * 255), "text")
+    assert (tmp_path / ("x" * 255)).read_text() == "text"
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+@pytest.mark.parametrize("wrong", [KeyboardInterrupt(), OSError(28, "No space left on device")])
+@pytest.mark.parametrize(("call", "after"), [("open", 0), ("open", 2), ("replace", 0), ("replace", 1), ("replace", 2)])
+def test_all_files_are_new_or_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wrong: BaseException, call: str, after: int
+) -> None:
+    (tmp_path / "a").write_text("old a")
+    (tmp_path / "c").write_text("old c")
+    right, left = getattr(Path, call), [after]
+
+    def fails(path: Path, *words: object, **named: object) -> object:
+        left[0] -= 1
+        if left[0] == -1:
+            raise wrong
+        return right(path, *words, **named)
+
+    monkeypatch.setattr(Path, call, fails)
+    with pytest.raises(InputError if isinstance(wrong, OSError) else KeyboardInterrupt):
+        write_files(tmp_path, {"a": "new", "folder/b": "new", "c": "new"})
+    monkeypatch.undo()
+    assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {"a": "old a", "c": "old c"}
+
+
+def test_files_are_kept_where_they_cannot_have_two_names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*_: object, **__: object) -> None:
+        raise PermissionError
+
+    monkeypatch.setattr(os, "link", refused)
+    (tmp_path / "a").write_text("old")
+    write_files(tmp_path, {"a": "new", "b": "new"})
+    assert {p.name: p.read_text() for p in tmp_path.iterdir() if p.name != MANIFEST} == {"a": "new", "b": "new"}
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="there is no folder that lies about being writable")
+def test_the_message_names_the_place_that_was_given() -> None:
+    with pytest.raises(InputError, match=r"^/proc: the folder cannot be written to"):
+        write_text(Path("/proc/x"), "")
+
+
+def test_half_a_character_is_not_written(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"holds half a character; got '\\ud800'"):
+        write_files(tmp_path / "new", {"a": "a", "b": "\ud800"})
+    assert not (tmp_path / "new").exists()

@@ -12,7 +12,7 @@ import json
 import math
 import sys
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,7 +66,9 @@ def robot_of(nominal: Robot, targets: int, rng: np.random.Generator) -> Robot:
     """Return a robot with parameters from the priors, somewhere, with targets on a tool of 0.2 m."""
     turned = np.array([1.0, *rng.uniform(-0.05, 0.05, 2), rng.uniform(-1.0, 1.0)])
     base = Transform(tuple(rng.uniform(-2, 2, 3).tolist()), tuple((turned / np.linalg.norm(turned)).tolist()))
-    places = {str(i + 1): tuple((rng.uniform(-0.1, 0.1, 3) + (0, 0, 0.1)).tolist()) for i in range(targets)}
+    places = {
+        str(i + 1): tuple((np.array([0.0, 0.0, 0.1]) + rng.uniform(-0.1, 0.1, 3)).tolist()) for i in range(targets)
+    }
     placed = nominal.with_frames(base, places)
     drawn = GEOMETRIC.prepared(placed).parameters.values()
     own = [p for p in drawn if p.group in GEOMETRIC.groups]
@@ -98,7 +100,9 @@ def _distances(
     """Return distances from two points beside the robot: a closed loop."""
     base = np.array(true.base.translation)
     points = base + rng.uniform(-0.6, 0.6, (2, 3))
-    d = np.linalg.norm(positions[:, :, None, :] - points, axis=3) + SIGMA * rng.standard_normal((*positions.shape[:2], 2))
+    d = np.linalg.norm(positions[:, :, None, :] - points, axis=3) + SIGMA * rng.standard_normal(
+        (*positions.shape[:2], 2)
+    )
     n, k = positions.shape[:2]
     return Dataset(
         source="ballbar",

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
 from tests.simulated import campaign
+
 from truearm.identification.judging.one_sided import check_one_sided
 from truearm.identification.judging.repeatability import repeatability
 from truearm.identification.solving.fit import Fit, identify
@@ -148,7 +148,7 @@ def test_dropped_parameters_leave_intervals_that_hold() -> None:
 
 
 def test_what_errors_of_the_joints_do_not_explain_is_taken_from_the_scatter() -> None:
-    """The arm bends and the model is rigid: weighed as errors of the joints, its residuals would lead the fit astray."""
+    """The arm bends and the model is rigid: taken for errors of the joints, that would lead the fit astray."""
     _, data = campaign("irb120", 60, SIGMA, 18, "tracker-triangular")
     fit = identify(load_robot("irb120"), data, BY_NAME["geometric"])
     assert fit.scattered

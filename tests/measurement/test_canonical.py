@@ -538,3 +538,29 @@ def test_a_circumstance_that_changes_within_a_configuration(write: WriteFile, co
         f"data.csv, line 3, column {column}: {column} differs from line 2, which has the same configuration" in message
     )
     assert f"got '7'; allowed: {before}, as on line 2" in message
+
+
+def test_visits_of_a_configuration_are_read_and_written(tmp_path: Path) -> None:
+    text = (
+        "configuration,joint_1 [deg],target,visit,x [mm],y [mm],z [mm]\n"
+        "1,0.0,a,1,1.0,2.0,3.0\n"
+        "1,0.0,b,2,1.0,2.0,3.0\n"
+        "2,10.0,a,1,1.0,2.0,3.0\n"
+    )
+    path = tmp_path / "visits.csv"
+    path.write_text(text)
+    data = read_csv(path)
+    assert data.visit is not None
+    assert data.visit.tolist() == [1, 2, 1]
+    assert csv_text(data) == text
+    part = data.of_configurations([1, 0]).of_readings([2, 0])
+    assert part.visit is not None
+    assert part.visit.tolist() == [1, 1]
+
+
+@pytest.mark.parametrize("visit", ["", "-1", "1.5", "first"])
+def test_a_visit_that_is_no_number_is_refused(tmp_path: Path, visit: str) -> None:
+    path = tmp_path / "visits.csv"
+    path.write_text(f"configuration,joint_1 [deg],target,visit,x [mm],y [mm],z [mm]\n1,0.0,a,{visit},1.0,2.0,3.0\n")
+    with pytest.raises(InputError, match=r"visits.csv, line 2"):
+        read_csv(path)

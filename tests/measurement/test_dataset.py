@@ -468,3 +468,21 @@ def test_a_dataset_is_short() -> None:
     assert repr(many).splitlines()[3] == "with: nothing else"
     assert "&lt;0&gt;" in many._repr_html_()
     assert repr(Dataset.of(joints(1), positions(1, 1))).startswith("arrays: 1 configuration of 6 joints\n1 target: 1")
+
+
+def test_visits_are_given_for_each_configuration_or_each_target() -> None:
+    data = Dataset.of(joints(3), positions(3), visit=[1, 1, 2])
+    assert data.visit is not None
+    assert data.visit.tolist() == [1, 1, 1, 1, 2, 2]
+    several = Dataset.of(joints(2), np.zeros((2, 3, 3)), visit=[[1, 2, 3], [1, 1, 2]])
+    assert several.visit is not None
+    assert several.visit.tolist() == [1, 2, 3, 1, 1, 2]
+    assert "visits" in repr(several)
+
+
+@pytest.mark.parametrize("visit", [[1, 2], [1.5, 1, 1], [-1, 1, 1], [np.nan, 1, 1]])
+def test_visits_that_are_no_whole_numbers_are_refused(visit: Any) -> None:
+    with pytest.raises(InputError, match="visit"):
+        Dataset.of(joints(3), positions(3), visit=visit)
+    with pytest.raises(InputError, match="visit"):
+        replace(Dataset.of(joints(3), positions(3)), visit=np.array(visit))

@@ -81,7 +81,10 @@ class Fit:
     free
         The parameters that were identified, in the order of `covariance`.
     covariance
-        Of the free parameters [SI], ``(parameters, parameters)``.
+        Of the free parameters [SI], ``(parameters, parameters)``. An interval of 1.96 deviations to both sides is of
+        95 %: where variances are known from few readings, it is as much wider as one of Student's t. Readings of an
+        arrival may hang together. Outliers that lie to one side bias a robust fit, and the covariance does not contain
+        that.
     redundancies
         Parameters held because the data cannot tell them apart, with the combination.
     at_bound
@@ -232,7 +235,8 @@ def _fit(solved: Solved, model: Model, loss: Loss) -> Fit:
         )
     covariance = covariance * np.outer(free.prior, free.prior)
     deviation = np.sqrt(np.diag(covariance))
-    informed = np.clip(1.0 - (deviation / free.prior) ** 2, 0.0, 1.0)
+    share = (deviation / free.prior) ** 2
+    informed = np.clip(1.0 - share, 0.0, 1.0) if problem.priors else 1.0 / (1.0 + share)
     identified = [
         replace(start.parameters[n], value=float(v))
         if bound

@@ -293,6 +293,8 @@ def variance_components(
         best = best if holds else alone
     else:
         best = _State(moments, np.where(start > least, 1.0, start), before.weighing.joints)
+        if not np.isfinite(best.likelihood):  # the readings' variance has left that of the joints far behind
+            best = _State(moments, start, np.zeros(moments.M.shape[-1]))
         best = _maximised(moments, best, [kind for kind in kinds if best.joints[kind].any()], noise)
         holds, likeliest = before.holds, Variances(best.factors, best.joints)
         if before.likeliest is not before.weighing:

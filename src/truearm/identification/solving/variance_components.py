@@ -111,7 +111,8 @@ def _root(information: Array) -> Array:
         except np.linalg.LinAlgError:
             continue
     values, vectors = np.linalg.eigh(information)
-    return np.asarray(np.linalg.qr((vectors * np.sqrt(np.maximum(values, _MORE[-1] * size))).T, mode="r").T)
+    rows = (vectors * np.sqrt(np.maximum(values, _MORE[-1] * size))).T
+    return np.asarray(np.linalg.qr(rows, mode="r"), dtype=np.float64).T
 
 
 class _State:
@@ -478,12 +479,13 @@ def _widened(state: _State, inverse: Array, kinds: Sequence[NDArray[np.intp] | i
         changes.append(size * inverse @ state.curvature(kind) @ inverse.T)
     weighted = [sum(relative[i, j] * changes[j] for j in range(len(kinds))) for i in range(len(kinds))]
     spread = sum(change @ other for change, other in zip(changes, weighted, strict=True))
-    spread = 0.5 * (spread + spread.T)
-    largest = float(np.linalg.eigvalsh(spread)[-1])
-    if largest <= 0.0:
+    sizes, vectors = np.linalg.eigh(0.5 * (spread + spread.T))
+    sizes = np.maximum(sizes, 0.0)  # where no reading is left over, rounding may say less than nothing
+    if sizes[-1] <= 0.0:
         return np.eye(count)
-    freedom = max(2.0 / largest, 1.0)
-    return np.asarray(np.eye(count) + (widening(freedom) ** 2 - 1.0) / largest * spread)
+    freedom = max(2.0 / float(sizes[-1]), 1.0)
+    more = (widening(freedom) ** 2 - 1.0) / sizes[-1] * sizes
+    return np.asarray(np.eye(count) + (vectors * more) @ vectors.T)
 
 
 def widening(freedom: float) -> float:

@@ -43,6 +43,8 @@ CAMPAIGNS = ("narrow", "far", "few", "full")
 NOISE = 0.02e-3
 FRAME = (0.31, -0.11, 0.06)
 ACCEPTED = ("rank-loss", "not-converged", "implausible", "narrow-data")
+#: Notices that name targets.
+NAMED = ("not-better-here", "beyond-measured")
 HERE = Path(__file__).parent
 
 
@@ -95,7 +97,7 @@ def one(seed: int) -> dict[str, Any]:
             if name == "judged":
                 made["kept"] = int(sum(not found.corrected[row] for row in rows))
                 made["targets"] = len(rows)
-                made["said"] = [n.code for n in done.warnings if n.code in ("not-better-here", *ACCEPTED)]
+                made["said"] = [n.code for n in done.warnings if n.code in (*NAMED, *ACCEPTED)]
             if not made["kept"]:
                 made["all"] = made["judged"]
                 break
@@ -226,7 +228,8 @@ def summed_up(cases: list[dict[str, Any]]) -> dict[str, Any]:
         "worse_without_judging": sum(case["all"] > 1.1 * case["before"] for case in known),
         "worse": len(worse),
         "worse_and_no_notice": sum(not case["said"] for case in worse),
-        "worse_and_no_target_named": sum("not-better-here" not in case["said"] for case in worse),
+        "worse_and_no_target_named": sum(not {*NAMED} & {*case["said"]} for case in worse),
+        "full_campaigns_with_a_notice": sum(bool({*NAMED} & {*c["said"]}) for c in full),
         "kept_targets_of_full_campaigns": [sum(c["kept"] for c in full), sum(c["targets"] for c in full)],
         "full_campaigns_judged_and_all_mm": [float(np.mean([c[n] for c in full])) for n in ("judged", "all")],
         "true_over_expected_before_median": float(np.median([c["before"] / c["expected"][0] for c in known])),

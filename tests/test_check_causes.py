@@ -124,7 +124,7 @@ def test_the_sign_of_the_last_joint_is_named_for_a_target_near_its_axis(offset: 
         if p.group in ("geometry", "joint zero")
     }
     tool = Tool({"A": (offset, 0.0, 0.1)})
-    twin = Twin(at_station(nominal.with_values(drawn), tool), {}, None)
+    twin = Twin(at_station(nominal.with_values(drawn), tool), {})
     data = replace(measure(twin, nominal.random_configurations(40, rng), 0.02e-3, rng), sigma=None)
     assert not check(ROBOT, data).warnings
     (notice,) = check(ROBOT, sign_of(6)(data)).warnings

@@ -6,6 +6,7 @@ commands and pipelines go to the shell.
 
 from __future__ import annotations
 
+import ast
 import io
 import os
 import re
@@ -15,10 +16,14 @@ import sys
 from collections.abc import Iterator
 from contextlib import chdir, contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
 from truearm.cli import main
+from truearm.identification.judging.changes import Kind
+from truearm.limits import LIMITS
+from truearm.measurement.rigid_tool import Suspicion
 
 ROOT = Path(__file__).parents[1]
 GUIDE = sorted((ROOT / "docs" / "guide").glob("*.md"))
@@ -210,3 +215,41 @@ def test_every_file_that_the_architecture_names_is_there() -> None:
     assert len(named) > 60
     for name in named:
         assert any(file.endswith(f"/{name.rstrip('/')}") for file in files), name
+
+
+#: What makes a notice, or becomes one, and the level that it has if none is given.
+NOTICES = {"Notice": "warning", "Slip": "error", "Suspect": "warning"}
+
+
+def notices_in_code() -> dict[str, set[str]]:
+    """Return the levels of every code in the code; those that are chosen where it runs are not among them."""
+    found: dict[str, set[str]] = {code: set() for code in (*get_args(Kind), *get_args(Suspicion))}
+    for file in (ROOT / "src" / "truearm").rglob("*.py"):
+        for call in ast.walk(ast.parse(file.read_text())):
+            if not isinstance(call, ast.Call) or not isinstance(call.func, ast.Name) or call.func.id not in NOTICES:
+                continue
+            if not call.args or not isinstance(call.args[0], ast.Constant):
+                continue
+            given = call.args[2] if call.func.id == "Notice" and len(call.args) > 2 else None
+            levels = found.setdefault(str(call.args[0].value), set())
+            if given is None:
+                levels.add(NOTICES[call.func.id])
+            elif isinstance(given, ast.Constant):
+                levels.add(str(given.value))
+    return found
+
+
+def test_every_code_of_a_notice_stands_in_the_guide_with_its_level() -> None:
+    rows = [line.split("|") for page in GUIDE for line in page.read_text().splitlines() if line.startswith("| `")]
+    codes = notices_in_code()
+    assert len(codes) > 60
+    for code, levels in codes.items():
+        told = [row[2] for row in rows if f"`{code}`" in row[1] and re.search("note|warning|error", row[2])]
+        assert told, f"{code} has no row with its level"
+        assert all(any(level in cell for cell in told) for level in levels), f"{code}: {levels}, told as {told}"
+
+
+def test_every_limit_stands_in_the_guide() -> None:
+    text = (ROOT / "docs" / "guide" / "data.md").read_text().replace(" ", "")
+    for name, limit in LIMITS.items():
+        assert f"|`{name}`|{limit.most}|" in text, f"{name} is {limit.most}"

@@ -7,11 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.compensation.test_program_on_twin import commanded, plate
+from tests.compensation.test_program_on_twin import plate
 
 import truearm
 from truearm import InputError
 from truearm.compensation.gauge import best_agreement
+from truearm.compensation.program_correction import commanded
 from truearm.library import load_robot
 from truearm.modeling.transform import quaternion_from_rotation
 from truearm.results.calibration import Calibration
@@ -80,7 +81,7 @@ def test_a_program_that_would_get_worse_stays_as_it_was(tmp_path: Path) -> None:
     assert missed(twin, done)[1] == pytest.approx(before, rel=0.01)
     assert {"not-better-here", "narrow-data"} <= {notice.code for notice in done.warnings}
     (notice,) = [notice for notice in done.warnings if notice.code == "not-better-here"]
-    assert "stay as they were" in notice.message
+    assert "stay as before" in notice.message
     assert "outside of what was measured" in notice.message
 
 

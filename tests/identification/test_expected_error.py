@@ -84,7 +84,8 @@ def test_large_angles_go_round_instead_of_straight_on(tmp_path: Path) -> None:
 
 
 def test_an_error_of_every_arrival_is_in_the_error_to_expect_and_makes_it_a_lower_bound(tmp_path: Path) -> None:
-    found = expected_error(replace(fitted(ARM, tmp_path), joint_error=np.array([1e-4])))
+    fit = replace(fitted(ARM, tmp_path), joint_error=np.array([1e-4]), weight=np.ones(10**6))
+    found = expected_error(fit)
     assert found.remainder == pytest.approx(0.5e-4, rel=1e-3)
     assert found.overall.mean == pytest.approx(0.5e-4 * np.sqrt(2 / np.pi), rel=0.02)
     assert found.overall.p95 == pytest.approx(0.5e-4 * 1.960, rel=0.05)

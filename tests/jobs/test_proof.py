@@ -23,7 +23,7 @@ SIGNS = Notice("joint-sign", "Joint 6 turns the other way.", "error")
 
 @pytest.fixture(scope="module")
 def robot() -> Robot:
-    return truearm.calibrate("irb120", campaign("irb120", 20, 2e-5, 1)[1], model="offsets").robot
+    return truearm.calibrate("irb120", campaign("irb120", 20, 2e-5, 1)[1]).robot
 
 
 @pytest.fixture
@@ -70,7 +70,7 @@ def test_an_error_of_the_calibration_is_told_with_its_words(robot: Robot, progra
 def test_narrow_data_are_judged_target_by_target(robot: Robot, program: Path) -> None:
     narrow = ended(robot, "converged", NARROW)
     assert codes(truearm.compensate(narrow, [program]))["narrow-data"] == "warning"
-    edited = narrow.with_values({"theta_offset_2": 0.001})
+    edited = narrow.with_values({"a_3": 0.2703})
     with pytest.raises(InputError, match="got 'narrow-data'"):
         truearm.compensate(edited, [program])
     assert "edited-by-hand" in codes(truearm.compensate(edited, [program], accept=["narrow-data"]))
@@ -105,7 +105,7 @@ def test_a_payload_leaves_the_proof(robot: Robot, program: Path) -> None:
 
 
 def test_an_edited_robot_is_not_cleared_of_how_its_fit_ended(robot: Robot, program: Path) -> None:
-    edited = ended(robot, "rank-loss").with_values({"theta_offset_2": 0.001})
+    edited = ended(robot, "rank-loss").with_values({"a_3": 0.2703})
     with pytest.raises(InputError, match="rank-loss"):
         truearm.compensate(edited, [program])
     done = truearm.compensate(edited, [program], accept=["rank-loss"])
@@ -114,7 +114,7 @@ def test_an_edited_robot_is_not_cleared_of_how_its_fit_ended(robot: Robot, progr
 
 
 def test_joints_for_poses_and_exports_are_made_with_a_warning(robot: Robot, tmp_path: Path) -> None:
-    unsound = ended(robot, "rank-loss", SIGNS).with_values({"theta_offset_2": 0.001})
+    unsound = ended(robot, "rank-loss", SIGNS).with_values({"a_3": 0.2703})
     position, rotation = robot.forward(np.zeros((1, 6)))
     table = truearm.inverse(unsound, position, rotation)
     exported = truearm.export(unsound, "json", out=tmp_path / "robot.json")
@@ -133,7 +133,7 @@ def test_joints_for_poses_and_exports_are_made_with_a_warning(robot: Robot, tmp_
 def test_the_description_of_a_robot_says_how_its_calibration_ended(robot: Robot) -> None:
     unsound = ended(robot, "rank-loss", SIGNS)
     assert "Calibration: rank-loss, joint-sign" in RobotDescription(unsound).lines()
-    edited = RobotDescription(unsound.with_values({"theta_offset_2": 0.001}))
+    edited = RobotDescription(unsound.with_values({"a_3": 0.2703}))
     assert "Calibration: rank-loss, joint-sign; values were changed since" in edited.lines()
     assert edited.summary()["proof"]["intact"] is False
     assert RobotDescription(truearm.load_robot("irb120")).summary()["proof"] is None
@@ -155,6 +155,23 @@ def test_what_is_expected_is_told(robot: Robot, program: Path, tmp_path: Path) -
     assert f'<td class="n">{1e3 * now.mean():.3f}</td>' in page
 
 
+def test_targets_that_were_measured_nowhere_near_are_named(robot: Robot, program: Path) -> None:
+    assert robot.proof is not None
+    known = truearm.compensate(robot, [program])
+    assert "beyond-measured" not in codes(known)
+    (low, high), *others = robot.proof.region
+    turned = ((low + 2 * np.pi, high + 2 * np.pi), *others)
+    assert "beyond-measured" not in codes(
+        truearm.compensate(sealed(robot, replace(robot.proof, region=turned)), [program])
+    )
+    elsewhere = sealed(robot, replace(robot.proof, region=((1.5, 2.0), *others)))
+    (notice,) = [n for n in truearm.compensate(elsewhere, [program]).warnings if n.code == "beyond-measured"]
+    assert (
+        "44 targets were corrected although axis_1 stood nowhere near in calibration: plate.mod line 7"
+        in notice.message
+    )
+
+
 def test_a_lower_bound_is_called_one(robot: Robot, program: Path) -> None:
     assert robot.proof is not None
     for bound in (True, False):
@@ -172,6 +189,8 @@ def test_targets_that_rather_get_worse_are_kept_and_listed(robot: Robot, program
     kept = [row for row in file.not_better if not file.correction.corrected[row]]
     assert kept
     assert codes(done)["not-better-here"] == "warning"
+    (assumed,) = [notice for notice in done.warnings if notice.code == "frames-assumed"]
+    assert "so few targets" not in assumed.message
     told = done.summary()["programs"][0]
     assert told["corrected"] == 44 - len(kept)
     assert len(told["not_better"]) == len(file.not_better)

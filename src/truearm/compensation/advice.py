@@ -11,13 +11,14 @@ import numpy as np
 
 from truearm.compensation.gauge import turns_between
 from truearm.compensation.kept_targets import LARGEST_STEP, LIKELY
+from truearm.compensation.measured_region import beyond_measured
 from truearm.compensation.program_correction import CorrectedPrograms, Correction, Frames
 from truearm.compensation.split import MOST_SEGMENTS, ProgramSplit
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import NO_PAYLOAD
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
-from truearm.shown import listed
+from truearm.shown import counted, listed
 
 #: Corrections of calibration errors are smaller [m]; a larger mean comes of a wrong tool, frame or robot.
 _LARGE_MEAN: Final = 0.02
@@ -43,7 +44,8 @@ def check_correction(
     corrections = result.corrections
     count = sum(int(one.corrected.sum()) for one in corrections)
     if any(one.program.targets for one in corrections):
-        made = _assumed(result.frames, count)
+        kept = sum(not one.corrected[row] for one in corrections for row in one.not_better)
+        made = _assumed(result.frames, count + int(kept))
     else:
         made = [Notice("no-targets", "There is no target in the programs that could be corrected.")]
     skipped = sum(len(one.skipped) for one in corrections)
@@ -51,7 +53,7 @@ def check_correction(
         made.append(
             Notice("targets-skipped", f"{_counted(skipped, 'target')} left unchanged, as listed with the reason.")
         )
-    made += _not_better(robot, result)
+    made += [*_not_better(robot, result), *_beyond(robot, result)]
     unknown: Counter[str] = sum((Counter(one.program.unknown) for one in corrections), Counter())
     if unknown:
         words = ", ".join(f"{word} ({number})" for word, number in unknown.most_common(_LISTED))
@@ -114,37 +116,55 @@ def _not_better(robot: Robot, result: CorrectedPrograms) -> list[Notice]:
     every = [(one, row) for one in result.corrections for row in one.not_better]
     if not every:
         return []
+    alone = [(one, row) for one, row in every if one.expected is not None and one.expected.worse[row] > LIKELY]
     kept = [(one, row) for one, row in every if not one.corrected[row]]
+    corrected = len(every) - len(kept)
     share = f"{LIKELY:.0%}".replace("%", " %")
     words = (
-        f"{_counted(len(every), 'target')} found whose correction makes the real error larger with a probability above "
-        f"{share}: {_lines(every)}. "
+        f"For {counted(len(alone), 'target')} the correction makes the real error larger with a probability above "
+        f"{share}: {_lines(alone)}. "
     )
     if kept:
+        joined = len(kept) + corrected - len(alone)
+        words += f"{counted(len(kept), 'target')} {'stays' if len(kept) == 1 else 'stay'} as before"
+        words += f", {joined} of them because straight moves join them to the others" if joined else ""
+        words += f"; a path may have a step of up to {LARGEST_STEP * 1e3:g} mm there. "
+    if corrected:
         words += (
-            f"{len(kept)} of them, and what belongs to their paths, stay as they were; a path may have a step of up to "
-            f"{LARGEST_STEP * 1e3:g} mm there."
+            f"{counted(corrected, 'target')} {'is' if corrected == 1 else 'are'} corrected nevertheless, because the "
+            "path as a whole is rather better for it or `accept=not-better-here` asks for it. "
         )
-    if len(kept) < len(every):
-        words += f"{' ' if kept else ''}{len(every) - len(kept)} are corrected nevertheless"
-        words += ", because their path as a whole is rather better for it or `accept=not-better-here` asks for it."
-    outside = _joints_outside(robot, every)
+    beyond = _joints_beyond(robot, every)
     words += (
-        f" They need {outside} outside of what was measured: measure there."
-        if outside
-        else " The corrections are small beside what is known of them: measure more configurations near the program."
+        f"They need {beyond} outside of what was measured: measure there."
+        if beyond
+        else "The corrections are small beside what is known of them: measure more configurations near the program."
     )
     return [Notice("not-better-here", words)]
 
 
-def _joints_outside(robot: Robot, targets: Sequence[tuple[Correction, int]]) -> str:
-    """Return the joints that are at some targets outside of what was measured."""
-    if robot.proof is None or not robot.proof.region:
-        return ""
-    low, high = np.array(robot.proof.region).T
-    joints = np.array([one.joints[row] for one, row in targets])
-    outside = ((joints < low) | (joints > high)).any(axis=0)
-    return listed([joint.name for joint, one in zip(robot.joints, outside.tolist(), strict=True) if one])
+def _beyond(robot: Robot, result: CorrectedPrograms) -> list[Notice]:
+    """Say which targets are reached with joint positions that calibration has not seen."""
+    found = [
+        (one, row)
+        for one in result.corrections
+        for row in np.flatnonzero(one.corrected & beyond_measured(robot, one.joints).any(axis=1)).tolist()
+    ]
+    if not found:
+        return []
+    return [
+        Notice(
+            "beyond-measured",
+            f"{_counted(len(found), 'target')} corrected although {_joints_beyond(robot, found)} stood nowhere near in "
+            f"calibration: {_lines(found)}. What the model leaves out counts more there than where it was measured.",
+        )
+    ]
+
+
+def _joints_beyond(robot: Robot, targets: Sequence[tuple[Correction, int]]) -> str:
+    """Return the joints that are at some targets well beyond what was measured."""
+    beyond = beyond_measured(robot, np.array([one.joints[row] for one, row in targets]))
+    return listed([robot.joints[number].name for number in np.flatnonzero(beyond.any(axis=0)).tolist()])
 
 
 def _lines(targets: Sequence[tuple[Correction, int]]) -> str:

@@ -84,7 +84,7 @@ def changed_since(robot: object) -> list[Notice]:
 def told_of(robot: Robot) -> list[Notice]:
     """Return what speaks against the calibration of a robot that is used all the same."""
     return [
-        *(Notice(name, f"From the calibration of this robot: {message}") for name, message in _against(robot).items()),
+        *(Notice(name, message) for name, message in _against(robot).items()),
         *_edited(robot),
     ]
 

@@ -25,6 +25,7 @@ from truearm.measurement.statistics import errors_of
 from truearm.modeling.chain import Array, ForwardKinematics
 from truearm.modeling.parts import Payload
 from truearm.modeling.postures import Postures
+from truearm.modeling.robot import Robot
 
 #: Configurations at which positions are asked for, and draws of the parameters' errors: fewer for many targets.
 _CONFIGURATIONS: Final = (60, 200)
@@ -133,13 +134,23 @@ class PositionErrors:
     def _errors(self) -> dict[str, Array]:
         """Errors of the parameters by name, ``(draws,)`` each [SI]."""
         names, root = covariance_root(self.fit)
-        rng = np.random.default_rng(self.seed)
-        drawn = root @ rng.standard_normal((self.draws, root.shape[1])).T
-        if not self.fit.declared or self.fit.excess > 1.0:
-            # The noise was estimated too: Student's distribution (Gelman et al. 2013, section 3.2).
-            freedom = _freedom(self.fit)
-            drawn *= np.sqrt(freedom / rng.chisquare(freedom, self.draws))
-        return dict(zip(names, drawn, strict=True))
+        normal = np.random.default_rng(self.seed).standard_normal((self.draws, root.shape[1]))
+        if self.draws > 2 * root.shape[1]:
+            # So few draws have a covariance of their own: they are turned and stretched to the one they are drawn from.
+            normal -= normal.mean(axis=0)
+            normal = np.linalg.qr(normal)[0] * math.sqrt(self.draws)
+        return dict(zip(names, root @ normal.T * self._scale, strict=True))
+
+    @cached_property
+    def _scale(self) -> Array:
+        """How many times larger the errors of each draw are, ``(draws,)``: Student's distribution.
+
+        Variances that were estimated are uncertain themselves (Gelman et al. 2013, section 3.2).
+        """
+        if self.fit.declared and self.fit.excess == 1.0 and not self.fit.joint_error.any():
+            return np.ones(self.draws)
+        freedom = _freedom(self.fit)
+        return np.asarray(np.sqrt(freedom / np.random.default_rng((self.seed, 3)).chisquare(freedom, self.draws)))
 
     @cached_property
     def _bent(self) -> bool:
@@ -159,7 +170,7 @@ class PositionErrors:
         fit, at = self.fit, self.fit.robot.loaded(joints)
         shape = (self.draws, len(joints), len(fit.joint_error))
         normal = np.random.default_rng((self.seed, 1)).standard_normal(shape) if fit.joint_error.any() else None
-        shared = None if normal is None else normal * fit.joint_error
+        shared = None if normal is None else normal * fit.joint_error * self._scale[:, None, None]
         moves: Iterable[Array] = _moves(fit, at, self._errors, shared, exact=self._bent)
         if fit.gauge_freedoms:
             moves = _without_gauge(fit, at, np.stack([*moves]))
@@ -185,7 +196,7 @@ def expected_error(fit: Fit, seed: int = 0, *, plausible: bool = True) -> Expect
     count = min(many, max(few, _POSITIONS // max(len(robot.targets), 1)))
     few, many = _DRAWS
     draws = min(many, max(few, _LENGTHS // (count * max(len(robot.targets), 1))))
-    joints = robot.random_configurations(count, np.random.default_rng(seed))
+    joints = _all_over(robot, count, np.random.default_rng(seed))
     lengths = PositionErrors(fit, draws, seed).at(joints)
     overall = _expectation(lengths.reshape(draws, -1))
     remainder = _remainder(fit, joints)
@@ -241,6 +252,16 @@ def expected_map(fit: Fit, positions: int, seed: int = 0) -> tuple[Array, Array]
     return np.concatenate([robot.forward(joints, target=target.name)[0] for target in robot.targets]), error.reshape(-1)
 
 
+def _all_over(robot: Robot, count: int, rng: np.random.Generator) -> Array:
+    """Return joint positions ``(count, joints)``, evenly spread within the limits of every joint.
+
+    A Latin hypercube (McKay, Beckman and Conover 1979): means over it vary less than over independent ones.
+    """
+    low, high = np.array([joint.range for joint in robot.joints]).T
+    slices = rng.permuted(np.tile(np.arange(count), (len(low), 1)), axis=1).T
+    return np.asarray(low + (high - low) * (slices + rng.random(slices.shape)) / count)
+
+
 def _expectation(lengths: Array) -> Expectation:
     """Summarise lengths ``(draws, positions)``."""
     means = lengths.mean(axis=1)
@@ -271,8 +292,10 @@ def _omissions(fit: Fit, remainder: float, overall: Expectation, *, plausible: b
         yield "the robot's own geometry counts as exact"
     if fit.at_bound:
         yield "values at a bound count as exact"
-    if fit.excess > 1.0 or remainder**2 > _REMAINDER * overall.mean**2:
+    if fit.excess > 1.0:
         yield "the robot does something that the model cannot express, and it may do more of it elsewhere"
+    elif remainder**2 > _REMAINDER * overall.mean**2:
+        yield "what the model cannot express is in it only as far as it was seen where the robot was measured"
 
 
 def _freedom(fit: Fit) -> float:

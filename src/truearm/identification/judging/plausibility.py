@@ -9,7 +9,7 @@ import numpy as np
 
 from truearm.errors import InputError
 from truearm.identification.judging.implausible import check_plausible
-from truearm.identification.judging.slips import off_by, signs_by_fit, slips_in_lengths, slips_in_positions
+from truearm.identification.judging.slips import off_by, slips_by_fit, slips_in_lengths, slips_in_positions
 from truearm.identification.solving.fit import Fit, identify
 from truearm.identification.solving.models import named_model
 from truearm.identification.solving.problem import Problem
@@ -66,7 +66,7 @@ def check_against(robot: Robot, data: Dataset) -> tuple[list[Notice], list[Suspe
     fit = identify(robot, data, named_model("geometric"), loss="cauchy")
     off = off_by(errors_of(fit.robot, data))
     if np.nanmedian(off) > _FITTED_WITHIN:
-        slips = signs_by_fit(robot, data)
+        slips = slips_by_fit(robot, data)
         if slips:
             return [*slips, *found], []
     unlike_robot = check_plausible(fit, data)

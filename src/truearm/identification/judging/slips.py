@@ -39,6 +39,8 @@ _PLAIN_IMPROVEMENT: Final = 20.0
 _AS_GOOD: Final = 1.5
 #: Configurations looked at; more tell nothing new.
 _CONFIGURATIONS_TRIED: Final = 60
+#: Targets looked at, those that were read most often.
+_TARGETS_TRIED: Final = 10
 #: A campaign moves some joint by more than this [rad or m].
 _LEAST_TRAVEL: Final = 0.3
 #: Share of the spread of the readings that is left where these do not follow the joints; chance leaves 0.6 or more.
@@ -87,6 +89,7 @@ class Slip:
 
 def slips_in_positions(robot: Robot, data: Dataset) -> list[Notice]:
     """Return which slip explains positions in the instrument's frame; nothing if they fit, or if none does."""
+    data = _few_targets(data)
     turned = _quaternion_slips(robot, data)
     some, rest = _some(data), replace(data, quaternion=None, sigma_rot=None)
     some = replace(some, quaternion=None, sigma_rot=None)
@@ -167,19 +170,19 @@ def slips_in_lengths(robot: Robot, data: Dataset) -> list[Notice]:
     ]
 
 
-def signs_by_fit(robot: Robot, data: Dataset) -> list[Notice]:
-    """Return the joint whose opposite sign explains what a fit leaves over.
+def slips_by_fit(robot: Robot, data: Dataset) -> list[Notice]:
+    """Return the joint whose opposite sign, or the mirror image that, explains what a fit leaves over.
 
-    The targets may be so near the axis of the last joint that the placed nominal robot hardly sees its sign. So one
-    step of the geometric fit from there is judged, which takes out what the robot's own errors explain.
+    The targets may be so near the axis of the last joint, or the campaign so narrow, that the placed nominal robot
+    hardly sees it. So one step of the geometric fit from there is judged, which takes out what the robot's own errors
+    explain.
     """
-    some = _some(replace(data, quaternion=None, sigma=None, sigma_rot=None))
+    some = _some(replace(_few_targets(data), quaternion=None, sigma=None, sigma_rot=None))
     given = _fitted_misfit(robot, some)
-    tried = [(_fitted_misfit(robot, slip.data), slip) for slip in _sign_slips(some, 1)]
-    if not tried:
-        return []
-    left, slip = min(tried, key=lambda entry: entry[0])
-    return [slip.notice] if left * _LEAST_IMPROVEMENT < given else []
+    tried = [(_fitted_misfit(robot, slip.data), slip) for slip in (*_mirrored(some), *_sign_slips(some, 1))]
+    least = min(left for left, _ in tried)
+    slip = next(slip for left, slip in tried if left <= _AS_GOOD * least)
+    return [slip.notice] if least * _LEAST_IMPROVEMENT < given else []
 
 
 def _fitted_misfit(robot: Robot, data: Dataset) -> float:
@@ -444,6 +447,14 @@ def _some(data: Dataset) -> Dataset:
     if data.configurations <= _CONFIGURATIONS_TRIED:
         return data
     return data.of_configurations(np.linspace(0, data.configurations - 1, _CONFIGURATIONS_TRIED).astype(np.intp))
+
+
+def _few_targets(data: Dataset) -> Dataset:
+    """Return the data of the targets that were read most often."""
+    if len(data.targets) <= _TARGETS_TRIED:
+        return data
+    often = np.argsort(-np.bincount(data.target[data.has_position], minlength=len(data.targets)), kind="stable")
+    return data.of_readings(np.isin(data.target, often[:_TARGETS_TRIED]))
 
 
 def _only(data: Dataset, target: int) -> Dataset:

@@ -160,7 +160,7 @@ def test_joint_positions_of_another_row_are_told() -> None:
     joints = data.joints.copy()
     joints[4] = joints[9]
     (notice,) = check(ROBOT, replace(data, joints=joints)).warnings
-    assert notice.code in ("outliers", "target-mistaken")
+    assert notice.code == "joints-repeated"
 
 
 def renamed(data: Dataset, readings: list[int], name: str) -> Dataset:

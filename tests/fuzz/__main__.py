@@ -11,6 +11,7 @@ import time
 import warnings
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import suppress
 from itertools import count
 from pathlib import Path
 
@@ -58,16 +59,17 @@ def main() -> int:
     kinds = tuple(kind for kind in KINDS if not given.only or kind.startswith(tuple(given.only)))
     used, done, wrong = dict.fromkeys(kinds, 0.0), Counter[str](), 0
     began = time.monotonic()
-    for kind, number in _cases(kinds, given.first, used, given.most):
-        if sum(used.values()) > given.seconds:
-            break
-        start, clock = time.process_time(), time.monotonic()
-        found = findings(kind, number)
-        used[kind] += (time.monotonic() - clock if kind == "command" else time.process_time() - start) + 1e-4
-        done[kind] += 1
-        for words in found:
-            wrong += 1
-            print(f"script/fuzz --case {kind}:{number}  # {words}", flush=True)  # noqa: T201
+    with suppress(KeyboardInterrupt):
+        for kind, number in _cases(kinds, given.first, used, given.most):
+            if sum(used.values()) > given.seconds:
+                break
+            start, clock = time.process_time(), time.monotonic()
+            found = findings(kind, number)
+            used[kind] += (time.monotonic() - clock if kind == "command" else time.process_time() - start) + 1e-4
+            done[kind] += 1
+            for words in found:
+                wrong += 1
+                print(f"script/fuzz --case {kind}:{number}  # {words}", flush=True)  # noqa: T201
     commands = done.pop("command", 0)
     print(  # noqa: T201
         f"{sum(done.values())} inputs in process, {commands} commands, {wrong} findings in "

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.fuzz import cases, verdicts
+from tests.fuzz import cases, regressions, samples, verdicts
 from tests.fuzz.mutations import damaged
 from tests.fuzz.readers import READERS
 
@@ -85,3 +85,18 @@ def test_verdicts() -> None:
     assert verdicts.not_finite({"a": [1.0, {"b": float("inf")}]})
     assert verdicts.of_files({"a": "1"}, {"a": "1"}, done=False) == []
     assert len(verdicts.of_files({"a": "1", "b": ""}, {"a": "2", "c": "", ".truearm.0": ""}, done=False)) == 4
+
+
+@pytest.mark.parametrize(("reader", "what"), regressions.CONTENTS)
+def test_what_once_went_wrong(reader: str, what: str, tmp_path: Path) -> None:
+    files = iter(READERS[reader].files.items())
+    first, _ = next(files)
+    (tmp_path / first).write_bytes(regressions.CONTENTS[reader, what]())
+    for name, sample in files:
+        (tmp_path / name).write_bytes(samples.content(sample))
+    found = []
+    try:
+        READERS[reader].read(tmp_path)
+    except InputError as error:
+        found = verdicts.of_refusal(error)
+    assert found == []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -17,6 +18,7 @@ import truearm
 from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of
+from truearm.modeling.chain import Array
 from truearm.modeling.transform import IDENTITY
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import Twin, measure
@@ -156,6 +158,37 @@ def test_targets_that_took_other_names(folder: Path) -> None:
     found = told("validate", folder / "None" / "calibrated.yaml", written(folder, renamed, "renamed.csv"))
     assert found.says("targets-renamed", "error"), found
     assert found.code == 3
+
+
+TURN: Final = np.array([[np.cos(0.3), -np.sin(0.3), 0.0], [np.sin(0.3), np.cos(0.3), 0.0], [0.0, 0.0, 1.0]])
+
+
+@pytest.mark.parametrize(
+    ("change", "code", "level", "ends", "words"),
+    [
+        (lambda p: p @ TURN.T + np.array([0.1, 0.0, 0.0]), "frames-differ", "error", 3, "turned by 17 deg"),
+        (lambda p: p + np.array([5e-4, 0.0, 0.0]), "frames-differ", "warning", 0, r"moved by 0\.5"),
+        (lambda p: p * 1e-3, "implausible", "error", 3, "units"),
+    ],
+    ids=["instrument-elsewhere", "table-pushed-by-half-a-millimetre", "metres-called-millimetres"],
+)
+def test_new_readings_in_another_frame(
+    change: Callable[[Array], Array], code: str, level: str, ends: int, words: str, folder: Path
+) -> None:
+    calibrated(None, folder)
+    fresh = more_of(made(None)[0], 10, NOISE, 5)
+    file = written(folder, replace(fresh, position=change(fresh.position)), "elsewhere.csv")
+    found = told("validate", folder / "None" / "calibrated.yaml", file)
+    assert found.says(code, level, words), found
+    assert found.code == ends
+
+
+def test_a_robot_that_errs_is_not_in_another_frame(folder: Path) -> None:
+    calibrated(1.0, folder)
+    fresh = written(folder, more_of(made(1.0)[0], 10, NOISE, 5), "wide.csv")
+    found = told("validate", folder / "1.0" / "calibrated.yaml", fresh)
+    assert found.summary["position_mm"]["mean"] > 0.1
+    assert (found.code, found.levels) == (0, {})
 
 
 # -- folders ---------------------------------------------------------------------------------------------------

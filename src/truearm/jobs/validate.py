@@ -10,6 +10,7 @@ from typing import Final
 
 from truearm.errors import InputError, refusals_of
 from truearm.files import path_argument, read_bytes
+from truearm.identification.judging.same_frames import check_frames
 from truearm.identification.judging.target_names import check_names
 from truearm.jobs.arguments import data_argument, gravity_argument, payload_argument, refuse_swapped, robot_argument
 from truearm.jobs.proof import changed_since
@@ -63,8 +64,8 @@ def validate(
             "'truearm distances'.",
         )
     errors = errors_of(robot, data)
-    warnings = (*changed, *check_names(robot, data, errors), *_seen_in_training(robot, data, digest))
-    return Validation(data.source, errors, warnings)
+    mistaken = check_names(robot, data, errors) or check_frames(robot, data, errors)
+    return Validation(data.source, errors, (*changed, *mistaken, *_seen_in_training(robot, data, digest)))
 
 
 #: How a calibration says in the robot's history which configurations of which file it was trained on.

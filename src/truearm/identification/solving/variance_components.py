@@ -23,6 +23,8 @@ from truearm.modeling.chain import Array
 
 #: Twice the gain in log-likelihood from which joint errors are believed.
 _SIGNIFICANT: Final = 5.41
+#: Share of the largest information that is added where a matrix is singular but for rounding, in turn.
+_MORE: Final = (0.0, 1e-15, 1e-13, 1e-11)
 _STEPS: Final = 40
 _LARGEST_STEP: Final = 2.0  # in the logarithm of a variance
 _FURTHER: Final = 4.0  # how many times longer than the information says
@@ -31,6 +33,8 @@ _SETTLED: Final = 1e-5  # what a step may still gain in twice the log-likelihood
 _LEAST_DIFFERENCE: Final = 0.05
 #: Of the logarithm of a variance: what is known of it beforehand.
 _LEAST_INFORMATION: Final = 0.05
+#: Times the readings' variance above which a variance of the joints is beyond what readings can say.
+_MOST: Final = 1e10
 #: Share of the readings' variance below which a variance of the joints is none.
 _LEAST: Final = 1e-8
 
@@ -98,6 +102,19 @@ class _Moments:
         self.C, self.c, self.q = sums[:, :-1, :-1], sums[:, :-1, -1], sums[:, -1, -1]
 
 
+def _root(information: Array) -> Array:
+    """Return the Cholesky factor of an information, with as little more as rounding asks for where little is known."""
+    size = float(np.abs(np.diag(information)).max())
+    for more in _MORE:
+        try:
+            return np.asarray(np.linalg.cholesky(information + more * size * np.eye(len(information))))
+        except np.linalg.LinAlgError:
+            continue
+    values, vectors = np.linalg.eigh(information)
+    rows = (vectors * np.sqrt(np.maximum(values, _MORE[-1] * size))).T
+    return np.asarray(np.linalg.qr(rows, mode="r"), dtype=np.float64).T
+
+
 class _State:
     """The likelihood at some variances, with its slopes."""
 
@@ -113,17 +130,13 @@ class _State:
         whole = np.tensordot(by, of.C, 1) - self.T.reshape(-1, p).T @ ET.reshape(-1, p)
         self.whole = whole
         self._curvatures: dict[int | tuple[int, ...], Array] = {}
-        try:
-            self.L = np.linalg.cholesky(whole + of.known)
-        except np.linalg.LinAlgError:  # variances so far apart that rounding is all there is
-            self.likelihood = -np.inf
-            return
+        self.L = _root(whole + of.known)
         b = by @ of.c - np.einsum("akp,ak->p", ET, self.t)
         self.found = np.linalg.solve(self.L.T, np.linalg.solve(self.L, b))
         self.ET = ET
         left = float(by @ of.q - np.einsum("ak,akl,al->", self.t, self.E, self.t) - b @ self.found)
         logs = float(of.rows @ np.log(factors)) + float(np.linalg.slogdet(inner)[1].sum())
-        self.likelihood = -0.5 * (logs + 2.0 * float(np.log(np.diag(self.L)).sum()) + left)
+        self.likelihood = -0.5 * (logs + 2.0 * float(np.log(np.abs(np.diag(self.L))).sum()) + left)
 
     @cached_property
     def inverse(self) -> Array:
@@ -293,6 +306,8 @@ def variance_components(
         best = best if holds else alone
     else:
         best = _State(moments, np.where(start > least, 1.0, start), before.weighing.joints)
+        if not np.isfinite(best.likelihood):  # the readings' variance has left that of the joints far behind
+            best = _State(moments, start, np.zeros(moments.M.shape[-1]))
         best = _maximised(moments, best, [kind for kind in kinds if best.joints[kind].any()], noise)
         holds, likeliest = before.holds, Variances(best.factors, best.joints)
         if before.likeliest is not before.weighing:
@@ -327,7 +342,8 @@ def _with_and_without(
             break
         squares, traces, information = best.slopes([*waiting])
         steps = 0.5 * (squares - traces) / np.maximum(np.diag(information), 1e-300)
-        rising = [(kind, step) for kind, step in zip(waiting, steps.tolist(), strict=True) if step > 0.0]
+        most = _MOST * float(best.factors.max()) / max(_effect(moments), 1e-300)  # beyond, the readings say nothing
+        rising = [(kind, step) for kind, step in zip(waiting, steps.tolist(), strict=True) if 0.0 < step < most]
         if not rising:
             break
         joints = best.joints.copy()
@@ -394,7 +410,7 @@ def beyond_chance(squares: float, freedom: float) -> bool:
 def _maximised(moments: _Moments, start: _State, kinds: Sequence[NDArray[np.intp]], noise: Sequence[int]) -> _State:
     """Climb to the largest likelihood from some variances, all of them above zero."""
     here, kinds = start, list(kinds)
-    size = np.trace(moments.M.sum(axis=(0, 1))) / moments.rows.sum()
+    size = _effect(moments)
     before: tuple[Array, Array] | None = None
     for _ in range(_STEPS):
         free: list[NDArray[np.intp] | int] = [*kinds, *noise]
@@ -420,11 +436,18 @@ def _maximised(moments: _Moments, start: _State, kinds: Sequence[NDArray[np.intp
         else:
             break
         here, before = there, (step, slope)
+        if any(here.joints[kind[0]] * size > _MOST * here.factors.max() for kind in kinds):
+            break
         gone = [kind for kind in kinds if here.joints[kind[0]] * size < _LEAST * here.factors.min()]
         for kind in gone:
             here, before = _at(moments, here, [kind], np.zeros(1)), None
         kinds = [kind for kind in kinds if not any(kind is other for other in gone)]
     return here
+
+
+def _effect(moments: _Moments) -> float:
+    """Return the mean variance of an equation by the variance of a joint."""
+    return float(np.trace(moments.M.sum(axis=(0, 1))) / moments.rows.sum())
 
 
 def _at(moments: _Moments, here: _State, kinds: Sequence[NDArray[np.intp] | int], values: Array) -> _State:
@@ -458,12 +481,13 @@ def _widened(state: _State, inverse: Array, kinds: Sequence[NDArray[np.intp] | i
         changes.append(size * inverse @ state.curvature(kind) @ inverse.T)
     weighted = [sum(relative[i, j] * changes[j] for j in range(len(kinds))) for i in range(len(kinds))]
     spread = sum(change @ other for change, other in zip(changes, weighted, strict=True))
-    spread = 0.5 * (spread + spread.T)
-    largest = float(np.linalg.eigvalsh(spread)[-1])
-    if largest <= 0.0:
+    sizes, vectors = np.linalg.eigh(0.5 * (spread + spread.T))
+    sizes = np.maximum(sizes, 0.0)  # where no reading is left over, rounding may say less than nothing
+    if sizes[-1] <= 0.0:
         return np.eye(count)
-    freedom = max(2.0 / largest, 1.0)
-    return np.asarray(np.eye(count) + (widening(freedom) ** 2 - 1.0) / largest * spread)
+    freedom = max(2.0 / float(sizes[-1]), 1.0)
+    more = (widening(freedom) ** 2 - 1.0) / sizes[-1] * sizes
+    return np.asarray(np.eye(count) + (vectors * more) @ vectors.T)
 
 
 def widening(freedom: float) -> float:

@@ -9,7 +9,7 @@ import time
 import traceback
 import zlib
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import chdir, contextmanager
 from pathlib import Path
 from types import FrameType
 from typing import Final
@@ -47,7 +47,8 @@ def findings(kind: str, number: int, keep: Path | None = None) -> list[str]:
         what, _, name = kind.partition("-")
         began = time.process_time()
         with _seconds(commands.SECONDS):
-            found = _command(rng, folder) if what == "command" else _in_process(rng, what, name, folder)
+            with chdir(folder):  # odd texts are good names of files
+                found = _command(rng, folder) if what == "command" else _in_process(rng, what, name, folder)
         if time.process_time() - began > commands.SECONDS:
             found.append("it took too long")
         return found

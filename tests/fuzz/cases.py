@@ -46,9 +46,8 @@ def findings(kind: str, number: int, keep: Path | None = None) -> list[str]:
     try:
         what, _, name = kind.partition("-")
         began = time.process_time()
-        with _seconds(commands.SECONDS):
-            with chdir(folder):  # odd texts are good names of files
-                found = _command(rng, folder) if what == "command" else _in_process(rng, what, name, folder)
+        with _seconds(commands.SECONDS), chdir(folder):  # odd texts are good names of files
+            found = _command(rng, folder) if what == "command" else _in_process(rng, what, name, folder)
         if time.process_time() - began > commands.SECONDS:
             found.append("it took too long")
         return found

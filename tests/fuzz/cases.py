@@ -9,7 +9,7 @@ import time
 import traceback
 import zlib
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import chdir, contextmanager
 from pathlib import Path
 from types import FrameType
 from typing import Final
@@ -46,7 +46,7 @@ def findings(kind: str, number: int, keep: Path | None = None) -> list[str]:
     try:
         what, _, name = kind.partition("-")
         began = time.process_time()
-        with _seconds(commands.SECONDS):
+        with _seconds(commands.SECONDS), chdir(folder):  # odd texts are good names of files
             found = _command(rng, folder) if what == "command" else _in_process(rng, what, name, folder)
         if time.process_time() - began > commands.SECONDS:
             found.append("it took too long")

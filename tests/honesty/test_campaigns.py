@@ -138,6 +138,8 @@ def as_thousands(p: Array, _: Dataset) -> Array:
     return np.array([int(f"{v * 1e3:.3f}".replace(".", "").rstrip("0") or "0") * 1e-3 for v in p.flat]).reshape(p.shape)
 
 
+RIGHT_SIGMA: Final = with_sigma(NOISE)
+
 #: The lies of data, each under the name that a metrologist would give it.
 LIES: Final[dict[str, Lie]] = {
     # units
@@ -155,13 +157,13 @@ LIES: Final[dict[str, Lie]] = {
     ),
     # deviations
     "micrometres-called-millimetres-in-sigma": Lie(
-        with_sigma(20e-3), "calibrate", "sigma-too-large", "error", "", 3, with_sigma(NOISE)
+        with_sigma(20e-3), "calibrate", "sigma-too-large", "error", "", 3, RIGHT_SIGMA
     ),
     "three-sigma-called-sigma": Lie(
-        with_sigma(3 * NOISE), "calibrate", "sigma-too-large", "warning", "", 0, with_sigma(NOISE)
+        with_sigma(3 * NOISE), "calibrate", "sigma-too-large", "warning", "", 0, RIGHT_SIGMA
     ),
     "a-third-of-sigma": Lie(
-        with_sigma(NOISE / 3), "calibrate", "residuals-exceed-sigma", "warning", "", 0, with_sigma(NOISE)
+        with_sigma(NOISE / 3), "calibrate", "residuals-exceed-sigma", "warning", "", 0, RIGHT_SIGMA
     ),
     # axes and signs
     "left-handed-instrument": Lie(with_positions(lambda p, _: p * [1, -1, 1]), "check", "mirrored", "error", "", 3),

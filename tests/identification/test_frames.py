@@ -79,7 +79,7 @@ def test_orientation_readings_place_an_arm_of_two_joints() -> None:
 
 def test_a_calibrated_arm_is_placed_to_its_noise() -> None:
     _, data = campaign("ur5", 40, 1e-4, 3, truth="nominal")
-    errors = errors_of(place(load_robot("ur5"), data).robot, data)
+    errors = errors_of(place(load_robot("ur5"), data), data)
     assert errors.position is not None
     assert errors.position.rms == pytest.approx(np.sqrt(3) * 1e-4, rel=0.15)
 

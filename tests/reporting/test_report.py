@@ -87,7 +87,7 @@ def made(
         data=data,
         training=training,
         held_out=held_out,
-        nominal=errors_of(place(robot, first).robot, judged),
+        nominal=errors_of(place(robot, first), judged),
         train=errors_of(fit.robot, first),
         validation=errors_of(fit.robot, judged) if len(held_out) else None,
         expected=expected_error(fit),

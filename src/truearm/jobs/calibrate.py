@@ -224,7 +224,7 @@ def calibrate(
             )
         chosen: Model = selection.model if named is None and selection is not None else named.also(effects)  # type: ignore[union-attr]
         progress("placing the nominal robot")
-        nominal = place(nominal_robot, first, loss)
+        placed = place(nominal_robot, first, loss)
         progress(f"identifying the {chosen.name} model on {count} configurations")
         fit = identify(
             nominal_robot, first, chosen, loss=loss, redundancy=redundancy, bounds=bounds, bounds_file=bounds_file
@@ -232,7 +232,7 @@ def calibrate(
     progress("judging it")
     judged = first if second is None else second
     validation = None if second is None else errors_of(fit.robot, second)
-    before = errors_of(nominal.robot, judged)
+    before = errors_of(placed, judged)
     train_errors = errors_of(fit.robot, first)
     # What the robust fit of the check could not explain, the fit itself may.
     noticed = tuple(notice for notice in noticed if notice.code != Status.IMPLAUSIBLE.value)

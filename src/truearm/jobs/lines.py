@@ -114,7 +114,7 @@ def _placed(nominal: Robot, errors: Robot | None, data: Dataset) -> Robot:
     for robot in (errors, nominal):
         if robot is not None and set(data.targets) <= {target.name for target in robot.targets}:
             return robot
-    return place(nominal, data).robot
+    return place(nominal, data)
 
 
 def _check_design(nominal: Robot, errors: Robot) -> None:

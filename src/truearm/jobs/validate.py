@@ -50,7 +50,8 @@ def validate(
     refuse_swapped(robot, data, "validate")
     digest = None
     if isinstance(data, str | Path):
-        digest = hashlib.sha256(read_bytes(path_argument(data, "data"))).hexdigest()
+        with refusals_of("data"):
+            digest = hashlib.sha256(read_bytes(path_argument(data, "data"))).hexdigest()
     data = data_argument(data)
     changed = changed_since(robot)
     robot = as_measured(robot, data, payload, gravity)

@@ -104,7 +104,7 @@ def test_noise_is_where_the_tip_is_and_is_declared() -> None:
 def test_roll_and_pitch_against_the_robot_are_base_parameters() -> None:
     table = CalibrationTable(GRID, PLACE).tilted(ROLL, PITCH)
     data = table.touched_by(Twin(arm()), ELBOW_UP, 0.0, np.random.default_rng(0))
-    base = place(load_robot("li3"), data).robot.base  # T_table_base
+    base = place(load_robot("li3"), data).base  # T_table_base
     np.testing.assert_allclose(base.rotation.T, table.place.rotation, atol=1e-7)
     np.testing.assert_allclose(-base.rotation.T @ np.array(base.translation), PLACE.translation, atol=1e-7)
 
@@ -116,7 +116,7 @@ def test_an_arm_identified_on_an_exact_table_predicts_other_points_of_it() -> No
     other = replace(table, points=rectangular_grid(4, 4, 0.045) + np.array([0.005, -0.003, 0.0]))
     geometric = next(model for model in MODELS if model.name == "geometric")
     data, unseen = (t.touched_by(twin, ELBOW_UP, 0.0, rng) for t in (table, other))
-    before, fitted = (f.robot for f in (place(load_robot("li3"), data), identify(load_robot("li3"), data, geometric)))
+    before, fitted = (place(load_robot("li3"), data), identify(load_robot("li3"), data, geometric).robot)
     assert np.abs(before.world_poses(unseen.joints, "tip")[0] - unseen.position).max() > 1e-5
     assert np.abs(fitted.world_poses(unseen.joints, "tip")[0] - unseen.position).max() < 1e-7
 

@@ -208,9 +208,12 @@ def identify(
     return _fit(solved, model, loss)
 
 
-def place(robot: Robot, data: Dataset, loss: Loss = "linear") -> Fit:
-    """Fit only the base and the targets: the uncalibrated robot in the frames of the data."""
-    return identify(robot, data, FRAMES, loss=loss)
+def place(robot: Robot, data: Dataset, loss: Loss = "linear") -> Robot:
+    """Return the uncalibrated robot in the frames of the data: only base, targets and fixtures are fitted.
+
+    Readings are weighed one by one. What an uncalibrated robot leaves is no error of the joints at an arrival.
+    """
+    return find_parameters(robot, data, FRAMES, loss=loss, shared=False).robot
 
 
 def _fit(solved: Solved, model: Model, loss: Loss) -> Fit:

@@ -90,10 +90,16 @@ def find_parameters(
     bounds: Bounds | None = None,
     bounds_file: str = "bounds",
     small: float = SMALL,
+    shared: bool = True,
 ) -> Solved:
     """Find the free parameters of a robot from training data.
 
     It is what :func:`truearm.identification.solving.fit.identify` does first, with the same parameters and refusals.
+
+    Parameters
+    ----------
+    shared
+        Whether errors of the joints that the readings of an arrival share are looked for, with the linear loss.
     """
     start = start_from_readings(model.prepared(robot), data)
     check_circumstances(start, data)
@@ -114,7 +120,9 @@ def find_parameters(
             _check_held(held, free, check_bounds, bounds_file)
         kept = problem.free.without(held)
         limits = None if check_bounds is None else _limits_of(check_bounds, free, kept)
-        solution, reduced, components = _solve_with_noise(replace(problem, free=kept), loss, limits, small)
+        solution, reduced, components = _solve_with_noise(
+            replace(problem, free=kept), loss, limits, small, shared=shared
+        )
         steps += solution.steps
         if redundancy == "prior":
             break
@@ -147,7 +155,7 @@ def _limits_of(limits: tuple[Array, Array], free: FreeParameters, kept: FreePara
 
 
 def _solve_with_noise(
-    problem: Problem, loss: Loss, limits: tuple[Array, Array] | None, small: float
+    problem: Problem, loss: Loss, limits: tuple[Array, Array] | None, small: float, *, shared: bool
 ) -> tuple[Solution, Problem, Components | None]:
     """Solve; then again with what the solution says of deviations and of the loads at every joint.
 
@@ -160,7 +168,7 @@ def _solve_with_noise(
     joints = np.zeros(len(problem.robot.joints))
     components = None
     for _ in range(_ROUNDS):
-        if loss == "linear":
+        if loss == "linear" and shared:
             components = components_found(problem, solution, limits, components)
             there, change, joints = _with_components(problem, components, joints)
         else:

@@ -81,7 +81,7 @@ def accuracy(
     fit = identify(nominal, data, ELASTIC)
     points = _targets(device, twin)
     truly = np.concatenate([truth.places(points[name]) for name in data.targets])
-    before = _predicted(place(nominal, data).robot, data, truth)
+    before = _predicted(place(nominal, data), data, truth)
     after = _predicted(fit.robot, data, truth)
     if not data.anchored:
         before, after = _moved(before, truly), _moved(after, truly)
@@ -138,7 +138,7 @@ def tool_alone(
         return {count: float(np.linalg.norm(place - right)) for count, place in found.items()}
 
     return ToolErrors(
-        nominal=errors(place(nominal, with_tracker).robot),
+        nominal=errors(place(nominal, with_tracker)),
         calibrated=errors(identify(nominal, with_tracker, ELASTIC).robot),
         true=errors(twin.robot.with_effects(("compliance",)).with_values(compliance)),
     )

@@ -9,8 +9,8 @@ from typing import Final
 import numpy as np
 
 from truearm.errors import InputError
-from truearm.identification.solving.fit import Fit, identify, place
-from truearm.identification.solving.models import MODELS
+from truearm.identification.solving.fit import Fit, identify
+from truearm.identification.solving.models import FRAMES, MODELS
 from truearm.identification.solving.redundancy import gauge_freedoms
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
@@ -153,7 +153,7 @@ def _one(seed: Seed, counts: Counts) -> Outcome:
 
     def before(data: Dataset, true: Array) -> Reached:
         data = _without_deviations(data)
-        return _reached(place(nominal, data), data, others, true)
+        return _reached(identify(nominal, data, FRAMES), data, others, true)
 
     def fitted(data: Dataset) -> dict[Start, Fit]:
         return {name: identify(start, _without_deviations(data), _GEOMETRIC) for name, start in starts.items()}

@@ -264,13 +264,12 @@ def _without_camera(
     grid = touched_by_hand(tables(rectangular_grid(5, 7, 0.025))[tilt], twin, rng).joints
     rotation, origin = table.place.rotation, np.array(table.place.translation)
     found: dict[tuple[Tilt, Alone], WithoutCamera] = {}
-    fits = (place(nominal, data), identify(nominal, data, _GEOMETRIC, loss="l1", bounds=BOUNDS))
-    for name, fitted in zip(ALONE, fits, strict=True):
+    robots = (place(nominal, data), identify(nominal, data, _GEOMETRIC, loss="l1", bounds=BOUNDS).robot)
+    for name, robot in zip(ALONE, robots, strict=True):
         on_table, around = (
-            _apart(fitted.robot, joints, (true_positions(twin, joints, rng) - origin) @ rotation)
-            for joints in (grid, judged)
+            _apart(robot, joints, (true_positions(twin, joints, rng) - origin) @ rotation) for joints in (grid, judged)
         )
-        normal = fitted.robot.base.rotation[2]  # of T_table_base: the plate's normal in the robot's base
+        normal = robot.base.rotation[2]  # of T_table_base: the plate's normal in the robot's base
         leaning = math.degrees(math.acos(min(1.0, float(normal @ rotation[:, 2]))))
         found[tilt, name] = WithoutCamera(on_table, around, leaning)
     return found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import Final
 
@@ -39,6 +40,9 @@ CONTENTS: Final[dict[tuple[str, str], Callable[[], bytes]]] = {
     ("robot-new", "aliases of aliases"): lambda: (
         b"a0: &a0 [x]\n"
         + b"".join(b"a%d: &a%d [%s]\n" % (n, n, b",".join([b"*a%d" % (n - 1)] * 9)) for n in range(1, 12))
+    ),
+    ("robot-calibrated", "a proof without errors of joints"): lambda: re.sub(
+        rb"\n  joint_error:[^\n]*(?:\n   [^\n]*)*", b"", samples.content("calibrated.yaml")
     ),
     ("bounds", "a list as a name"): lambda: b"truearm: truearm-bounds/1\n? [a, b]\n: 1\n",
     ("bounds", "a list as a name in brackets"): lambda: b"{truearm: truearm-bounds/1, {a: 1}: 2}\n",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import atexit
+import shutil
 import tempfile
 from functools import cache
 from importlib.resources import files
@@ -47,6 +49,7 @@ clearance: 60
 def folder() -> Path:
     """Return a folder with all of them, made once."""
     place = Path(tempfile.mkdtemp(prefix="truearm-fuzz-"))
+    atexit.register(shutil.rmtree, place, ignore_errors=True)
     for job in ("calibrate", "import_table", "import_matrices", "import_circle", "tolerance", "compensate", "revert"):
         EXAMPLES[job](place)
     _rename(place, {"result/calibrated.yaml": "calibrated.yaml", "axes/joint-errors.yaml": "joint-errors.yaml"})

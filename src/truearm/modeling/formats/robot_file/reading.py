@@ -184,8 +184,9 @@ def _proof(robot: Robot, entry: ProofEntry, shown: Mapping[str, str], where: str
     """Return what a calibration knew about its result, in SI units."""
     cure = "Leave the entry proof as calibration wrote it, or take it out: the robot is then unproven."
     joints = [shown["rad" if joint.kind == "revolute" else "m"] for joint in robot.joints]
+    measured = bool(entry.region or entry.joint_error or entry.deviations)
     for name, rows in (("region", entry.region), ("joint_error", entry.joint_error)):
-        if rows and len(rows) != len(joints):
+        if measured and len(rows) != len(joints):
             raise InputError(
                 "one entry belongs here for each joint",
                 where=f"{where}, proof.{name}",

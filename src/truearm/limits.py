@@ -50,7 +50,7 @@ LIMITS: Final[Mapping[str, Limit]] = {
     "file_size": Limit(100_000_000, "the file is too large", "bytes"),
     "yaml_size": Limit(4_000_000, "the file is too large for YAML", "bytes"),
     "program_size": Limit(
-        20_000_000, "the program is too large to be corrected at once", "bytes", "Split it into several files."
+        30_000_000, "the program is too large to be corrected at once", "bytes", "Split it into several files."
     ),
     "entries": Limit(100_000, "the file has too many entries", "entries"),
     "nesting": Limit(100, "the entries are nested too deep", "levels"),

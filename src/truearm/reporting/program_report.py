@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from truearm.compensation.program_correction import Correction
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import Joint
+from truearm.notices import worst_first
 from truearm.reporting.drawing import AFTER, BEFORE, CAMERA, COLOURS, Figure, axis, figure, scene_axis
 from truearm.reporting.figures import histogram
 from truearm.reporting.numbers import rounded, rounded_to
@@ -54,6 +55,7 @@ def program_html(correction: ProgramCorrection) -> str:
         "program.html.jinja",
         figures,
         correction=correction,
+        notices=worst_first(correction.warnings),
         joints=_joint_rows(correction.robot.joints, corrections),
         not_better=not_better[:_LISTED],
         not_better_unlisted=max(len(not_better) - _LISTED, 0),

@@ -54,7 +54,7 @@ class Status(Enum):
     def advice(self) -> str:
         """What to do about it."""
         return {
-            Status.CONVERGED: "Judge the fit by its held-out error.",
+            Status.CONVERGED: "Judge the fit by its held-out and expected errors.",
             Status.AT_BOUND: "A parameter is at a bound. Widen the bound if it was a guess.",
             Status.RANK_LOSS: "The data are too few or too alike to determine everything that predictions "
             "depend on. Measure more configurations that move every joint, or free fewer parameters.",

@@ -33,8 +33,9 @@ _SETTLED: Final = 1e-5  # what a step may still gain in twice the log-likelihood
 _LEAST_DIFFERENCE: Final = 0.05
 #: Of the logarithm of a variance: what is known of it beforehand.
 _LEAST_INFORMATION: Final = 0.05
-#: Times the readings' variance above which a variance of the joints is beyond what readings can say.
-_MOST: Final = 1e10
+#: Times the readings' variance above which a variance of the joints is not told apart from it: it would be an
+#: instrument whose noise is below a hundredth of what the joints do. Of one target any residual is some joint error.
+_MOST: Final = 1e4
 #: Share of the readings' variance below which a variance of the joints is none.
 _LEAST: Final = 1e-8
 
@@ -309,6 +310,8 @@ def variance_components(
         if not np.isfinite(best.likelihood):  # the readings' variance has left that of the joints far behind
             best = _State(moments, start, np.zeros(moments.M.shape[-1]))
         best = _maximised(moments, best, [kind for kind in kinds if best.joints[kind].any()], noise)
+        if _alone_in(best):
+            best = _maximised(moments, _State(moments, start, np.zeros(moments.M.shape[-1])), [], noise)
         holds, likeliest = before.holds, Variances(best.factors, best.joints)
         if before.likeliest is not before.weighing:
             factors = before.likeliest.factors / before.weighing.factors * best.factors
@@ -351,7 +354,13 @@ def _with_and_without(
             joints[kind] = step
         taken = [kind for kind in kinds if joints[kind].any()]
         best = _maximised(moments, _State(moments, best.factors, joints), taken, noise)
-    return alone, best if 2.0 * (best.likelihood - alone.likelihood) >= _SIGNIFICANT else alone
+    believed = 2.0 * (best.likelihood - alone.likelihood) >= _SIGNIFICANT and not _alone_in(best)
+    return alone, best if believed else alone
+
+
+def _alone_in(state: _State) -> bool:
+    """Return whether errors of the joints explain all that there is, and leave no noise to the readings."""
+    return bool(state.joints.max(initial=0.0) * _effect(state.of) > _MOST * state.factors.max())
 
 
 def _agree(alone: _State, best: _State) -> bool:

@@ -155,8 +155,9 @@ def _beyond(robot: Robot, result: CorrectedPrograms) -> list[Notice]:
     return [
         Notice(
             "beyond-measured",
-            f"{_counted(len(found), 'target')} corrected although {_joints_beyond(robot, found)} stood nowhere near in "
-            f"calibration: {_lines(found)}. What the model leaves out counts more there than where it was measured.",
+            f"{_counted(len(found), 'target')} corrected although {_joints_beyond(robot, found)} stood well outside "
+            f"the range measured in calibration: {_lines(found)}. What the model leaves out counts more there than "
+            "where it was measured.",
         )
     ]
 

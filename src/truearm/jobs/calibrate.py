@@ -238,12 +238,13 @@ def calibrate(
     noticed = tuple(notice for notice in noticed if notice.code != Status.IMPLAUSIBLE.value)
     unlike = check_plausible(fit, first, noticed)
     expected = expected_error(as_residuals_allow(fit, first), plausible=not unlike)
+    left_over = LeftOver.of(fit, readings)
+    wrong_sigma = check_sigma(left_over)
     narrow = (
-        []
-        if unlike
+        []  # more configurations do not mend these
+        if unlike or wrong_sigma
         else check_narrow_data(fit, expected, first, validation or train_errors, held_out=validation is not None)
     )
-    left_over = LeftOver.of(fit, readings)
     digest = "" if sha256 is None else f" (sha256 {sha256[:12]})"
     history = (
         f"calibrated by truearm {__version__}: model {' + '.join([chosen.name, *effects])},"
@@ -267,7 +268,7 @@ def calibrate(
             *narrow,
             *(notice for notice in noticed if notice.level != "error"),
             *check_one_sided(fit, first),
-            *check_sigma(left_over),
+            *wrong_sigma,
             *check_changes(left_over),
             *check_arrival_lag(left_over),
             *check_transmission(fit, first),

@@ -120,6 +120,15 @@ class Calibration(Record):
         """Whether its figures can be believed: it converged or has a value at a bound, and no notice is an error."""
         return self.status in (Status.CONVERGED, Status.AT_BOUND) and not has_error(self.warnings)
 
+    @property
+    def advice(self) -> str:
+        """What to do next, in words."""
+        if self.status is not Status.CONVERGED:
+            return self.status.advice
+        if has_error(self.warnings):
+            return "See the errors before you use the result."
+        return self.status.advice if self.validation else "Hold configurations out to judge the fit."
+
     def summary(self) -> dict[str, Any]:
         """Return the figures as ``result.json`` begins with them: errors in mm and mrad."""
         return {
@@ -162,9 +171,7 @@ class Calibration(Record):
             text.append(f"Chosen model: {self.fit.model.summary}")
         if self.fit.model.name == "frames":
             text += self._target_lines()
-        converged = self.status is Status.CONVERGED and self.validation is None
-        advice = "Hold configurations out to judge the fit." if converged else self.status.advice
-        text.append(f"Status: {self.status.value}. {advice}")
+        text.append(f"Status: {self.status.value}. {self.advice}")
         return text + notice_lines(self.warnings)
 
     def residuals(self) -> Residuals:

@@ -88,8 +88,8 @@ def noise_lines(fit: Fit, again: Repeatability | None) -> list[str]:
         )
     if again is not None:
         lines.append(
-            f"Repeatability (RP of ISO 9283) at {counted(again.postures, 'posture')} visited again: "
-            f"{again.rp * 1e3:.2g} mm"
+            f"Repeatability at {counted(again.postures, 'posture')} visited again, as RP of ISO 9283 but pooled over "
+            f"them and without the instrument's noise: {again.rp * 1e3:.2g} mm"
         )
     return lines
 
@@ -136,8 +136,9 @@ def expected_lines(expected: ExpectedError) -> list[str]:
         figure * 1e3 for figure in (expected.overall.mean, expected.overall.p95, *expected.overall.interval_90)
     )
     places = max(3, -math.floor(math.log10(max(mean, 1e-6))) + 1)
+    end = "or more" if expected.lower_bound else f"to {high:.{places}f}"
     lines = [
-        f"Expected over the workspace: mean {mean:.{places}f} mm (90 %: {low:.{places}f} to {high:.{places}f}), "
+        f"Expected over the workspace: mean {mean:.{places}f} mm (90 %: {low:.{places}f} {end}), "
         f"95 % below {p95:.{places}f} mm; {expected_of(expected)}"
     ]
     if expected.lower_bound:

@@ -52,6 +52,7 @@ def test_streams_that_are_closed(closed: int, robot: str, ended: tuple[int, str,
 #: Somebody presses Ctrl-C when a module is about to be loaded; what loads it may make any error of that.
 INTERRUPTED = """
 import signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)  # in the background of a shell it is ignored
 class Pressed:
     def find_spec(self, name, path=None, target=None):
         if name == {when!r}:

@@ -108,6 +108,8 @@ def name_pattern(pattern: str) -> Any:
     options.max_mem = _PATTERN_MEMORY
     try:
         return re2.compile(pattern, options)
+    except UnicodeEncodeError:
+        raise InputError("the pattern holds half a character", allowed="whole characters") from None
     except re2.error as error:
         reason = error.args[0] if error.args else ""
         reason = reason.decode("utf-8", "replace") if isinstance(reason, bytes) else str(reason)

@@ -6,8 +6,9 @@ from scipy.special import stdtrit
 
 from truearm.identification.solving.arrivals import Arrivals, Whitening
 from truearm.identification.solving.cluster_covariance import cluster_covariance
+from truearm.identification.solving.likelihood import Linearised
 from truearm.identification.solving.losses import Loss, pulls
-from truearm.identification.solving.variance_components import Components, Linearised, variance_components
+from truearm.identification.solving.variance_components import Components, variance_components
 from truearm.modeling.chain import Array
 
 ARRIVALS, READINGS = 12, 5

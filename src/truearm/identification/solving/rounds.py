@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from truearm.errors import InputError
 from truearm.identification.solving.arrivals import Arrivals, WhitenedProblem, Whitening
 from truearm.identification.solving.bounds import Bounds, bound_vectors
+from truearm.identification.solving.likelihood import Linearised
 from truearm.identification.solving.losses import Loss, norms_of, robust_scale
 from truearm.identification.solving.models import Model
 from truearm.identification.solving.problem import SETUP, Problem, check_circumstances, check_solvable
@@ -22,7 +23,6 @@ from truearm.identification.solving.redundancy import Redundancy, find_redundanc
 from truearm.identification.solving.solver import SMALL, Solution, solve
 from truearm.identification.solving.variance_components import (
     Components,
-    Linearised,
     beyond_chance,
     variance_components,
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import stat
@@ -252,6 +253,30 @@ def test_what_has_the_name_of_a_manifest_and_is_none_is_not_overwritten(tmp_path
             write()
     assert (tmp_path / name).read_text() == text
     assert len([*tmp_path.iterdir()]) == 1
+
+
+def test_a_mark_removes_no_file_that_its_run_did_not_make(tmp_path: Path) -> None:
+    write_text(tmp_path / "doc" / "thesis", "thesis")
+    known = hash_of(b"thesis")
+    mark = {"truearm": "truearm-unfinished/1", "version": "0.1.0", "command": None, "files": {"doc/thesis": known}}
+    for beside in (
+        {"kept": {}},
+        {"kept": {}, "made": {}},
+        {"kept": {}, "made": {"doc/thesis": ".truearm.0123456789abcdef"}},
+        {"kept": {}, "made": {"doc/thesis": "thesis"}},
+    ):
+        (tmp_path / UNFINISHED).write_text(json.dumps(mark | beside))
+        for write in (lambda: output_folder(tmp_path / "out"), lambda: write_files(tmp_path, NEW)):
+            with pytest.raises(InputError, match=rf"{UNFINISHED}: truearm writes .* this is not one.*Remove or rename"):
+                write()
+        assert contents(tmp_path)["doc/thesis"] == b"thesis"
+
+
+@pytest.mark.parametrize("name", [MANIFEST, UNFINISHED])
+def test_a_pipe_called_as_a_manifest_is_refused(tmp_path: Path, name: str) -> None:
+    os.mkfifo(tmp_path / name)
+    with pytest.raises(InputError, match=rf"{name}: truearm writes a file of this name itself, and this is not"):
+        output_folder(tmp_path)
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root may give files away")

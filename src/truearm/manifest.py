@@ -59,10 +59,14 @@ class Unfinished:
         The files that it writes.
     kept
         The names beside them that the old ones have meanwhile, of those that there were.
+    made
+        The names of empty files beside the others, those that there were not. Whoever could write a mark, or copied
+        one, may not write beside every file that it names: without its empty file, none is removed.
     """
 
     new: FileSet
     kept: Mapping[str, str]
+    made: Mapping[str, str]
 
 
 def hash_of(content: bytes) -> str:
@@ -78,7 +82,8 @@ def manifest_text(sets: Sequence[FileSet]) -> str:
 
 def unfinished_text(run: Unfinished) -> str:
     """Return the text of the mark of a run that has not finished."""
-    return json.dumps({"truearm": _SCHEMAS[UNFINISHED], **_written(run.new), "kept": {**run.kept}}, indent=1) + "\n"
+    beside = {"kept": {**run.kept}, "made": {**run.made}}
+    return json.dumps({"truearm": _SCHEMAS[UNFINISHED], **_written(run.new), **beside}, indent=1) + "\n"
 
 
 def _written(one: FileSet) -> dict[str, Any]:
@@ -107,8 +112,13 @@ def unfinished_in(folder: Path) -> Unfinished | None:
         If what has the name of its mark is none.
     """
     content = _content(folder / UNFINISHED)
+    if content is None:
+        return None
     with _read_as_ours(folder / UNFINISHED):
-        return None if content is None else Unfinished(_file_set(content), _texts(content["kept"]))
+        run = Unfinished(_file_set(content), _texts(content["kept"]), _texts(content["made"]))
+    if {*run.new.files} != {*run.kept, *run.made}:
+        raise not_ours(folder / UNFINISHED)
+    return run
 
 
 def refuse_unfinished(path: Path) -> None:
@@ -170,7 +180,7 @@ def _read_as_ours(path: Path) -> Iterator[None]:
     try:
         yield
     except (KeyError, TypeError) as error:
-        raise _not_ours(path) from error
+        raise not_ours(path) from error
 
 
 def _content(path: Path) -> dict[str, Any] | None:
@@ -179,14 +189,16 @@ def _content(path: Path) -> dict[str, Any] | None:
         if _planted(found, path.parent):
             return None
         if not stat.S_ISREG(found.st_mode) or found.st_size > _LARGEST:
-            raise _not_ours(path)
+            raise not_ours(path)
         content = json.loads(path.read_bytes())
     except (RecursionError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise _not_ours(path) from error
+        raise not_ours(path) from error
+    except InputError:
+        raise
     except (OSError, ValueError):  # there is none, or it cannot be looked up, as the files beside it
         return None
     if not isinstance(content, dict) or content.get("truearm") != _SCHEMAS[path.name]:
-        raise _not_ours(path)
+        raise not_ours(path)
     return content
 
 
@@ -213,7 +225,8 @@ def _checked(value: Any, kind: type) -> Any:
     return value
 
 
-def _not_ours(path: Path) -> InputError:
+def not_ours(path: Path) -> InputError:
+    """Return the refusal of a manifest or mark that truearm cannot have written."""
     return InputError(
         f"truearm writes a file of this name itself, and this is not one: schema {_SCHEMAS[path.name]}",
         where=str(path),

@@ -23,6 +23,7 @@ from truearm.manifest import (
     Unfinished,
     hash_of,
     manifest_text,
+    not_ours,
     sets_in,
     unfinished_above,
     unfinished_in,
@@ -278,6 +279,7 @@ def _replace(folder: Path, contents: Mapping[Path, bytes], command: str | None) 
     mark = folder / UNFINISHED
     staged: dict[Path, Path] = {}
     kept: dict[Path, Path] = {}
+    made: dict[Path, Path] = {}
     try:
         for target, content in contents.items():
             with _refusals_at(target):
@@ -285,14 +287,17 @@ def _replace(folder: Path, contents: Mapping[Path, bytes], command: str | None) 
                 _write(staged[target], content)
         if len(contents) > 1:
             for target in contents:
-                if os.path.lexists(target):
-                    with _refusals_at(target):
+                with _refusals_at(target):
+                    if os.path.lexists(target):
                         kept[target] = _temporary(target)
                         _keep(target, kept[target])
-            names = {_name(target, folder): old.name for target, old in kept.items()}
+                    else:
+                        made[target] = _temporary(target)
+                        made[target].touch(exist_ok=False)
+            names = [{_name(target, folder): path.name for target, path in beside.items()} for beside in (kept, made)]
             with _refusals_at(mark):
                 staged[mark] = _temporary(mark)
-                _write(staged[mark], unfinished_text(Unfinished(_file_set(folder, contents, command), names)).encode())
+                _write(staged[mark], unfinished_text(Unfinished(_file_set(folder, contents, command), *names)).encode())
                 _synchronise(contents)
                 staged[mark].replace(mark)
                 del staged[mark]
@@ -309,7 +314,8 @@ def _replace(folder: Path, contents: Mapping[Path, bytes], command: str | None) 
                 _undo(folder)
             raise
     finally:
-        for temporary in staged.values() if os.path.lexists(mark) else (*staged.values(), *kept.values()):
+        beside = () if os.path.lexists(mark) else (*kept.values(), *made.values())
+        for temporary in (*staged.values(), *beside):
             with suppress(OSError):
                 temporary.unlink(missing_ok=True)
 
@@ -319,19 +325,28 @@ def _undo(folder: Path) -> None:
     run = unfinished_in(folder)
     if run is None:
         return
-    for name, known in run.new.files.items():
-        target = folder / name
-        if not target.is_file() or hash_of(target.read_bytes()) != known:
-            continue  # not replaced yet, put back already, or changed since
-        if name not in run.kept:
+    # not replaced yet, put back already, or changed since: such files stay
+    targets = {name: folder / name for name, known in run.new.files.items() if _is(folder / name, known)}
+    if not all(_stands_beside(targets[name], run.made[name]) for name in targets if name in run.made):
+        raise not_ours(folder / UNFINISHED)
+    for name, target in targets.items():
+        if name in run.made:
             target.unlink()
-            continue
-        old = target.with_name(run.kept[name])
-        if _TEMPORARY.fullmatch(old.name) and os.path.lexists(old):
+        elif _stands_beside(target, run.kept[name]):
+            old = target.with_name(run.kept[name])
             old.replace(target)
             old.unlink(missing_ok=True)  # where both were one file under two names
     _synchronise(folder / name for name in run.new.files)
     (folder / UNFINISHED).unlink()
+
+
+def _is(target: Path, known: str) -> bool:
+    return target.is_file() and hash_of(target.read_bytes()) == known
+
+
+def _stands_beside(target: Path, name: str) -> bool:
+    """Return whether a file stands beside another that only a run has put there."""
+    return bool(_TEMPORARY.fullmatch(name)) and os.path.lexists(target.with_name(name))
 
 
 def _temporary(target: Path) -> Path:

@@ -143,7 +143,7 @@ def _far_from_nominal(fit: Fit, *, doubted: bool) -> list[Notice]:
         return []
     names = far or together
     listed = f"{', '.join(names[:8])}{' and others' if len(names) > 8 else ''}"
-    wider = "" if doubted else " If it is, enter wider priors in the robot file."
+    wider = "" if doubted else " If all that holds, enter wider priors in the robot file."
     moved = (
         f"{listed} moved by more than {_LARGEST_MOVE:g} standard deviations of their priors."
         if far
@@ -155,7 +155,8 @@ def _far_from_nominal(fit: Fit, *, doubted: bool) -> list[Notice]:
         Notice(
             "far-from-nominal",
             f"{moved} Check that it is this robot, in these units, with its joints in this order, and that the nominal "
-            f"values are those of its controller.{wider}",
+            "values are those of its controller: corrections of programs are wrong by what they differ."
+            f"{wider}",
         )
     ]
 

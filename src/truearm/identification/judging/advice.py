@@ -166,6 +166,7 @@ def _far_together(fit: Fit) -> list[str]:
 
     Parameters that move every target alike, as the distances between parallel axes, are known by their sum alone: each
     moves by a share of what their sum does. Directions are those of the covariance in priors, of the geometry.
+    Nothing is said where parameters are held at their nominal values: another one then moves by the sum of several.
     """
     of = fit.robot.parameters
     places = [
@@ -173,7 +174,7 @@ def _far_together(fit: Fit) -> list[str]:
         for i, name in enumerate(fit.free.names)
         if of[name].group in _KINEMATIC - {"joint zero"} and name not in fit.at_bound
     ]
-    if not places:
+    if not places or fit.redundancies:
         return []
     names = [fit.free.names[i] for i in places]
     prior = np.array([of[name].prior for name in names])

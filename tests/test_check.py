@@ -18,6 +18,7 @@ from truearm.jobs.check import check
 from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset, IntArray
 from truearm.measurement.readers.matrices import read_matrices
+from truearm.measurement.rigid_tool import rigid_suspects
 from truearm.measurement.statistics import errors_of
 from truearm.measurement.table_motion import without_table_motion
 from truearm.modeling.chain import Array
@@ -165,6 +166,31 @@ def test_exchanged_and_mistaken_targets_show_without_a_robot(measured: Dataset, 
     for corrupt in (outliers, targets_swapped, target_mistaken):
         corrupted = corrupt(measured, np.random.default_rng(seed))
         assert codes(corrupted, None) == {corrupt.__name__.replace("_", "-")}
+
+
+@pytest.mark.parametrize("side", [(0.1, 0.1, 0.1), (0.1, 0.1, 0.1002), (0.1, 0.1, 0.13)])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_reading_that_is_off_is_no_exchange_of_targets(side: tuple[float, float, float], seed: int) -> None:
+    rng, (a, b, c) = np.random.default_rng(seed), side
+    along = (a**2 + c**2 - b**2) / (2 * c)
+    tool = np.array([[0.0, 0, 0], [c, 0, 0], [along, np.sqrt(a**2 - along**2), 0]])
+    position = np.tile(tool, (20, 1)) + rng.normal(0.0, 2e-5, (60, 3))
+    wrong = rng.choice(20, 6, replace=False)
+    outward = (tool - tool.mean(axis=0)) / np.linalg.norm(tool - tool.mean(axis=0), axis=1, keepdims=True)
+    at = rng.integers(3, size=6)
+    position[3 * wrong + at] += 1e-3 * outward[at]
+    data = Dataset(
+        source="tool",
+        labels=tuple(map(str, range(20))),
+        joints=rng.uniform(-1.0, 1.0, (20, 6)),
+        joint_kinds=("revolute",) * 6,
+        targets=("1", "2", "3"),
+        configuration=np.repeat(np.arange(20), 3),
+        target=np.tile(np.arange(3), 20),
+        position=position,
+    )
+    found = {(s.code, s.configuration, s.target) for s in rigid_suspects(data)}
+    assert found == {("outliers", str(c), str(t + 1)) for c, t in zip(wrong, at, strict=True)}
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -12,12 +12,13 @@ from tests.simulated import campaign
 
 import truearm
 from truearm import InputError, Robot
-from truearm.modeling.formats.robot_file import sealed
+from truearm.modeling.formats.robot_file import robot_text, sealed
 from truearm.notices import Notice
 from truearm.results.program_correction import ProgramCorrection
 from truearm.results.robot_description import RobotDescription
 
 NARROW = Notice("narrow-data", "Over the workspace it is worse.", "error")
+FAR = Notice("far-from-nominal", "Check that the nominal values are those of its controller.")
 SIGNS = Notice("joint-sign", "Joint 6 turns the other way.", "error")
 
 
@@ -65,6 +66,30 @@ def test_an_error_of_the_calibration_is_told_with_its_words(robot: Robot, progra
     assert {"rank-loss", "joint-sign"} <= set(
         codes(truearm.compensate(unsound, [program], accept=["rank-loss", "joint-sign"]))
     )
+
+
+def test_a_warning_that_concerns_programs_is_repeated_and_refuses_nothing(
+    robot: Robot, program: Path, tmp_path: Path
+) -> None:
+    assert robot.proof is not None
+    doubted = sealed(robot, replace(robot.proof, warnings=(FAR,)))
+    path = tmp_path / "calibrated.yaml"
+    path.write_text(robot_text(doubted), encoding="utf-8")
+    correction = truearm.compensate(path, [program])
+    assert FAR in correction.warnings
+    assert "edited-by-hand" not in codes(correction)
+    assert "far-from-nominal" not in codes(truearm.compensate(robot, [program]))
+
+
+def test_a_calibration_keeps_the_doubt_about_its_nominal_values(robot: Robot, program: Path) -> None:
+    data = campaign("irb120", 20, 2e-5, 1)[1]
+    other = truearm.load_robot("irb120")
+    a_3 = other.parameters["a_3"]
+    off = other.with_parameters([replace(a_3, nominal=a_3.nominal + 0.01, value=a_3.value + 0.01)])
+    found = truearm.calibrate(off, data).robot
+    assert codes(truearm.compensate(found, [program]))["far-from-nominal"] == "warning"
+    again = truearm.calibrate(found, data, model="frames").robot
+    assert codes(truearm.compensate(again, [program]))["far-from-nominal"] == "warning"
 
 
 def test_narrow_data_are_judged_target_by_target(robot: Robot, program: Path) -> None:

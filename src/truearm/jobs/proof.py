@@ -85,6 +85,7 @@ def told_of(robot: Robot) -> list[Notice]:
     """Return what speaks against the calibration of a robot that is used all the same."""
     return [
         *(Notice(name, message) for name, message in _against(robot).items()),
+        *(() if robot.proof is None else robot.proof.warnings),
         *_edited(robot),
     ]
 

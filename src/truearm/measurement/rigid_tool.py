@@ -29,6 +29,12 @@ _PARTNERS: Final = 8
 _WRONG_SHARE: Final = 0.75
 #: Among so many targets of a configuration exchanged names are looked for.
 _EXCHANGED: Final = (3, 6)
+#: An exchange must change a distance by so many times what distances may be off: exchanged names of an equilateral
+#: triangle change none, and explain nothing that a wrong reading does not.
+_TOLD_APART: Final = 1.5
+#: One wrong reading explains a configuration if all distances without it are off by less than this share of what they
+#: may be off.
+_EXPLAINED: Final = 0.3
 
 
 @dataclass(frozen=True)
@@ -132,13 +138,19 @@ def _blamed(data: Dataset, distances: _Distances, c: int, known: dict[str, Array
     places, allowed = distances.places, distances.allowed
     mine = places.at(c)
     here, seen, label, names = places.position[mine], places.target[mine], data.labels[c], data.targets
-    swap = _swap(here, distances.usual_between(seen), allowed) if _EXCHANGED[0] <= len(seen) <= _EXCHANGED[1] else []
-    if swap:
-        return [Suspect("targets-swapped", label, names[seen[a]], f"is target {names[seen[b]]}") for a, b in swap]
+    alone = np.ones(len(seen), dtype=bool)
+    if _EXCHANGED[0] <= len(seen) <= _EXCHANGED[1]:
+        usual = distances.usual_between(seen)
+        swap = _swap(here, usual, allowed)
+        if swap:
+            return [Suspect("targets-swapped", label, names[seen[a]], f"is target {names[seen[b]]}") for a, b in swap]
+        alone = _off_without_each(here, usual) <= _EXPLAINED * allowed
     wrong: NDArray[np.bool_] = distances.share[mine] >= _WRONG_SHARE
     if len(seen) > 2 and wrong.sum() > 1:
         wrong = np.arange(len(seen)) == np.argmax(np.where(wrong, distances.total[mine], -1.0))
     doubted = wrong if wrong.any() else distances.most[mine] > allowed
+    if (doubted & alone).any():
+        doubted &= alone
     others = np.flatnonzero(~doubted)
     suspects = []
     for k in np.flatnonzero(doubted).tolist():
@@ -179,6 +191,8 @@ def suspect(point: Array, label: str, target: str, size: float, known: dict[str,
 def _swap(here: Array, usual: Array, allowed: float) -> list[tuple[int, int]]:
     """Return the exchange of names under which all distances hold best; nothing if there is none.
 
+    An exchange that hardly changes the usual distances explains nothing that a wrong reading does not.
+
     Parameters
     ----------
     here
@@ -187,6 +201,10 @@ def _swap(here: Array, usual: Array, allowed: float) -> list[tuple[int, int]]:
         Distances of their targets [m], ``(n, n)``.
     """
     orders = np.array(list(permutations(range(len(here)))))[1:]
+    changed = np.abs(usual[orders[:, :, None], orders[:, None]] - usual).max(axis=(1, 2))
+    orders = orders[changed > _TOLD_APART * allowed]
+    if not len(orders):
+        return []
     orders = orders[np.argsort((orders != np.arange(len(here))).sum(axis=1), kind="stable")]
     points = here[orders]
     misfit = np.abs(np.linalg.norm(points[:, :, None] - points[:, None], axis=3) - usual).max(axis=(1, 2))
@@ -195,6 +213,21 @@ def _swap(here: Array, usual: Array, allowed: float) -> list[tuple[int, int]]:
         return []
     # the kth really is the reading named order[k]
     return [(b, a) for a, b in enumerate(orders[best].tolist()) if a != b]
+
+
+def _off_without_each(here: Array, usual: Array) -> Array:
+    """Return how far off distances are among all readings but one [m], for each one, ``(n,)``.
+
+    Parameters
+    ----------
+    here
+        Readings of a configuration [m], ``(n, 3)``.
+    usual
+        Distances of their targets [m], ``(n, n)``.
+    """
+    off = np.abs(np.linalg.norm(here[:, None] - here, axis=2) - usual)
+    kept = ~np.eye(len(here), dtype=bool)
+    return np.array([off[np.ix_(others, others)].max() for others in kept])
 
 
 def fixed_points(data: Dataset) -> dict[str, Array]:

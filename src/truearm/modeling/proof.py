@@ -43,6 +43,8 @@ class Proof:
     factor
         Rows of the lower triangular factor of their correlation matrix, each one longer than the one before; zero for
         parameters that are not uncertain.
+    warnings
+        Notices of the level warning that whoever corrects programs should hear again.
     lower_bound
         Whether the error may be larger than covariance and joint error say, for a reason that is known.
     digest
@@ -57,6 +59,7 @@ class Proof:
     deviations: tuple[float, ...]
     factor: tuple[tuple[float, ...], ...]
     lower_bound: bool = False
+    warnings: tuple[Notice, ...] = ()
     digest: str = ""
 
     @classmethod
@@ -69,6 +72,7 @@ class Proof:
         parameters: Sequence[Parameter],
         covariance: Array,
         *,
+        warnings: Sequence[Notice] = (),
         lower_bound: bool = False,
     ) -> Self:
         """Make the proof of a calibration, rounded to what a file holds of it.
@@ -97,6 +101,7 @@ class Proof:
                 for number, row in enumerate(_factor(covariance, deviation).tolist())
             ),
             lower_bound,
+            tuple(warnings),
         )
 
     def summary(self) -> dict[str, Any]:

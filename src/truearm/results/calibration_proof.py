@@ -14,6 +14,8 @@ from truearm.modeling.parameters import PLACES
 from truearm.modeling.proof import Proof
 from truearm.notices import Notice
 
+#: A warning of the calibration that concerns every program: its controller may not have the nominal values of the file.
+_REPEATED: Final = "far-from-nominal"
 _SOUND: Final = (Status.CONVERGED.value, Status.AT_BOUND.value)
 
 
@@ -45,6 +47,7 @@ def proof_of(
     """
     ended, joint_error = status.value, expected.joint_error
     errors = [notice for notice in warnings if notice.level == "error"]
+    repeated = [notice for notice in warnings if notice.code == _REPEATED]
     lower_bound = expected.lower_bound
     names, root = covariance_root(fit)
     parameters, covariance = [fit.robot.parameters[name] for name in names], root @ root.T
@@ -55,10 +58,13 @@ def proof_of(
         if kept or not any(name in arm for name in names):
             ended = before.status if ended in _SOUND else ended
             errors += [error for error in before.errors if error.code not in [e.code for e in errors]]
+            repeated += [warning for warning in before.warnings if not repeated]
             parameters += [arm[before.names[i]] for i in kept]
             region = [(min(a, c), max(b, d)) for (a, b), (c, d) in zip(region, before.region or region, strict=True)]
             joint_error = np.maximum(joint_error, before.joint_error or 0.0)
             lower_bound = lower_bound or before.lower_bound
             beside = np.zeros((len(covariance), len(kept)))
             covariance = np.block([[covariance, beside], [beside.T, before.covariance[np.ix_(kept, kept)]]])
-    return Proof.of(ended, errors, region, joint_error, parameters, covariance, lower_bound=lower_bound)
+    return Proof.of(
+        ended, errors, region, joint_error, parameters, covariance, warnings=repeated, lower_bound=lower_bound
+    )

@@ -217,6 +217,7 @@ def _proof(robot: Robot, entry: ProofEntry, shown: Mapping[str, str], where: str
             for number, row in enumerate(entry.correlations, 1)
         ),
         lower_bound=entry.lower_bound,
+        warnings=tuple(Notice(warning.code, warning.message) for warning in entry.warnings),
         digest=entry.sha256,
     )
 

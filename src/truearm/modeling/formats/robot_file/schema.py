@@ -153,8 +153,8 @@ class PriorsEntry(_Entry):
     angle: Positive | None = None
 
 
-class ErrorEntry(_Entry):
-    """A notice of the level error."""
+class NoticeEntry(_Entry):
+    """A notice of the level error, or of the level warning."""
 
     code: Name
     message: str
@@ -164,7 +164,8 @@ class ProofEntry(_Entry):
     """What the calibration knew about its result; `correlations` are the rows of a lower triangular factor."""
 
     status: Literal["converged", "at-bound", "rank-loss", "not-converged", "implausible"]
-    errors: list[ErrorEntry] = []
+    errors: list[NoticeEntry] = []
+    warnings: list[NoticeEntry] = []
     lower_bound: Annotated[bool, Field(strict=True)] = False
     region: list[tuple[Number, Number]] = []
     joint_error: list[NotNegative] = []

@@ -170,6 +170,8 @@ def _proof(
     made: dict[str, Any] = {"status": proof.status}
     if proof.errors:
         made["errors"] = [{"code": error.code, "message": text(error.message)} for error in proof.errors]
+    if proof.warnings:
+        made["warnings"] = [{"code": warning.code, "message": text(warning.message)} for warning in proof.warnings]
     if proof.lower_bound:
         made["lower_bound"] = True
     if len(proof.region) == len(robot.joints) and all(name in robot.parameters for name in proof.names):

@@ -259,13 +259,8 @@ def test_a_mark_removes_no_file_that_its_run_did_not_make(tmp_path: Path) -> Non
     write_text(tmp_path / "doc" / "thesis", "thesis")
     known = hash_of(b"thesis")
     mark = {"truearm": "truearm-unfinished/1", "version": "0.1.0", "command": None, "files": {"doc/thesis": known}}
-    for beside in (
-        {"kept": {}},
-        {"kept": {}, "made": {}},
-        {"kept": {}, "made": {"doc/thesis": ".truearm.0123456789abcdef"}},
-        {"kept": {}, "made": {"doc/thesis": "thesis"}},
-    ):
-        (tmp_path / UNFINISHED).write_text(json.dumps(mark | beside))
+    for made in (None, {}, {"doc/thesis": ".truearm.0123456789abcdef"}, {"doc/thesis": "thesis"}):
+        (tmp_path / UNFINISHED).write_text(json.dumps({**mark, "kept": {}} | ({} if made is None else {"made": made})))
         for write in (lambda: output_folder(tmp_path / "out"), lambda: write_files(tmp_path, NEW)):
             with pytest.raises(InputError, match=rf"{UNFINISHED}: truearm writes .* this is not one.*Remove or rename"):
                 write()

@@ -68,24 +68,24 @@ def revisits(data: Dataset, some: IntArray, others: IntArray) -> list[str]:
 
 
 def repeated_joints(data: Dataset) -> list[tuple[str, str]]:
-    """Return the labels of configurations with the same joint positions to the last digit, and readings far apart."""
-    first: dict[bytes, int] = {}
-    pairs = [(first.setdefault(data.joints[c].tobytes(), c), c) for c in range(data.configurations)]
-    found = []
-    for a, b in pairs:
-        if a != b and _apart(data, a, b) > _LARGEST_CHANGE:
-            found.append((data.labels[a], data.labels[b]))
-    return found
+    """Return the labels of configurations with the same joint positions to the last digit, and readings far apart.
 
-
-def _apart(data: Dataset, a: int, b: int) -> float:
-    """Return how far apart the readings of a target are at two configurations, the farthest [m]; 0 if none is."""
-    read = [(data.configuration == c) & data.has_position for c in (a, b)]
-    gaps = [0.0]
-    for reading in np.flatnonzero(read[0]).tolist():
-        other = read[1] & (data.target == data.target[reading]) & (data.against == data.against[reading])
-        gaps += np.linalg.norm(data.position[other] - data.position[reading], axis=1).tolist()
-    return max(gaps)
+    Each reading is compared with the first one of its target at these joint positions, so the time grows with the
+    readings and not with their pairs. A configuration is named once, with the first one that it is far from.
+    """
+    posture = np.unique(data.joints, axis=0, return_inverse=True)[1].reshape(-1)
+    readings = np.flatnonzero(data.has_position)
+    readings = readings[np.argsort(data.configuration[readings], kind="stable")]
+    of = data.configuration[readings]
+    what = np.column_stack([posture[of], data.target[readings]])
+    _, first, which = np.unique(what, axis=0, return_index=True, return_inverse=True)
+    other = first[which.reshape(-1)]
+    place = data.position[readings]
+    apart = (of != of[other]) & (np.linalg.norm(place - place[other], axis=1) > _LARGEST_CHANGE)
+    pairs: dict[int, int] = {}
+    for b, a in zip(of[apart].tolist(), of[other][apart].tolist(), strict=True):
+        pairs[b] = min(a, pairs.get(b, a))
+    return [(data.labels[a], data.labels[b]) for b, a in pairs.items()]
 
 
 def repeated_joints_notices(data: Dataset, pairs: list[tuple[str, str]]) -> list[Notice]:

@@ -183,6 +183,16 @@ def test_a_file_that_somebody_else_wrote_is_not_overwritten(tmp_path: Path) -> N
     assert not (tmp_path / "out" / "n.mod").exists()
 
 
+def test_a_report_that_somebody_else_wrote_is_not_overwritten(tmp_path: Path) -> None:
+    theirs = write(tmp_path, "compensation.html", b"theirs")
+    with pytest.raises(InputError, match="not written by truearm or was changed since"):
+        write_programs(tmp_path, [], {"m.mod": b"new", "compensation.html": b"page"})
+    theirs.unlink()
+    for page in (b"page", b"other page"):
+        write_programs(tmp_path, [], {"n.txt.truearm.json": b"{}", "compensation.html": page})
+    assert theirs.read_bytes() == b"other page"
+
+
 def test_an_original_is_not_written_beside_the_record_of_a_correction(tmp_path: Path) -> None:
     path = corrected(tmp_path / "one")
     corrected(tmp_path / "two")

@@ -26,6 +26,7 @@ from truearm.compensation.programs.program import Edit, Language, Program, Sourc
 from truearm.errors import InputError
 from truearm.files import exists, read_bytes
 from truearm.limits import limit, refuse_beyond
+from truearm.manifest import sets_in
 from truearm.schemas import validated
 from truearm.writing import refuse_overwriting, write_files
 
@@ -189,7 +190,7 @@ def recorded(file: ProgramFile, corrected: bytes, language: str, applied: Mappin
 def write_programs(
     folder: Path, inputs: Sequence[Path], files: Mapping[str, str | bytes], command: str | None = None
 ) -> None:
-    """Write results into a folder, all of them or none. Records and reports replace earlier ones.
+    """Write results into a folder, all of them or none. Records replace earlier ones.
 
     Records are put in place first: there is never a corrected program whose record is missing, and which could be
     corrected once more.
@@ -204,6 +205,9 @@ def write_programs(
     for name, content in files.items():
         path = folder / name
         refuse_overwriting(path, read)
+        report = name.endswith(".html") and exists(path)
+        if report and all(one.files.get(name) != _hash(read_bytes(path)) for one in sets_in(folder)):
+            raise _not_written_here(path)
         if name.endswith((".truearm.json", ".html")):
             continue
         if exists(record_path(path)) and f"{name}.truearm.json" not in files:
@@ -218,13 +222,17 @@ def write_programs(
         record = _record(path)
         new = content if isinstance(content, bytes) else content.encode()
         if here != new and (record is None or record.corrected_sha256 != _hash(here)):
-            raise InputError(
-                "this file exists already, was not written by truearm or was changed since, and is not overwritten",
-                where=str(path),
-                cure="Choose another `out`.",
-            )
+            raise _not_written_here(path)
     order = sorted(files, key=lambda name: not name.endswith(".truearm.json"))
     write_files(folder, {name: files[name] for name in order}, command)
+
+
+def _not_written_here(path: Path) -> InputError:
+    return InputError(
+        "this file exists already, was not written by truearm or was changed since, and is not overwritten",
+        where=str(path),
+        cure="Choose another `out`.",
+    )
 
 
 # -- reading ----------------------------------------------------------------------------------------------

@@ -129,3 +129,17 @@ def test_of_many_skipped_targets_the_first_are_listed(program: Path) -> None:
     assert len(repr(file)) <= 2000
     assert f"  and {len(file.skipped) - 10} more; the JSON summary lists all" in correction.lines()
     assert len(correction.summary()["programs"][0]["skipped"]) == len(file.skipped)
+
+
+def test_a_corrected_program_without_its_record_is_known_by_the_manifest(program: Path) -> None:
+    out = program.parent / "out"
+    truearm.compensate(calibrated(), [program], out=out)
+    copy = out / "copy.mod"
+    copy.write_bytes((out / "plate.mod").read_bytes())
+    (out / "plate.mod.truearm.json").unlink()
+    for corrected in (out / "plate.mod", copy):
+        with pytest.raises(
+            InputError, match=r"corrected already; got 'the content of plate.mod, written together with"
+        ):
+            truearm.compensate(calibrated(), [corrected])
+    truearm.compensate(calibrated(), [program], out=program.parent / "other")

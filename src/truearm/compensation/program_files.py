@@ -241,7 +241,9 @@ def _not_written_here(path: Path) -> InputError:
 def _original(path: Path, again: bool) -> bytes:
     record = _record(path)
     if record is None:
-        return _text_bytes(path)
+        content = _text_bytes(path)
+        _refuse_without_record(path, _hash(content))
+        return content
     if not again:
         raise InputError(
             "this program was corrected already",
@@ -250,6 +252,19 @@ def _original(path: Path, again: bool) -> bytes:
             cure="Give the original; or correct that original anew with `again`, or restore it with `revert`.",
         )
     return _unchanged_original(path, record)
+
+
+def _refuse_without_record(path: Path, content: str) -> None:
+    """Refuse what the manifest beside it knows as a corrected program: its record was removed, or it is a copy."""
+    for one in sets_in(path.parent):
+        for name, known in one.files.items():
+            if known == content and record_path(Path(name)).as_posix() in one.files:
+                raise InputError(
+                    "this program was corrected already",
+                    where=str(path),
+                    came=f"the content of {name}, written with its record",
+                    cure="Give the original, or put the record back beside it.",
+                )
 
 
 def _unchanged_original(path: Path, record: CorrectionRecord) -> bytes:

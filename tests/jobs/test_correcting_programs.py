@@ -139,7 +139,7 @@ def test_a_corrected_program_without_its_record_is_known_by_the_manifest(program
     (out / "plate.mod.truearm.json").unlink()
     for corrected in (out / "plate.mod", copy):
         with pytest.raises(
-            InputError, match=r"corrected already; got 'the content of plate.mod, written together with"
+            InputError, match=r"corrected already; got 'the content of plate.mod, written with its record"
         ):
             truearm.compensate(calibrated(), [corrected])
     truearm.compensate(calibrated(), [program], out=program.parent / "other")

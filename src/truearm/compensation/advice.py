@@ -200,7 +200,8 @@ def frame_words(frames: Frames) -> list[str]:
         said = [
             "`frames` is not given. Calibration cannot know where a program's frames really are, so the base was "
             f"shifted by {size(frames.base)} until the mean correction of all targets is zero: targets are right to "
-            "each other, and the program as a whole stays where it was."
+            "each other, and their mean position and orientation stay where they were. For a work object that was "
+            "touched up by points, give `frames`."
         ]
     if frames.tools == "identified":
         said.append("The program's tools are where `tools` places them, on the identified flange.")

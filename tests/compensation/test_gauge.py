@@ -76,7 +76,7 @@ def test_a_work_object_located_by_points_with_the_uncorrected_robot_is_met() -> 
     start, flange = best_agreement(robot)
     holes = np.tile(np.eye(4), (9, 1, 1))
     holes[:, 0, 3], holes[:, 1, 3] = np.repeat([-0.1, 0.0, 0.1], 3), np.tile([-0.1, 0.0, 0.1], 3)
-    holes[:, :3, :3] = Rotation.from_euler("zyx", rng.uniform(-0.4, 0.4, (9, 3)) + [0, np.pi, 0]).as_matrix()
+    holes[:, :3, :3] = Rotation.from_euler("zyx", rng.uniform(-0.4, 0.4, (9, 3)) + np.array([0, np.pi, 0])).as_matrix()
     stands = small([0.33, 0.06, 0.15, 0.05, 0.02, 0.4])
     wanted = start @ stands @ holes  # in the identified base
     near = np.tile(np.array([0.2, 0.6, 0.1, 0.0, 0.8, 0.0]), (9, 1))

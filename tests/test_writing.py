@@ -80,5 +80,5 @@ def test_a_file_in_the_folder_that_was_not_written_there_by_us_is_not_replaced(t
     write_files(tmp_path, {"a": "1", "b": "2"})
     output_folder(tmp_path, ["a", "b"])
     (tmp_path / "report.html").write_text("mine")
-    with pytest.raises(InputError, match="report.html: this file exists already, was not written by truearm"):
+    with pytest.raises(InputError, match=r"report\.html: this exists already, was not written here by truearm"):
         output_folder(tmp_path, ["a", "b", "report.html"])

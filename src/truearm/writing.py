@@ -54,7 +54,7 @@ def output_folder(
             refuse_overwriting(path / name, read)
             if name not in written and exists(path / name):
                 raise InputError(
-                    "this file exists already, was not written by truearm, and is not overwritten",
+                    "this exists already, was not written here by truearm, and is not overwritten",
                     where=str(path / name),
                     cure="Choose another `out`, or move the file.",
                 )

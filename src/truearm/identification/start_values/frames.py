@@ -4,7 +4,7 @@ With the nominal flange poses (R_c, p_c) a reading of target t at configuration 
 ``y = R (R_c t + p_c) + p``; turned back by the base, ``R' y - p_c = R_c t + R' p``. For a given R this is linear
 in the target t and in u = R' p with a matrix that does not depend on R, so both can be projected out once and for
 all: what is left is ``|M vec(R) - m|^2``, nine numbers on the rotations, which a coarse look at all rotations and
-a few Gauss-Newton steps solve. Measured orientations add rows to it: the axis about which a target turned between
+a few Newton steps solve. Measured orientations add rows to it: the axis about which a target turned between
 two configurations is the axis about which the flange turned, seen from the instrument.
 No start needs to be given by hand, and the number of joints does not matter.
 """
@@ -122,7 +122,12 @@ def _turn_axes(R: Array) -> Array:
 
 
 def _nearest_rotation(G: Array, g: Array) -> Array:
-    """Minimise r' G r - 2 g' r over the rotations, r = vec(R) row by row."""
+    """Minimise r' G r - 2 g' r over the rotations, r = vec(R) row by row.
+
+    Newton steps on the rotation group: with ``A = R' mat(G r - g)`` half the second derivative by w, of R exp(w), is
+    ``D' G D + sym(A) - tr(A) I``, D the columns of d vec(R) / dw. Where it is not positive, its eigenvalues are taken
+    without their signs, so that every step goes downhill.
+    """
     candidates = _even_rotations(1500)
     best = candidates[np.argsort(_cost(G, g, candidates))[:24]]
     costs = _cost(G, g, best)
@@ -130,10 +135,14 @@ def _nearest_rotation(G: Array, g: Array) -> Array:
         # R exp(w): the columns of d vec(R) / dw are vec(R [e_k]x)
         D = np.ascontiguousarray((best[:, None] @ _GENERATORS).reshape(-1, 3, 9).swapaxes(1, 2))
         Dt = D.swapaxes(1, 2)
-        gradient = (Dt @ (best.reshape(-1, 9) @ G - g)[:, :, None])[:, :, 0]
-        hessian = Dt @ (G @ D)
-        damping = 1e-9 * np.trace(hessian, axis1=1, axis2=2)[:, None, None] * _IDENTITY + 1e-300 * _IDENTITY
-        step = -np.linalg.solve(hessian + damping, gradient[:, :, None])[:, :, 0]
+        slope = best.reshape(-1, 9) @ G - g
+        gradient = (Dt @ slope[:, :, None])[:, :, 0]
+        A = best.swapaxes(1, 2) @ slope.reshape(-1, 3, 3)
+        bend = (A + A.swapaxes(1, 2)) / 2 - np.trace(A, axis1=1, axis2=2)[:, None, None] * _IDENTITY
+        curvature, V = np.linalg.eigh(Dt @ (G @ D) + bend)
+        curvature = np.abs(curvature)
+        curvature += 1e-9 * curvature.sum(axis=1, keepdims=True) + 1e-300
+        step = -(V @ ((V.swapaxes(1, 2) @ gradient[:, :, None]) / curvature[:, :, None]))[:, :, 0]
         size = np.linalg.norm(step, axis=1, keepdims=True)
         step *= np.minimum(1.0, 0.5 / np.maximum(size, 1e-300))
         moved = best @ _rotations(step)

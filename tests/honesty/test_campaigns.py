@@ -140,6 +140,63 @@ def as_thousands(p: Array, _: Dataset) -> Array:
 
 RIGHT_SIGMA: Final = with_sigma(NOISE)
 
+
+def without_sigma(data: Dataset) -> Dataset:
+    return replace(data, sigma=None)
+
+
+def one_after_the_other(*changes: Change) -> Change:
+    def changed(data: Dataset) -> Dataset:
+        for change in changes:
+            data = change(data)
+        return data
+
+    return changed
+
+
+def missing_by(deviation: float, *, each_target: bool = False) -> Change:
+    """Read the robot with joints that miss by so much [deg] at every arrival, each target on one of its own or not."""
+
+    def change(data: Dataset) -> Dataset:
+        rng = np.random.default_rng(2)
+        position = data.position.copy()
+        for arrival in range(len(data.targets) if each_target else 1):
+            missed = np.radians(deviation) * rng.standard_normal(data.joints.shape)
+            read = measure(honest()[0], data.joints + missed, NOISE, rng).position
+            mine = data.target == arrival if each_target else np.ones(len(data.target), dtype=bool)
+            position[mine] = read[mine]
+        return replace(data, position=position)
+
+    return change
+
+
+def rounded(step: float) -> Change:
+    """Write joint positions in such steps [deg]."""
+    return with_joints(lambda q: np.radians(np.round(np.degrees(q) / step) * step))
+
+
+def commanded(step: float) -> Change:
+    """Read the robot at joint positions that were commanded in such steps [deg]."""
+
+    def change(data: Dataset) -> Dataset:
+        joints = np.radians(np.round(np.degrees(data.joints) / step) * step)
+        return replace(measure(honest()[0], joints, NOISE, np.random.default_rng(3)), approach=None, number=None)
+
+    return change
+
+
+def not_numbered(data: Dataset) -> Dataset:
+    return replace(data, labels=tuple(f"pose-{label}" for label in data.labels), number=None, approach=None)
+
+
+def shuffled(data: Dataset) -> Dataset:
+    return not_numbered(data.of_configurations(np.random.default_rng(4).permutation(data.configurations)))
+
+
+def moved_by_a_millimetre(data: Dataset) -> Dataset:
+    return replace(data, position=data.position + late(data) * [1e-3, 0.0, 0.0])
+
+
 #: The lies of data, each under the name that a metrologist would give it.
 LIES: Final[dict[str, Lie]] = {
     # units
@@ -164,6 +221,36 @@ LIES: Final[dict[str, Lie]] = {
     ),
     "a-third-of-sigma": Lie(
         with_sigma(NOISE / 3), "calibrate", "residuals-exceed-sigma", "warning", "", 0, RIGHT_SIGMA
+    ),
+    "data-sheet-error-called-sigma": Lie(
+        one_after_the_other(missing_by(0.005), with_sigma(3 * NOISE)),
+        "calibrate",
+        "sigma-too-large",
+        "warning",
+        "maximum permissible error",
+        0,
+        missing_by(0.005),
+    ),
+    # visits
+    "targets-read-on-separate-visits": Lie(
+        one_after_the_other(missing_by(0.01, each_target=True), without_sigma),
+        "calibrate",
+        "separate-visits",
+        "warning",
+        "`visit`",
+        0,
+        one_after_the_other(missing_by(0.01), without_sigma),
+    ),
+    # digits
+    "joints-rounded-to-tenths": Lie(rounded(0.1), "check", "joints-rounded", "warning", r"0\.1 deg", 0, commanded(0.1)),
+    "joints-rounded-to-degrees": Lie(
+        one_after_the_other(rounded(1.0), without_sigma),
+        "calibrate",
+        "joints-rounded",
+        "warning",
+        "multiples of 1 deg",
+        0,
+        commanded(1.0),
     ),
     # axes and signs
     "left-handed-instrument": Lie(with_positions(lambda p, _: p * [1, -1, 1]), "check", "mirrored", "error", "", 3),
@@ -200,6 +287,33 @@ LIES: Final[dict[str, Lie]] = {
         "error",
         rf"\b{HALF + 1}\b",
         3,
+    ),
+    "instrument-moved-and-nothing-numbered": Lie(
+        one_after_the_other(moved_by_a_millimetre, without_sigma, not_numbered),
+        "calibrate",
+        "instrument-moved",
+        "warning",
+        f"configuration pose-{HALF + 1} .* order of the file",
+        0,
+        one_after_the_other(without_sigma, not_numbered),
+    ),
+    "instrument-moved-and-rows-shuffled": Lie(
+        one_after_the_other(moved_by_a_millimetre, without_sigma, shuffled),
+        "calibrate",
+        "large-remainder",
+        "warning",
+        "instrument or a base that moved",
+        0,
+        one_after_the_other(without_sigma, shuffled),
+    ),
+    "another-robot-and-no-sigma": Lie(
+        one_after_the_other(two_robots, without_sigma, shuffled),
+        "calibrate",
+        "large-remainder",
+        "warning",
+        "another robot",
+        0,
+        one_after_the_other(without_sigma, shuffled),
     ),
     "probe-bent": Lie(
         with_positions(lambda p, data: p + late(data) * (data.target == 1)[:, None] * [0.0, 0.0, 3e-3]),

@@ -20,10 +20,12 @@ from truearm.identification.judging.arrival_lag import check_arrival_lag
 from truearm.identification.judging.changes import check_changes
 from truearm.identification.judging.expected_error import as_residuals_allow, expected_error
 from truearm.identification.judging.implausible import check_plausible
+from truearm.identification.judging.large_remainder import check_remainder
 from truearm.identification.judging.left_over import LeftOver
 from truearm.identification.judging.narrow_data import check_narrow_data
 from truearm.identification.judging.one_sided import check_one_sided
-from truearm.identification.judging.sigma import check_sigma
+from truearm.identification.judging.separate_visits import check_separate_visits
+from truearm.identification.judging.sigma import check_sigma, check_sigma_beside_joints
 from truearm.identification.judging.transmission import check_transmission
 from truearm.identification.solving.bounds import Bounds, read_bounds
 from truearm.identification.solving.fit import Status, identify, place
@@ -240,9 +242,14 @@ def calibrate(
     expected = expected_error(as_residuals_allow(fit, first), plausible=not unlike)
     left_over = LeftOver.of(fit, readings)
     wrong_sigma = check_sigma(left_over)
+    hidden = [] if unlike or has_error(wrong_sigma) else check_sigma_beside_joints(left_over)
+    explained = [*check_changes(left_over), *check_arrival_lag(left_over)]
+    doubted = has_error([*unlike, *noticed])
+    if not explained and not doubted and not any(notice.code == "joints-rounded" for notice in noticed):
+        explained = check_remainder(left_over)
     narrow = (
         []  # more configurations do not mend these
-        if unlike or wrong_sigma
+        if unlike or (wrong_sigma and not hidden)
         else check_narrow_data(fit, expected, first, validation or train_errors, held_out=validation is not None)
     )
     digest = "" if sha256 is None else f" (sha256 {sha256[:12]})"
@@ -264,13 +271,13 @@ def calibrate(
             *_check_copies(readings, training, held_out),
             *_check_trained_before(nominal_robot, sha256, (count, n, seed)),
             *moved,
-            *check_fit(fit, expected, doubted=has_error([*unlike, *noticed])),
+            *check_fit(fit, expected, doubted=doubted),
             *narrow,
             *(notice for notice in noticed if notice.level != "error"),
             *check_one_sided(fit, first),
-            *wrong_sigma,
-            *check_changes(left_over),
-            *check_arrival_lag(left_over),
+            *(hidden or wrong_sigma),
+            *([] if doubted else check_separate_visits(left_over)),
+            *explained,
             *check_transmission(fit, first),
         ),
         data=readings,

@@ -9,6 +9,7 @@ import numpy as np
 
 from truearm.errors import InputError
 from truearm.identification.judging.implausible import check_plausible
+from truearm.identification.judging.joint_rounding import check_rounding
 from truearm.identification.judging.slips import off_by, slips_by_fit, slips_in_lengths, slips_in_positions
 from truearm.identification.solving.fit import Fit, identify
 from truearm.identification.solving.models import named_model
@@ -73,7 +74,7 @@ def check_against(robot: Robot, data: Dataset) -> tuple[list[Notice], list[Suspe
     if unlike_robot:
         return [*unlike_robot, *found], []
     mistaken, suspects = _far_off(fit, data, off)
-    return [*found, *mistaken], suspects
+    return [*found, *mistaken, *check_rounding(fit, data)], suspects
 
 
 def _beyond_limits(robot: Robot, data: Dataset) -> list[Notice]:

@@ -116,6 +116,25 @@ def names_exchanged(data: Dataset) -> Dataset:
     return replace(data, target=np.asarray(mixed, dtype=np.intp))
 
 
+def renamed_in_half(name: str, other: str) -> Change:
+    """Call the second target by a name, and by another one at every second configuration."""
+
+    def change(data: Dataset) -> Dataset:
+        target = np.where((data.target == 1) & (data.configuration % 2 == 1), 3, data.target)
+        return replace(data, targets=(data.targets[0], name, data.targets[2], other), target=target)
+
+    return change
+
+
+def a_fifth_off(p: Array, data: Dataset) -> Array:
+    """Put a fifth of the readings off by twenty deviations."""
+    rng = np.random.default_rng(5)
+    wrong = rng.random(len(p)) < 0.2
+    far = rng.standard_normal((int(wrong.sum()), 3))
+    p[wrong] += 20 * NOISE * far / np.linalg.norm(far, axis=1, keepdims=True)
+    return p
+
+
 def each_twice(data: Dataset, *, own_readings: bool) -> Dataset:
     """Return data in which every configuration stands twice, read anew or copied with fewer digits."""
     twin, _ = honest()
@@ -260,6 +279,13 @@ LIES: Final[dict[str, Lie]] = {
     "joint-3-counted-from-joint-2": Lie(
         with_joints(lambda q: q + q[:, 1:2] * np.eye(6)[2]), "check", "implausible", "error", "", 3
     ),
+    # names
+    "half-of-the-rows-in-another-spelling": Lie(
+        renamed_in_half("T2", "t-2"), "check", "target-misspelt", "error", "T2 and t-2", 3, as_it_is
+    ),
+    "half-of-the-rows-misspelt": Lie(
+        renamed_in_half("reflector", "reflecter"), "check", "target-misspelt", "error", "same point", 3
+    ),
     # rows
     "joints-shifted-by-a-row": Lie(
         with_joints(lambda q: np.roll(q, 1, axis=0)), "check", "rows-shifted", "error", "", 3
@@ -279,6 +305,7 @@ LIES: Final[dict[str, Lie]] = {
     "copies-with-fewer-digits": Lie(
         lambda data: each_twice(data, own_readings=False), "calibrate", "held-out-seen", "warning", ""
     ),
+    "a-fifth-of-the-readings-off": Lie(with_positions(a_fifth_off), "check", "outliers", "warning", "2[0-9] %|2[0-9]%"),
     # half-way
     "instrument-moved": Lie(
         with_positions(lambda p, data: p + late(data) * [2e-3, 0.0, 0.0]),

@@ -66,6 +66,8 @@ class Change:
         Probability that noise alone shows one as large anywhere.
     by_file
         Whether the order of measurement is not known, and that of the file was taken.
+    follows
+        Number of the joint that moved on with the order of measurement; 0 if none did.
     """
 
     kind: Kind
@@ -75,6 +77,7 @@ class Change:
     values: tuple[float, ...]
     chance: float
     by_file: bool = False
+    follows: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +104,7 @@ def find_change(left: LeftOver) -> Change | None:
     """
     data = left.problem.data
     n = data.configurations
-    if data.fixture is not None or n < 2 * LEAST_ARRIVALS or (data.number is None and _follows_a_joint(data.joints)):
+    if data.fixture is not None or n < 2 * LEAST_ARRIVALS:
         return None
     hypotheses = list(_hypotheses(left))
     residual = left.without_parameters(left.residual)
@@ -110,6 +113,9 @@ def find_change(left: LeftOver) -> Change | None:
     if total <= 0.0 or effective < n or not hypotheses:
         return None
     order = np.arange(n) if data.number is None else np.argsort(data.number, kind="stable")
+    follows = _followed_joint(data.joints[order])
+    if data.number is None and follows:
+        return None
     place = np.empty(n, dtype=np.intp)
     place[order] = np.arange(n)
     rows = np.argsort(place[left.configuration], kind="stable")
@@ -145,20 +151,20 @@ def find_change(left: LeftOver) -> Change | None:
     _, change = min(found, key=lambda entry: entry[0])
     if change.chance >= _LARGEST_CHANCE or change.share <= _LEAST_SHARE:
         return None
-    return replace(change, by_file=data.number is None)
+    return replace(change, by_file=data.number is None, follows=follows)
 
 
-def _follows_a_joint(joints: Array) -> bool:
-    """Return whether the order of the rows is that of a joint's positions, by the correlation of ranks."""
+def _followed_joint(joints: Array) -> int:
+    """Return the number of a joint whose positions the rows are sorted by, by the correlation of ranks; 0 if none."""
     at = np.arange(len(joints)) - 0.5 * (len(joints) - 1)
-    for positions in joints.T:
+    for number, positions in enumerate(joints.T, 1):
         _, rank, times = np.unique(positions, return_inverse=True, return_counts=True)
         ranks = (np.cumsum(times) - 0.5 * times)[rank.reshape(-1)]
         ranks = ranks - ranks.mean()
         size = float(np.linalg.norm(ranks) * np.linalg.norm(at))
         if size > 0.0 and abs(float(ranks @ at)) > _SORTED * size:
-            return True
-    return False
+            return number
+    return 0
 
 
 def _hypotheses(left: LeftOver) -> Iterator[tuple[Kind, str, tuple[int, ...]]]:
@@ -255,6 +261,11 @@ def check_changes(left: LeftOver) -> list[Notice]:
         f"or its temperature drifted. {explains} Measure reference points beside the robot along with the targets, or "
         "let the arm warm up first.",
     }
+    if change.follows:
+        words[change.kind] += (
+            f" Joint {change.follows} moved on with the order of measurement, so what the model lacks at some of its "
+            "positions, as the periodic error of a gear, looks like that too."
+        )
     taken = (
         " The configurations are not numbered, so the order of the file was taken for that of measurement. If it is, "
         "number them so."

@@ -305,7 +305,7 @@ LIES: Final[dict[str, Lie]] = {
     "copies-with-fewer-digits": Lie(
         lambda data: each_twice(data, own_readings=False), "calibrate", "held-out-seen", "warning", ""
     ),
-    "a-fifth-of-the-readings-off": Lie(with_positions(a_fifth_off), "check", "outliers", "warning", "2[0-9] %|2[0-9]%"),
+    "a-fifth-of-the-readings-off": Lie(with_positions(a_fifth_off), "check", "outliers", "warning", "1[0-9]%"),
     # half-way
     "instrument-moved": Lie(
         with_positions(lambda p, data: p + late(data) * [2e-3, 0.0, 0.0]),

@@ -115,7 +115,11 @@ def test_without_an_order_that_of_the_file_is_tried_unless_it_follows_a_joint() 
     assert told(data) == []
     assert told(moved.of_configurations(np.argsort(data.joints[:, 1]))) == []
     sorted_first = data.of_configurations(np.argsort(-data.joints[:, 1]))
-    assert told(moved_instrument(sorted_first, np.array([2e-3, 0.0, 0.0]))) == []
+    late = moved_instrument(sorted_first, np.array([2e-3, 0.0, 0.0]))
+    assert told(late) == []
+    (notice,) = told(replace(late, number=np.arange(float(late.configurations))))
+    assert notice.level == "error"
+    assert "Joint 2 moved on with the order of measurement" in notice.message
 
 
 def test_measured_campaigns_show_no_change(measured_data: Path) -> None:

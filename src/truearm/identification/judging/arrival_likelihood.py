@@ -90,13 +90,14 @@ class ArrivalLikelihood:
 
 
 def lever_of(left: LeftOver) -> float:
-    """Return how far targets move if every joint errs by one, as a root mean square [m/rad or 1]; 0 without positions.
+    """Return how far targets move if every turning joint errs by one, as a root mean square [m/rad]; 0 if by nothing.
 
     The squares of the joints add up.
     """
     problem = left.problem
+    turning = np.array([joint.kind == "revolute" for joint in left.fit.robot.joints])
     values = np.array([left.fit.robot.values[name] for name in left.fit.free.names])
-    by_joints, first, squares, count = problem.at(values).by_joints, 0, 0.0, 0
+    by_joints, first, squares, count = problem.at(values).by_joints[:, turning], 0, 0.0, 0
     for block in problem.blocks:
         rows = by_joints[first : first + block.rows].reshape(len(block.readings), -1)
         first += block.rows
@@ -107,10 +108,10 @@ def lever_of(left: LeftOver) -> float:
 
 
 def joints_as_far_off(left: LeftOver) -> float:
-    """Return the error of every joint that would move targets as far as they are left off [rad]; 0 without positions.
+    """Return the error of every turning joint that would move targets as far as they are left off [rad]; 0 if none can.
 
     As a root mean square, with the share that parameters have taken given back, and what is declared as noise taken
-    out. Of turning joints, where all turn.
+    out.
     """
     off = errors_of(left.fit.robot, left.problem.data).position_norms
     lever = lever_of(left)

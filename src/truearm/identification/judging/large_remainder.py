@@ -30,13 +30,13 @@ def check_remainder(left: LeftOver) -> list[Notice]:
     seeming = joints_as_far_off(left)
     if seeming <= _LARGEST:
         return []
-    off = math.degrees(seeming)
+    off, more = math.degrees(seeming), "" if fit.model.tried else " (try `model=auto`)"
     return [
         Notice(
             "large-remainder",
             f"The readings are left as far off as if every joint missed by {off:.2g} deg at each arrival. Arms repeat "
             "to less than 0.01 deg. No deviation is declared, so all of that counts as noise and errors of the joints. "
-            f"Look for what the {fit.model.name} model lacks (try `model=auto`), for joint positions that were rounded "
+            f"Look for what the {fit.model.name} model lacks{more}, for joint positions that were rounded "
             "or taken before the arm stood still, for an instrument or a base that moved, and for readings of another "
             "robot. If the instrument is no better, declare its deviation as sigma.",
         )

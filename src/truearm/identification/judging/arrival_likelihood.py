@@ -25,6 +25,8 @@ from truearm.modeling.chain import Array
 #: Readings that are left so many times farther off than half of them are outliers: no variance is made of these.
 _OUTLIER: Final = 6.0
 _LEAST: Final = 1e-12
+#: Configurations that are looked at, evenly spaced; more would tell no more, and take longer than the fit.
+_CONFIGURATIONS: Final = 100
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +55,7 @@ class ArrivalLikelihood:
         names, factor = factors_of(problem)
         of_reading = _readings(left)
         arrivals = of_reading if each_reading else problem.arrivals
-        kept = _no_outliers(left.residual, of_reading)
+        kept = _no_outliers(left.residual, of_reading) & _some(left)
         return cls(
             left,
             Linearised(
@@ -129,6 +131,13 @@ def _readings(left: LeftOver) -> NDArray[np.intp]:
     """Return the reading that each equation is of, ``(rows,)``."""
     blocks = left.problem.blocks
     return np.concatenate([np.repeat(block.readings, block.observation.components) for block in blocks])
+
+
+def _some(left: LeftOver) -> NDArray[np.bool_]:
+    """Return which equations are of configurations that are looked at, ``(rows,)``."""
+    count = left.problem.data.configurations
+    chosen = np.linspace(0, count - 1, min(count, _CONFIGURATIONS)).round().astype(np.intp)
+    return np.asarray(np.isin(left.configuration, chosen))
 
 
 def _no_outliers(residual: Array, of_reading: NDArray[np.intp]) -> NDArray[np.bool_]:

@@ -16,6 +16,7 @@ import numpy as np
 
 from truearm.errors import InputError, did_you_mean
 from truearm.modeling.chain import Array
+from truearm.modeling.controller import ControllerKinematics
 from truearm.modeling.conventions import convention
 from truearm.modeling.conversion.base_frame import exponentials, zero_reference
 from truearm.modeling.conversion.common_normals import dh, hayati, s_model
@@ -99,6 +100,8 @@ def converted(robot: Robot, convention_name: str) -> Robot:
         x, y, z = (round(float(v), _DECIMALS) + 0.0 for v in links.base[:3, :3].T @ base[:3, :3] @ robot.gravity)
         its = np.linalg.inv(links.base) @ base @ robot.controller.base.matrix
         controller = replace(robot.controller, base=_transform(its))
+        if controller.kinematics.rows:  # they begin at the base frame as it was
+            controller = replace(controller, kinematics=ControllerKinematics())
         made = replace(_based(made, links.base), gravity=(x, y, z), controller=controller)
     behind = np.linalg.inv(at_zero(made, made.rigid.trunk.elements)) @ flange
     if np.abs(behind - np.eye(4)).max() > _SAME_FRAME:

@@ -44,14 +44,20 @@ def nominal_robot(robot: Robot) -> Robot:
         targets=(),
         fixtures=(),
     )
-    inside = (name for name, p in nominal.parameters.items() if p.group != "base")
-    if not robot.effect_names and all(robot.values[name] == nominal.values[name] for name in inside):
+    controllers = controller_robot(nominal)
+    if not robot.effect_names and (_same_arm(robot, nominal) or _same_arm(robot, controllers)):
         raise InputError(
-            "this robot is not calibrated: all its parameters are nominal",
+            "this robot is not calibrated: all its parameters are nominal, or those of its controller",
             where=robot.name,
             cure="Give the calibrated.yaml of truearm calibrate; a converted robot has lost its nominal values.",
         )
-    return controller_robot(nominal)
+    return controllers
+
+
+def _same_arm(robot: Robot, other: Robot) -> bool:
+    """Return whether an arm has the values of another one, wherever both stand."""
+    inside = (name for name, p in other.parameters.items() if p.group != "base")
+    return all(robot.values.get(name) == other.values[name] for name in inside)
 
 
 @dataclass(frozen=True, eq=False)

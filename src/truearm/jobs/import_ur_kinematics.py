@@ -39,8 +39,8 @@ def import_ur_kinematics(
     Returns
     -------
     imported
-        The robot: its table is what the controller computes with, and its masses, limits and tools are those of the
-        type, in frames beside the type's.
+        The robot: its values are what the controller computes with. Its nominal values, masses, limits and tools are
+        those of the type, in frames beside the type's.
 
     Raises
     ------

@@ -12,7 +12,7 @@ from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.results.record import Record, notice_lines, notice_summaries
 
-#: Joint zeros that are so many times smaller speak for another type: of published files they are above 100 times, or
+#: Joint zeros that are so many times smaller speak for another type: of published files they are 8 times and more, or
 #: less than twice.
 _CLEARLY: Final = 5.0
 
@@ -24,7 +24,7 @@ class ImportedKinematics(Record):
     Attributes
     ----------
     robot
-        Its table is the controller's.
+        Its values are the controller's, its nominal values the type's.
     type
         The type of arm, as its maker publishes it.
     distance
@@ -92,5 +92,5 @@ class ImportedKinematics(Record):
 
 
 def largest_zero(robot: Robot) -> float:
-    """Return the largest joint zero of a robot's table [rad]."""
-    return max(abs(joint.row.get("theta_offset", 0.0)) for joint in robot.joints)
+    """Return the largest joint zero of a robot [rad]."""
+    return max(abs(parameter.value) for parameter in robot.parameters.values() if parameter.group == "joint zero")

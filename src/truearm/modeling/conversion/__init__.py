@@ -83,9 +83,13 @@ def converted(robot: Robot, convention_name: str) -> Robot:
         for name, p in robot.known.items()
         if p.group not in ("geometry", "joint zero") and not (moved and p.group == "base")
     }
+    controller = robot.controller
+    if controller.kinematics.rows:  # a converted robot has lost the nominal values that they stand beside
+        controller = replace(controller, kinematics=ControllerKinematics())
     made = replace(
         robot,
         convention_name=convention_name,
+        controller=controller,
         joints=tuple(
             replace(joint, row=_tidy(row, convention(convention_name).row_units(joint.kind)))
             for joint, row in zip(robot.joints, links.rows, strict=True)
@@ -99,9 +103,7 @@ def converted(robot: Robot, convention_name: str) -> Robot:
     if moved and links.base is not None:
         x, y, z = (round(float(v), _DECIMALS) + 0.0 for v in links.base[:3, :3].T @ base[:3, :3] @ robot.gravity)
         its = np.linalg.inv(links.base) @ base @ robot.controller.base.matrix
-        controller = replace(robot.controller, base=_transform(its))
-        if controller.kinematics.rows:  # they begin at the base frame as it was
-            controller = replace(controller, kinematics=ControllerKinematics())
+        controller = replace(controller, base=_transform(its))
         made = replace(_based(made, links.base), gravity=(x, y, z), controller=controller)
     behind = np.linalg.inv(at_zero(made, made.rigid.trunk.elements)) @ flange
     if np.abs(behind - np.eye(4)).max() > _SAME_FRAME:

@@ -8,7 +8,6 @@ from typing import Final
 
 from truearm.errors import InputError, did_you_mean
 from truearm.files import exists
-from truearm.modeling.controller import ControllerKinematics
 from truearm.modeling.formats.controller_entry import STATED
 from truearm.modeling.formats.ur_kinematics import read_kinematics, refuse_far, with_kinematics
 from truearm.modeling.robot import Robot
@@ -45,7 +44,5 @@ def with_controller_kinematics(robot: Robot, said: str, folder: Path) -> Robot:
             )
         made = with_kinematics(robot, read_kinematics(path))
         refuse_far(made, robot, str(path))
-        stated = made.controller.kinematics
-        rows = tuple(dict(joint.row) for joint in made.joints)
-        kinematics = ControllerKinematics("own", rows, stated.source, stated.identity)
+        kinematics = made.controller.kinematics
     return replace(robot, controller=replace(robot.controller, kinematics=kinematics))

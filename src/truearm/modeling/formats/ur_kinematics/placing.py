@@ -8,6 +8,7 @@ frame before (Hayati and Mirmirani 1985), which is beside the nominal one. No po
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -38,18 +39,19 @@ _SAME: Final = 1e-9
 
 
 def controller_robot(robot: Robot) -> Robot:
-    """Return the robot that the controller computes with, where its rows are known; else `robot` itself."""
+    """Return the robot that the controller computes with, where its rows are known; else `robot` itself.
+
+    Its nominal values stay those of `robot`, and its values are the controller's: so it has a closed form to start
+    from where `robot` has one.
+    """
     rows = robot.controller.kinematics.rows
-    if not rows:
-        return robot
-    joints = tuple(replace(joint, row=row) for joint, row in zip(robot.joints, rows, strict=True))
-    return replace(robot, convention_name="hayati", joints=joints, flange=IDENTITY, masses=(), truths={}, known={})
+    return _with_rows(replace(robot, known={}), rows) if rows else robot
 
 
 def with_kinematics(type_: Robot, found: FactoryKinematics) -> Robot:
-    """Return the robot of a type with the kinematics of a file as its nominal ones.
+    """Return the robot of a type with the kinematics of a file as its values, and as those of its controller.
 
-    Masses, tools and limits are those of the type, in frames beside the type's.
+    The nominal values, masses, tools and limits are those of the type. The frames of links lie beside the type's.
 
     Raises
     ------
@@ -59,21 +61,13 @@ def with_kinematics(type_: Robot, found: FactoryKinematics) -> Robot:
     """
     plain = _plain(type_)
     if found.frames is None:
-        if any(joint.row.get("beta") for joint in plain.joints):
-            raise InputError(
-                "the file has differences to the table of a type, and this robot's table is no such one any more",
-                where=type_.name,
-                came="a table with the beta of a measured arm",
-                cure="Give the type as the library has it. A robot that was made from such a file is nominal already.",
-            )
-        rows = [
+        table = [
             {column: joint.row.get(column, 0.0) + found.deltas[column][number] for column in found.deltas}
             for number, joint in enumerate(plain.joints)
         ]
-        measured = replace(plain, convention_name="standard-dh", joints=_joints(plain, rows))
+        measured = replace(plain, convention_name="standard-dh", joints=_joints(plain, table))
     else:
-        rows = [_origin(frame) for frame in found.frames]
-        measured = replace(plain, convention_name="urdf", joints=_joints(plain, rows))
+        measured = replace(plain, convention_name="urdf", joints=_joints(plain, [_origin(f) for f in found.frames]))
     placed = converted(measured, "hayati")
     offset = np.abs(placed.base.matrix - np.eye(4)).max()
     if offset > _SAME or placed.flange != IDENTITY:
@@ -82,23 +76,25 @@ def with_kinematics(type_: Robot, found: FactoryKinematics) -> Robot:
             where=str(found.path),
             cure="Take the file that the controller or its ROS driver wrote.",
         )
-    made = replace(
-        type_,
-        title=f"{type_.title}, with the kinematics of its controller",
-        convention_name="hayati",
-        joints=placed.joints,
-        flange=IDENTITY,
-        known={},
-        truths={},
-        proof=None,
-    )
+    rows = tuple({column: float(value) for column, value in joint.row.items()} for joint in placed.joints)
+    kinematics = ControllerKinematics("own", rows, found.path.name, found.identity)
     return replace(
-        made,
-        controller=replace(
-            type_.controller,
-            kinematics=ControllerKinematics("nominal", source=found.path.name, identity=found.identity),
-        ),
+        _with_rows(replace(type_, known={}, proof=None), rows),
+        title=f"{type_.title}, with the kinematics of its controller",
+        controller=replace(type_.controller, kinematics=kinematics),
         history=(*type_.history, f"kinematics of the controller from {found.path.name}"),
+    )
+
+
+def _with_rows(robot: Robot, rows: Sequence[Mapping[str, float]]) -> Robot:
+    """Return a robot in nominal values with rows of the convention ``hayati`` as its values."""
+    joints = tuple(
+        replace(joint, row={**dict.fromkeys(row, 0.0), **joint.row})
+        for joint, row in zip(robot.joints, rows, strict=True)
+    )
+    made = replace(robot, convention_name="hayati", joints=joints, truths={})
+    return made.with_values(
+        {f"{column}_{number}": value for number, row in enumerate(rows, 1) for column, value in row.items()}
     )
 
 
@@ -119,7 +115,7 @@ def refuse_far(made: Robot, type_: Robot, where: str) -> None:
             allowed=f"{MOST_APART * 1e3:g} mm",
             cure="Give the type that stands on the arm.",
         )
-    pairs = zip(_link_frames(made), _link_frames(_plain(type_)), strict=True)
+    pairs = zip(_link_frames(_bare(made)), _link_frames(_plain(type_)), strict=True)
     for number, (ours, theirs) in enumerate(pairs, 1):
         gap = float(np.linalg.norm(ours[:3, 3] - theirs[:3, 3]))
         turned = float(np.arccos(np.clip((np.trace(ours[:3, :3].T @ theirs[:3, :3]) - 1.0) / 2.0, -1.0, 1.0)))
@@ -133,10 +129,10 @@ def refuse_far(made: Robot, type_: Robot, where: str) -> None:
             )
 
 
-def mean_distance(one: Robot, other: Robot) -> float:
-    """Return how far the flanges of two arms are apart on average at random joint positions [m]."""
-    joints = np.random.default_rng(0).uniform(-np.pi, np.pi, (_CONFIGURATIONS, len(one.joints)))
-    places = [_plain(robot).world_poses(joints)[0] for robot in (one, other)]
+def mean_distance(made: Robot, type_: Robot) -> float:
+    """Return how far the flange of an arm is from that of a type on average, at random joint positions [m]."""
+    joints = np.random.default_rng(0).uniform(-np.pi, np.pi, (_CONFIGURATIONS, len(made.joints)))
+    places = [robot.world_poses(joints)[0] for robot in (_bare(made), _plain(type_))]
     return float(np.linalg.norm(places[0] - places[1], axis=1).mean())
 
 
@@ -159,11 +155,16 @@ def _plain(type_: Robot) -> Robot:
             allowed=f"{' or '.join(_TABLES)}, base and flange as the controller has them",
             cure="Give the type as the library has it.",
         )
+    return _bare(replace(type_, known={}))
+
+
+def _bare(robot: Robot) -> Robot:
+    """Return the geometry of an arm as it is: at the origin, without masses, effects and what is beside it."""
     return replace(
-        type_,
+        robot,
         effect_names=(),
         base_quaternion=IDENTITY.quaternion,
-        known={},
+        known={name: p for name, p in robot.known.items() if p.group in ("geometry", "joint zero")},
         targets=(),
         fixtures=(),
         masses=(),

@@ -58,8 +58,8 @@ def kinematics_text(robot: Robot) -> tuple[str, list[str]]:
     said = [
         *masses_left_out(robot, KINEMATICS_FILE),
         *_flange_left_out(behind),
-        f"{KINEMATICS_FILE} of the factory has the hash of what the controller has. This one's is that of its own numbers: "
-        "the driver says that they are not the controller's, which is true.",
+        f"{KINEMATICS_FILE} of the factory has the hash of what the controller has. The hash of this one is that of "
+        "its own numbers: the driver says that they are not the controller's, which is true.",
     ]
     text = "\n".join(lines)
     return f"{text}\n  hash: truearm_{hashlib.sha256(text.encode()).hexdigest()[:16]}\n", said

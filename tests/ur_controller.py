@@ -108,7 +108,7 @@ def rotation(vector: Array) -> Array:
     angle = float(np.linalg.norm(vector))
     x, y, z = vector / angle if angle else vector
     K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
+    return np.asarray(np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K)
 
 
 def vector(R: Array) -> Array:
@@ -130,7 +130,8 @@ def inverse(rows: tuple[Array, Array, Array, Array], pose: Array, near: Array) -
         step = np.linalg.lstsq(np.array(rates).T, missed, rcond=None)[0]
         q = q + step * min(1.0, 0.3 / float(np.abs(step).max()))
         if np.abs(missed).max() < 1e-11:
-            return np.asarray(q)
+            found: Array = q
+            return found
     raise AssertionError("the controller does not reach this pose")
 
 

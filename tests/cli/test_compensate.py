@@ -71,7 +71,12 @@ def test_the_contract(truearm: Truearm, cell: Path) -> None:
     assert (program["file"], program["language"]) == ("plate.mod", "RAPID")
     assert program["targets"] == program["corrected"] == 44
     assert 0.05 < program["shift_mm"]["mean"] < program["shift_mm"]["max"] < 3.0
-    assert {warning["code"] for warning in told["warnings"]} == {"unproven", "frames-assumed", "tools-assumed"}
+    assert {warning["code"] for warning in told["warnings"]} == {
+        "unproven",
+        "controller-unknown",
+        "frames-assumed",
+        "tools-assumed",
+    }
     assert sorted(p.name for p in (cell / "out").iterdir()) == [
         "compensation.html",
         "plate.mod",
@@ -84,7 +89,8 @@ def test_the_contract(truearm: Truearm, cell: Path) -> None:
 
 
 def test_with_tool_and_frame_nothing_is_assumed(truearm: Truearm, cell: Path) -> None:
-    code, said = run(truearm, cell, "--tool", cell / "cell.yaml", "--frame", cell / "cell.yaml", "--json")
+    places = ["--tool", cell / "cell.yaml", "--frame", cell / "cell.yaml"]
+    code, said = run(truearm, cell, *places, "--controller-kinematics", "nominal", "--json")
     assert code == 0
     told = json.loads(said)
     assert [warning["code"] for warning in told["warnings"]] == ["unproven"]

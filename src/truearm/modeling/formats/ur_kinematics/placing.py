@@ -61,6 +61,13 @@ def with_kinematics(type_: Robot, found: FactoryKinematics) -> Robot:
     """
     plain = _plain(type_)
     if found.frames is None:
+        if any(joint.row.get("beta") for joint in plain.joints):
+            raise InputError(
+                "the file has differences to the table of a type, and this robot's table is no such one",
+                where=type_.name,
+                came="a table with a beta other than zero",
+                cure="Give the type as the library has it.",
+            )
         table = [
             {column: joint.row.get(column, 0.0) + found.deltas[column][number] for column in found.deltas}
             for number, joint in enumerate(plain.joints)

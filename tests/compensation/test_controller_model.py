@@ -87,6 +87,7 @@ def test_where_a_calibration_can_be_ordered_it_is_asked_for_in_a_warning(tmp_pat
     answered = truearm.compensate(worn("irb120"), [program(tmp_path, RAPID)], controller_kinematics="nominal")
     assert "controller-unknown" not in codes(answered)
     assert answered.files[0].text == correction.files[0].text
+    assert [one.applied()["controller"]["kinematics"] for one in (correction, answered)] == ["unknown", "nominal"]
     assert "controller_kinematics='nominal'" in answered.command
 
 

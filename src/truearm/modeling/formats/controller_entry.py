@@ -253,3 +253,8 @@ def _kinematics_entry(kinematics: ControllerKinematics) -> str | dict[str, Any]:
             for row in kinematics.rows
         ]
     return made
+
+
+def controller_summary(kinematics: ControllerKinematics) -> dict[str, Any]:
+    """Return in short what a controller computes with, without its numbers."""
+    return {"kinematics": kinematics.kind, "source": kinematics.source, "identity": dict(kinematics.identity)}

@@ -102,6 +102,7 @@ def _corrected_plate(
         [folder / _PLATE],
         tools=cell,
         frames=cell,
+        taught=["none"],
         controller_kinematics="nominal",  # so does the twin's
         progress=progress,
     )

@@ -55,12 +55,12 @@ def folder() -> Path:
         "import_table",
         "import_matrices",
         "import_circle",
-        "import_ur_kinematics",
         "tolerance",
         "compensate",
         "revert",
     ):
         EXAMPLES[job](place)
+    truearm.import_ur_kinematics(**EXAMPLES["import_ur_kinematics"](place))
     _rename(place, {"result/calibrated.yaml": "calibrated.yaml", "axes/joint-errors.yaml": "joint-errors.yaml"})
     _rename(place, {"corrected/plate.mod": "done.mod", "corrected/plate.mod.truearm.json": "done.mod.truearm.json"})
     for name in ("irb120", "kr5"):

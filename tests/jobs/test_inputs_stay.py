@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 from tests.jobs.examples import EXAMPLES
+from tests.ur_controller import UR10_CONF
 
 import truearm
 from truearm.errors import InputError
@@ -25,6 +26,8 @@ from truearm.results.program_correction import REPORT
 REFUSED = r"would be overwritten|not overwritten|of this name itself|no robot language has files of this kind"
 #: Parameters that name what a job writes.
 OUTPUTS = ("out", "steps", "file", "folder")
+#: Of these names those that a job reads.
+FILES = (("import_table", "file"), ("import_ur_kinematics", "file"))
 Arguments = dict[str, Any]
 
 
@@ -73,6 +76,10 @@ READ: dict[str, Callable[[Path], Arguments]] = {
     "export": lambda folder: {"robot": _robot(folder)},
     "compensate": lambda folder: {
         "tools": shutil.copy(EXAMPLES["compensate"](folder)["tools"], folder / "tools.yaml"),
+        "controller_kinematics": _written(folder / "controller.conf", UR10_CONF),
+    },
+    "import_ur_kinematics": lambda folder: {
+        "robot": _written(folder / "ur10.yaml", robot_text(truearm.load_robot("ur10")))
     },
 }
 #: What is no file that a job reads and overwrites: a folder of data whose files have names of their own.
@@ -105,7 +112,7 @@ def read_by(job: str) -> list[str]:
         p.name
         for p in named
         if "Path" in str(p.annotation)
-        and (p.name not in OUTPUTS or (job, p.name) == ("import_table", "file"))
+        and (p.name not in OUTPUTS or (job, p.name) in FILES)
         and (job, p.name) not in FOLDERS
     ]
 

@@ -205,8 +205,8 @@ def _by_joints(corrections: Sequence[Correction]) -> list[Notice]:
     return [
         Notice(
             "joint-targets-kept",
-            f"{counted(kept, 'target')} {stay}, as home positions should. Where they were computed from a place in "
-            "space, `joint_targets=correct` corrects them too.",
+            f"{counted(kept, 'target')} {stay}, as home positions should. Where one was computed from a place in "
+            "space, `joint_targets=correct` corrects it too.",
             "note",
         )
     ]

@@ -107,6 +107,16 @@ def test_another_robots_file_is_refused_by_its_parameter(tmp_path: Path) -> None
         assert not (tmp_path / "o").exists()
 
 
+@pytest.mark.parametrize("name", ["compensation.html", "a.script", "a.script.truearm.json"])
+def test_the_kinematics_file_is_not_overwritten(name: str, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / name).write_text(UR10_CONF)
+    with pytest.raises(InputError, match="overwritten"):
+        truearm.compensate(worn("ur10"), [program(tmp_path, POSES)], controller_kinematics=out / name, out=out)
+    assert (out / name).read_text() == UR10_CONF
+
+
 def test_an_imported_robot_is_not_a_calibrated_one(tmp_path: Path) -> None:
     (tmp_path / "calibration.conf").write_text(UR10_CONF)
     imported = truearm.import_ur_kinematics(tmp_path / "calibration.conf", "ur10").robot

@@ -11,7 +11,6 @@ from typing import Any
 
 import pytest
 from tests.jobs.examples import EXAMPLES
-from tests.ur_controller import UR10_CONF
 
 import truearm
 from truearm.errors import InputError
@@ -76,7 +75,6 @@ READ: dict[str, Callable[[Path], Arguments]] = {
     "export": lambda folder: {"robot": _robot(folder)},
     "compensate": lambda folder: {
         "tools": shutil.copy(EXAMPLES["compensate"](folder)["tools"], folder / "tools.yaml"),
-        "controller_kinematics": _written(folder / "controller.conf", UR10_CONF),
     },
     "import_ur_kinematics": lambda folder: {
         "robot": _written(folder / "ur10.yaml", robot_text(truearm.load_robot("ur10")))
@@ -84,6 +82,8 @@ READ: dict[str, Callable[[Path], Arguments]] = {
 }
 #: What is no file that a job reads and overwrites: a folder of data whose files have names of their own.
 FOLDERS = (("study", "data"), ("lines", "data"))
+#: What only another robot reads: tests/compensation/test_controller_model.py tries it.
+ELSEWHERE = (("compensate", "controller_kinematics"),)
 
 
 #: The names of what a job writes into the folder `out`.
@@ -113,7 +113,7 @@ def read_by(job: str) -> list[str]:
         for p in named
         if "Path" in str(p.annotation)
         and (p.name not in OUTPUTS or (job, p.name) in FILES)
-        and (job, p.name) not in FOLDERS
+        and (job, p.name) not in (*FOLDERS, *ELSEWHERE)
     ]
 
 

@@ -19,7 +19,21 @@ from truearm.library import load_robot
 from truearm.measurement.readers.canonical import csv_text, read_csv
 from truearm.results.demonstration import Demonstration
 
-IDS = ["irb120", "irb1600", "katana450", "kr5", "li3", "lrmate200ic", "puma560", "ur10", "ur5"]
+IDS = [
+    "irb120",
+    "irb1600",
+    "katana450",
+    "kr5",
+    "li3",
+    "lrmate200ic",
+    "puma560",
+    "ur10",
+    "ur10e",
+    "ur3",
+    "ur3e",
+    "ur5",
+    "ur5e",
+]
 
 
 def test_version_and_help_need_no_scipy_and_no_numpy() -> None:

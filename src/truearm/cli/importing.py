@@ -1,4 +1,4 @@
-"""``truearm import``: measurement files of other programs."""
+"""``truearm import``: files of other programs."""
 
 from __future__ import annotations
 
@@ -8,10 +8,13 @@ from typing import Annotated
 import typer
 
 from truearm.cli.options import Commands
-from truearm.cli.output import print_record
+from truearm.cli.output import Json, print_json, print_record
 from truearm.errors import InputError
 
-app = Commands(help="Turn measurement files into the canonical CSV.", no_args_is_help=True)
+app = Commands(
+    help="Turn measurement files into the canonical CSV, and a controller's kinematics into a robot file.",
+    no_args_is_help=True,
+)
 
 
 @app.command()
@@ -85,6 +88,27 @@ def circle(
         out=out,
     )
     print_record(imported)
+
+
+@app.command("ur-kinematics")
+def ur_kinematics(
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="calibration.conf of the controller, or the ROS driver's file.")
+    ],
+    robot: Annotated[
+        str, typer.Option("--robot", metavar="ROBOT", help="The arm's type: a library id such as ur5e, or a file.")
+    ],
+    out: Annotated[Path, typer.Option("--out", metavar="ROBOT.yaml", help="File to write; nothing is overwritten.")],
+    json: Json = False,
+) -> None:
+    """Write what the controller of a Universal Robots arm computes with as a robot file."""
+    from truearm.jobs.import_ur_kinematics import import_ur_kinematics
+
+    imported = import_ur_kinematics(file, robot, out=out)
+    if json:
+        print_json(imported.summary())
+    else:
+        print_record(imported)
 
 
 def _dots(text: str | None) -> float | tuple[float, float] | None:

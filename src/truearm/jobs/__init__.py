@@ -16,6 +16,7 @@ JOBS: Final = (
     "import_table",
     "import_matrices",
     "import_circle",
+    "import_ur_kinematics",
     "check",
     "calibrate",
     "validate",

@@ -9,13 +9,39 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 
 from truearm.errors import InputError
 from truearm.modeling.chain import Array
 from truearm.modeling.transform import IDENTITY, Transform
+
+#: With what a controller computes poses: nobody said; the table of the robot file; rows of its own, which are known;
+#: a model that nobody outside can read.
+KinematicsKind = Literal["unknown", "nominal", "own", "proprietary"]
+
+
+@dataclass(frozen=True)
+class ControllerKinematics:
+    """With what the controller turns poses into joint positions.
+
+    Attributes
+    ----------
+    kind
+        ``nominal`` if it is the table of the robot file, ``own`` if it is `rows`.
+    rows
+        Of ``own``: rows of the convention ``hayati``, from the robot's base frame to its flange, one a joint.
+    source
+        Where this is known from.
+    identity
+        What its maker knows the kinematics by, such as checksums, as they were read.
+    """
+
+    kind: KinematicsKind = "unknown"
+    rows: tuple[Mapping[str, float], ...] = ()
+    source: str = ""
+    identity: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -42,6 +68,8 @@ class Controller:
         ``T_flange_controllerflange``: the controller's flange frame in the robot's.
     source
         Where this is known from.
+    kinematics
+        With what the controller computes poses.
     """
 
     signs: tuple[int, ...] = ()
@@ -51,6 +79,7 @@ class Controller:
     base: Transform = IDENTITY
     flange: Transform = IDENTITY
     source: str = ""
+    kinematics: ControllerKinematics = ControllerKinematics()
 
     def coupling(self, count: int) -> Array:
         """Return which joints the counts of `count` joints include, before signs and zeros, ``(count, count)``."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -101,9 +101,21 @@ class RobotDescription(Record):
         return text + [f"History: {line}" for line in robot.history]
 
 
+#: What the words of robot files say of a controller's kinematics.
+_KINEMATICS: Final = {
+    "unknown": "not known",
+    "nominal": "the nominal values",
+    "proprietary": "a calibration of its maker that nobody else can read",
+}
+
+
 def _controller_lines(entry: dict[str, Any], joints: list[dict[str, Any]]) -> Iterator[str]:
     """Say what of a controller differs from the model; `entry` is what a robot file would say of it."""
     units = {joint["name"]: "deg" if joint["type"] == "revolute" else "mm" for joint in joints}
+    kinematics = entry.get("kinematics", "unknown")
+    if not isinstance(kinematics, str):
+        kinematics = f"{kinematics['kind']}, from {kinematics.get('source') or 'the robot file'}"
+    yield f"computes poses with: {_KINEMATICS.get(kinematics, kinematics)}"
     for row in entry.get("joints", []):
         counted = [row["joint"], *(_share(value, name) for name, value in row.get("coupling", {}).items())]
         text = " + ".join(counted).replace("+ -", "- ")

@@ -299,6 +299,24 @@ class SplitEdits(NamedTuple):
     unsplit: list[int]
 
 
+class MakersCalibration(NamedTuple):
+    """How the maker of a controller may have calibrated the arm itself.
+
+    Attributes
+    ----------
+    maker
+        Of robot and controller.
+    name
+        What the maker calls it.
+    always
+        Whether every arm is delivered so, or only where it was ordered.
+    """
+
+    maker: str
+    name: str
+    always: bool = False
+
+
 @dataclass(frozen=True)
 class Language:
     """A robot language.
@@ -319,6 +337,8 @@ class Language:
         Whether files that are given together are one program and share names; else each is one for itself.
     companions
         Pairs of suffixes: beside a file of the first may lie one of the second that belongs to it.
+    calibration
+        How controllers that run it may have been calibrated by their maker; None if nothing is known of that.
     """
 
     name: str
@@ -328,6 +348,7 @@ class Language:
     split: Callable[[Program, Sequence[Split]], SplitEdits] | None = None
     together: bool = False
     companions: tuple[tuple[str, str], ...] = ()
+    calibration: MakersCalibration | None = None
 
     def programs(self, sources: Sequence[Source]) -> tuple[Program, ...]:
         """Read files that may be of several programs.

@@ -29,7 +29,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from truearm.compensation.programs.lines import BYTE_ORDER_MARK
-from truearm.compensation.programs.program import Language, MoveKind, Program, Source
+from truearm.compensation.programs.program import Language, MakersCalibration, MoveKind, Program, Source
 from truearm.compensation.programs.urscript.program import Going, made_program
 from truearm.compensation.programs.urscript.script import Call, Script
 from truearm.compensation.programs.urscript.split import split_moves
@@ -161,4 +161,11 @@ class _File:
         return self.targets.reach(value, at)
 
 
-URSCRIPT: Final = Language("URScript", (".script", ".urscript"), _is_one, _read, split_moves)
+URSCRIPT: Final = Language(
+    "URScript",
+    (".script", ".urscript"),
+    _is_one,
+    _read,
+    split_moves,
+    calibration=MakersCalibration("Universal Robots", "the kinematic calibration of the factory", always=True),
+)

@@ -25,6 +25,7 @@ from truearm.identification.judging.narrow_data import check_narrow_data
 from truearm.identification.judging.one_sided import check_one_sided
 from truearm.identification.judging.sigma import check_sigma
 from truearm.identification.judging.transmission import check_transmission
+from truearm.identification.judging.wrong_robot import WRONG_ROBOT, check_robot, judges_lengths
 from truearm.identification.solving.bounds import Bounds, read_bounds
 from truearm.identification.solving.fit import Status, identify, place
 from truearm.identification.solving.losses import LOSSES, Loss
@@ -236,9 +237,17 @@ def calibrate(
     train_errors = errors_of(fit.robot, first)
     # What the robust fit of the check could not explain, the fit itself may.
     noticed = tuple(notice for notice in noticed if notice.code != Status.IMPLAUSIBLE.value)
-    unlike = check_plausible(fit, first, noticed)
-    expected = expected_error(as_residuals_allow(fit, first), plausible=not unlike)
     left_over = LeftOver.of(fit, readings)
+    changes = check_changes(left_over)
+    told = [notice for notice in noticed if notice.code == WRONG_ROBOT]
+    noticed = tuple(notice for notice in noticed if notice.code != WRONG_ROBOT)
+    wrong_robot = check_robot(fit, first) if judges_lengths(fit) else told
+    if has_error([*noticed, *changes]):  # what is wrong with the data bends the robot too
+        wrong_robot = []
+    unlike = check_plausible(fit, first, (*noticed, *wrong_robot, *told))
+    if unlike:
+        wrong_robot = wrong_robot or told
+    expected = expected_error(as_residuals_allow(fit, first), plausible=not unlike)
     wrong_sigma = check_sigma(left_over)
     narrow = (
         []  # more configurations do not mend these
@@ -260,16 +269,17 @@ def calibrate(
         warnings=(
             *(notice for notice in noticed if notice.level == "error"),
             *unlike,
+            *wrong_robot,
             *_check_proof(before, validation),
             *_check_copies(readings, training, held_out),
             *_check_trained_before(nominal_robot, sha256, (count, n, seed)),
             *moved,
-            *check_fit(fit, expected, doubted=has_error([*unlike, *noticed])),
+            *check_fit(fit, expected, doubted=has_error([*unlike, *wrong_robot, *noticed])),
             *narrow,
             *(notice for notice in noticed if notice.level != "error"),
             *check_one_sided(fit, first),
             *wrong_sigma,
-            *check_changes(left_over),
+            *changes,
             *check_arrival_lag(left_over),
             *check_transmission(fit, first),
         ),

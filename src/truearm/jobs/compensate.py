@@ -27,7 +27,7 @@ from truearm.jobs.arguments import (
     python_call,
     robot_argument,
 )
-from truearm.jobs.proof import NOT_BETTER, accept_argument, changed_since, known_of, refuse_unaccepted
+from truearm.jobs.proof import NOT_BETTER, accept_argument, changed_since, check_maker, known_of, refuse_unaccepted
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
 from truearm.results.program_correction import REPORT, FileCorrection, ProgramCorrection
@@ -72,8 +72,9 @@ def compensate(
         Take the originals of programs that were corrected already.
     accept
         What may speak against the robot's calibration or against a correction, by name: ``rank-loss``,
-        ``not-converged``, ``implausible``, or a notice of the level error that the calibration ended with; and
-        ``not-better-here`` to correct also the targets that would rather get worse.
+        ``not-converged``, ``implausible``, or a notice of the level error that the calibration ended with, such as
+        ``wrong-robot``; ``maker`` for programs in the language of another maker; and ``not-better-here`` to correct
+        also the targets that would rather get worse.
     command
         How to do it again, for the report; None writes the call in Python.
     progress
@@ -83,7 +84,7 @@ def compensate(
     ------
     InputError
         If a program cannot be read or was corrected already, the robot is not calibrated or its calibration ended
-        badly, a tool or frame is not defined, or with `strict` a target cannot be corrected.
+        badly or is another maker's, a tool or frame is not defined, or with `strict` a target cannot be corrected.
     """
     progress_argument(progress)
     paths = paths_argument(programs, "programs", "program")
@@ -119,11 +120,12 @@ def compensate(
         files = program_files(paths, again=again)
         progress("reading the programs")
         read = read_programs(files)
+    language = language_called(read[0].language)
+    foreign = check_maker(arm, language, accepted)
     with refusals_of("robot"):
         result = corrected_programs(arm, read, cell, progress, every=NOT_BETTER in accepted)
     if strict:
         _refuse_skipped(result)
-    language = language_called(read[0].language)
     splits: tuple[ProgramSplit, ...] = ()
     if split is not None:
         progress("splitting moves")
@@ -144,7 +146,7 @@ def compensate(
         files=tuple(corrected),
         result=result,
         splits=splits,
-        warnings=(*changed_since(robot), *known_of(arm), *check_correction(arm, result, splits)),
+        warnings=(*changed_since(robot), *known_of(arm), *foreign, *check_correction(arm, result, splits)),
         command=invocation,
         inputs=files_of(robot, tools, frames),
     )

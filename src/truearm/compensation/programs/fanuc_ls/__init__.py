@@ -167,4 +167,4 @@ def read(sources: Sequence[Source]) -> Program:
     return Program(_NAME, tuple(sources), tuple(targets), tuple(moves), skipped=tuple(skipped), unknown=dict(unknown))
 
 
-FANUC_LS: Final = Language(_NAME, (".ls",), is_one, read, split_moves)
+FANUC_LS: Final = Language(_NAME, (".ls",), ("FANUC",), is_one, read, split_moves)

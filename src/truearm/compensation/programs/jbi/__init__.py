@@ -202,4 +202,4 @@ def _interval(joint: int, degrees: float) -> tuple[int, float, float]:
     return joint, _OPEN - radians(degrees), _OPEN + radians(degrees)
 
 
-JBI: Final = Language("INFORM", (".jbi",), is_one, read, split_moves)
+JBI: Final = Language("INFORM", (".jbi",), ("Yaskawa", "Motoman"), is_one, read, split_moves)

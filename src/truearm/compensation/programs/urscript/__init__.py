@@ -161,4 +161,6 @@ class _File:
         return self.targets.reach(value, at)
 
 
-URSCRIPT: Final = Language("URScript", (".script", ".urscript"), _is_one, _read, split_moves)
+URSCRIPT: Final = Language(
+    "URScript", (".script", ".urscript"), ("Universal Robots", "UR"), _is_one, _read, split_moves
+)

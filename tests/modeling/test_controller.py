@@ -357,6 +357,12 @@ MODELS: dict[str, tuple[Joints, Still, Still]] = {
         (HERE, (0, 0, -180)),
         ((0, 92.2, 0), (-90, 0, 0)),
     ),
+    # UniversalRobots/Universal_Robots_ROS2_Description, ur10e: one offset d4 at the wrist.
+    "ur10e": (
+        universal(180.7, 0, 612.7, 0, 571.55, 174.15, 119.85),
+        (HERE, (0, 0, -180)),
+        ((0, 116.55, 0), (-90, 0, 0)),
+    ),
 }
 
 

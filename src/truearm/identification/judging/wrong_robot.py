@@ -197,7 +197,7 @@ def other_robot(robot: Robot, data: Dataset) -> list[Notice]:
     another unit.
     """
     better = _Better.of(robot, data)
-    if better is None or better.left > LARGEST_SHARE_LEFT * better.reach:
+    if better is None:
         return []
     return [
         Notice(
@@ -210,19 +210,18 @@ def other_robot(robot: Robot, data: Dataset) -> list[Notice]:
 
 @dataclass(frozen=True)
 class _Better:
-    """A robot of the library that fits readings several times better than the one given, neither calibrated.
+    """A robot of the library that fits readings, several times better than the one given, neither calibrated.
 
-    Errors are root mean squares [m], `given` that of the robot given; `reach` is how far this one's flange came [m].
+    Errors are root mean squares [m], `given` that of the robot given.
     """
 
     name: str
     left: float
     given: float
-    reach: float
 
     @classmethod
     def of(cls, robot: Robot, data: Dataset) -> _Better | None:
-        """Compare the robots of the library that have the same joints on some of the readings."""
+        """Compare the robots of the library with as many joints, of the same kinds, on some of the readings."""
         few = data
         if data.configurations > _COMPARED:
             few = data.of_configurations(np.linspace(0, data.configurations - 1, _COMPARED).astype(np.intp))
@@ -237,7 +236,8 @@ class _Better:
         best = min(found, key=lambda name: found[name], default=None)
         if best is None or not found[best] * _SEVERAL_TIMES <= given < math.inf:
             return None
-        return cls(best, found[best], given, float(np.linalg.norm(alike[best].forward(few.joints)[0], axis=1).max()))
+        reach = float(np.linalg.norm(alike[best].forward(few.joints)[0], axis=1).max())
+        return cls(best, found[best], given) if found[best] <= LARGEST_SHARE_LEFT * reach else None
 
     @property
     def text(self) -> str:

@@ -11,8 +11,10 @@ import pytest
 from tests.simulated import campaign
 
 from truearm.compensation.cell import Cell, Placed
+from truearm.compensation.chosen_targets import Choice
+from truearm.compensation.correction import Correction
 from truearm.compensation.expected_errors import ExpectedErrors
-from truearm.compensation.program_correction import Correction, corrected_programs
+from truearm.compensation.program_correction import corrected_programs
 from truearm.compensation.programs.program import Program, Source
 from truearm.compensation.programs.rapid import RAPID
 from truearm.jobs.calibrate import calibrate
@@ -78,7 +80,7 @@ def test_robots_drawn_from_the_covariance_miss_as_expected(robot: Robot, measure
 
 
 def corrected(robot: Robot, one: Program, cell: Cell) -> Correction:
-    return corrected_programs(robot, [one], cell, every=True).corrections[0]
+    return corrected_programs(robot, [one], cell, choice=Choice(every=True)).corrections[0]
 
 
 def test_the_error_of_the_joints_counts(robot: Robot) -> None:

@@ -12,15 +12,15 @@ rules (:mod:`truearm.compensation.gauge`): an uncertain place of the base, or of
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.compensation.gauge import flange_rates
+from truearm.compensation.gauge import CommonMotion, common_motion, flange_rates
 from truearm.compensation.program_places import Provenance
 from truearm.modeling.chain import Array
 from truearm.modeling.proof import Proof
@@ -30,6 +30,22 @@ from truearm.modeling.robot import Robot
 _AT_ONCE: Final = 2000
 #: Corrections below this are none [m]: programs are written with fewer digits.
 _NOTHING: Final = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """Points that were taught with the real robot, and that targets are offsets from.
+
+    Attributes
+    ----------
+    joints
+        Where the controller sends the joints there, as the model counts them, ``(n, joints)`` [rad or m].
+    turned
+        Whether the offset is in the axes of the tool, ``(n,)``.
+    """
+
+    joints: Array
+    turned: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,12 +62,22 @@ class TargetsReached:
         By how much targets are moved, in the axes of the robot's base, ``(n, 3)`` [m].
     groups
         Number of the group that each target belongs to, ``(n,)``; groups are corrected together or not at all.
+    frames
+        Number of the frame, or of several together, that takes up what its targets share, ``(n,)``.
+    arms, arm
+        The robot with each load, and which of them it is at each target, ``(n,)``.
+    start
+        The taught points that they are offsets from; None if they are not.
     """
 
     joints: Array
     tips: Array
     shifts: Array
     groups: NDArray[np.intp]
+    frames: NDArray[np.intp]
+    arms: tuple[Robot, ...]
+    arm: NDArray[np.intp]
+    start: Start | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +132,7 @@ def expected_errors(
         in the world of the calibration, tools on the target that is nearest to them.
     """
     model = _ModelErrors(robot, proof, tools == "assumed", frames == "assumed")
-    if frames == "assumed":
+    if frames == "assumed" and not any(one.start for one in programs):
         model = replace(model, shared=model.shared_by(programs))
     return tuple(_expected(model, one) for one in programs)
 
@@ -159,15 +185,14 @@ class _ModelErrors:
     assumed_tools, assumed_frames
         Whether the places of tools and frames are assumed, and so take part of the errors up.
     shared
-        What the program's frame takes up: ``(3, parameters)`` each of the mean motion and turn, and where the middle of
-        the targets is ``(3,)``; None if it takes up nothing.
+        What each frame takes up, by its number; nothing where there is none.
     """
 
     robot: Robot
     proof: Proof
     assumed_tools: bool
     assumed_frames: bool
-    shared: tuple[Array, Array, Array] | None = None
+    shared: Mapping[int, CommonMotion] = field(default_factory=dict)
 
     @cached_property
     def _flange(self) -> Array:
@@ -180,35 +205,42 @@ class _ModelErrors:
             root[[self.robot.parameters[name].group == "base" for name in self.proof.names]] = 0.0
         return root
 
-    def errors(self, targets: TargetsReached) -> Iterator[tuple[slice, Array, Array]]:
+    def errors(self, targets: TargetsReached) -> Iterator[tuple[NDArray[np.intp], Array, Array]]:
         """Yield for parts of the targets the errors by the parameters ``(m, 3, parameters)``, and by the joints.
 
         Those by the joints are ``(m, 3, joints)``; both in the axes of the world [m].
         """
-        for first in range(0, len(targets.joints), _AT_ONCE):
-            part = slice(first, first + _AT_ONCE)
-            moved, _, tips = self._motions(targets, part)
-            if self.shared is not None:
-                mean, turn, middle = self.shared
-                moved = moved - mean - np.cross(turn, (tips - middle)[:, :, None], axis=-2)
-            yield part, moved, self._by_joints(targets, part)
+        for rows in _parts(targets):
+            robot, tip = targets.arms[targets.arm[rows[0]]], targets.tips[rows]
+            moved, _, tips = self._motions(robot, targets.joints[rows], tip)
+            by_joints = self._by_joints(robot, targets.joints[rows], tip)
+            for number, common in self.shared.items():
+                mine = targets.frames[rows] == number
+                moved[mine] -= common.of(tips[mine])
+            if targets.start is not None:
+                start, turned = targets.start.joints[rows], targets.start.turned[rows, None, None]
+                before, turn, from_there = self._motions(robot, start, tip)
+                moved -= before + turned * np.cross(turn, (tips - from_there)[:, :, None], axis=-2)
+                by_joints = np.concatenate([by_joints, self._by_joints(robot, start, tip)], axis=2)
+            yield rows, moved, by_joints
 
-    def shared_by(self, programs: Sequence[TargetsReached]) -> tuple[Array, Array, Array]:
-        """Return what the frame of the programs takes up: the mean of all errors, as of all corrections."""
-        size = len(self.proof.names)
-        moved, turned, place, count = np.zeros((3, size)), np.zeros((3, size)), np.zeros(3), 0
+    def shared_by(self, programs: Sequence[TargetsReached]) -> dict[int, CommonMotion]:
+        """Return what each frame takes up of all errors of its targets, as of their corrections."""
+        numbers = {number for targets in programs for number in targets.frames.tolist()}
+        return {number: common_motion(self._motions_in(programs, number)) for number in sorted(numbers)}
+
+    def _motions_in(self, programs: Sequence[TargetsReached], number: int) -> Iterator[tuple[Array, Array, Array]]:
         for targets in programs:
-            for first in range(0, len(targets.joints), _AT_ONCE):
-                motion, turn, tips = self._motions(targets, slice(first, first + _AT_ONCE))
-                moved += motion.sum(axis=0)
-                turned += turn.sum(axis=0)
-                place += tips.sum(axis=0)
-                count += len(tips)
-        return moved / max(count, 1), turned / max(count, 1), place / max(count, 1)
+            for rows in _parts(targets):
+                mine = rows[targets.frames[rows] == number]
+                if len(mine):
+                    robot = targets.arms[targets.arm[mine[0]]]
+                    moved, turned, tips = self._motions(robot, targets.joints[mine], targets.tips[mine])
+                    yield tips, moved, turned
 
-    def _motions(self, targets: TargetsReached, part: slice) -> tuple[Array, Array, Array]:
+    def _motions(self, robot: Robot, q: Array, tip: Array) -> tuple[Array, Array, Array]:
         """Return motions and turns of tips ``(m, 3, parameters)``, and the tips ``(m, 3)``, in the world."""
-        robot, names, q, tip = self.robot, self.proof.names, targets.joints[part], targets.tips[part]
+        names = self.proof.names
         kinematics = robot.forward_kinematics(q)
         R = kinematics.matrix()
         moved, turned = (np.moveaxis(rate, 2, 0).swapaxes(1, 2) for rate in robot.jacobians(kinematics, q, names))
@@ -235,13 +267,20 @@ class _ModelErrors:
         nearest = np.argmin(np.linalg.norm(tips[:, None] - places, axis=2), axis=1)
         return np.asarray(rates[nearest])
 
-    def _by_joints(self, targets: TargetsReached, part: slice) -> Array:
+    def _by_joints(self, robot: Robot, q: Array, tip: Array) -> Array:
         """Return the errors of tips by the errors of the joints at an arrival, ``(m, 3, joints)``."""
         deviations = np.asarray(self.proof.joint_error)
-        q, tip = targets.joints[part], targets.tips[part]
         if not deviations.any():
             return np.zeros((len(q), 3, 1))
-        kinematics = self.robot.forward_kinematics(q)
+        kinematics = robot.forward_kinematics(q)
         arm = (kinematics.matrix() @ tip[:, :, None])[:, :, 0]
-        rates = self.robot.joint_jacobian(q)
+        rates = robot.joint_jacobian(q)
         return np.asarray((rates[:, :3] + np.cross(rates[:, 3:], arm[:, :, None], axis=-2)) * deviations)
+
+
+def _parts(targets: TargetsReached) -> Iterator[NDArray[np.intp]]:
+    """Go through the targets in parts, each of them with one load."""
+    for number in range(len(targets.arms)):
+        mine = np.flatnonzero(targets.arm == number)
+        for first in range(0, len(mine), _AT_ONCE):
+            yield mine[first : first + _AT_ONCE]

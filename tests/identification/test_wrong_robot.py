@@ -16,6 +16,7 @@ from truearm.identification.solving.models import named_model
 from truearm.identification.solving.rounds import Redundant
 from truearm.jobs.calibrate import calibrate
 from truearm.jobs.check import check
+from truearm.jobs.simulate import simulate
 from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.readers.canonical import read_csv
@@ -133,6 +134,13 @@ def test_an_elastic_arm_is_itself_with_either_model() -> None:
     rng = np.random.default_rng(3)
     data = measure(truth_twin(nominal, "tracker-triangular", rng), nominal.random_configurations(40, rng), 5e-5, rng)
     assert doubts(nominal, data, "geometric") == doubts(nominal, data, "elastic") == []
+
+
+def test_readings_without_an_anchor_are_judged_too() -> None:
+    ballbar = simulate(UR10E, truth="random", poses=24, device="ballbar", seed=2).data
+    (notice,) = doubts(UR10, ballbar)
+    assert "d_2 + d_3 + d_4 by +12." in notice.message
+    assert doubts(UR10E, ballbar) == []
 
 
 def test_outliers_of_a_robust_fit_are_left_out_of_account() -> None:

@@ -83,7 +83,8 @@ class Lengths:
         """
         robot = fit.robot
         names = [n for n in (*fit.free.names, *(r.dropped for r in fit.redundancies)) if n not in fit.at_bound]
-        names.sort(key=lambda name: _is_length(robot.parameters[name]))
+        order = [*robot.parameters]
+        names.sort(key=lambda name: (_is_length(robot.parameters[name]), order.index(name)))
         free = FreeParameters(tuple(robot.parameters[name] for name in names))
         lengths = tuple(p for p in free.parameters if _is_length(p))
         if not lengths:
@@ -137,15 +138,16 @@ class Lengths:
     def _in_words(self, direction: Array, along: float) -> str:
         """Name a combination of unit length in priors and how far it moved, counted in its largest member."""
         prior = np.array([p.prior for p in self.parameters])
-        largest = int(np.argmax(np.abs(direction)))
+        shares = np.round(np.abs(direction) / np.abs(direction).max(), 2)
+        order = np.argsort(-shares, kind="stable").tolist()
+        largest, words = order[0], ""
         factors = direction / direction[largest] * prior[largest] / prior
-        words = ""
-        for p, share, factor in zip(self.parameters, direction / direction[largest], factors.tolist(), strict=True):
-            if abs(share) < _LEAST_SHARE:
-                continue
-            size = "" if abs(abs(factor) - 1.0) < 0.02 else f"{abs(factor):.2g}·"
-            sign = "-" if factor < 0.0 else "+"
-            words += f" {sign} {size}{p.name}" if words else f"{'-' if factor < 0.0 else ''}{size}{p.name}"
+        for i in order:
+            if shares[i] < _LEAST_SHARE:
+                break
+            size = "" if abs(abs(factors[i]) - 1.0) < 0.02 else f"{abs(factors[i]):.2g}·"
+            sign = "-" if factors[i] < 0.0 else "+"
+            words += f" {sign} {size}{self.parameters[i].name}" if words else f"{size}{self.parameters[i].name}"
         return f"{words} by {along * prior[largest] / direction[largest] * 1e3:+.3g} mm"
 
 

@@ -28,6 +28,13 @@ from truearm.modeling.robot import Robot
 
 #: Targets looked at together: their derivatives by every parameter take some ten MB.
 _AT_ONCE: Final = 2000
+#: Targets and draws from which the interval of the mean error follows.
+_DRAWN_TARGETS: Final = 500
+_DRAWS: Final = 400
+#: Share of the joints' error at an arrival that all targets of a program have in common: what the model leaves changes
+#: slowly from place to place, repeatability does not.
+_IN_COMMON: Final = 0.5
+_INTERVAL: Final = (5.0, 95.0)
 #: Corrections below this are none [m]: programs are written with fewer digits.
 _NOTHING: Final = 1e-6
 
@@ -79,6 +86,47 @@ class TargetsReached:
     arm: NDArray[np.intp]
     start: Start | None = None
 
+    def some(self, rows: NDArray[np.intp]) -> TargetsReached:
+        """Return some of them."""
+        start = None if self.start is None else Start(self.start.joints[rows], self.start.turned[rows])
+        joints, tips, shifts = (values[rows] for values in (self.joints, self.tips, self.shifts))
+        groups, frames, arm = (numbers[rows] for numbers in (self.groups, self.frames, self.arm))
+        return TargetsReached(joints, tips, shifts, groups, frames, self.arms, arm, start)
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnErrors:
+    """Distances of the real robot from some targets, drawn from what is not known of it.
+
+    Attributes
+    ----------
+    rows
+        Which targets, ``(m,)``.
+    before, after
+        Distances without and with the correction [m], ``(m, draws)``.
+    """
+
+    rows: NDArray[np.intp]
+    before: Array
+    after: Array
+
+    def interval(self, corrected: NDArray[np.bool_], among: NDArray[np.bool_]) -> tuple[float, float] | None:
+        """Return from where to where the mean distance lies with a probability of 90 % [m]; None of no targets.
+
+        Parameters
+        ----------
+        corrected
+            Which of all targets are, ``(n,)``.
+        among
+            Which of all targets count, ``(n,)``.
+        """
+        mine = among[self.rows]
+        if not mine.any():
+            return None
+        lengths = np.where(corrected[self.rows][mine, None], self.after[mine], self.before[mine])
+        low, high = np.percentile(lengths.mean(axis=0), _INTERVAL)
+        return float(low), float(high)
+
 
 @dataclass(frozen=True, eq=False)
 class ExpectedErrors:
@@ -92,12 +140,15 @@ class ExpectedErrors:
         Probability that the correction makes the distance larger, ``(n,)``.
     group_worse
         Probability that it makes the sum of squares of the distances in the target's group larger, ``(n,)``.
+    drawn
+        Distances that the real robot may have from some of them.
     """
 
     before: Array
     after: Array
     worse: Array
     group_worse: Array
+    drawn: DrawnErrors
 
     def of_some(self, rows: NDArray[np.intp], count: int) -> ExpectedErrors:
         """Return it for `count` targets, of which these are the ones in `rows`; NaN for the others."""
@@ -107,7 +158,8 @@ class ExpectedErrors:
             every[rows] = values
             return every
 
-        return ExpectedErrors(*map(spread, (self.before, self.after, self.worse, self.group_worse)))
+        before, after, worse, group_worse = map(spread, (self.before, self.after, self.worse, self.group_worse))
+        return ExpectedErrors(before, after, worse, group_worse, replace(self.drawn, rows=rows[self.drawn.rows]))
 
 
 def expected_errors(
@@ -160,7 +212,28 @@ def _expected(model: _ModelErrors, targets: TargetsReached) -> ExpectedErrors:
         after=_mean_length(mean2, 2.0 * spread2),
         worse=_worse(length2, along),
         group_worse=_worse(of_group, np.sum(together**2, axis=1) + alone)[targets.groups],
+        drawn=_drawn(model, targets),
     )
+
+
+def _drawn(model: _ModelErrors, targets: TargetsReached) -> DrawnErrors:
+    """Draw robots of which the calibrated one may be any, and where each is at some of the targets."""
+    count = len(targets.joints)
+    some = np.unique(np.linspace(0, count - 1, min(count, _DRAWN_TARGETS)).astype(np.intp))
+    shift = targets.shifts[some] @ model.robot.base.rotation.T
+    before, after = np.zeros((2, len(some), _DRAWS))
+    rng = np.random.default_rng(0)
+    drawn = rng.standard_normal((len(model.proof.names), _DRAWS))
+    common: Array | None = None
+    in_common = 0.0 if model.assumed_frames else _IN_COMMON  # a frame takes it up
+    for part, errors, by_joints in model.errors(targets.some(some)):
+        if common is None:
+            common = math.sqrt(in_common) * rng.standard_normal((by_joints.shape[2], _DRAWS))
+        own = math.sqrt(1.0 - in_common) * rng.standard_normal((len(part), by_joints.shape[2], _DRAWS))
+        missed = errors @ drawn + by_joints @ (common + own)
+        after[part] = np.linalg.norm(missed, axis=1)
+        before[part] = np.linalg.norm(missed + shift[part][:, :, None], axis=1)
+    return DrawnErrors(some, before, after)
 
 
 def _worse(length2: Array, along: Array) -> Array:

@@ -113,6 +113,17 @@ class FileCorrection(Record):
         return (known.before[rows], after[rows]) if len(rows) else None
 
     @cached_property
+    def intervals(self) -> tuple[tuple[float, float], tuple[float, float]] | None:
+        """Where the mean of these distances lies with a probability of 90 % [m], before and as it is written now."""
+        known = self.correction.expected
+        if known is None:
+            return None
+        corrected = self.correction.corrected
+        mine = np.array([target.source == self.source for target in self.correction.program.targets], dtype=bool)
+        before, now = (known.drawn.interval(done, mine) for done in (np.zeros_like(corrected), corrected))
+        return None if before is None or now is None else (before, now)
+
+    @cached_property
     def not_better(self) -> tuple[int, ...]:
         """Indices of the targets whose correction would rather do harm."""
         found = set(self.correction.not_better)
@@ -141,12 +152,16 @@ class FileCorrection(Record):
             "not_better": [self._not_better_summary(row) for row in self.not_better],
         }
 
-    def _expected_summary(self) -> dict[str, dict[str, float]] | None:
-        if self.expected is None:
+    def _expected_summary(self) -> dict[str, dict[str, Any]] | None:
+        if self.expected is None or self.intervals is None:
             return None
         return {
-            when: {"mean": float(values.mean()) * 1e3, "max": float(values.max()) * 1e3}
-            for when, values in zip(("before", "after"), self.expected, strict=True)
+            when: {
+                "mean": float(values.mean()) * 1e3,
+                "max": float(values.max()) * 1e3,
+                "interval_90": [1e3 * low, 1e3 * high],
+            }
+            for when, values, (low, high) in zip(("before", "after"), self.expected, self.intervals, strict=True)
         }
 
     def _not_better_summary(self, row: int) -> dict[str, Any]:
@@ -163,12 +178,13 @@ class FileCorrection(Record):
     @property
     def headline(self) -> str:
         """What is expected of its targets before and now, in words and figures."""
-        if self.expected is None:
+        if self.expected is None or self.intervals is None:
             return f"{self.name}  {self.language}: the error to expect is not known"
+        low, high = self.intervals[1]
         (mean, most), (mean_now, most_now) = ((v.mean() * 1e3, v.max() * 1e3) for v in self.expected)
         return (
             f"{self.name}  {self.language}: error to expect {mean:.3f} mm before, {mean_now:.3f} mm now "
-            f"(at most {most:.3f} and {most_now:.3f} mm)"
+            f"(90 %: {low * 1e3:.3f} to {high * 1e3:.3f}), at most {most:.3f} and {most_now:.3f} mm"
         )
 
     @property

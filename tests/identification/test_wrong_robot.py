@@ -137,10 +137,16 @@ def test_an_elastic_arm_is_itself_with_either_model() -> None:
 
 
 def test_readings_without_an_anchor_are_judged_too() -> None:
-    ballbar = simulate(UR10E, truth="random", poses=24, device="ballbar", seed=2).data
+    ballbar = simulate(UR10E, truth="random", poses=32, device="ballbar", seed=2).data
     (notice,) = doubts(UR10, ballbar)
     assert "d_2 + d_3 + d_4 by +12." in notice.message
     assert doubts(UR10E, ballbar) == []
+
+
+def test_a_model_without_free_lengths_says_nothing_of_them() -> None:
+    data = campaign_of(UR10E, 20, 1)[1]
+    lengths = Lengths.of(identify(UR10, data, named_model("offsets")), data)
+    assert (lengths.chance, lengths.named()) == (1.0, [])
 
 
 def test_outliers_of_a_robust_fit_are_left_out_of_account() -> None:

@@ -123,6 +123,8 @@ class Lengths:
         Of all that is determined, what lies nearest to each single length is looked at: the length itself, or the sum
         that it is known in.
         """
+        if not len(self.moved):
+            return []
         together = self.directions.T @ self.directions
         share = np.sqrt(np.diag(together))
         own = together / np.where(share > 0.0, share, 1.0)

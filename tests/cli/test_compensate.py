@@ -322,7 +322,8 @@ def test_two_programs_of_one_name_keep_their_folders(truearm: Truearm, cell: Pat
     for path in paths:
         path.parent.mkdir()
         path.write_text(LS)
-    done = truearm("compensate", cell / "calibrated.yaml", *paths, "--out", cell / "out", "--json")
+    words = ("--accept", "maker", "--out", cell / "out", "--json")
+    done = truearm("compensate", cell / "calibrated.yaml", *paths, *words)
     assert done.code == 0
     assert [file["file"] for file in json.loads(done.out)["programs"]] == ["one/p.ls", "two/p.ls"]
     assert (cell / "out" / "two" / "p.ls.truearm.json").exists()

@@ -293,7 +293,9 @@ def test_python_and_command_say_the_same(truearm: Truearm, small: Path, tmp_path
 def test_the_wrong_robot_is_doubted(truearm: Truearm, small: Path, tmp_path: Path) -> None:
     run = truearm("calibrate", "irb1600", small / "data.csv", "--out", tmp_path, "--json")
     codes = {w["code"]: w["message"] for w in json.loads(run.out)["warnings"]}
-    assert "Check that it is this robot" in codes["far-from-nominal"]
+    assert run.code == 3
+    assert "The readings are not of irb1600" in codes["wrong-robot"]
+    assert "irb120 of the library fits them" in codes["wrong-robot"]
 
 
 def test_too_few_readings_for_a_model_are_said(truearm: Truearm, small: Path, tmp_path: Path) -> None:

@@ -81,8 +81,8 @@ def compensate(
         list[str] | None,
         typer.Option(
             metavar="NAME",
-            help="Accept what speaks against the calibration, as rank-loss, or against a target, not-better-here; "
-            "repeatable.",
+            help="Accept what speaks against the calibration, as rank-loss, against a target, not-better-here, or "
+            "against programs of another maker, maker; repeatable.",
             show_default=False,
         ),
     ] = None,

@@ -28,6 +28,7 @@ from truearm.identification.judging.payload import check_payload
 from truearm.identification.judging.separate_visits import check_separate_visits
 from truearm.identification.judging.sigma import check_sigma, check_sigma_beside_joints
 from truearm.identification.judging.transmission import check_transmission
+from truearm.identification.judging.wrong_robot import WRONG_ROBOT, check_robot, judges_lengths
 from truearm.identification.solving.bounds import Bounds, read_bounds
 from truearm.identification.solving.fit import Status, identify, place
 from truearm.identification.solving.losses import LOSSES, Loss
@@ -239,13 +240,21 @@ def calibrate(
     train_errors = errors_of(fit.robot, first)
     # What the robust fit of the check could not explain, the fit itself may.
     noticed = tuple(notice for notice in noticed if notice.code != Status.IMPLAUSIBLE.value)
-    unlike = check_plausible(fit, first, noticed)
-    expected = expected_error(as_residuals_allow(fit, first), plausible=not unlike)
     left_over = LeftOver.of(fit, readings)
+    changes = check_changes(left_over)
+    told = [notice for notice in noticed if notice.code == WRONG_ROBOT]
+    noticed = tuple(notice for notice in noticed if notice.code != WRONG_ROBOT)
+    wrong_robot = check_robot(fit, first) if judges_lengths(fit) else told
+    if has_error([*noticed, *changes]):  # what is wrong with the data bends the robot too
+        wrong_robot = []
+    unlike = check_plausible(fit, first, (*noticed, *wrong_robot, *told))
+    if unlike:
+        wrong_robot = wrong_robot or told
+    expected = expected_error(as_residuals_allow(fit, first), plausible=not unlike)
     wrong_sigma = check_sigma(left_over)
     hidden = [] if unlike or has_error(wrong_sigma) else check_sigma_beside_joints(left_over)
-    explained = [*check_changes(left_over), *check_arrival_lag(left_over)]
-    doubted = has_error([*unlike, *noticed])
+    explained = [*changes, *check_arrival_lag(left_over)]
+    doubted = has_error([*unlike, *wrong_robot, *noticed])
     if not explained and not doubted and not any(notice.code == "joints-rounded" for notice in noticed):
         explained = check_remainder(left_over)
     narrow: list[Notice] = []
@@ -269,6 +278,7 @@ def calibrate(
         warnings=(
             *(notice for notice in noticed if notice.level == "error"),
             *unlike,
+            *wrong_robot,
             *_check_proof(before, validation),
             *_check_copies(readings, training, held_out),
             *_check_trained_before(nominal_robot, as_read, sha256, (count, n, seed)),

@@ -34,7 +34,7 @@ from truearm.jobs.arguments import (
     python_call,
     robot_argument,
 )
-from truearm.jobs.proof import NOT_BETTER, accept_argument, changed_since, known_of, refuse_unaccepted
+from truearm.jobs.proof import NOT_BETTER, accept_argument, changed_since, check_maker, known_of, refuse_unaccepted
 from truearm.modeling.formats.controller_entry import STATED
 from truearm.modeling.formats.controller_kinematics import with_controller_kinematics
 from truearm.modeling.parts import Payload
@@ -98,8 +98,9 @@ def compensate(
         it is not known: then all is taken as computed off-line.
     accept
         What may speak against the robot's calibration or against a correction, by name: ``rank-loss``,
-        ``not-converged``, ``implausible``, or a notice of the level error that the calibration ended with; and
-        ``not-better-here`` to correct also the targets that would rather get worse.
+        ``not-converged``, ``implausible``, or a notice of the level error that the calibration ended with, such as
+        ``wrong-robot``; ``maker`` for programs in the language of another maker; and ``not-better-here`` to correct
+        also the targets that would rather get worse.
     command
         How to do it again, for the report; None writes the call in Python.
     progress
@@ -109,8 +110,8 @@ def compensate(
     ------
     InputError
         If a program cannot be read or was corrected already, the robot is not calibrated or its calibration ended
-        badly, a tool or frame is not defined, it is not known with what the controller computes and its maker
-        calibrates every arm, or with `strict` a target cannot be corrected.
+        badly or is another maker's, a tool or frame is not defined, it is not known with what the controller computes
+        and its maker calibrates every arm, or with `strict` a target cannot be corrected.
     """
     progress_argument(progress)
     paths = paths_argument(programs, "programs", "program")
@@ -161,6 +162,8 @@ def compensate(
         files = program_files(paths, again=again)
         progress("reading the programs")
         read = read_programs(files)
+    language = language_called(read[0].language)
+    foreign = check_maker(arm, language, accepted)
     refuse_unknown_controller(arm, read)
     with refusals_of("robot"):
         result = corrected_programs(
@@ -173,7 +176,6 @@ def compensate(
         )
     if strict:
         _refuse_skipped(result)
-    language = language_called(read[0].language)
     splits: tuple[ProgramSplit, ...] = ()
     if split is not None:
         progress("splitting moves")
@@ -197,6 +199,7 @@ def compensate(
         warnings=(
             *changed_since(robot),
             *known_of(arm),
+            *foreign,
             *controller_notices(arm, read),
             *check_correction(arm, result, splits),
         ),

@@ -48,6 +48,7 @@ class RobotDescription(Record):
         return {
             "name": robot.name,
             "title": robot.title,
+            "maker": robot.maker or None,
             "source": robot.source,
             "convention": robot.convention_name,
             "units": {"length": "mm", "angle": "deg"},

@@ -6,6 +6,8 @@ corrects the program puts other numbers in those places, and no other byte chang
 
 from __future__ import annotations
 
+import re
+import unicodedata
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -327,6 +329,8 @@ class Language:
         Its name.
     suffixes
         Of its files, lower case with the dot. The suffix decides the language; what is in the file has to agree.
+    makers
+        Whose controllers run it, by the names that the maker has; the first is the usual one.
     is_one
         Whether a text looks like this language.
     read
@@ -343,12 +347,18 @@ class Language:
 
     name: str
     suffixes: tuple[str, ...]
+    makers: tuple[str, ...]
     is_one: Callable[[str], bool]
     read: Callable[[Sequence[Source]], Program]
     split: Callable[[Program, Sequence[Split]], SplitEdits] | None = None
     together: bool = False
     companions: tuple[tuple[str, str], ...] = ()
     calibration: MakersCalibration | None = None
+
+    def runs_on(self, maker: str) -> bool:
+        """Return whether controllers of a maker run it, whatever else is in the maker's full name."""
+        words = _words(maker)
+        return any(_words(name) <= words for name in self.makers)
 
     def programs(self, sources: Sequence[Source]) -> tuple[Program, ...]:
         """Read files that may be of several programs.
@@ -362,3 +372,9 @@ class Language:
             key = (source.path.parent if several else None) if self.together else source.path
             groups.setdefault(key, []).append(source)
         return tuple(self.read(group) for group in groups.values())
+
+
+def _words(name: str) -> set[str]:
+    """Return the words of a name, without capitals and accents."""
+    plain = unicodedata.normalize("NFKD", name.casefold())
+    return set(re.findall(r"[^\W_]+", "".join(c for c in plain if not unicodedata.combining(c))))

@@ -14,6 +14,7 @@ from truearm.errors import InputError
 from truearm.identification.judging.implausible import check_plausible
 from truearm.identification.judging.joint_rounding import check_rounding
 from truearm.identification.judging.slips import off_by, slips_by_fit, slips_in_lengths, slips_in_positions
+from truearm.identification.judging.wrong_robot import check_robot, other_robot
 from truearm.identification.solving.fit import Fit, identify
 from truearm.identification.solving.models import named_model
 from truearm.identification.solving.problem import Problem
@@ -72,24 +73,33 @@ def check_against(robot: Robot, data: Dataset) -> tuple[list[Notice], list[Suspe
         slips = slips_in_lengths(robot, data)
         if slips:
             return [*slips, *found], []
-        unlike, suspects = _far_from_fixtures(robot, data)
-        return [*unlike, *found], suspects
+        fit = identify(robot, data, named_model("geometric"), loss="cauchy")
+        unlike, suspects = _far_from_fixtures(fit, data)
+        return [*check_robot(fit, data), *unlike, *found], suspects
     if not data.has_position.any():
         return found, []
     slips = slips_in_positions(robot, data)
     if slips:
-        return [*slips, *found], []
+        return [*(other_robot(robot, data) or slips), *found], []
     fit = identify(robot, data, named_model("geometric"), loss="cauchy")
     off = off_by(errors_of(fit.robot, data))
     if np.nanmedian(off) > _FITTED_WITHIN:
         slips = slips_by_fit(robot, data)
         if slips:
-            return [*slips, *found], []
-    unlike_robot = check_plausible(fit, data)
+            return [*(other_robot(robot, data) or slips), *found], []
+    wrong = check_robot(fit, data)
+    unlike_robot = check_plausible(fit, data, wrong)
     if unlike_robot:
-        return [*unlike_robot, *found], []
+        return [*unlike_robot, *wrong, *found], []
     mistaken, suspects = _far_off(fit, data, off)
-    return [*found, *mistaken, *_often_off(data, off), *_one_point(fit, data), *check_rounding(fit, data)], suspects
+    return [
+        *wrong,
+        *found,
+        *mistaken,
+        *_often_off(data, off),
+        *_one_point(fit, data),
+        *check_rounding(fit, data),
+    ], suspects
 
 
 def _beyond_limits(robot: Robot, data: Dataset) -> list[Notice]:
@@ -119,9 +129,8 @@ def _beyond_limits(robot: Robot, data: Dataset) -> list[Notice]:
     ]
 
 
-def _far_from_fixtures(robot: Robot, data: Dataset) -> tuple[list[Notice], list[Suspect]]:
+def _far_from_fixtures(fit: Fit, data: Dataset) -> tuple[list[Notice], list[Suspect]]:
     """Doubt readings against fixtures that a robust geometric fit leaves far off, and what is said of fixtures."""
-    fit = identify(robot, data, named_model("geometric"), loss="cauchy")
     errors = errors_of(fit.robot, data)
     off = off_by(errors)
     allowed = max(_LEAST_OUTLIER, _OUTLIER_RATIO * float(np.nanmedian(off)))

@@ -171,6 +171,7 @@ def read(sources: Sequence[Source]) -> Program:
 FANUC_LS: Final = Language(
     _NAME,
     (".ls",),
+    ("FANUC",),
     is_one,
     read,
     split_moves,

@@ -204,5 +204,11 @@ def _interval(joint: int, degrees: float) -> tuple[int, float, float]:
 
 
 JBI: Final = Language(
-    "INFORM", (".jbi",), is_one, read, split_moves, calibration=MakersCalibration("Yaskawa", "absolute accuracy")
+    "INFORM",
+    (".jbi",),
+    ("Yaskawa", "Motoman"),
+    is_one,
+    read,
+    split_moves,
+    calibration=MakersCalibration("Yaskawa", "absolute accuracy"),
 )

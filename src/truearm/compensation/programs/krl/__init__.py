@@ -54,6 +54,7 @@ def is_one(text: str) -> bool:
 KRL: Final = Language(
     name="KRL",
     suffixes=(".src", ".dat", ".sub"),
+    makers=("KUKA",),
     is_one=is_one,
     read=read,
     split=split_moves,

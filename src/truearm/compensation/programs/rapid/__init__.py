@@ -43,6 +43,7 @@ def _read(sources: Sequence[Source]) -> Program:
 RAPID: Final = Language(
     name="RAPID",
     suffixes=(".mod", ".prg", ".sys", ".modx", ".prgx", ".sysx"),
+    makers=("ABB",),
     is_one=_is_one,
     read=_read,
     split=split_moves,

@@ -164,6 +164,7 @@ class _File:
 URSCRIPT: Final = Language(
     "URScript",
     (".script", ".urscript"),
+    ("Universal Robots", "UR"),
     _is_one,
     _read,
     split_moves,

@@ -72,6 +72,7 @@ def _robot(content: RobotFile, where: str) -> Robot:
     robot = Robot(
         name=content.name,
         title=content.title or content.name,
+        maker=content.maker,
         source=content.source,
         convention_name=content.convention,
         joints=joints,
@@ -232,7 +233,7 @@ def _proof(robot: Robot, entry: ProofEntry, shown: Mapping[str, str], where: str
             for number, row in enumerate(entry.correlations, 1)
         ),
         lower_bound=entry.lower_bound,
-        warnings=tuple(Notice(warning.code, warning.message) for warning in entry.warnings),
+        warnings=tuple(Notice(warning.code, warning.message, "note") for warning in entry.warnings),
         digest=entry.sha256,
     )
 

@@ -9,13 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 
 from truearm.errors import InputError
 from truearm.modeling.chain import Array
 from truearm.modeling.transform import IDENTITY, Transform
+
+#: Whose joint positions numbers are: the ``controller``'s, as its pendant shows them, or the ``model``'s.
+JointsOf = Literal["controller", "model"]
 
 
 @dataclass(frozen=True)
@@ -52,6 +55,16 @@ class Controller:
     flange: Transform = IDENTITY
     source: str = ""
 
+    @property
+    def counts_known(self) -> bool:
+        """Whether it is said how the joints are counted, be it as the model does; a source says so."""
+        return self.counts_otherwise or any(self.pulses) or bool(self.source)
+
+    @property
+    def counts_otherwise(self) -> bool:
+        """Whether the joints are counted otherwise than by the model."""
+        return bool(self.signs or any(self.zeros) or self.couplings)
+
     def coupling(self, count: int) -> Array:
         """Return which joints the counts of `count` joints include, before signs and zeros, ``(count, count)``."""
         matrix = np.eye(count)
@@ -73,6 +86,28 @@ class Controller:
         if not self.couplings:
             return coupled
         return np.asarray(np.linalg.solve(self.coupling(counted.shape[1]), coupled.T).T, float)
+
+    def check_counts(self, robot: str) -> None:
+        """Refuse joint positions of a controller of which it is not said how it counts.
+
+        Parameters
+        ----------
+        robot
+            Whose controller it is, for the message.
+
+        Raises
+        ------
+        InputError
+            If nothing is said.
+        """
+        if not self.counts_known:
+            raise InputError(
+                "it is not known how the robot's controller counts the joints",
+                where=robot,
+                allowed="a robot file with the entry controller",
+                cure="Say under controller, joints, how its readings follow from the model's joint positions, or give "
+                "the source that says they are the same. Or use the model's joint positions, joint_1 [deg] and so on.",
+            )
 
     def to_pulses(self, counted: Array) -> Array:
         """Return the pulses ``(n, joints)`` of the motors at joints ``(n, joints)`` [rad or m] of the controller.

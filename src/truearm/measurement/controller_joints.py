@@ -26,7 +26,7 @@ def in_model_joints(robot: Robot, data: Dataset) -> Dataset:
     check_joints(robot, data)
     if data.joints_are != "controller":
         return data
-    robot.controller.check_counts(robot.name)
+    robot.controller.check_counts(robot.name, f"{data.source}, column axis_1")
     return _with_joints(data, robot.controller.to_model(data.joints), "converted")
 
 

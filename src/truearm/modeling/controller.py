@@ -87,13 +87,15 @@ class Controller:
             return coupled
         return np.asarray(np.linalg.solve(self.coupling(counted.shape[1]), coupled.T).T, float)
 
-    def check_counts(self, robot: str) -> None:
+    def check_counts(self, robot: str, where: str | None = None) -> None:
         """Refuse joint positions of a controller of which it is not said how it counts.
 
         Parameters
         ----------
         robot
             Whose controller it is, for the message.
+        where
+            Names the joint positions in it, if they come from a file.
 
         Raises
         ------
@@ -102,8 +104,8 @@ class Controller:
         """
         if not self.counts_known:
             raise InputError(
-                "it is not known how the robot's controller counts the joints",
-                where=robot,
+                f"it is not known how the controller of {robot} counts the joints",
+                where=where,
                 allowed="a robot file with the entry controller",
                 cure="Say under controller, joints, how its readings follow from the model's joint positions, or give "
                 "the source that says they are the same. Or use the model's joint positions, joint_1 [deg] and so on.",

@@ -57,9 +57,8 @@ def frame_and_tip(robot: Robot, frame: Frame, target: str | None) -> tuple[Trans
     controller = robot.controller
     if controller == AS_THE_MODEL:
         raise InputError(
-            "it is not known where the robot's controller has its frames",
+            f"it is not known where the controller of {robot.name} has its frames",
             parameter="frame",
-            where=robot.name,
             allowed="a robot file with the entry controller",
             cure="Say under controller where its base and flange are, or give the source that says they are the "
             "model's.",

@@ -67,5 +67,5 @@ def read_touches(path: Path, robot: Robot) -> Array:
     found = np.asarray(joints[[labels.index(cup) for cup in _CUPS]])
     if joints_are == "model":
         return found
-    robot.controller.check_counts(robot.name)
+    robot.controller.check_counts(robot.name, f"{path}, column axis_1")
     return robot.controller.to_model(found)

@@ -162,7 +162,7 @@ def test_a_calibration_is_validated_with_pendant_readings(files: dict[str, Path]
     for name, file in new.items():
         errors = truearm.validate(calibrated, file).errors.position
         assert errors is not None
-        means[name] = errors.mean, truearm.distances(calibrated, file).found.mean
+        means[name] = errors.mean, truearm.distances(calibrated, file).summary()["distance_mm"]["mean"]
     assert means["axis"][0] < 0.06e-3
     assert means["axis"] == pytest.approx(means["joint"], abs=1e-9)
 

@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -20,7 +20,8 @@ from truearm.measurement.controller_joints import in_controller_joints, in_model
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.hexapod.touches import read_touches
 from truearm.measurement.readers.canonical import csv_text
-from truearm.modeling.controller import Controller
+from truearm.modeling.chain import Array
+from truearm.modeling.controller import Controller, JointsOf
 from truearm.modeling.formats.robot_file import read_robot, robot_text
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
@@ -49,10 +50,10 @@ def rows(file: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(stream))
 
 
-def shown(joints: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+def shown(joints: Array) -> Array:
     """Return FANUC's readings at plain angles between links, written out."""
-    j1, j2, j3, j4, j5, j6 = joints.T
-    return np.column_stack([j1, j2, -(j3 + j2), -j4, -j5, -j6])
+    j2, j3 = joints[:, 1], joints[:, 2]
+    return np.column_stack([joints[:, :2], -(j3 + j2), -joints[:, 3:]])
 
 
 @pytest.fixture
@@ -83,7 +84,7 @@ def test_a_file_is_read_and_written_as_it_is(pendant: Path, data: Dataset) -> No
 
 
 def test_where_joints_came_from_is_that_of_the_models_joints() -> None:
-    joints = np.radians([[0.0, 10, 20, 0, 0, 0], [0, 20, 20, 5, 0, 0], [0, 30, 20, 0, 0, 0], [0, 30, 25, 0, 0, 0]])
+    joints = np.radians(np.array([[0.0, 10.0, 20, 0, 0, 0], [0, 20, 20, 5, 0, 0], [0, 30, 20, 0, 0, 0], [0, 30, 25, 0, 0, 0]]))
     there = Dataset.of(joints, np.ones((4, 3)), order=[0, 1, 2, 3])
     came = in_model_joints(
         load_robot(FANUC), Dataset.of(shown(joints), np.ones((4, 3)), order=[0, 1, 2, 3], joints_are="controller")
@@ -131,7 +132,7 @@ def test_other_tables_say_whose_joints_they_hold(tmp_path: Path) -> None:
     (tmp_path / "joints.txt").write_text("0 10 20\n5 15 30\n")
     (tmp_path / "points.txt").write_text("1 2 3\n4 5 6\n")
     files = (tmp_path / "joints.txt", {"t": tmp_path / "points.txt"})
-    for whose, column in (("model", "joint_1"), ("controller", "axis_1")):
+    for whose, column in zip(get_args(JointsOf), ("axis_1", "joint_1"), strict=True):
         out = tmp_path / f"{whose}.csv"
         made = truearm.import_matrices(*files, angle_unit="deg", length_unit="mm", joints_are=whose, out=out)
         assert made.data.joints_are == whose
@@ -145,20 +146,21 @@ readings: [{target: tip, x: x, y: y, z: z}]
 """
     table = tmp_path / "table.csv"
     table.write_text("q1,q2,x,y,z\n10,20,100,200,300\n")
-    for are, asked, whose in (
+    cases: list[tuple[str, JointsOf | None, str]] = [
         ("", None, "model"),
         ("", "controller", "controller"),
         (", are: controller", None, "controller"),
         (", are: controller", "controller", "controller"),
-    ):
+    ]
+    for are, asked, expected in cases:
         (tmp_path / "map.yaml").write_text(mapping.replace("ARE", are))
-        assert truearm.import_table(table, tmp_path / "map.yaml", joints_are=asked).data.joints_are == whose
+        assert truearm.import_table(table, tmp_path / "map.yaml", joints_are=asked).data.joints_are == expected
     with pytest.raises(InputError, match=r"joints\.are: the mapping says whose joint positions they are.*Leave one"):
         truearm.import_table(table, tmp_path / "map.yaml", joints_are="model")
 
 
 def test_touched_cups_are_read_from_the_pendant(tmp_path: Path) -> None:
-    robot, q = load_robot(FANUC), np.radians([[0.0, 10, 20, 30, 40, 50], [5, 5, 5, 5, 5, 5], [9, 8, 7, 6, 5, 4]])
+    robot, q = load_robot(FANUC), np.radians(np.array([[0.0, 10, 20, 30, 40, 50], [5, 5, 5, 5, 5, 5], [9, 8, 7, 6, 5, 4]]))
     lines = [",".join(["cup", *(f"axis_{i} [deg]" for i in range(1, 7))])]
     lines += [",".join([f"B{i}", *(repr(float(v)) for v in row)]) for i, row in enumerate(np.degrees(shown(q)), 1)]
     file = tmp_path / "touches.csv"
@@ -206,13 +208,14 @@ def test_what_is_to_be_commanded_is_written_as_asked(tmp_path: Path, whose: Any,
 
 
 def test_the_hexapods_sheet_and_steps_are_the_controllers(tmp_path: Path) -> None:
-    files = {"out": tmp_path / "sheet.csv", "steps": tmp_path / "steps.txt"}
-    made = truearm.hexapod_plan(FANUC, (0.3, 0.0, 0.1, -0.5), tool="triangular", branches=["front-up"], **files)
+    sheet, steps = tmp_path / "sheet.csv", tmp_path / "steps.txt"
+    place = (0.3, 0.0, 0.1, -0.5)
+    made = truearm.hexapod_plan(FANUC, place, tool="triangular", branches=["front-up"], out=sheet, steps=steps)
     expected = shown(np.array([row.joints for row in made.reachable.rows]))
-    written = [[float(row[f"axis_{i} [deg]"]) for i in range(1, 7)] for row in rows(files["out"])]
+    written = [[float(row[f"axis_{i} [deg]"]) for i in range(1, 7)] for row in rows(sheet)]
     assert np.radians(written) == pytest.approx(expected, abs=1e-12)
     first = " ".join(f"{v:.3f}" for v in np.degrees(expected[0]))
-    assert f"joints as the controller shows them {first}" in files["steps"].read_text()
+    assert f"joints as the controller shows them {first}" in steps.read_text()
 
 
 def test_a_robot_that_counts_as_its_model_is_written_as_ever(tmp_path: Path) -> None:

@@ -25,7 +25,7 @@ controller:
 def test_show_says_what_the_controller_does_its_own_way(truearm: Truearm, tmp_path: Path) -> None:
     shown = truearm("show", "lrmate200ic").out
     assert "Controller: ros-industrial/fanuc" in shown
-    assert "  reading of axis_3 = -(axis_3 + axis_2)\n  reading of axis_4 = -axis_4\n" in shown
+    assert "  axis_3 = -(joint_3 + joint_2)\n  axis_4 = -joint_4\n" in shown
     assert "  base frame at x 0  y 0  z 330 mm of the model's, quaternion 1 0 0 0\n" in shown
     assert "  joints and frames are the model's\n" in truearm("show", "irb120").out
     assert "Controller" not in truearm("show", "puma560").out

@@ -38,10 +38,10 @@ def show(
     json: Json = False,
 ) -> None:
     """Show a robot: its joints, its reach at zero, what is known about it, and where it stands at joint positions."""
-    from truearm.jobs.arguments import robot_argument
+    from truearm.jobs.load_robot import load_robot
     from truearm.jobs.show import show as run
 
-    loaded = robot_argument(robot)
+    loaded = load_robot(robot)
     given = None if joints is None else read_joints(joints, loaded, "joints")
     described = run(loaded, joints=given, joints_are=joints_are)  # type: ignore[arg-type]
     if json:

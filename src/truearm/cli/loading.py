@@ -57,9 +57,14 @@ def read_gravity(text: str | None) -> tuple[float, float, float] | None:
 
 def read_joints(text: str, robot: Robot, parameter: str) -> list[float]:
     """Return joint positions [rad or m] of a text in deg or mm, in the units of the robot's joints."""
-    from truearm.units import sized_si
+    from truearm.units import to_si
 
-    numbers = read_numbers(text, parameter, "numbers in deg, or mm if sliding, separated by commas: 0,-30,45, ..")
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        raise InputError(
+            "numbers separated by commas belong here", parameter=parameter, came=text, allowed="0,-30,45, .."
+        ) from None
     if len(numbers) != len(robot.joints):
         raise InputError(
             "there are not as many numbers as joints",
@@ -68,7 +73,7 @@ def read_joints(text: str, robot: Robot, parameter: str) -> list[float]:
             allowed=f"{len(robot.joints)}, one for each joint of {robot.name}",
         )
     units = ["deg" if joint.kind == "revolute" else "mm" for joint in robot.joints]
-    return [sized_si(value, unit, parameter=parameter) for value, unit in zip(numbers, units, strict=True)]
+    return [to_si(value, unit) for value, unit in zip(numbers, units, strict=True)]
 
 
 def read_lengths(text: str, parameter: str) -> float | list[float]:

@@ -12,6 +12,8 @@ from truearm.arrays import finite_number
 from truearm.errors import InputError, refusals_of, wrong_kind
 from truearm.files import path_argument
 from truearm.jobs.arguments import (
+    JOINTS_OF,
+    choice_argument,
     count_argument,
     deviation_argument,
     device_argument,
@@ -100,7 +102,7 @@ def simulate(
     file = None if out is None else file_for(out, robot, truth)
     rng = np.random.default_rng(whole_argument(seed, "seed"))
     nominal = robot_argument(robot)
-    joints_are = joints_argument("model" if joints is None else joints, nominal)
+    joints_are = joints_argument(choice_argument(joints, "joints", JOINTS_OF), nominal)
     with refusals_of("truth"):
         twin = truth_twin(nominal, truth, rng)
     twin = replace(twin, robot=twin.robot.with_payload(payload_argument(payload), gravity_argument(gravity)))

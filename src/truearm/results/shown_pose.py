@@ -31,6 +31,9 @@ _WRITTEN: Final[tuple[tuple[str, Orientation, str, str], ...]] = (
     ("rx ry rz", ROTATION_VECTOR, "rad", "Universal Robots"),
 )
 
+#: A turn is half a turn within this [deg, rad or parts of a quaternion]: it has two signs.
+_HALF_A_TURN: Final = 1e-6
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ShownPose(Record):
@@ -94,8 +97,17 @@ class ShownPose(Record):
         pose = {"position_mm": (1e3 * position[0]).tolist()}
         for _, way, unit, _ in _WRITTEN:
             numbers = way.nearest(rotation, np.zeros((1, way.count)))[0]
-            pose[way.name] = (np.degrees(numbers) if unit == "deg" else numbers).tolist()
+            pose[way.name] = _usual(np.degrees(numbers) if unit == "deg" else numbers, way)
         return pose
+
+
+def _usual(numbers: Array, way: Orientation) -> list[float]:
+    """Return numbers of an orientation with the signs that pendants prefer, where rounding decides between two."""
+    if way.count == 3 and way is not ROTATION_VECTOR:
+        return np.where(numbers <= -180.0 + _HALF_A_TURN, numbers + 360.0, numbers).tolist()
+    half = abs(numbers[0]) if way is QUATERNION else np.pi - np.linalg.norm(numbers)
+    first = next((v for v in numbers.tolist() if abs(v) > _HALF_A_TURN), 0.0)
+    return (-numbers if abs(half) <= _HALF_A_TURN and first < 0.0 else numbers).tolist()
 
 
 def _row(values: list[float], digits: int) -> str:

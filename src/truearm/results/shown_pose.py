@@ -104,10 +104,11 @@ class ShownPose(Record):
 def _usual(numbers: Array, way: Orientation) -> list[float]:
     """Return numbers of an orientation with the signs that pendants prefer, where rounding decides between two."""
     if way.count == 3 and way is not ROTATION_VECTOR:
-        return np.where(numbers <= -180.0 + _HALF_A_TURN, numbers + 360.0, numbers).tolist()
+        return [float(v) + 360.0 * (v <= -180.0 + _HALF_A_TURN) for v in numbers]
     half = abs(numbers[0]) if way is QUATERNION else np.pi - np.linalg.norm(numbers)
     first = next((v for v in numbers.tolist() if abs(v) > _HALF_A_TURN), 0.0)
-    return (-numbers if abs(half) <= _HALF_A_TURN and first < 0.0 else numbers).tolist()
+    sign = -1.0 if abs(half) <= _HALF_A_TURN and first < 0.0 else 1.0
+    return [sign * float(v) for v in numbers]
 
 
 def _row(values: list[float], digits: int) -> str:

@@ -75,6 +75,7 @@ def test_a_seed_is_of_the_kind_that_is_written(truearm: Truearm, tmp_path: Path)
     words = ("ik", "lrmate200ic", there, "--frame", "controller", "--out", out, "--seed-joints")
     run = truearm(*words, ",".join(map(str, shown)))
     assert "Joint positions in the file are those that the robot's controller shows (axis_i)." in run.out
+    assert "model-frame" not in run.out
     assert [float(_rows(out)[0][f"axis_{n} [deg]"]) for n in range(1, 7)] == pytest.approx(shown)
     assert truearm(*words, "10,20,-50,-40,-50,300", "--joints", "model").code == 0
     assert _joints(_rows(out)[0]) == pytest.approx([10, 20, -50, -40, -50, 300])

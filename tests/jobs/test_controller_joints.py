@@ -253,6 +253,17 @@ def test_poses_in_the_controllers_frame_are_of_its_flange() -> None:
     assert robot.jacobian(q, frame="controller")[0, :3, 0] == pytest.approx(rates[0], abs=1e-5)
 
 
+def test_poses_in_the_models_frame_are_said_to_be() -> None:
+    robot, q = turned(), np.radians([[10.0, 20.0, -30.0, 40.0, 50.0, 60.0]])
+    p, R = robot.forward(q)
+    (said,) = truearm.inverse(robot, p, R, seed=q[0]).warnings
+    assert (said.code, said.level) == ("model-frame", "note")
+    assert "for poses that the pendant shows use `frame=controller`" in said.message
+    assert not truearm.inverse(robot, *robot.forward(q, frame="controller"), seed=q[0], frame="controller").warnings
+    assert not truearm.inverse(robot, p, R, seed=q[0], frame="world").warnings
+    assert not truearm.inverse("irb120", p, R, seed=q[0]).warnings
+
+
 def test_a_target_is_where_it_is_in_the_controllers_base() -> None:
     robot = turned().with_frames(Transform((1.0, 2.0, 3.0)), {"tip": (0.1, 0.0, 0.2)})
     q = np.zeros((1, 6))

@@ -28,7 +28,8 @@ from truearm.modeling.inverse import inverse as inverse_kinematics
 from truearm.modeling.inverse.pose_solver import Orientation
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
-from truearm.modeling.transform import rotation_from_quaternion
+from truearm.modeling.transform import IDENTITY, rotation_from_quaternion
+from truearm.notices import Notice
 from truearm.results.joint_table import JointTable
 from truearm.writing import write_text
 
@@ -116,7 +117,23 @@ def inverse(
         )
     if file is not None:
         write_text(file, joints_csv(solutions, labels, arm.joints, counting(arm, joints_are)))
-    return JointTable(labels, solutions, tuple(told_of(arm)), joints_are)
+    return JointTable(labels, solutions, (*told_of(arm), *_other_frame(arm, frame, target)), joints_are)
+
+
+def _other_frame(robot: Robot, frame: Frame, target: str | None) -> list[Notice]:
+    """Say if poses were taken in the model's base frame, and a pendant would show them in another."""
+    controller = robot.controller
+    alike = controller.base == IDENTITY and (target is not None or controller.flange == IDENTITY)
+    if frame != "base" or alike:
+        return []
+    return [
+        Notice(
+            "model-frame",
+            "The poses were taken as those of the model's flange in its base frame. The controller has them elsewhere "
+            "('truearm show' says where): for poses that the pendant shows use `frame=controller`.",
+            "note",
+        )
+    ]
 
 
 def _poses(poses: object, rotations: object) -> tuple[tuple[str, ...], Array, Array | None]:

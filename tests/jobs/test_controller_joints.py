@@ -75,6 +75,7 @@ def pendant(tmp_path: Path, data: Dataset) -> Path:
 def test_a_file_is_read_and_written_as_it_is(pendant: Path, data: Dataset) -> None:
     read = truearm.load_data(pendant)
     assert read.joints_are == "controller"
+    assert "of 6 joints as the controller shows them" in repr(read)
     assert csv_text(read) == pendant.read_text()
     assert pendant.read_text().startswith("configuration,axis_1 [deg],")
     with_robot = truearm.load_data(pendant, FANUC)
@@ -173,6 +174,32 @@ def test_touched_cups_are_read_from_the_pendant(tmp_path: Path) -> None:
     assert read_touches(file, robot) == pytest.approx(q, abs=1e-12)
     with pytest.raises(InputError, match=r"touches\.csv, column axis_1: it is not known how"):
         read_touches(file, replace(robot, controller=Controller()))
+
+
+def wrong_sign(noted: Array) -> Array:
+    return noted * [1, -1, 1, 1, 1, 1]
+
+
+def exchanged(noted: Array) -> Array:
+    return noted[:, [0, 2, 1, 3, 4, 5]]
+
+
+@pytest.mark.parametrize(
+    ("slip", "code", "words"),
+    [
+        (np.radians, "unit-angle", "The joints: radians are called deg"),
+        (wrong_sign, "joint-sign", "sign of joint 2 is"),
+        (exchanged, "joint-sign", "Joints 2 and 3 are in the wrong order"),
+    ],
+)
+def test_other_slips_are_looked_for_in_what_was_noted(
+    data: Dataset, slip: Callable[[Array], Array], code: str, words: str
+) -> None:
+    robot = load_robot(FANUC)
+    robot = replace(robot, controller=replace(robot.controller, zeros=(0.0, 0.0, 1.5, 0.0, 0.0, 0.0)))
+    noted = in_controller_joints(robot, data)
+    said = truearm.check(robot, replace(noted, joints=slip(noted.joints))).warnings[0]
+    assert (said.code, words in said.message) == (code, True), said.message
 
 
 # -- out -----------------------------------------------------------------------------------------------------

@@ -148,7 +148,8 @@ class Dataset:
         return short_text(
             [
                 f"{self.source}: {counted(self.configurations, 'configuration')} "
-                f"of {counted(len(self.joint_kinds), 'joint')}",
+                f"of {counted(len(self.joint_kinds), 'joint')}"
+                f"{' as the controller shows them' if self.joints_are == 'controller' else ''}",
                 f"{counted(len(self.targets), 'target')}: {listed(self.targets)}",
                 f"readings: {', '.join(found)}",
                 f"with: {', '.join(what for what, given in known.items() if given is not None) or 'nothing else'}",

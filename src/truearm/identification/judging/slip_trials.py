@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Final
 
 import numpy as np
 
+from truearm.measurement.controller_joints import in_controller_joints, in_model_joints
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
@@ -176,7 +177,16 @@ def controller_slips(robot: Robot, data: Dataset) -> Iterator[Slip]:
     yield Slip("joints-of-model", words, replace(data, joints=controller.from_model(data.joints)))
 
 
-def sign_slips(data: Dataset, size: int) -> Iterator[Slip]:
+def as_noted(robot: Robot, data: Dataset, slips: Callable[[Dataset], Iterator[Slip]]) -> Iterator[Slip]:
+    """Try slips with joint positions on those that were noted: on the controller's, where they came as such."""
+    if data.joints_are != "converted":
+        yield from slips(data)
+        return
+    for slip in slips(in_controller_joints(robot, data)):
+        yield replace(slip, data=in_model_joints(robot, slip.data))
+
+
+def sign_slips(data: Dataset, size: int = 1) -> Iterator[Slip]:
     """Try the opposite signs of so many joints at once."""
     for group in map(list, combinations(range(data.joints.shape[1]), size)):
         joints = data.joints.copy()

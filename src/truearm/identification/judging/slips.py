@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -17,6 +18,7 @@ from truearm.errors import InputError
 from truearm.identification.judging.slip_trials import (
     Slip,
     angle_slips,
+    as_noted,
     controller_slips,
     length_slips,
     mirrored,
@@ -79,7 +81,12 @@ def slips_in_positions(robot: Robot, data: Dataset) -> list[Notice]:
     if not bad:
         if least <= _PLACED_WITHIN:
             return turned
-        best = _best(robot, some, _simple_slips(robot, rest), lambda: [*sign_slips(some, 2), *sign_slips(some, 3)])
+        best = _best(
+            robot,
+            some,
+            _simple_slips(robot, rest),
+            lambda: [slip for size in (2, 3) for slip in as_noted(robot, some, partial(sign_slips, size=size))],
+        )
         if best is not None:
             return [best.notice]
         return turned or _beyond_reach(robot, some) or _unrelated(robot, some)
@@ -97,11 +104,11 @@ def _simple_slips(robot: Robot, data: Dataset) -> Iterator[Slip]:
     """Try everything but several slips at once, the simplest first."""
     some = _some(data)
     yield from length_slips(some)
-    yield from angle_slips(some)
+    yield from as_noted(robot, some, angle_slips)
     yield from controller_slips(robot, some)
     yield from mirrored(some)
-    yield from sign_slips(some, 1)
-    yield from order_slips(some)
+    yield from as_noted(robot, some, sign_slips)
+    yield from as_noted(robot, some, order_slips)
     yield from (replace(slip, data=_some(slip.data)) for slip in shifted(data))
     yield from scale_slips(robot, some)
 
@@ -135,10 +142,10 @@ def slips_in_lengths(robot: Robot, data: Dataset) -> list[Notice]:
         return []
     for slip in (
         *length_slips(data),
-        *angle_slips(data),
+        *as_noted(robot, data, angle_slips),
         *controller_slips(robot, data),
-        *sign_slips(data, 1),
-        *order_slips(data),
+        *as_noted(robot, data, sign_slips),
+        *as_noted(robot, data, order_slips),
     ):
         if np.ptp(slip.data.joints, axis=0).max() < _LEAST_TRAVEL:
             continue  # an arm that hardly moves fits any fixture
@@ -166,7 +173,7 @@ def slips_by_fit(robot: Robot, data: Dataset) -> list[Notice]:
     """
     some = _some(replace(_few_targets(data), quaternion=None, sigma=None, sigma_rot=None))
     given = _fitted_misfit(robot, some)
-    tries = [*controller_slips(robot, some), *mirrored(some), *sign_slips(some, 1)]
+    tries = [*controller_slips(robot, some), *mirrored(some), *as_noted(robot, some, sign_slips)]
     tried = [(_fitted_misfit(robot, slip.data), slip) for slip in tries]
     least = min(left for left, _ in tried)
     slip = next(slip for left, slip in tried if left <= _AS_GOOD * least)

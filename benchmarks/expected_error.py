@@ -1,8 +1,9 @@
 """Holds the error to expect over the workspace against the true one of simulated robots.
 
 An IRB 120 is measured within a few degrees of one posture, calibrated, and judged at 300 configurations of its full
-range. Arguments: robots for each case (40, three times as many where the truth is drawn from the priors as they are)
-and full-range campaigns (100). Writes benchmarks/expected_error.json.
+range. Others are measured over their full range, with joints that repeat to so many degrees. Arguments: robots for each
+case (40, three times as many where the truth is drawn from the priors as they are) and full-range campaigns (100).
+Writes benchmarks/expected_error.json.
 """
 
 from __future__ import annotations
@@ -30,7 +31,10 @@ from truearm.simulation.twin import Twin, measure
 CENTRE = np.array([10.0, 20.0, 10.0, 20.0, 40.0, 10.0])
 WIDTHS = (1.0, 5.0, 15.0, 40.0, None)
 SCALES = (1.0, 0.3, 3.0)
+REPEATABILITIES = (0.005, 0.02)
 POSES, NOISE, JUDGED = 60, 0.02e-3, 300
+#: Configurations of a campaign of few, with repeatability.
+FEW = 14
 GEOMETRIC = named_model("geometric")
 nominal = load_robot("irb120")
 
@@ -48,31 +52,44 @@ def narrowed(width: float | None) -> Robot:
     )
 
 
-def simulated(rng: np.random.Generator, width: float | None, targets: int, scale: float) -> tuple[Twin, Dataset]:
+def simulated(
+    rng: np.random.Generator, width: float | None, targets: int, scale: float, joint_error: float, poses: int
+) -> tuple[Twin, Dataset]:
     """Draw a truth of `scale` times the priors, and measure it with some of the three targets."""
     drawn = [p for p in nominal.parameters.values() if p.group in ("geometry", "joint zero")]
     twin = truth_twin(nominal.with_parameters(replace(p, prior=scale * p.prior) for p in drawn), "random", rng)
     tool = {t.name: [twin.robot.values[t.parameter(a)] for a in "xyz"] for t in twin.robot.targets[:targets]}
     twin = replace(twin, robot=twin.robot.with_frames(twin.robot.base, tool))
-    return twin, measure(twin, narrowed(width).random_configurations(POSES, rng), NOISE, rng)
+    commanded = narrowed(width).random_configurations(poses, rng)
+    data = measure(twin, commanded + joint_error * rng.standard_normal(commanded.shape), NOISE, rng)
+    return twin, replace(data, joints=commanded)
 
 
-def judged(rng: np.random.Generator, width: float | None, targets: int, scale: float) -> list[float]:
-    """Calibrate one robot as `truearm calibrate` does.
+def judged(
+    rng: np.random.Generator,
+    width: float | None,
+    targets: int,
+    scale: float,
+    repeatability: float = 0.0,
+    poses: int = POSES,
+) -> list[float]:
+    """Calibrate one robot, whose joints repeat to so many degrees, as `truearm calibrate` does.
 
     Returns true, expected, lowest, highest and held-out error [mm], 1 for a warning of narrow data and 2 for an error,
     and 1 if the fit converged.
     """
-    twin, data = simulated(rng, width, targets, scale)
-    order = np.random.default_rng(0).permutation(POSES)
-    training, held_out = (data.of_configurations(part) for part in np.split(order, [round(0.7 * POSES)]))
+    joint_error = float(np.radians(repeatability))
+    twin, data = simulated(rng, width, targets, scale, joint_error, poses)
+    order = np.random.default_rng(0).permutation(poses)
+    training, held_out = (data.of_configurations(part) for part in np.split(order, [round(0.7 * poses)]))
     fit = identify(nominal, training, GEOMETRIC)
     after = errors_of(fit.robot, held_out)
     expected = expected_error(as_residuals_allow(fit, training))
     notices = check_narrow_data(fit, expected, training, after, held_out=True)
     # The truth has no effects that the twin alone would know.
     q = nominal.random_configurations(JUDGED, rng)
-    apart = [fit.robot.world_poses(q, t.name)[0] - twin.robot.world_poses(q, t.name)[0] for t in fit.robot.targets]
+    there = q + joint_error * rng.standard_normal(q.shape)
+    apart = [fit.robot.world_poses(q, t.name)[0] - twin.robot.world_poses(there, t.name)[0] for t in fit.robot.targets]
     true = float(np.linalg.norm(apart, axis=2).mean())
     of, known = expected.overall, after.position_norms.mean()
     noticed = max(({"warning": 1.0, "error": 2.0}[notice.level] for notice in notices), default=0.0)
@@ -88,6 +105,15 @@ def cases(robots: int) -> Iterator[tuple[dict[str, Any], np.ndarray]]:
             for seed in range(robots if scale != 1.0 else 3 * robots)
         ]
         yield {"scale": scale, "targets": targets, "width_deg": width, "robots": len(rows)}, np.array(rows)
+    for k, (repeatability, targets, poses) in enumerate(
+        (r, t, p) for r in REPEATABILITIES for t in (1, 3) for p in (FEW, POSES)
+    ):
+        rows = [
+            judged(np.random.default_rng((50 + k, seed)), None, targets, 1.0, repeatability, poses)
+            for seed in range(3 * robots)
+        ]
+        case = {"repeatability_deg": repeatability, "targets": targets, "poses": poses, "robots": len(rows)}
+        yield case, np.array(rows)
 
 
 def figures(rows: np.ndarray) -> dict[str, float]:

@@ -10,7 +10,7 @@ import pytest
 
 from truearm.errors import InputError
 from truearm.manifest import MANIFEST
-from truearm.writing import write_files, write_text
+from truearm.writing import output_folder, write_files, write_text
 
 
 def test_what_is_no_plain_file_is_not_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -73,3 +73,12 @@ def test_half_a_character_is_not_written(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"holds half a character; got '\\ud800'"):
         write_files(tmp_path / "new", {"a": "a", "b": "\ud800"})
     assert not (tmp_path / "new").exists()
+
+
+def test_a_file_in_the_folder_that_was_not_written_there_by_us_is_not_replaced(tmp_path: Path) -> None:
+    output_folder(tmp_path, ["a", "b"])
+    write_files(tmp_path, {"a": "1", "b": "2"})
+    output_folder(tmp_path, ["a", "b"])
+    (tmp_path / "report.html").write_text("mine")
+    with pytest.raises(InputError, match=r"report\.html: this exists already, was not written here by truearm"):
+        output_folder(tmp_path, ["a", "b", "report.html"])

@@ -41,15 +41,23 @@ def output_folder(
 
     Parameters
     ----------
+    names
+        Of the files. One that stands there already must be in the folder's manifest: truearm has written it.
     read
         None of these files may be overwritten.
     """
     with refusals_of(parameter):
         path = writable_folder(path_argument(folder, parameter))
         put_back_old(path)
-        sets_in(path)
+        written = {name for one in sets_in(path) for name in one.files}
         for name in names:
             refuse_overwriting(path / name, read)
+            if name not in written and exists(path / name):
+                raise InputError(
+                    "this exists already, was not written here by truearm, and is not overwritten",
+                    where=str(path / name),
+                    cure="Choose another `out`, or move the file.",
+                )
     return path
 
 

@@ -9,11 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.special import chdtri, fdtri
 from tests.simulated import campaign
 
 from truearm.identification.judging.expected_error import as_residuals_allow, expected_error, expected_map
 from truearm.identification.solving.fit import Fit, Status, identify
 from truearm.identification.solving.models import FRAMES, MODELS, Model
+from truearm.identification.solving.variance_components import CovariancePart
 from truearm.jobs.calibrate import calibrate
 from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
@@ -48,12 +50,13 @@ def fitted(text: str, folder: Path) -> Fit:
     rng = np.random.default_rng(0)
     data = measure(truth_twin(robot, "nominal", rng), robot.random_configurations(20, rng), 1e-5, rng)
     fit = identify(robot, data, MODEL["geometric"])
-    return replace(fit, covariance=np.zeros_like(fit.covariance), declared=True)
+    return uncertain(fit)
 
 
-def uncertain(fit: Fit, **deviations: float) -> Fit:
+def uncertain(fit: Fit, freedom: float = np.inf, **deviations: float) -> Fit:
     """Return a fit that knows some parameters only to so much [SI]."""
-    return replace(fit, covariance=np.diag([deviations.get(name, 0.0) ** 2 for name in fit.free.names]))
+    covariance = np.diag([deviations.get(name, 0.0) ** 2 for name in fit.free.names])
+    return replace(fit, covariance=covariance, covariance_parts=(CovariancePart(covariance, freedom),))
 
 
 def test_a_turn_of_one_joint_moves_its_target_by_the_arm(tmp_path: Path) -> None:
@@ -111,10 +114,30 @@ def test_joint_errors_count_as_far_as_the_residuals_allow() -> None:
 
 
 def test_noise_that_was_estimated_widens_the_interval(tmp_path: Path) -> None:
-    fit = uncertain(fitted(ARM, tmp_path), base_x=1e-4, base_y=1e-4, base_z=1e-4)
-    few = replace(fit, declared=False, weight=fit.weight[:4])
-    known, estimated = (expected_error(f).overall.interval_90 for f in (fit, few))
-    assert estimated[1] > 1.05 * known[1]
+    """A length of three normal numbers with a variance of 4 degrees of freedom: the square is 3 F."""
+    fit = uncertain(fitted(ARM, tmp_path), freedom=4, base_x=1e-4, base_y=1e-4, base_z=1e-4)
+    low, high = expected_error(fit).overall.interval_90
+    assert low == pytest.approx(1e-4 * np.sqrt(3 * fdtri(3, 4, 0.05)), rel=0.3)
+    assert high == pytest.approx(1e-4 * np.sqrt(3 * fdtri(3, 4, 0.95)), rel=0.15)
+
+
+def test_an_error_of_the_joints_is_known_as_well_as_its_degrees_of_freedom_say(tmp_path: Path) -> None:
+    fit = replace(fitted(ARM, tmp_path), joint_error=np.array([1e-4]), joint_freedom=np.array([20.0]))
+    low, high = expected_error(fit).overall.interval_90
+    mean = 0.5e-4 * np.sqrt(2 / np.pi)
+    assert low == pytest.approx(mean * np.sqrt(20 / chdtri(20, 0.05)), rel=0.03)
+    assert high == pytest.approx(mean * np.sqrt(20 / chdtri(20, 0.95)), rel=0.05)
+
+
+def test_parameters_are_uncertain_together_with_the_error_of_the_joints_that_they_are_found_by(tmp_path: Path) -> None:
+    """The same variance stands behind both: where it is larger, both are."""
+    fit = uncertain(fitted(ARM, tmp_path), freedom=8, theta_offset_1=1e-4)
+    part = fit.covariance_parts[0]
+    nothing = replace(part, covariance=0.0 * part.covariance)
+    fit = replace(fit, joint_error=np.array([1e-4]), joint_freedom=np.array([8.0]))
+    alone = expected_error(replace(fit, covariance_parts=(nothing, part))).overall.interval_90
+    together = expected_error(replace(fit, covariance_parts=(nothing, replace(part, joints=(0,))))).overall.interval_90
+    assert together[1] - together[0] > 1.03 * (alone[1] - alone[0])
 
 
 @pytest.mark.parametrize(

@@ -90,6 +90,15 @@ def test_priors_are_integrated_out() -> None:
             other = best.copy()
             other[place] *= step
             assert likelihood(other) < likelihood(best)
+    V = np.diag(best[factor])
+    of_joints = (of_row[:, None] == of_row[None, :]) * ((G[:, :2] * best[2]) @ G[:, :2].T)
+    V += of_joints + (of_row[:, None] == of_row[None, :]) * (best[3] * np.outer(G[:, 2], G[:, 2]))
+    C = np.linalg.inv(A.T @ np.linalg.solve(V, A) + np.eye(6))
+    np.testing.assert_allclose(sum(part.covariance for part in found.parts), C, rtol=1e-6)
+    part = next(part for part in found.parts if part.joints == (0, 1))
+    pulled = np.linalg.solve(V, A @ C)
+    np.testing.assert_allclose(part.covariance, pulled.T @ of_joints @ pulled, rtol=1e-6, atol=1e-9)
+    assert part.freedom == found.likeliest.freedom[0] < 2 * len(set(of_row.tolist()))
 
 
 def test_whitening_is_the_root_of_the_inverse_and_can_be_undone() -> None:
@@ -108,9 +117,11 @@ def test_scatter_of_equal_arrivals_is_that_of_their_means() -> None:
     y = readings.reshape(-1)
     rows = np.ones((len(y), 1))
     arrivals = Arrivals(np.repeat(np.arange(ARRIVALS), READINGS))
-    covariance = cluster_covariance(rows, (y - y.mean())[:, None], arrivals, np.array([True]), False)
+    covariance, parts = cluster_covariance(rows, (y - y.mean())[:, None], arrivals, np.array([True]), False)
     variance = np.var(readings.mean(axis=1), ddof=1) / ARRIVALS
     assert covariance[0, 0] == pytest.approx(variance * (stdtrit(ARRIVALS - 1, 0.975) / 1.959964) ** 2, rel=1e-6)
+    assert parts[0].covariance[0, 0] == pytest.approx(variance, rel=1e-6)
+    assert parts[0].freedom == pytest.approx(ARRIVALS - 1, rel=1e-6)
 
 
 @pytest.mark.parametrize("loss", ["huber", "cauchy", "l1"])

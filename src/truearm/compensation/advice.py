@@ -199,9 +199,10 @@ def frame_words(frames: Frames) -> list[str]:
     else:
         said = [
             "`frames` is not given. Calibration cannot know where a program's frames really are, so the base was "
-            f"shifted by {size(frames.base)} until the mean correction of all targets is zero: targets are right to "
-            "each other, and their mean position and orientation stay where they were. For a work object that was "
-            "touched up by points, give `frames`."
+            f"shifted by {size(frames.base)} until the corrections of all targets have no shift and no turn in common: "
+            "targets are right to each other, and the pattern of their positions stays where it was. A work object "
+            "that was located elsewhere than at its targets may be off by what the uncorrected robot missed there: "
+            "give `frames`."
         ]
     if frames.tools == "identified":
         said.append("The program's tools are where `tools` places them, on the identified flange.")

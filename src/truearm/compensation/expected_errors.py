@@ -20,7 +20,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.compensation.gauge import flange_rates
+from truearm.compensation.gauge import CommonMotion, common_motion, flange_rates
 from truearm.compensation.program_places import Provenance
 from truearm.modeling.chain import Array
 from truearm.modeling.proof import Proof
@@ -159,15 +159,14 @@ class _ModelErrors:
     assumed_tools, assumed_frames
         Whether the places of tools and frames are assumed, and so take part of the errors up.
     shared
-        What the program's frame takes up: ``(3, parameters)`` each of the mean motion and turn, and where the middle of
-        the targets is ``(3,)``; None if it takes up nothing.
+        What the program's frame takes up; None if it takes up nothing.
     """
 
     robot: Robot
     proof: Proof
     assumed_tools: bool
     assumed_frames: bool
-    shared: tuple[Array, Array, Array] | None = None
+    shared: CommonMotion | None = None
 
     @cached_property
     def _flange(self) -> Array:
@@ -189,22 +188,19 @@ class _ModelErrors:
             part = slice(first, first + _AT_ONCE)
             moved, _, tips = self._motions(targets, part)
             if self.shared is not None:
-                mean, turn, middle = self.shared
-                moved = moved - mean - np.cross(turn, (tips - middle)[:, :, None], axis=-2)
+                moved = moved - self.shared.of(tips)
             yield part, moved, self._by_joints(targets, part)
 
-    def shared_by(self, programs: Sequence[TargetsReached]) -> tuple[Array, Array, Array]:
-        """Return what the frame of the programs takes up: the mean of all errors, as of all corrections."""
-        size = len(self.proof.names)
-        moved, turned, place, count = np.zeros((3, size)), np.zeros((3, size)), np.zeros(3), 0
-        for targets in programs:
-            for first in range(0, len(targets.joints), _AT_ONCE):
-                motion, turn, tips = self._motions(targets, slice(first, first + _AT_ONCE))
-                moved += motion.sum(axis=0)
-                turned += turn.sum(axis=0)
-                place += tips.sum(axis=0)
-                count += len(tips)
-        return moved / max(count, 1), turned / max(count, 1), place / max(count, 1)
+    def shared_by(self, programs: Sequence[TargetsReached]) -> CommonMotion | None:
+        """Return what the frame of the programs takes up of all errors, as of all corrections."""
+        if not any(len(targets.joints) for targets in programs):
+            return None
+        return common_motion(
+            (tips, moved, turned)
+            for targets in programs
+            for first in range(0, len(targets.joints), _AT_ONCE)
+            for moved, turned, tips in (self._motions(targets, slice(first, first + _AT_ONCE)),)
+        )
 
     def _motions(self, targets: TargetsReached, part: slice) -> tuple[Array, Array, Array]:
         """Return motions and turns of tips ``(m, 3, parameters)``, and the tips ``(m, 3)``, in the world."""

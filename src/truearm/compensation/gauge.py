@@ -3,13 +3,15 @@
 After a calibration the shift of the base against joint 1, and of the tool against joint 6, is arbitrary: readings of a
 target say where the target is, and not where the robot's base plate and its flange are. Written into a program, that
 shift would move all of it. So unless somebody says where a program's tool and frames really are, the identified flange
-is taken to be where it agrees best with the nominal one all over the workspace, and the base to be where the mean
-correction of the program is zero.
+is taken to be where it agrees best with the nominal one all over the workspace, and the base to be where the
+corrections of the program have no part that a motion of all targets together would make. A work object that was
+located by points with the uncorrected robot is in its place then.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -23,8 +25,11 @@ from truearm.modeling.transform import rotation_from_vector, rotation_vector
 #: Configurations on which flange and base are compared.
 _CONFIGURATIONS: Final = 300
 _ROUNDS: Final = 8
-#: The mean correction counts as zero below this [m, rad].
+#: The common part of the corrections counts as zero below this [m, rad].
 _ZERO: Final = 1e-10
+#: What a turn of a tool counts as beside a shift of its tip [m]. Work objects are located by points: orientations tell
+#: only how targets are turned together that are all in one place or on one line.
+_TOOL: Final = 1e-3
 
 
 def best_agreement(robot: Robot) -> tuple[Array, Array]:
@@ -84,7 +89,7 @@ def flange_rates(robot: Robot, names: Sequence[str]) -> Array:
 
 
 def base_shift(corrected: Callable[[Array], tuple[Array, Array]], start: Array) -> Array:
-    """Return where the nominal base has to be in the identified one for the mean correction of targets to be zero.
+    """Return where the nominal base has to be in the identified one for the corrections to have no common part.
 
     Parameters
     ----------
@@ -97,23 +102,70 @@ def base_shift(corrected: Callable[[Array], tuple[Array, Array]], start: Array) 
     Returns
     -------
     base
-        ``T_base_nominalbase``, ``(4, 4)``. The mean change of positions is zero, and so is the mean rotation vector
-        of the changes of orientations.
+        ``T_base_nominalbase``, ``(4, 4)``. The :func:`common_motion` of the changes is zero.
     """
     base = start
     for _ in range(_ROUNDS):
         tips, new_tips = corrected(base)
         if not len(tips):
             break
-        moved = (new_tips[:, :3, 3] - tips[:, :3, 3]).mean(axis=0)
-        turned = turns_between(tips, new_tips).mean(axis=0)
-        if np.abs(moved).max() < _ZERO and np.abs(turned).max() < _ZERO:
+        places = tips[:, :3, 3]
+        moved, turned = (new_tips[:, :3, 3] - places)[:, :, None], turns_between(tips, new_tips)[:, :, None]
+        motion = common_motion([(places, moved, turned)])
+        if max(np.abs(motion.moved).max(), np.abs(motion.turned).max()) < _ZERO:
             break
         centre = np.eye(4)
-        centre[:3, 3] = tips[:, :3, 3].mean(axis=0)
+        centre[:3, 3] = motion.middle
         # Base and correction move alike: where the base goes, the answers, and with them what is written, go as well.
-        base = centre @ _small(-np.concatenate([moved, turned])) @ np.linalg.inv(centre) @ base
+        step = _small(-np.concatenate([motion.moved[:, 0], motion.turned[:, 0]]))
+        base = centre @ step @ np.linalg.inv(centre) @ base
     return base
+
+
+@dataclass(frozen=True, eq=False)
+class CommonMotion:
+    """The motions of one rigid body that are nearest to those of many targets.
+
+    Attributes
+    ----------
+    moved, turned
+        Motion of the middle [m], and rotation vector, ``(3, k)`` each.
+    middle
+        Of the targets, ``(3,)`` [m].
+    """
+
+    moved: Array
+    turned: Array
+    middle: Array
+
+    def of(self, places: Array) -> Array:
+        """Return what it does to places ``(n, 3)``: ``(n, 3, k)`` [m]."""
+        return np.asarray(self.moved + np.cross(self.turned, (places - self.middle)[:, :, None], axis=-2))
+
+
+def common_motion(parts: Iterable[tuple[Array, Array, Array]]) -> CommonMotion:
+    """Return the motions that all targets have in common, by least squares.
+
+    Parameters
+    ----------
+    parts
+        Of the targets: places ``(n, 3)`` [m], motions [m] and rotation vectors [rad], ``(n, 3, k)`` each. Targets of
+        all parts together share the motions.
+    """
+    count, place, moments = 0, np.zeros(3), np.zeros((3, 3))
+    moved: Array | float = 0.0
+    turned: Array | float = 0.0
+    for places, motions, turns in parts:
+        count += len(places)
+        place = place + places.sum(axis=0)
+        moments += places.T @ places
+        moved = moved + motions.sum(axis=0)
+        turned = turned + (np.cross(places[:, :, None], motions, axis=-2) + _TOOL**2 * turns).sum(axis=0)
+    middle, mean = place / count, np.asarray(moved / count)
+    spread = moments - count * np.outer(middle, middle)
+    inertia = (np.trace(spread) + count * _TOOL**2) * np.eye(3) - spread
+    turn = np.asarray(turned) - count * np.cross(middle[:, None], mean, axis=0)
+    return CommonMotion(mean, np.linalg.solve(inertia, turn), middle)
 
 
 def turns_between(one: Array, other: Array) -> Array:

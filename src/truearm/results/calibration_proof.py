@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from truearm.identification.judging.expected_error import ExpectedError, covariance_root
+from truearm.identification.judging.expected_error import ExpectedError, covariance_root, uncertain_names
 from truearm.identification.solving.fit import Fit, Status
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.parameters import PLACES
@@ -49,7 +49,7 @@ def proof_of(
     errors = [notice for notice in warnings if notice.level == "error"]
     repeated = [notice for notice in warnings if notice.code == _REPEATED]
     lower_bound = expected.lower_bound
-    names, root = covariance_root(fit)
+    names, root = uncertain_names(fit), covariance_root(fit, fit.covariance)
     parameters, covariance = [fit.robot.parameters[name] for name in names], root @ root.T
     region = list(zip(training.joints.min(axis=0).tolist(), training.joints.max(axis=0).tolist(), strict=True))
     if before is not None:

@@ -133,24 +133,48 @@ class PositionErrors:
     @cached_property
     def _errors(self) -> dict[str, Array]:
         """Errors of the parameters by name, ``(draws,)`` each [SI]."""
-        names, root = covariance_root(self.fit)
-        normal = np.random.default_rng(self.seed).standard_normal((self.draws, root.shape[1]))
-        if self.draws > 2 * root.shape[1]:
-            # So few draws have a covariance of their own: they are turned and stretched to the one they are drawn from.
-            normal -= normal.mean(axis=0)
-            normal = np.linalg.qr(normal)[0] * math.sqrt(self.draws)
-        return dict(zip(names, root @ normal.T * self._scale, strict=True))
+        fit, names = self.fit, uncertain_names(self.fit)
+        rng = np.random.default_rng(self.seed)
+        errors, last = np.zeros((len(names), self.draws)), len(fit.covariance_parts) - 1
+        for number, (part, scale) in enumerate(zip(fit.covariance_parts, self._scales, strict=True)):
+            root = covariance_root(fit, part.covariance, held=number == last)
+            normal = rng.standard_normal((self.draws, root.shape[1]))
+            if self.draws > 2 * root.shape[1]:
+                # So few draws have a covariance of their own: they are turned and stretched to the one they are of.
+                normal -= normal.mean(axis=0)
+                normal = np.linalg.qr(normal)[0] * math.sqrt(self.draws)
+            errors += root @ normal.T * scale
+        return dict(zip(names, errors, strict=True))
 
     @cached_property
-    def _scale(self) -> Array:
-        """How many times larger the errors of each draw are, ``(draws,)``: Student's distribution.
+    def _scales(self) -> list[Array]:
+        """How many times larger the errors of each draw are, ``(draws,)``, by the part of the covariance.
 
-        Variances that were estimated are uncertain themselves (Gelman et al. 2013, section 3.2).
+        Variances that were estimated are uncertain themselves: errors have Student's distribution (Gelman et al. 2013,
+        section 3.2).
         """
-        if self.fit.declared and self.fit.excess == 1.0 and not self.fit.joint_error.any():
-            return np.ones(self.draws)
-        freedom = _freedom(self.fit)
-        return np.asarray(np.sqrt(freedom / np.random.default_rng((self.seed, 3)).chisquare(freedom, self.draws)))
+        return [
+            _student(part.freedom, chance)
+            for part, chance in zip(self.fit.covariance_parts, self._chances, strict=True)
+        ]
+
+    @cached_property
+    def _joint_scale(self) -> Array:
+        """Likewise of the errors of the joints, ``(draws, joints)``."""
+        fit = self.fit
+        chance = np.tile(self._chances[0], (len(fit.joint_error), 1))
+        for part, mine in zip(fit.covariance_parts, self._chances, strict=True):
+            chance[list(part.joints)] = mine
+        return np.stack(
+            [_student(known, mine) for known, mine in zip(fit.joint_freedom.tolist(), chance, strict=True)]
+        ).T
+
+    @cached_property
+    def _chances(self) -> Array:
+        """Probabilities of lower variances than those of each draw, evenly spread, ``(parts, draws)``."""
+        rng = np.random.default_rng((self.seed, 3))
+        evenly = np.tile((np.arange(self.draws) + 0.5) / self.draws, (len(self.fit.covariance_parts), 1))
+        return rng.permuted(evenly, axis=1)
 
     @cached_property
     def _bent(self) -> bool:
@@ -170,7 +194,7 @@ class PositionErrors:
         fit, at = self.fit, self.fit.robot.loaded(joints)
         shape = (self.draws, len(joints), len(fit.joint_error))
         normal = np.random.default_rng((self.seed, 1)).standard_normal(shape) if fit.joint_error.any() else None
-        shared = None if normal is None else normal * fit.joint_error * self._scale[:, None, None]
+        shared = None if normal is None else normal * fit.joint_error * self._joint_scale[:, None]
         moves: Iterable[Array] = _moves(fit, at, self._errors, shared, exact=self._bent)
         if fit.gauge_freedoms:
             moves = _without_gauge(fit, at, np.stack([*moves]))
@@ -298,35 +322,55 @@ def _omissions(fit: Fit, remainder: float, overall: Expectation, *, plausible: b
         yield "what the model cannot express is in it only as far as it was seen where the robot was measured"
 
 
-def _freedom(fit: Fit) -> float:
-    """Return the degrees of freedom that the readings left to the estimate of their noise."""
-    rows = int(np.isfinite(fit.weight).sum()) * (3 if "position" in fit.sigma else 1)
-    spent = sum(fit.robot.parameters[name].informed or 0.0 for name in fit.free.names)
-    return max(rows - spent, _LEAST_FREEDOM)
+def _student(freedom: float, chance: Array) -> Array:
+    """Return how many times larger than estimated deviations are, ``(draws,)``, with such probabilities."""
+    if math.isinf(freedom):
+        return np.ones(len(chance))
+    from scipy.special import gammaincinv
+
+    known = max(freedom, _LEAST_FREEDOM)
+    return np.asarray(np.sqrt(known / (2.0 * gammaincinv(known / 2.0, chance))))
 
 
-def covariance_root(fit: Fit) -> tuple[tuple[str, ...], Array]:
-    """Return names of parameters and a root of the covariance of their errors, ``(parameters, rank)``.
+def uncertain_names(fit: Fit) -> tuple[str, ...]:
+    """Return the names of the parameters that have errors: those that were free, and those held as redundant."""
+    return (*fit.free.names, *(r.dropped for r in fit.redundancies))
+
+
+def covariance_root(fit: Fit, covariance: Array, *, held: bool = True) -> Array:
+    """Return a root ``(parameters, rank)`` of a covariance, for the parameters of :func:`uncertain_names`.
 
     Where there were no priors, parameters that the data do not tell apart from others were held. They are off by what
     the priors of all that take part allow, along combinations that no reading sees: nothing at the configurations that
     were measured, but perhaps elsewhere.
+
+    Parameters
+    ----------
+    covariance
+        Of the free parameters, ``(free, free)``.
+    held
+        Whether that of the held ones is added.
     """
-    names = (*fit.free.names, *(r.dropped for r in fit.redundancies))
+    names = uncertain_names(fit)
     size = np.array([fit.start.parameters[name].prior for name in names])
     count = len(fit.free.names)
-    covariance = np.zeros((len(names), len(names)))
-    covariance[:count, :count] = fit.covariance / np.outer(size[:count], size[:count])
-    if fit.redundancies:
-        index = {name: place for place, name in enumerate(names)}
-        along = np.zeros((len(fit.redundancies), len(names)))
-        for row, redundancy in zip(along, fit.redundancies, strict=True):
-            for name, coefficient in redundancy.members.items():
-                if name in index:
-                    row[index[name]] = coefficient / size[index[name]]
-        covariance += along.T @ np.linalg.pinv(along @ along.T) @ along
-    value, direction = np.linalg.eigh(covariance)
-    return names, size[:, None] * direction * np.sqrt(np.maximum(value, 0.0))
+    whole = np.zeros((len(names), len(names)))
+    whole[:count, :count] = covariance / np.outer(size[:count], size[:count])
+    if fit.redundancies and held:
+        whole += _held_back(fit, names, size)
+    value, direction = np.linalg.eigh(whole)
+    return np.asarray(size[:, None] * direction * np.sqrt(np.maximum(value, 0.0)))
+
+
+def _held_back(fit: Fit, names: tuple[str, ...], size: Array) -> Array:
+    """Return the covariance along the combinations that were held, per prior, ``(parameters, parameters)``."""
+    index = {name: place for place, name in enumerate(names)}
+    along = np.zeros((len(fit.redundancies), len(names)))
+    for row, redundancy in zip(along, fit.redundancies, strict=True):
+        for name, coefficient in redundancy.members.items():
+            if name in index:
+                row[index[name]] = coefficient / size[index[name]]
+    return np.asarray(along.T @ np.linalg.pinv(along @ along.T) @ along)
 
 
 def _moves(

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.identification.solving.arrivals import Arrivals
-from truearm.identification.solving.variance_components import widening
+from truearm.identification.solving.variance_components import CovariancePart, widening
 from truearm.modeling.chain import Array
 
 #: Share that an arrival may have in what is known of a direction, for its pull to be made up for.
@@ -27,8 +27,10 @@ _LEAST_FREEDOM: Final = 1.0
 
 def cluster_covariance(
     rows: Array, pull: Array, arrivals: Arrivals, uncertain: NDArray[np.bool_], priors: bool
-) -> Array:
+) -> tuple[Array, tuple[CovariancePart, ...]]:
     """Return the covariance of parameters scaled by their priors, zero for those that are not uncertain.
+
+    With it come its parts: of the arrivals' scatter, without what that is uncertain by, and of the priors.
 
     Parameters
     ----------
@@ -53,10 +55,11 @@ def cluster_covariance(
     X = A @ directions
     pulls = arrivals.products(pull[:, uncertain] @ directions, np.ones((len(pull), 1)))[..., 0]
     meat, freedom = _meat(X, pulls, arrivals, directions, priors)
-    known = directions.T @ directions if priors else 0.0
-    covariance = np.zeros((len(uncertain), len(uncertain)))
-    covariance[np.ix_(uncertain, uncertain)] = directions @ (widening(freedom) ** 2 * meat + known) @ directions.T
-    return covariance
+    known = directions.T @ directions if priors else np.zeros((count, count))
+    whole = CovariancePart(directions @ (widening(freedom) ** 2 * meat + known) @ directions.T, np.inf)
+    scatter = CovariancePart(directions @ meat @ directions.T, freedom)
+    rest = CovariancePart(directions @ known @ directions.T, np.inf)
+    return whole.among(uncertain).covariance, (scatter.among(uncertain), rest.among(uncertain))
 
 
 def _meat(X: Array, pulls: Array, arrivals: Arrivals, directions: Array, priors: bool) -> tuple[Array, float]:

@@ -31,6 +31,7 @@ from truearm.identification.solving.rounds import (
     noise_found,
 )
 from truearm.identification.solving.solver import SMALL
+from truearm.identification.solving.variance_components import CovariancePart
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
 from truearm.modeling.parameters import FreeParameters
@@ -85,6 +86,8 @@ class Fit:
         95 %: where variances are known from few readings, it is as much wider as one of Student's t. Readings of an
         arrival may hang together. Outliers that lie to one side bias a robust fit, and the covariance does not contain
         that.
+    covariance_parts
+        The covariance by its sources, and without what their variances are uncertain by.
     redundancies
         Parameters held because the data cannot tell them apart, with the combination.
     at_bound
@@ -107,6 +110,8 @@ class Fit:
     joint_error
         Standard deviation of the error of each joint that all readings of an arrival share, ``(joints,)`` [rad or m]:
         repeatability plus what the model leaves. Zero where none was found.
+    joint_freedom
+        Degrees of freedom behind its square, ``(joints,)``; infinite where none was found.
     scattered
         Whether the covariance follows from the scatter of the arrivals: for losses other than the linear one, and where
         errors of the joints do not explain how the residuals of an arrival hang together.
@@ -123,6 +128,7 @@ class Fit:
     status: Status
     free: FreeParameters
     covariance: Array
+    covariance_parts: tuple[CovariancePart, ...]
     redundancies: tuple[Redundancy, ...]
     at_bound: tuple[str, ...]
     unobservable: tuple[str, ...]
@@ -132,6 +138,7 @@ class Fit:
     declared: bool
     excess: float
     joint_error: Array
+    joint_freedom: Array
     scattered: bool
     weight: Array
     steps: int
@@ -220,7 +227,8 @@ def _fit(solved: Solved, model: Model, loss: Loss) -> Fit:
     problem, solution, start, limits = solved.problem, solved.solution, solved.start, solved.limits
     free, x = problem.free, solution.vector
     at_bound = bound_by(solution, free, limits)
-    components, joint_error = solved.components, np.zeros(len(start.joints))
+    components, count = solved.components, len(start.joints)
+    joint_error, joint_freedom = np.zeros(count), np.full(count, np.inf)
     noise = noise_found(problem, solution, loss)
     declared = {problem.kind(b) for b in problem.blocks if b.declared} - {SETUP}
     if components is None:
@@ -228,12 +236,13 @@ def _fit(solved: Solved, model: Model, loss: Loss) -> Fit:
         excess *= problem.widened
     else:
         excess, joint_error = problem.widened, np.sqrt(components.likeliest.joints)
+        joint_freedom = components.likeliest.freedom
     scattered = components is None or not components.holds
     if components is not None and not scattered:
-        covariance = components.covariance
+        covariance, parts = components.covariance, components.parts
     else:
         pull, rows = pulls(loss, solution.residual, solution.jacobian, problem.components)
-        covariance = cluster_covariance(
+        covariance, parts = cluster_covariance(
             rows * free.prior, pull * free.prior, Arrivals(problem.arrivals), ~at_bound, problem.priors
         )
     covariance = covariance * np.outer(free.prior, free.prior)
@@ -283,6 +292,7 @@ def _fit(solved: Solved, model: Model, loss: Loss) -> Fit:
         status=status,
         free=free,
         covariance=covariance,
+        covariance_parts=tuple(part.scaled(free.prior) for part in parts),
         redundancies=solved.redundancies,
         at_bound=tuple(n for n, bound in zip(free.names, at_bound, strict=True) if bound),
         unobservable=unobservable,
@@ -292,6 +302,7 @@ def _fit(solved: Solved, model: Model, loss: Loss) -> Fit:
         declared=declared == set(noise),
         excess=excess,
         joint_error=joint_error,
+        joint_freedom=joint_freedom,
         scattered=scattered,
         weight=weight,
         steps=solution.steps,

@@ -23,6 +23,7 @@ from truearm.identification.solving.redundancy import Redundancy, find_redundanc
 from truearm.identification.solving.solver import SMALL, Solution, solve
 from truearm.identification.solving.variance_components import (
     Components,
+    CovariancePart,
     beyond_chance,
     variance_components,
 )
@@ -229,9 +230,8 @@ def components_found(
             if beyond_chance(float(found.squares[place]), max(float(found.freedom[place]), 1e-3)):
                 free[place] = True
                 found = variance_components(at, free, least, alike)
-    covariance = np.zeros((len(prior), len(prior)))
-    covariance[np.ix_(uncertain, uncertain)] = found.covariance
-    return replace(found, covariance=covariance)
+    covariance = CovariancePart(found.covariance, np.inf).among(uncertain).covariance
+    return replace(found, covariance=covariance, parts=tuple(part.among(uncertain) for part in found.parts))
 
 
 def factors_of(problem: Problem) -> tuple[list[str], NDArray[np.intp]]:

@@ -11,7 +11,7 @@ found by Newton steps in the logarithms of the variances, with the average of th
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -48,10 +48,43 @@ class Variances:
         What the variance of the equations of each factor is, by the variance assumed, ``(factors,)``.
     joints
         Variance of the error of each joint that the readings of an arrival share [rad^2 or m^2], ``(joints,)``.
+    freedom
+        Degrees of freedom behind the variance of each joint (Satterthwaite 1946), ``(joints,)``; infinite where there
+        is none.
     """
 
     factors: Array
     joints: Array
+    freedom: Array
+
+
+@dataclass(frozen=True, eq=False)
+class CovariancePart:
+    """What one source of error adds to the covariance of the parameters.
+
+    Attributes
+    ----------
+    covariance
+        Of the parameters, ``(parameters, parameters)``, if the variance of the source is as estimated.
+    freedom
+        Degrees of freedom behind that variance; infinite where it is known.
+    joints
+        Indices of the joints whose errors are the source.
+    """
+
+    covariance: Array
+    freedom: float
+    joints: tuple[int, ...] = ()
+
+    def among(self, places: NDArray[np.bool_]) -> CovariancePart:
+        """Return it among more parameters, `places` of which these are; zero for the others."""
+        covariance = np.zeros((len(places), len(places)))
+        covariance[np.ix_(places, places)] = self.covariance
+        return replace(self, covariance=covariance)
+
+    def scaled(self, sizes: Array) -> CovariancePart:
+        """Return it for parameters that are so many times as large."""
+        return replace(self, covariance=self.covariance * np.outer(sizes, sizes))
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +104,8 @@ class Components:
         Whether the residuals look as they do with the variances that readings are weighed by.
     covariance
         Of the parameters, per prior, ``(parameters, parameters)``, with the uncertainty of these variances.
+    parts
+        The same by its sources, and without that uncertainty: per prior too.
     squares, freedom
         Sum of the squared residuals of each factor, divided by these variances, and what to expect of it,
         ``(factors,)``.
@@ -81,6 +116,7 @@ class Components:
     estimated: tuple[bool, ...]
     holds: bool
     covariance: Array
+    parts: tuple[CovariancePart, ...]
     squares: Array
     freedom: Array
 
@@ -118,7 +154,7 @@ def variance_components(
     noise = [index for index, free in enumerate(estimated) if free and start[index] > least[index]]
     if before is None:
         alone, best = _with_and_without(moments, start, kinds, noise)
-        likeliest = Variances(best.factors, best.joints)
+        likeliest = _variances(best, kinds, noise)
         holds = (best is alone or _agree(alone, best)) and _independent(best)
         best = best if holds else alone
     else:
@@ -128,25 +164,80 @@ def variance_components(
         best = _maximised(moments, best, [kind for kind in kinds if best.joints[kind].any()], noise)
         if _alone_in(best):
             best = _maximised(moments, Likelihood(moments, start, np.zeros(moments.M.shape[-1])), [], noise)
-        holds, likeliest = before.holds, Variances(best.factors, best.joints)
+        holds, likeliest = before.holds, _variances(best, kinds, noise)
         if before.likeliest is not before.weighing:
             factors = before.likeliest.factors / before.weighing.factors * best.factors
-            likeliest = Variances(factors, before.likeliest.joints)
+            likeliest = replace(before.likeliest, factors=factors)
     taken = [kind for kind in kinds if best.joints[kind].any()]
     squares, traces, _ = best.slopes(range(len(estimated)))
-    inverse = np.asarray(np.linalg.solve(best.L, np.eye(len(best.L))), dtype=np.float64)
-    turned = at.directions @ inverse.T
-    covariance = turned @ _widened(best, inverse, [*taken, *noise]) @ turned.T
-    weighing = Variances(best.factors, best.joints)
+    covariance, parts = _covariance(best, taken, noise)
+    weighing = likeliest if holds else _variances(best, kinds, noise)
     return Components(
-        weighing if holds else likeliest,
+        likeliest,
         weighing,
         tuple(estimated),
         holds,
         covariance,
+        parts,
         squares * best.factors,
         traces * best.factors,
     )
+
+
+def _variances(state: Likelihood, kinds: Sequence[NDArray[np.intp]], noise: Sequence[int]) -> Variances:
+    """Return the variances of a state, and how well those of the joints are known."""
+    taken = [kind for kind in kinds if state.joints[kind].any()]
+    freedom = np.full(len(state.joints), np.inf)
+    for kind, known in zip(taken, _freedoms(_relative(state, [*taken, *noise])), strict=False):
+        freedom[kind] = known
+    return Variances(state.factors, state.joints, freedom)
+
+
+def _relative(state: Likelihood, kinds: Sequence[NDArray[np.intp] | int]) -> Array:
+    """Return the covariance of the logarithms of variances, ``(kinds, kinds)``."""
+    if not kinds:
+        return np.zeros((0, 0))
+    _, _, information = state.slopes(kinds)
+    value = np.array([state.factors[i] if isinstance(i, int) else state.joints[i[0]] for i in kinds])
+    return np.asarray(np.linalg.inv(information * np.outer(value, value) + _LEAST_INFORMATION * np.eye(len(kinds))))
+
+
+def _freedoms(relative: Array) -> list[float]:
+    """Return the degrees of freedom of variances from the covariance of their logarithms."""
+    return [2.0 / float(share) for share in np.diag(relative)]
+
+
+def _covariance(
+    state: Likelihood, taken: Sequence[NDArray[np.intp]], noise: Sequence[int]
+) -> tuple[Array, tuple[CovariancePart, ...]]:
+    """Return the covariance of the parameters, with what the variances are uncertain by, and its parts without.
+
+    A variance v_i that were another one would change the covariance of the same estimate in proportion:
+    ``C A' V^-1 V_i V^-1 A C`` is the part of each, and what is left is of the priors.
+    """
+    directions = state.of.at.directions
+    inverse = np.asarray(np.linalg.solve(state.L, np.eye(len(state.L))), dtype=np.float64)
+    turned = directions @ inverse.T
+    kinds: list[NDArray[np.intp] | int] = [*taken, *noise]
+    relative = _relative(state, kinds)
+    changes = []
+    for kind in [*taken, *range(len(state.factors))]:
+        size = state.factors[kind] if isinstance(kind, int) else state.joints[kind[0]]
+        changes.append(size * inverse @ state.curvature(kind) @ inverse.T)
+    known = dict(zip([*range(len(taken)), *(len(taken) + index for index in noise)], _freedoms(relative), strict=True))
+    parts = [
+        CovariancePart(
+            turned @ change @ turned.T,
+            known.get(place, np.inf),
+            tuple(taken[place].tolist()) if place < len(taken) else (),
+        )
+        for place, change in enumerate(changes)
+    ]
+    if state.of.at.priors:
+        rest = np.eye(len(inverse)) - sum(changes)
+        parts.append(CovariancePart(turned @ rest @ turned.T, np.inf))
+    free = [changes[place] for place in known]
+    return turned @ _widened(free, relative, len(inverse)) @ turned.T, tuple(parts)
 
 
 def _with_and_without(
@@ -288,25 +379,18 @@ def _at(moments: Moments, here: Likelihood, kinds: Sequence[NDArray[np.intp] | i
     return Likelihood(moments, factors, joints)
 
 
-def _widened(state: Likelihood, inverse: Array, kinds: Sequence[NDArray[np.intp] | int]) -> Array:
+def _widened(changes: Sequence[Array], relative: Array, count: int) -> Array:
     """Return what the covariance of the parameters is multiplied by, in directions where that is one.
 
     The variance f of a combination of parameters is itself estimated, with the variance Var(f) that follows from the
-    information W on the variances. Satterthwaite's degrees of freedom are ``2 f^2 / Var(f)``, and an interval of
-    Student's t is ``t / 1.96`` times as wide. That is no covariance: each combination has its own factor. This is the
-    smallest one that is quadratic and nowhere narrower: with ``E_i`` the relative change of the covariance by a
-    variance, ``Var(f) / f <= c' (sum_ij W^-1_ij E_i E_j) c`` by Cauchy and Schwarz.
+    covariance W of the logarithms of the variances. Satterthwaite's degrees of freedom are ``2 f^2 / Var(f)``, and an
+    interval of Student's t is ``t / 1.96`` times as wide. That is no covariance: each combination has its own factor.
+    This is the smallest one that is quadratic and nowhere narrower: with ``E_i`` the relative change of the covariance
+    by a variance, ``Var(f) / f <= c' (sum_ij W_ij E_i E_j) c`` by Cauchy and Schwarz.
     """
-    count = len(inverse)
-    if not kinds:
+    if not changes:
         return np.eye(count)
-    _, _, information = state.slopes(kinds)
-    value = np.array([state.factors[i] if isinstance(i, int) else state.joints[i[0]] for i in kinds])
-    relative = np.linalg.inv(information * np.outer(value, value) + _LEAST_INFORMATION * np.eye(len(kinds)))
-    changes = []
-    for kind, size in zip(kinds, value.tolist(), strict=True):
-        changes.append(size * inverse @ state.curvature(kind) @ inverse.T)
-    weighted = [sum(relative[i, j] * changes[j] for j in range(len(kinds))) for i in range(len(kinds))]
+    weighted = [sum(relative[i, j] * changes[j] for j in range(len(changes))) for i in range(len(changes))]
     spread = sum(change @ other for change, other in zip(changes, weighted, strict=True))
     sizes, vectors = np.linalg.eigh(0.5 * (spread + spread.T))
     sizes = np.maximum(sizes, 0.0)  # where no reading is left over, rounding may say less than nothing

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 import truearm
+from truearm.library import load_robot
 from truearm.modeling.chain import Array
 from truearm.modeling.transform import quaternion_from_rotation
 
@@ -204,3 +205,34 @@ def test_a_robot_shows_the_pose_that_the_pendant_shows() -> None:
     assert (turn(2, r) @ turn(1, p) @ turn(0, w))[:3, :3] == pytest.approx(there[:3, :3])
     zero = truearm.show(ROBOT, joints=np.zeros(6)).lines()
     assert "  x 475.000  y 0.000  z 375.000 mm" in zero
+
+
+#: Joints of ROS's ur_description for a UR5: parent, child, place, turn, and axis of those that move. The link `base` is
+#: the pendant's Base.
+UR5_LINKS: Final = (
+    ("base_link", "base", "0 0 0", "0 0 -3.141592653589793", None),
+    ("base_link", "shoulder", "0 0 0.089159", "0 0 0", "0 0 1"),
+    ("shoulder", "upper_arm", "0 0.13585 0", "0 1.5707963267948966 0", "0 1 0"),
+    ("upper_arm", "forearm", "0 -0.1197 0.425", "0 0 0", "0 1 0"),
+    ("forearm", "wrist_1", "0 0 0.39225", "0 1.5707963267948966 0", "0 1 0"),
+    ("wrist_1", "wrist_2", "0 0.093 0", "0 0 0", "0 0 1"),
+    ("wrist_2", "wrist_3", "0 0 0.09465", "0 0 0", "0 1 0"),
+    ("wrist_3", "tool0", "0 0.0823 0", "-1.5707963267948966 0 0", None),
+)
+
+
+def test_a_ur_shows_its_pose_in_base_and_not_in_base_link(tmp_path: Path) -> None:
+    """The pose of a UR5 at zero joints is known: X -817.25, Y -191.45, Z -5.49 mm, RX 1.571."""
+    links = dict.fromkeys(name for parent, child, *_ in UR5_LINKS for name in (parent, child))
+    text = '<robot name="ur5">' + "".join(f'<link name="{link}"/>' for link in links)
+    for parent, child, xyz, rpy, axis in UR5_LINKS:
+        kind = "fixed" if axis is None else "revolute"
+        moves = "" if axis is None else f'<axis xyz="{axis}"/><limit lower="-6" upper="6"/>'
+        text += f'<joint name="to_{child}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+        text += f'<origin xyz="{xyz}" rpy="{rpy}"/>{moves}</joint>'
+    (tmp_path / "ur5.urdf").write_text(text + "</robot>")
+    for robot, own in (("ur5", -817.25), (str(tmp_path / "ur5.urdf"), 817.25)):
+        assert 1e3 * load_robot(robot).forward(np.zeros(6))[0][0, 0] == pytest.approx(own)
+        pose = truearm.show(robot, joints=np.zeros(6)).summary()["at"]["flange"]["controller"]
+        assert pose["position_mm"] == pytest.approx([-817.25, -191.45, -5.491], abs=1e-6)
+        assert pose["rotation vector"] == pytest.approx([np.pi / 2, 0.0, 0.0], abs=1e-9)

@@ -111,6 +111,13 @@ def test_converting_there_and_back_changes_nothing(data: Dataset) -> None:
     assert in_model_joints(robot, back) is back
 
 
+def test_joint_positions_that_repeat_stay_equal_to_the_last_digit() -> None:
+    joints = np.random.default_rng(0).uniform(-2, 2, size=(101, 6))
+    twice = np.concatenate([joints, joints[::-1]])
+    read = in_model_joints(load_robot(FANUC), Dataset.of(twice, np.ones((202, 3)), joints_are="controller"))
+    assert (read.joints[:101] == read.joints[:100:-1]).all()
+
+
 def test_slides_and_zeros(tmp_path: Path) -> None:
     file = tmp_path / "sliding.yaml"
     file.write_text(SLIDING)

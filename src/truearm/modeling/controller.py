@@ -85,7 +85,9 @@ class Controller:
         coupled = turned * self.signs if self.signs else turned
         if not self.couplings:
             return coupled
-        return np.asarray(np.linalg.solve(self.coupling(counted.shape[1]), coupled.T).T, float)
+        # Summed row by row: equal readings give joint positions that are equal to the last digit, wherever they stand.
+        undone = np.linalg.inv(self.coupling(counted.shape[1]))
+        return np.asarray((undone * coupled[:, None, :]).sum(axis=2), float)
 
     def check_counts(self, robot: str, where: str | None = None) -> None:
         """Refuse joint positions of a controller of which it is not said how it counts.

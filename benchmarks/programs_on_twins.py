@@ -91,9 +91,12 @@ def one(seed: int) -> dict[str, Any]:
             after = RAPID.read([Source(program, text)])
             misses = [missed(twin, calibration.robot, p, found.before, rows, measured) for p in (found.program, after)]
             made["before"], made[name] = (round(float(m.mean()) * 1e3, 4) for m in misses)
+            made[f"expected_{name}"] = round(float(done.files[0].expected[1].mean()) * 1e3, 4)
             made["expected"] = [
                 round(float(np.mean(v[rows])) * 1e3, 4) for v in (found.expected.before, found.expected.after)
             ]
+            spans = done.files[0].intervals
+            made[f"interval_{name}"] = [round(1e3 * v, 4) for v in spans[1]] if spans else None
             if name == "judged":
                 made["kept"] = int(sum(not found.corrected[row] for row in rows))
                 made["targets"] = len(rows)
@@ -215,6 +218,11 @@ def missed(twin: Twin, robot: Robot, program: Program, meant: Array, rows: Array
     return np.asarray(np.linalg.norm(a @ (u @ np.diag([1, 1, np.sign(np.linalg.det(u @ vt))]) @ vt) - b, axis=1))
 
 
+def _inside(true: float, interval: list[float]) -> bool:
+    """Return whether a true error lies in an interval."""
+    return interval[0] <= true <= interval[1]
+
+
 def summed_up(cases: list[dict[str, Any]]) -> dict[str, Any]:
     """Return how many programs got worse, and what was said of them."""
     known = [case for case in cases if "judged" in case]
@@ -232,6 +240,9 @@ def summed_up(cases: list[dict[str, Any]]) -> dict[str, Any]:
         "full_campaigns_with_a_notice": sum(bool({*NAMED} & {*c["said"]}) for c in full),
         "kept_targets_of_full_campaigns": [sum(c["kept"] for c in full), sum(c["targets"] for c in full)],
         "full_campaigns_judged_and_all_mm": [float(np.mean([c[n] for c in full])) for n in ("judged", "all")],
+        "corrected": len(used),
+        "inside_interval": sum(bool(c["interval_judged"]) and _inside(c["judged"], c["interval_judged"]) for c in used),
+        "within_factor_2": sum(0.5 < c["judged"] / c["expected_judged"] < 2.0 for c in used),
         "true_over_expected_before_median": float(np.median([c["before"] / c["expected"][0] for c in known])),
         "true_over_expected_after_median": float(np.median([c["all"] / c["expected"][1] for c in known])),
     }

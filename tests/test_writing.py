@@ -76,9 +76,9 @@ def test_half_a_character_is_not_written(tmp_path: Path) -> None:
 
 
 def test_a_file_in_the_folder_that_was_not_written_there_by_us_is_not_replaced(tmp_path: Path) -> None:
-    output_folder(tmp_path, ["a", "b"])
+    output_folder(tmp_path, ["a", "b"], ours=True)
     write_files(tmp_path, {"a": "1", "b": "2"})
-    output_folder(tmp_path, ["a", "b"])
+    output_folder(tmp_path, ["a", "b"], ours=True)
     (tmp_path / "report.html").write_text("mine")
     with pytest.raises(InputError, match=r"report\.html: this exists already, was not written here by truearm"):
-        output_folder(tmp_path, ["a", "b", "report.html"])
+        output_folder(tmp_path, ["a", "b", "report.html"], ours=True)

@@ -35,16 +35,24 @@ _TEMPORARY: Final = re.compile(r"\.truearm\.[0-9a-z_]{8,16}")
 
 
 def output_folder(
-    folder: object, names: Iterable[str] = (), read: Collection[Path] = (), parameter: str = "folder"
+    folder: object,
+    names: Iterable[str] = (),
+    read: Collection[Path] = (),
+    parameter: str = "folder",
+    *,
+    ours: bool = False,
 ) -> Path:
     """Return the folder that was given for files of some names, or refuse one that cannot be written to.
 
     Parameters
     ----------
     names
-        Of the files. One that stands there already must be in the folder's manifest: truearm has written it.
+        Of the files.
     read
         None of these files may be overwritten.
+    ours
+        Whether a file of one of the names that stands there already has to be in the folder's manifest: then truearm
+        has written it.
     """
     with refusals_of(parameter):
         path = writable_folder(path_argument(folder, parameter))
@@ -52,7 +60,7 @@ def output_folder(
         written = {name for one in sets_in(path) for name in one.files}
         for name in names:
             refuse_overwriting(path / name, read)
-            if name not in written and exists(path / name):
+            if ours and name not in written and exists(path / name):
                 raise InputError(
                     "this exists already, was not written here by truearm, and is not overwritten",
                     where=str(path / name),

@@ -63,15 +63,23 @@ def test_the_contract(truearm: Truearm, cell: Path) -> None:
         "language",
         "targets",
         "corrected",
+        "kept",
         "skipped",
         "shift_mm",
         "expected_mm",
         "not_better",
     }
     assert (program["file"], program["language"]) == ("plate.mod", "RAPID")
-    assert program["targets"] == program["corrected"] == 44
+    assert (program["targets"], program["corrected"], program["kept"]) == (44, 43, {"given by joints": 1})
     assert 0.05 < program["shift_mm"]["mean"] < program["shift_mm"]["max"] < 3.0
-    assert {warning["code"] for warning in told["warnings"]} == {"unproven", "frames-assumed", "tools-assumed"}
+    assert {warning["code"] for warning in told["warnings"]} == {
+        "unproven",
+        "frames-assumed",
+        "tools-assumed",
+        "computed-or-taught",
+        "joint-targets-kept",
+        "loads-taken",
+    }
     assert sorted(p.name for p in (cell / "out").iterdir()) == [
         "compensation.html",
         "plate.mod",
@@ -80,14 +88,19 @@ def test_the_contract(truearm: Truearm, cell: Path) -> None:
     ]
     record = json.loads((cell / "out" / "plate.mod.truearm.json").read_text())
     assert record["applied"]["frames"] == "assumed"
-    assert record["applied"]["payload_kg"] == 2.0
+    assert record["applied"]["payload_kg"] == {"tProbe": 2.7}
 
 
 def test_with_tool_and_frame_nothing_is_assumed(truearm: Truearm, cell: Path) -> None:
     code, said = run(truearm, cell, "--tool", cell / "cell.yaml", "--frame", cell / "cell.yaml", "--json")
     assert code == 0
     told = json.loads(said)
-    assert [warning["code"] for warning in told["warnings"]] == ["unproven"]
+    assert [w["code"] for w in told["warnings"]] == [
+        "computed-or-taught",
+        "unproven",
+        "joint-targets-kept",
+        "loads-taken",
+    ]
     # The frame is half a millimetre beside what the controller has.
     assert 0.5 < told["programs"][0]["shift_mm"]["mean"] < 3.0
 
@@ -95,6 +108,8 @@ def test_with_tool_and_frame_nothing_is_assumed(truearm: Truearm, cell: Path) ->
 def test_a_robot_without_a_payload_is_asked_for_one_if_it_bends(truearm: Truearm, cell: Path) -> None:
     for robot, asked in ((worn().with_payload(Payload()), True), (stiff(), False)):
         (cell / "calibrated.yaml").write_text(robot_text(robot))
+        program = cell / "plate.mod"
+        program.write_text(program.read_text().replace("[2.7,[50,25,100]", "[0.001,[0,0,0.001]"))
         code, said = run(truearm, cell, "--json", out=f"out{asked}")
         assert code == 0
         assert ("no-payload" in {warning["code"] for warning in json.loads(said)["warnings"]}) == asked
@@ -145,7 +160,7 @@ def test_what_cannot_be_corrected_is_listed_and_strict_writes_nothing(truearm: T
     code, said = run(truearm, cell)
     assert code == 0
     assert "plate.mod, line 9: out of reach of the nominal robot" in said
-    assert "41 of 44 targets" in said
+    assert "44 targets: 40 corrected, 1 kept (given by joints), 3 left unchanged" in said
     line = next(text for text in (cell / "out" / "plate.mod").read_text().splitlines() if "pHole1:" in text)
     assert "[[2000.0,20.0,0.0]" in line
     code, said = run(truearm, cell, "--strict", out="strict")
@@ -184,7 +199,7 @@ def test_a_move_on_which_the_posture_changes_is_not_split(truearm: Truearm, cell
     (cell / "turn.mod").write_text("\n".join(["MODULE Turn", "  PROC main()", *moves, "  ENDPROC", "ENDMODULE", ""]))
     code, said = run(truearm, cell, "--split", "0.01", program="turn.mod")
     assert code == 0
-    assert "2 of 2 targets corrected" in said
+    assert "2 targets: 2 corrected; moved by" in said
     assert "split by" not in said
     assert "the posture changes on the way" in said
     assert (cell / "out" / "turn.mod").read_text().count("MoveL") == 2
@@ -248,7 +263,7 @@ def test_one_joint_target_alone_has_nothing_left_to_correct(truearm: Truearm, ce
         "MODULE m\n  CONST jointtarget j:=[[0,0,0,0,30,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n"
         "  PROC main()\n    MoveAbsJ j,v100,fine,tool0;\n  ENDPROC\nENDMODULE\n"
     )
-    code, said = run(truearm, cell)
+    code, said = run(truearm, cell, "--joint-targets", "correct")
     assert code == 0
     assert "With so few targets (1) little or nothing of the correction is left" in said
     assert (cell / "out" / "plate.mod").read_bytes() == (cell / "plate.mod").read_bytes()
@@ -279,7 +294,7 @@ def test_what_was_left_or_is_on_an_edge_is_said_with_its_file(truearm: Truearm, 
     program = cell / "plate.mod"
     lines = [
         "  PROC edge()",
-        "    MoveL [[374,0,500],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;",
+        "    MoveL [[374,0,500],[0,0,1,0],[-1,-1,-1,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;",
         "    MoveL pNowhere,v100,fine,tool0;",
         "  ENDPROC",
         "ENDMODULE",

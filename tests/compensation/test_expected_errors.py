@@ -11,8 +11,9 @@ import pytest
 from tests.simulated import campaign
 
 from truearm.compensation.cell import Cell, Placed
-from truearm.compensation.expected_errors import ExpectedErrors
-from truearm.compensation.program_correction import Correction, corrected_programs
+from truearm.compensation.chosen_targets import Choice
+from truearm.compensation.correction import Correction
+from truearm.compensation.program_correction import corrected_programs
 from truearm.compensation.programs.program import Program, Source
 from truearm.compensation.programs.rapid import RAPID
 from truearm.jobs.calibrate import calibrate
@@ -69,16 +70,17 @@ def test_robots_drawn_from_the_covariance_miss_as_expected(robot: Robot, measure
         right = corrected(other, one, cell_of(other, stands) if measured else Cell({}, {})).after
         before.append(np.linalg.norm((right - found.before)[poses, :3, 3], axis=1))
         after.append(np.linalg.norm((right - found.after)[poses, :3, 3], axis=1))
-    said = ExpectedErrors(expected.before[poses], expected.after[poses], expected.worse[poses], expected.before[poses])
-    assert np.mean(after) == pytest.approx(said.after.mean(), rel=0.2)
-    assert np.mean(before) == pytest.approx(said.before.mean(), rel=0.2)
-    np.testing.assert_allclose(np.mean(after, axis=0), said.after, rtol=0.5)
+    assert np.mean(after) == pytest.approx(expected.after[poses].mean(), rel=0.2)
+    assert np.mean(before) == pytest.approx(expected.before[poses].mean(), rel=0.2)
+    np.testing.assert_allclose(np.mean(after, axis=0), expected.after[poses], rtol=0.5)
     worse = np.mean(np.array(after) > np.array(before))
-    assert worse == pytest.approx(said.worse.mean(), abs=0.05)
+    assert worse == pytest.approx(expected.worse[poses].mean(), abs=0.05)
+    low, high = expected.drawn.interval(found.corrected, poses) or (0.0, 0.0)
+    np.testing.assert_allclose(np.percentile(np.mean(after, axis=1), [5, 95]), [low, high], rtol=0.3)
 
 
 def corrected(robot: Robot, one: Program, cell: Cell) -> Correction:
-    return corrected_programs(robot, [one], cell, every=True).corrections[0]
+    return corrected_programs(robot, [one], cell, choice=Choice(every=True)).corrections[0]
 
 
 def test_the_error_of_the_joints_counts(robot: Robot) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from truearm.compensation.expected_errors import ExpectedErrors
+from truearm.compensation.expected_errors import DrawnErrors, ExpectedErrors
 from truearm.compensation.kept_targets import kept_targets, paths_of
 from truearm.compensation.programs.program import Program, Source
 from truearm.compensation.programs.rapid import RAPID
@@ -25,7 +25,8 @@ def rapid(*moves: str) -> Program:
 
 def expected(worse: list[float], path: float = 0.0) -> ExpectedErrors:
     size = np.full(len(worse), 1e-3)
-    return ExpectedErrors(size, size, np.array(worse), np.full(len(worse), path))
+    nothing = DrawnErrors(np.zeros(0, dtype=np.intp), np.zeros((0, 1)), np.zeros((0, 1)))
+    return ExpectedErrors(size, size, np.array(worse), np.full(len(worse), path), nothing)
 
 
 def kept(program: Program, worse: list[float], moved: list[float], path: float = 0.0) -> list[bool]:

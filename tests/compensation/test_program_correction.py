@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from truearm.compensation.cell import Cell, Placed
+from truearm.compensation.chosen_targets import Choice
 from truearm.compensation.program_correction import commanded, corrected_programs
 from truearm.compensation.programs.fanuc_ls import FANUC_LS
 from truearm.compensation.programs.program import Configuration, Program, Source
@@ -52,9 +53,12 @@ def worn(robot: Robot, size: float = 0.3) -> Robot:
 IRB120 = worn(load_robot("irb120"))
 
 
+EVERY = Choice(joint_targets=True)
+
+
 def test_joint_targets_alone_keep_to_the_base_that_was_measured() -> None:
     measured = Cell(FLANGE.tools, {"": Placed(None, Transform((0.0, 0.0, 0.001)))})
-    done = corrected_programs(IRB120, [rapid(JOINTS.format(10), JOINTS.format(30))], measured)
+    done = corrected_programs(IRB120, [rapid(JOINTS.format(10), JOINTS.format(30))], measured, choice=EVERY)
     assert (done.frames.tools, done.frames.frames) == ("identified", "identified")
     np.testing.assert_allclose(done.frames.base, Transform((0.0, 0.0, 0.001)).matrix, atol=1e-12)
     correction = done.corrections[0]
@@ -70,7 +74,7 @@ def test_programs_given_together_share_the_first_frame_that_was_measured() -> No
     poses = rapid(POSE.format(300, "\\WObj:=w"), POSE.format(310, "\\WObj:=w"))
     poses = replace(poses, frames={"w": defined})
     first, second = corrected_programs(
-        IRB120, [poses, rapid(JOINTS.format(10))], Cell(FLANGE.tools, frames)
+        IRB120, [poses, rapid(JOINTS.format(10))], Cell(FLANGE.tools, frames), choice=EVERY
     ).corrections
     assert first.corrected.all()
     position, _ = IRB120.world_poses(second.joints)
@@ -104,7 +108,7 @@ def test_a_track_is_reported_in_millimetres(tmp_path: Path) -> None:
     program.write_text(ls(joints("1000 mm", *six), joints("1500 mm", *six), joints("1200 mm", "40 deg", *six[1:])))
     cell = tmp_path / "cell.yaml"
     cell.write_text("truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\ntools:\n  flange: {of: flange}\n")
-    done = compensate(on_a_track(), [program], tools=cell)
+    done = compensate(on_a_track(), [program], tools=cell, joint_targets="correct")
     assert done.result.corrections[0].corrected.all()
     done.save(tmp_path / "out")
     page = (tmp_path / "out" / "compensation.html").read_text()

@@ -11,9 +11,11 @@ import numpy as np
 import pytest
 
 from truearm.compensation.cell import Cell, Placed
+from truearm.compensation.chosen_targets import Choice
+from truearm.compensation.correction import Correction
 from truearm.compensation.fake_targets import matrices
 from truearm.compensation.gauge import best_agreement
-from truearm.compensation.program_correction import Correction, commanded, corrected_programs
+from truearm.compensation.program_correction import commanded, corrected_programs
 from truearm.compensation.program_files import edited
 from truearm.compensation.programs.program import Program, Source
 from truearm.compensation.programs.rapid import RAPID
@@ -27,6 +29,7 @@ from truearm.simulation.twin import Twin, measure
 from truearm.simulation.twin_joint import PERFECT
 
 NOISE = 0.03e-3
+EVERY = Choice(joint_targets=True)
 LOW, HIGH = np.radians([[-90, 0, -80, -150, -90, -180], [90, 110, 70, 150, 90, 180]])
 
 
@@ -69,7 +72,7 @@ def poses_corrected(found: Correction) -> np.ndarray:
 
 
 def corrected(calibration: Calibration, program: Program, cell: Cell) -> Program:
-    found = corrected_programs(calibration.robot, [program], cell).corrections[0]
+    found = corrected_programs(calibration.robot, [program], cell, choice=EVERY).corrections[0]
     assert found.corrected.all()
     return plate(edited(program.sources[0].text, found.edits))
 
@@ -114,7 +117,7 @@ def test_targets_are_reached_within_half_more_than_the_held_out_error(campaign: 
     held_out = float(calibration.validation.position_norms.mean())
     program = plate(all_over_the_workspace(150, np.random.default_rng(7)))
     stands, cell = given(twin, calibration, program)
-    found = corrected_programs(calibration.robot, [program], cell).corrections[0]
+    found = corrected_programs(calibration.robot, [program], cell, choice=EVERY).corrections[0]
     after = plate(edited(program.sources[0].text, found.edits))
     meant = (stands @ found.before)[:, :3, 3]
     rows = poses_corrected(found)
@@ -129,7 +132,7 @@ def test_a_plate_is_reached(campaign: tuple[Twin, Calibration]) -> None:
     assert calibration.validation is not None
     program = plate(original())
     stands, cell = given(twin, calibration, program)
-    found = corrected_programs(calibration.robot, [program], cell).corrections[0]
+    found = corrected_programs(calibration.robot, [program], cell, choice=EVERY).corrections[0]
     meant = (stands @ found.before)[:, :3, 3]
     rows = poses_corrected(found)
     before = missed(twin, calibration, program, meant, rows).mean()
@@ -146,7 +149,7 @@ def test_without_frames_targets_are_right_to_each_other(campaign: tuple[Twin, Ca
     program = plate(original())
     after = corrected(calibration, program, Cell({}, {}))
     shapes = []
-    found = corrected_programs(calibration.robot, [program], Cell({}, {})).corrections[0]
+    found = corrected_programs(calibration.robot, [program], Cell({}, {}), choice=EVERY).corrections[0]
     rows = poses_corrected(found)
     for one in (program, after):
         tips = twin.frames(commanded(calibration.robot, one)[rows])["1"][:, :3, 3]

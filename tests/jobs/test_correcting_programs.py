@@ -32,7 +32,7 @@ def test_nothing_is_written_without_a_folder(program: Path) -> None:
     assert program.read_bytes() == before
     assert [path.name for path in program.parent.iterdir()] == ["plate.mod"]
     (file,) = correction.files
-    assert (file.name, file.language, file.targets, file.corrected) == ("plate.mod", "RAPID", 44, 44)
+    assert (file.name, file.language, file.targets, file.corrected) == ("plate.mod", "RAPID", 44, 43)
     assert file.text != before
     assert 0.0 < file.mean_shift < file.largest_shift < 3e-3
     assert file.summary()["shift_mm"]["max"] == pytest.approx(1e3 * file.largest_shift)
@@ -125,7 +125,8 @@ def test_of_many_skipped_targets_the_first_are_listed(program: Path) -> None:
     (file,) = correction.files
     assert len(file.skipped) > 10
     assert repr(file).startswith("plate.mod  RAPID: ")
-    assert len(file.lines()) == 1 + len(file.skipped)
+    assert len(file.lines()) == 2 + len(file.skipped)
+    assert file.targets == file.corrected + file.kept.total() + len(file.skipped)
     assert len(repr(file)) <= 2000
     assert f"  and {len(file.skipped) - 10} more; the JSON summary lists all" in correction.lines()
     assert len(correction.summary()["programs"][0]["skipped"]) == len(file.skipped)

@@ -47,6 +47,27 @@ def compensate(
     again: Annotated[
         bool, typer.Option("--again", help="Correct the originals of programs corrected before, anew.")
     ] = False,
+    joint_targets: Annotated[
+        str, typer.Option(metavar="keep|correct", help="What becomes of targets that are given by joints.")
+    ] = "keep",
+    only: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME", help="Correct only targets of this name or pattern; repeatable.", show_default=False
+        ),
+    ] = None,
+    keep: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="Targets of this name or pattern stay; repeatable.", show_default=False),
+    ] = None,
+    taught: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LIST",
+            help="What was taught with this robot, and is right already: points, frames, tools, or none.",
+            show_default="asked",
+        ),
+    ] = None,
     accept: Annotated[
         list[str] | None,
         typer.Option(
@@ -75,6 +96,10 @@ def compensate(
             split=split,
             strict=strict or None,
             again=again or None,
+            joint_targets=None if joint_targets == "keep" else joint_targets,
+            only=only or None,
+            keep=keep or None,
+            taught=taught,
             accept=accept or None,
         )
         return
@@ -92,6 +117,10 @@ def compensate(
             strict=strict,
             split=None if split is None else split / 1e3,
             again=again,
+            joint_targets=joint_targets,
+            only=only or (),
+            keep=keep or (),
+            taught=None if taught is None else [word.strip() for word in taught.split(",")],
             accept=accept or (),
             command=command_line(),
             progress=say,

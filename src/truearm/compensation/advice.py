@@ -9,10 +9,11 @@ from typing import Final
 
 import numpy as np
 
+from truearm.compensation.correction import Correction
 from truearm.compensation.gauge import turns_between
 from truearm.compensation.kept_targets import LARGEST_STEP, LIKELY
 from truearm.compensation.measured_region import beyond_measured
-from truearm.compensation.program_correction import CorrectedPrograms, Correction, Frames
+from truearm.compensation.program_correction import CorrectedPrograms
 from truearm.compensation.split import MOST_SEGMENTS, ProgramSplit
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import NO_PAYLOAD
@@ -44,8 +45,9 @@ def check_correction(
     corrections = result.corrections
     count = sum(int(one.corrected.sum()) for one in corrections)
     if any(one.program.targets for one in corrections):
-        kept = sum(not one.corrected[row] for one in corrections for row in one.not_better)
-        made = _assumed(result.frames, count + int(kept))
+        made = _asked(result) if count else []
+        made += _assumed(result)
+        made += _by_joints(corrections)
     else:
         made = [Notice("no-targets", "There is no target in the programs that could be corrected.")]
     skipped = sum(len(one.skipped) for one in corrections)
@@ -101,7 +103,9 @@ def check_correction(
                 f"{MOST_SEGMENTS} segments are not enough; or its instruction has options that segments cannot have.",
             )
         )
-    if robot.payload == NO_PAYLOAD and any(effect.loaded for effect in robot.effects):
+    made += _loads(robot, result)
+    unweighed = not result.loads or None in result.loads.values()
+    if robot.payload == NO_PAYLOAD and unweighed and any(effect.loaded for effect in robot.effects):
         made.append(
             Notice(
                 "no-payload",
@@ -174,18 +178,82 @@ def _lines(targets: Sequence[tuple[Correction, int]]) -> str:
     return f"{lines}{', ..' if len(targets) > _LISTED else ''}"
 
 
-def _assumed(frames: Frames, count: int) -> list[Notice]:
+def _asked(result: CorrectedPrograms) -> list[Notice]:
+    """Ask what was taught, as long as nobody has said it."""
+    if result.choice.taught is not None:
+        return []
+    places = ["points"]
+    places += [
+        what for what, known in (("frames", result.frames.frames), ("tools", result.frames.tools)) if known == "assumed"
+    ]
+    answers = ", ".join(f"`taught={what}`" for what in places)
+    return [
+        Notice(
+            "computed-or-taught",
+            f"Were the {listed(places)} of these programs computed, or taught with this robot? Nothing says it, and "
+            "they were taken as computed. Points that were taught are right already, and a correction moves them away. "
+            f"Answer with {answers}, or `taught=none`.",
+        )
+    ]
+
+
+def _by_joints(corrections: Sequence[Correction]) -> list[Notice]:
+    kept = sum(why == "given by joints" for one in corrections for why in one.kept.values())
+    if not kept:
+        return []
+    stay = "is given by joints and stays as it is" if kept == 1 else "are given by joints and stay as they are"
+    return [
+        Notice(
+            "joint-targets-kept",
+            f"{counted(kept, 'target')} {stay}, as home positions should. Where one was computed from a place in "
+            "space, `joint_targets=correct` corrects it too.",
+            "note",
+        )
+    ]
+
+
+def _loads(robot: Robot, result: CorrectedPrograms) -> list[Notice]:
+    """Say by what load the arm was bent with each tool, where the programs or nobody says it."""
+    if not result.loads or not any(effect.loaded for effect in robot.effects):
+        return []
+    weighed = [f"{tool or 'the flange'} {load.mass:g} kg" for tool, load in result.loads.items() if load is not None]
+    others = [tool or "the flange" for tool, load in result.loads.items() if load is None]
+    said = [f"The programs say what their tools weigh: {', '.join(weighed)}."] if weighed else []
+    if others:
+        said.append(
+            f"No mass is known of {listed(others)}: there the {robot.payload.mass:g} kg of the calibration are kept."
+        )
+    return [Notice("loads-taken", f"{' '.join(said)} `payload` says it for all of them.", "note")]
+
+
+def _assumed(result: CorrectedPrograms) -> list[Notice]:
     made = []
-    if frames.frames == "assumed":
-        few = f" With so few targets ({count}) little or nothing of the correction is left: give `frames`."
-        made.append(Notice("frames-assumed", f"{frame_words(frames)[0]}{few if count <= _FEW_TARGETS else ''}"))
-    if frames.tools == "assumed":
-        made.append(Notice("tools-assumed", frame_words(frames)[-1]))
+    frames, words = result.frames, frame_words(result)
+    if frames.frames == "assumed" and not result.choice.was_taught("points"):
+        few = [number for number in _targets_by_shift(result) if number <= _FEW_TARGETS]
+        if few:
+            words[0] += f" With so few targets ({min(few)}) little or nothing of the correction is left: give `frames`."
+        if few or not result.choice.was_taught("frames"):
+            made.append(Notice("frames-assumed", words[0]))
+    if frames.tools == "assumed" and not result.choice.was_taught("tools"):
+        made.append(Notice("tools-assumed", words[-1]))
     return made
 
 
-def frame_words(frames: Frames) -> list[str]:
+def _targets_by_shift(result: CorrectedPrograms) -> list[int]:
+    """Return how many targets each shift of the base was found from."""
+    apart = result.choice.was_taught("frames")
+    number: Counter[str] = Counter()
+    for one in result.corrections:
+        for row, target in enumerate(one.program.targets):
+            if one.corrected[row] or row in one.not_better:
+                number[target.frame.lower() if apart else ""] += 1
+    return list(number.values())
+
+
+def frame_words(result: CorrectedPrograms) -> list[str]:
     """Return what was taken for the real base and flange, in words: first of the frames, then of the tools."""
+    frames = result.frames
 
     def size(shift: Array) -> str:
         turned = math.degrees(float(np.linalg.norm(turns_between(np.eye(4)[None], shift[None])[0])))
@@ -195,6 +263,14 @@ def frame_words(frames: Frames) -> list[str]:
         said = [
             "The program's frames are where `frames` places them; targets are corrected in them, and may all move "
             "together."
+        ]
+    elif result.choice.was_taught("points"):
+        said = ["The points were taught, and stay. Offsets from them are corrected to be as long as they say."]
+    elif result.choice.was_taught("frames"):
+        said = [
+            "The frames were taught with this robot. So in each of them the base was shifted until the corrections of "
+            "its targets have no shift and no turn in common: they are right to each other, and their pattern stays "
+            "where it was taught."
         ]
     else:
         said = [
@@ -207,9 +283,10 @@ def frame_words(frames: Frames) -> list[str]:
     if frames.tools == "identified":
         said.append("The program's tools are where `tools` places them, on the identified flange.")
     else:
+        given = "The tools were taught with this robot" if result.choice.was_taught("tools") else "`tools` is not given"
         said.append(
-            "`tools` is not given. The program's tools are taken to sit on a flange that agrees best with the nominal "
-            f"one all over the workspace, {size(frames.flange)} from the identified one."
+            f"{given}. The program's tools are taken to sit on a flange that agrees best with the nominal one all over "
+            f"the workspace, {size(frames.flange)} from the identified one."
         )
     return said
 

@@ -12,8 +12,8 @@ rules (:mod:`truearm.compensation.gauge`): an uncertain place of the base, or of
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Final
 
@@ -28,8 +28,31 @@ from truearm.modeling.robot import Robot
 
 #: Targets looked at together: their derivatives by every parameter take some ten MB.
 _AT_ONCE: Final = 2000
+#: Targets and draws from which the interval of the mean error follows.
+_DRAWN_TARGETS: Final = 500
+_DRAWS: Final = 400
+#: Share of the joints' error at an arrival that all targets of a program have in common: what the model leaves changes
+#: slowly from place to place, repeatability does not.
+_IN_COMMON: Final = 0.5
+_INTERVAL: Final = (5.0, 95.0)
 #: Corrections below this are none [m]: programs are written with fewer digits.
 _NOTHING: Final = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """Points that were taught with the real robot, and that targets are offsets from.
+
+    Attributes
+    ----------
+    joints
+        Where the controller sends the joints there, as the model counts them, ``(n, joints)`` [rad or m].
+    turned
+        Whether the offset is in the axes of the tool, ``(n,)``.
+    """
+
+    joints: Array
+    turned: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,12 +69,63 @@ class TargetsReached:
         By how much targets are moved, in the axes of the robot's base, ``(n, 3)`` [m].
     groups
         Number of the group that each target belongs to, ``(n,)``; groups are corrected together or not at all.
+    frames
+        Number of the frame, or of several together, that takes up what its targets share, ``(n,)``.
+    arms, arm
+        The robot with each load, and which of them it is at each target, ``(n,)``.
+    start
+        The taught points that they are offsets from; None if they are not.
     """
 
     joints: Array
     tips: Array
     shifts: Array
     groups: NDArray[np.intp]
+    frames: NDArray[np.intp]
+    arms: tuple[Robot, ...]
+    arm: NDArray[np.intp]
+    start: Start | None = None
+
+    def some(self, rows: NDArray[np.intp]) -> TargetsReached:
+        """Return some of them."""
+        start = None if self.start is None else Start(self.start.joints[rows], self.start.turned[rows])
+        joints, tips, shifts = (values[rows] for values in (self.joints, self.tips, self.shifts))
+        groups, frames, arm = (numbers[rows] for numbers in (self.groups, self.frames, self.arm))
+        return TargetsReached(joints, tips, shifts, groups, frames, self.arms, arm, start)
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnErrors:
+    """Distances of the real robot from some targets, drawn from what is not known of it.
+
+    Attributes
+    ----------
+    rows
+        Which targets, ``(m,)``.
+    before, after
+        Distances without and with the correction [m], ``(m, draws)``.
+    """
+
+    rows: NDArray[np.intp]
+    before: Array
+    after: Array
+
+    def interval(self, corrected: NDArray[np.bool_], among: NDArray[np.bool_]) -> tuple[float, float] | None:
+        """Return from where to where the mean distance lies with a probability of 90 % [m]; None of no targets.
+
+        Parameters
+        ----------
+        corrected
+            Which of all targets are, ``(n,)``.
+        among
+            Which of all targets count, ``(n,)``.
+        """
+        mine = among[self.rows]
+        if not mine.any():
+            return None
+        lengths = np.where(corrected[self.rows][mine, None], self.after[mine], self.before[mine])
+        low, high = np.percentile(lengths.mean(axis=0), _INTERVAL)
+        return float(low), float(high)
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,12 +140,15 @@ class ExpectedErrors:
         Probability that the correction makes the distance larger, ``(n,)``.
     group_worse
         Probability that it makes the sum of squares of the distances in the target's group larger, ``(n,)``.
+    drawn
+        Distances that the real robot may have from some of them.
     """
 
     before: Array
     after: Array
     worse: Array
     group_worse: Array
+    drawn: DrawnErrors
 
     def of_some(self, rows: NDArray[np.intp], count: int) -> ExpectedErrors:
         """Return it for `count` targets, of which these are the ones in `rows`; NaN for the others."""
@@ -81,7 +158,8 @@ class ExpectedErrors:
             every[rows] = values
             return every
 
-        return ExpectedErrors(*map(spread, (self.before, self.after, self.worse, self.group_worse)))
+        before, after, worse, group_worse = map(spread, (self.before, self.after, self.worse, self.group_worse))
+        return ExpectedErrors(before, after, worse, group_worse, replace(self.drawn, rows=rows[self.drawn.rows]))
 
 
 def expected_errors(
@@ -106,7 +184,7 @@ def expected_errors(
         in the world of the calibration, tools on the target that is nearest to them.
     """
     model = _ModelErrors(robot, proof, tools == "assumed", frames == "assumed")
-    if frames == "assumed":
+    if frames == "assumed" and not any(one.start for one in programs):
         model = replace(model, shared=model.shared_by(programs))
     return tuple(_expected(model, one) for one in programs)
 
@@ -134,7 +212,28 @@ def _expected(model: _ModelErrors, targets: TargetsReached) -> ExpectedErrors:
         after=_mean_length(mean2, 2.0 * spread2),
         worse=_worse(length2, along),
         group_worse=_worse(of_group, np.sum(together**2, axis=1) + alone)[targets.groups],
+        drawn=_drawn(model, targets),
     )
+
+
+def _drawn(model: _ModelErrors, targets: TargetsReached) -> DrawnErrors:
+    """Draw robots of which the calibrated one may be any, and where each is at some of the targets."""
+    count = len(targets.joints)
+    some = np.unique(np.linspace(0, count - 1, min(count, _DRAWN_TARGETS)).astype(np.intp))
+    shift = targets.shifts[some] @ model.robot.base.rotation.T
+    before, after = np.zeros((2, len(some), _DRAWS))
+    rng = np.random.default_rng(0)
+    drawn = rng.standard_normal((len(model.proof.names), _DRAWS))
+    common: Array | None = None
+    in_common = 0.0 if model.assumed_frames else _IN_COMMON  # a frame takes it up
+    for part, errors, by_joints in model.errors(targets.some(some)):
+        if common is None:
+            common = math.sqrt(in_common) * rng.standard_normal((by_joints.shape[2], _DRAWS))
+        own = math.sqrt(1.0 - in_common) * rng.standard_normal((len(part), by_joints.shape[2], _DRAWS))
+        missed = errors @ drawn + by_joints @ (common + own)
+        after[part] = np.linalg.norm(missed, axis=1)
+        before[part] = np.linalg.norm(missed + shift[part][:, :, None], axis=1)
+    return DrawnErrors(some, before, after)
 
 
 def _worse(length2: Array, along: Array) -> Array:
@@ -159,14 +258,14 @@ class _ModelErrors:
     assumed_tools, assumed_frames
         Whether the places of tools and frames are assumed, and so take part of the errors up.
     shared
-        What the program's frame takes up; None if it takes up nothing.
+        What each frame takes up, by its number; nothing where there is none.
     """
 
     robot: Robot
     proof: Proof
     assumed_tools: bool
     assumed_frames: bool
-    shared: CommonMotion | None = None
+    shared: Mapping[int, CommonMotion] = field(default_factory=dict)
 
     @cached_property
     def _flange(self) -> Array:
@@ -179,32 +278,42 @@ class _ModelErrors:
             root[[self.robot.parameters[name].group == "base" for name in self.proof.names]] = 0.0
         return root
 
-    def errors(self, targets: TargetsReached) -> Iterator[tuple[slice, Array, Array]]:
+    def errors(self, targets: TargetsReached) -> Iterator[tuple[NDArray[np.intp], Array, Array]]:
         """Yield for parts of the targets the errors by the parameters ``(m, 3, parameters)``, and by the joints.
 
         Those by the joints are ``(m, 3, joints)``; both in the axes of the world [m].
         """
-        for first in range(0, len(targets.joints), _AT_ONCE):
-            part = slice(first, first + _AT_ONCE)
-            moved, _, tips = self._motions(targets, part)
-            if self.shared is not None:
-                moved = moved - self.shared.of(tips)
-            yield part, moved, self._by_joints(targets, part)
+        for rows in _parts(targets):
+            robot, tip = targets.arms[targets.arm[rows[0]]], targets.tips[rows]
+            moved, _, tips = self._motions(robot, targets.joints[rows], tip)
+            by_joints = self._by_joints(robot, targets.joints[rows], tip)
+            for number, common in self.shared.items():
+                mine = targets.frames[rows] == number
+                moved[mine] -= common.of(tips[mine])
+            if targets.start is not None:
+                start, turned = targets.start.joints[rows], targets.start.turned[rows, None, None]
+                before, turn, from_there = self._motions(robot, start, tip)
+                moved -= before + turned * np.cross(turn, (tips - from_there)[:, :, None], axis=-2)
+                by_joints = np.concatenate([by_joints, self._by_joints(robot, start, tip)], axis=2)
+            yield rows, moved, by_joints
 
-    def shared_by(self, programs: Sequence[TargetsReached]) -> CommonMotion | None:
-        """Return what the frame of the programs takes up of all errors, as of all corrections."""
-        if not any(len(targets.joints) for targets in programs):
-            return None
-        return common_motion(
-            (tips, moved, turned)
-            for targets in programs
-            for first in range(0, len(targets.joints), _AT_ONCE)
-            for moved, turned, tips in (self._motions(targets, slice(first, first + _AT_ONCE)),)
-        )
+    def shared_by(self, programs: Sequence[TargetsReached]) -> dict[int, CommonMotion]:
+        """Return what each frame takes up of all errors of its targets, as of their corrections."""
+        numbers = {number for targets in programs for number in targets.frames.tolist()}
+        return {number: common_motion(self._motions_in(programs, number)) for number in sorted(numbers)}
 
-    def _motions(self, targets: TargetsReached, part: slice) -> tuple[Array, Array, Array]:
+    def _motions_in(self, programs: Sequence[TargetsReached], number: int) -> Iterator[tuple[Array, Array, Array]]:
+        for targets in programs:
+            for rows in _parts(targets):
+                mine = rows[targets.frames[rows] == number]
+                if len(mine):
+                    robot = targets.arms[targets.arm[mine[0]]]
+                    moved, turned, tips = self._motions(robot, targets.joints[mine], targets.tips[mine])
+                    yield tips, moved, turned
+
+    def _motions(self, robot: Robot, q: Array, tip: Array) -> tuple[Array, Array, Array]:
         """Return motions and turns of tips ``(m, 3, parameters)``, and the tips ``(m, 3)``, in the world."""
-        robot, names, q, tip = self.robot, self.proof.names, targets.joints[part], targets.tips[part]
+        names = self.proof.names
         kinematics = robot.forward_kinematics(q)
         R = kinematics.matrix()
         moved, turned = (np.moveaxis(rate, 2, 0).swapaxes(1, 2) for rate in robot.jacobians(kinematics, q, names))
@@ -231,13 +340,20 @@ class _ModelErrors:
         nearest = np.argmin(np.linalg.norm(tips[:, None] - places, axis=2), axis=1)
         return np.asarray(rates[nearest])
 
-    def _by_joints(self, targets: TargetsReached, part: slice) -> Array:
+    def _by_joints(self, robot: Robot, q: Array, tip: Array) -> Array:
         """Return the errors of tips by the errors of the joints at an arrival, ``(m, 3, joints)``."""
         deviations = np.asarray(self.proof.joint_error)
-        q, tip = targets.joints[part], targets.tips[part]
         if not deviations.any():
             return np.zeros((len(q), 3, 1))
-        kinematics = self.robot.forward_kinematics(q)
+        kinematics = robot.forward_kinematics(q)
         arm = (kinematics.matrix() @ tip[:, :, None])[:, :, 0]
-        rates = self.robot.joint_jacobian(q)
+        rates = robot.joint_jacobian(q)
         return np.asarray((rates[:, :3] + np.cross(rates[:, 3:], arm[:, :, None], axis=-2)) * deviations)
+
+
+def _parts(targets: TargetsReached) -> Iterator[NDArray[np.intp]]:
+    """Go through the targets in parts, each of them with one load."""
+    for number in range(len(targets.arms)):
+        mine = np.flatnonzero(targets.arm == number)
+        for first in range(0, len(mine), _AT_ONCE):
+            yield mine[first : first + _AT_ONCE]

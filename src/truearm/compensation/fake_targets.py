@@ -6,7 +6,7 @@ joint positions with which the calibrated robot reaches the wanted one.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -127,6 +127,27 @@ def fake_targets(robot: Robot, flange: Array, near: Array) -> FakeTargets:
             status.append(one)
     branch = tuple(BRANCHES[number] for number in rule.numbers(nominal.forward_kinematics(found.joints)).tolist())
     return FakeTargets(matrices(nominal, found.joints), replace(found, status=tuple(status), branch=branch))
+
+
+def fake_targets_of(robots: Sequence[Robot], which: NDArray[np.intp], flange: Array, near: Array) -> FakeTargets:
+    """Return the fake targets of wanted poses, for one calibrated robot with several loads.
+
+    Parameters
+    ----------
+    robots
+        The robot with each load.
+    which
+        Index of the robot for each pose, ``(n,)``; `flange` and `near` as for :func:`fake_targets`.
+    """
+    if len(robots) == 1:
+        return fake_targets(robots[0], flange, near)
+    fakes, parts = np.empty_like(flange), []
+    for number in np.unique(which).tolist():
+        rows = np.flatnonzero(which == number)
+        found = fake_targets(robots[number], flange[rows], near[rows])
+        fakes[rows] = found.flange
+        parts.append((rows, found.solutions))
+    return FakeTargets(fakes, _merged(parts, len(flange)))
 
 
 def _better(

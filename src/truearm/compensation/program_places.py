@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Literal
 
 import numpy as np
@@ -18,6 +18,8 @@ from truearm.modeling.transform import IDENTITY
 Kind = Literal["tool", "frame"]
 #: Whether real places were given, or have to be assumed.
 Provenance = Literal["identified", "assumed"]
+#: Where the nominal base, or flange, is in the identified one, ``(4, 4)``; or that for the targets in each frame.
+Shift = Array | Mapping[str, Array]
 
 
 def provenance(programs: Sequence[Program], cell: Cell, kind: Kind) -> Provenance:
@@ -71,6 +73,7 @@ class Places:
         defined = {name.lower(): t for name, t in (program.tools if kind == "tool" else program.frames).items()}
         names = [(target.tool if kind == "tool" else target.frame).lower() for target in program.targets]
         unique = {name: number for number, name in enumerate(dict.fromkeys(names))}
+        self._names = tuple(unique)
         self._index = np.array([unique[name] for name in names], dtype=int)
         nominal, real = [], []
         for name in unique:
@@ -94,10 +97,26 @@ class Places:
         pairs = zip(self._nominal, self._real, strict=True)
         return next((real @ np.linalg.inv(nominal) for nominal, real in pairs if real is not None), None)
 
-    def real(self, rows: NDArray[np.intp], shift: Array) -> Array:
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What they are called, in small letters."""
+        return self._names
+
+    def among(self, names: Collection[str]) -> NDArray[np.bool_]:
+        """Return which targets have one of these names, ``(n,)``."""
+        return np.asarray(np.array([name in names for name in self._names], dtype=bool)[self._index])
+
+    def numbers(self, names: Sequence[str]) -> NDArray[np.intp]:
+        """Return the place of each target's name among names of all programs, ``(n,)``; 0 if there are none."""
+        number = {name: index for index, name in enumerate(names)}
+        return np.asarray(np.array([number.get(name, 0) for name in self._names], dtype=np.intp)[self._index])
+
+    def real(self, rows: NDArray[np.intp], shift: Shift) -> Array:
         """Return them in the identified base or flange; where it was not measured, with the shift that is assumed."""
-        pairs = zip(self._nominal, self._real, strict=True)
-        every = [shift @ nominal if real is None else real for nominal, real in pairs]
+        every = []
+        for name, nominal, real in zip(self._names, self._nominal, self._real, strict=True):
+            by = shift[name] if isinstance(shift, Mapping) else shift
+            every.append(by @ nominal if real is None else real)
         return np.asarray(np.reshape(every, (-1, 4, 4))[self._index[rows]])
 
 

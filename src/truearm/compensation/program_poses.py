@@ -62,6 +62,12 @@ def joints_of(robot: Robot, program: Program) -> Array:
     return joints
 
 
+def offsets_in_order(program: Program) -> Iterator[int]:
+    """Go through the targets that are offsets, each after the one that it is an offset from."""
+    for generation in _generations(program.targets):
+        yield from generation
+
+
 def place(program: Program, target: ProgramTarget) -> str:
     """Return where a target stands, for a message."""
     return program.sources[target.source].where(target.line)

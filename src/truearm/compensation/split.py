@@ -16,9 +16,10 @@ from typing import Final
 
 import numpy as np
 
-from truearm.compensation.program_correction import Between, Correction
+from truearm.compensation.correction import Correction
 from truearm.compensation.program_poses import numbers_of
 from truearm.compensation.programs.program import Edit, Language, Move, Program, Split
+from truearm.compensation.resolved_program import Between
 from truearm.errors import InputError
 from truearm.modeling.chain import Array
 from truearm.modeling.transform import homogeneous, rotation_from_vector, rotation_vector

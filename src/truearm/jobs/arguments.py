@@ -104,15 +104,17 @@ def joints_argument(joints: object, robot: Robot, parameter: str = "joints") -> 
     return chosen
 
 
-def folder_for(names: Iterable[str], out: object, *read: object, parameter: str = "out") -> Path:
+def folder_for(names: Iterable[str], out: object, *read: object, parameter: str = "out", ours: bool = False) -> Path:
     """Return the folder for files of some names, or refuse one that cannot be written to, before any long work.
 
     Parameters
     ----------
     read
         What the job was given: none of these, as far as they are files, may be overwritten.
+    ours
+        Whether only files may be overwritten that truearm has written there.
     """
-    return output_folder(out, names, files_of(*read), parameter)
+    return output_folder(out, names, files_of(*read), parameter, ours=ours)
 
 
 def file_for(out: object, *read: object, parameter: str = "out") -> Path:

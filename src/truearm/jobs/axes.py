@@ -57,7 +57,7 @@ def axes(
     progress_argument(progress)
     in_robot_frame = choice_argument(frame, "frame", _FRAMES)
     refuse_swapped(robot, data, "axes")
-    folder = None if out is None else folder_for(AXIS_FILES, out, robot, data)
+    folder = None if out is None else folder_for(AXIS_FILES, out, robot, data, ours=True)
     nominal = robot_argument(robot)
     readings = readings_argument(nominal, data)
     progress("fitting circles and axes")

@@ -164,7 +164,7 @@ def calibrate(
     )
     refuse_swapped(robot, data, "calibrate")
     inputs = files_of(robot, data, bounds)
-    folder = None if out is None else folder_for(RESULT_FILES, out, robot, data, bounds)
+    folder = None if out is None else folder_for(RESULT_FILES, out, robot, data, bounds, ours=True)
     progress("reading the robot")
     source = urdf_source(robot) if isinstance(robot, str | Path) else None
     urdf = None if source is None else read_bytes(source[0])

@@ -5,22 +5,28 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from truearm.arrays import finite_number
 from truearm.compensation.advice import check_correction
 from truearm.compensation.cell import Cell, read_frames, read_tools
-from truearm.compensation.program_correction import CorrectedPrograms, Correction, corrected_programs
+from truearm.compensation.chosen_targets import TAUGHT, Choice, Taught
+from truearm.compensation.correction import Correction
+from truearm.compensation.program_correction import CorrectedPrograms, corrected_programs
 from truearm.compensation.program_files import edited, language_called, program_files, read_programs
 from truearm.compensation.programs.program import Edit
 from truearm.compensation.split import ProgramSplit, check_tolerance, split_program
 from truearm.errors import InputError, refusals_of
 from truearm.files import path_argument
 from truearm.jobs.arguments import (
+    choice_argument,
+    choices_argument,
     command_argument,
     files_of,
     flag_argument,
     folder_for,
+    names_argument,
     paths_argument,
     payload_argument,
     progress_argument,
@@ -44,6 +50,10 @@ def compensate(
     strict: bool = False,
     split: float | None = None,
     again: bool = False,
+    joint_targets: str = "keep",
+    only: Sequence[str] = (),
+    keep: Sequence[str] = (),
+    taught: Sequence[str] | None = None,
     accept: Sequence[str] = (),
     command: str | None = None,
     progress: Callable[[str], None] = lambda _: None,
@@ -63,13 +73,21 @@ def compensate(
         Files that say where tools and frames are, see :mod:`truearm.compensation.cell`.
     payload
         What the flange carries in production (an object, or a text such as ``2.7kg,50mm,25mm,100mm``); None for what
-        it carried in calibration.
+        the program says of each tool, and what it carried in calibration where the program does not say it.
     strict
         Refuse if a target cannot be corrected.
     split
         Split straight and circular moves where the correction between targets would deviate farther [m].
     again
         Take the originals of programs that were corrected already.
+    joint_targets
+        ``keep`` leaves targets that are given by joints as they are, home positions for instance; ``correct`` sends the
+        real robot where the nominal one would be.
+    only, keep
+        Names of targets, or patterns such as ``pHole*``: the only ones that are corrected, and some that stay.
+    taught
+        What was taught with this robot and is right already: ``points``, ``frames``, ``tools``, or ``none``. None if
+        it is not known: then all is taken as computed off-line.
     accept
         What may speak against the robot's calibration or against a correction, by name: ``rank-loss``,
         ``not-converged``, ``implausible``, or a notice of the level error that the calibration ended with; and
@@ -94,6 +112,12 @@ def compensate(
     if split is not None:
         split = finite_number(split, "split")
         check_tolerance(split)
+    choice = Choice(
+        joint_targets=choice_argument(joint_targets, "joint_targets", {"keep": False, "correct": True}),
+        only=names_argument(only, "only"),
+        keep=names_argument(keep, "keep"),
+        taught=_taught(taught, tools=tool_file is not None, frames=frame_file is not None),
+    )
     folder = None if out is None else folder_for((REPORT,), out, robot, tools, frames, *paths)
     arm = robot_argument(robot).with_payload(payload)
     accepted = accept_argument(accept, arm)
@@ -107,6 +131,10 @@ def compensate(
         strict=strict or None,
         split=split,
         again=again or None,
+        joint_targets="correct" if choice.joint_targets else None,
+        only=list(choice.only) or None,
+        keep=list(choice.keep) or None,
+        taught=None if choice.taught is None else sorted(choice.taught) or ["none"],
         accept=list(accepted) or None,
     )
     refuse_unaccepted(arm, accepted)
@@ -120,7 +148,14 @@ def compensate(
         progress("reading the programs")
         read = read_programs(files)
     with refusals_of("robot"):
-        result = corrected_programs(arm, read, cell, progress, every=NOT_BETTER in accepted)
+        result = corrected_programs(
+            arm,
+            read,
+            cell,
+            progress,
+            choice=replace(choice, every=NOT_BETTER in accepted),
+            weigh_tools=payload is None,
+        )
     if strict:
         _refuse_skipped(result)
     language = language_called(read[0].language)
@@ -152,6 +187,28 @@ def compensate(
         with refusals_of("out"):
             made.save(folder, progress)
     return made
+
+
+def _taught(taught: object, *, tools: bool, frames: bool) -> frozenset[Taught] | None:
+    """Return what was taught; None if that was not said."""
+    if taught is None:
+        return None
+    named = choices_argument(taught, "taught", [*TAUGHT, "none"], "answer")
+    if not named or ("none" in named and len(named) > 1):
+        raise InputError(
+            "what was taught is not clear",
+            parameter="taught",
+            came=", ".join(named) or "nothing",
+            allowed=f"none, or some of {', '.join(TAUGHT)}",
+        )
+    for what, measured in (("tools", tools), ("frames", frames)):
+        if measured and what in named:
+            raise InputError(
+                f"the {what} cannot be both taught and measured",
+                parameter=f"taught, {what}",
+                cure=f"Leave {what} out of `taught`, or leave out `{what}`.",
+            )
+    return frozenset(what for what in TAUGHT if what in named)
 
 
 def _refuse_skipped(result: CorrectedPrograms) -> None:

@@ -97,7 +97,9 @@ def _corrected_plate(
     quaternion = ", ".join(f"{v:.7f}" for v in Transform.from_matrix(place[:3, :3], place[:3, 3]).quaternion)
     cell = folder / "cell.yaml"
     write_files(folder, {cell.name: _CELL.format(place=f"{x}, {y}, {z}", quaternion=quaternion)})
-    correction = compensate(folder / "calibrated.yaml", [folder / _PLATE], tools=cell, frames=cell, progress=progress)
+    correction = compensate(
+        folder / "calibrated.yaml", [folder / _PLATE], tools=cell, frames=cell, taught=["none"], progress=progress
+    )
     progress("running the program on the twin")
     before, after = correction.result.corrections[0].program, correction.as_written()[0]
     poses = [row for row, target in enumerate(before.targets) if target.form.kind == "pose"]

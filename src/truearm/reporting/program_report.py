@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.compensation.program_correction import Correction
+from truearm.compensation.correction import Correction
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import Joint
 from truearm.notices import worst_first
@@ -61,8 +61,8 @@ def program_html(correction: ProgramCorrection) -> str:
         not_better_unlisted=max(len(not_better) - _LISTED, 0),
         skipped=every[:_LISTED],
         unlisted=max(len(every) - _LISTED, 0),
-        corrected=sum(file.corrected for file in correction.files),
-        targets=sum(file.targets for file in correction.files),
+        counts=[f"{file.name}: {file.count_words}" for file in correction.files],
+        expected=_expected(correction.files),
         moved=_spread(np.concatenate([c.moved[c.corrected] for c in corrections]) * 1e3),
         turned=_spread(np.degrees(np.concatenate([c.turned[c.corrected] for c in corrections]))),
     )
@@ -196,6 +196,15 @@ def expected_figure(corrections: Sequence[Correction]) -> Figure:
         xaxis=axis("step of the program, in the order of its text"),
         yaxis=axis("expected distance [mm]") | {"rangemode": "tozero"},
     )
+
+
+def _expected(files: Sequence[FileCorrection]) -> tuple[str, str, str, str] | None:
+    """Return the mean and largest error to expect of all targets before [mm], and the same now; None if unknown."""
+    known = [file.expected for file in files if file.expected is not None]
+    if not known:
+        return None
+    before, now = (np.concatenate(values) * 1e3 for values in zip(*known, strict=True))
+    return (*_spread(before), *_spread(now))
 
 
 def _not_better(file: FileCorrection, row: int) -> tuple[str, int, str, str, str, str]:

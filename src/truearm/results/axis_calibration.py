@@ -116,7 +116,7 @@ class AxisCalibration(Record):
         -------
         The files written.
         """
-        folder = output_folder(folder, AXIS_FILES, self.inputs)
+        folder = output_folder(folder, AXIS_FILES, self.inputs, ours=True)
         files = {
             "calibrated.yaml": robot_text(self.robot),
             "joint-errors.yaml": robot_text(self.robot_with_errors),

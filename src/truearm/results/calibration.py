@@ -252,7 +252,7 @@ class Calibration(Record):
         from truearm.modeling.formats.urdf_writing import urdf_text
         from truearm.reporting.report import report_html
 
-        folder = output_folder(folder, RESULT_FILES, self.inputs)
+        folder = output_folder(folder, RESULT_FILES, self.inputs, ours=True)
         progress("drawing the report")
         urdf = calibrated_urdf(self.urdf, self.robot)[0] if self.urdf else urdf_text(self.robot)[0]
         files: dict[str, str | bytes] = {

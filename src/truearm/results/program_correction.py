@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,8 +13,10 @@ from typing import Any, Final
 import numpy as np
 
 from truearm.compensation.advice import frame_words
+from truearm.compensation.chosen_targets import Kept
+from truearm.compensation.correction import Correction
 from truearm.compensation.gauge import turns_between
-from truearm.compensation.program_correction import CorrectedPrograms, Correction
+from truearm.compensation.program_correction import CorrectedPrograms
 from truearm.compensation.program_files import ProgramFile, language_called, recorded, write_programs
 from truearm.compensation.programs.program import Program, Skipped, Source
 from truearm.compensation.split import ProgramSplit
@@ -21,6 +24,7 @@ from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.results.record import Record, notice_lines, notice_summaries
+from truearm.shown import counted
 from truearm.writing import output_folder
 
 #: The report beside the corrected programs.
@@ -72,8 +76,13 @@ class FileCorrection(Record):
 
     @property
     def targets(self) -> int:
-        """How many targets it has."""
-        return len(self.rows)
+        """How many targets it has: those that were corrected, that stay because they shall, and that were skipped."""
+        return self.corrected + self.kept.total() + len(self.skipped)
+
+    @cached_property
+    def kept(self) -> Counter[Kept]:
+        """How many targets stay because they shall, by the reason."""
+        return Counter(self.correction.kept[row] for row in self.rows if row in self.correction.kept)
 
     @property
     def corrected(self) -> int:
@@ -104,6 +113,17 @@ class FileCorrection(Record):
         return (known.before[rows], after[rows]) if len(rows) else None
 
     @cached_property
+    def intervals(self) -> tuple[tuple[float, float], tuple[float, float]] | None:
+        """Where the mean of these distances lies with a probability of 90 % [m], before and as it is written now."""
+        known = self.correction.expected
+        if known is None:
+            return None
+        corrected = self.correction.corrected
+        mine = np.array([target.source == self.source for target in self.correction.program.targets], dtype=bool)
+        before, now = (known.drawn.interval(done, mine) for done in (np.zeros_like(corrected), corrected))
+        return None if before is None or now is None else (before, now)
+
+    @cached_property
     def not_better(self) -> tuple[int, ...]:
         """Indices of the targets whose correction would rather do harm."""
         found = set(self.correction.not_better)
@@ -122,6 +142,7 @@ class FileCorrection(Record):
             "language": self.language,
             "targets": self.targets,
             "corrected": self.corrected,
+            "kept": {why.replace("`", ""): number for why, number in self.kept.items()},
             "skipped": [{"line": one.line, "reason": one.reason} for one in self.skipped],
             "shift_mm": {
                 "mean": float(millimetres.mean()) if self.corrected else 0.0,
@@ -131,12 +152,16 @@ class FileCorrection(Record):
             "not_better": [self._not_better_summary(row) for row in self.not_better],
         }
 
-    def _expected_summary(self) -> dict[str, dict[str, float]] | None:
-        if self.expected is None:
+    def _expected_summary(self) -> dict[str, dict[str, Any]] | None:
+        if self.expected is None or self.intervals is None:
             return None
         return {
-            when: {"mean": float(values.mean()) * 1e3, "max": float(values.max()) * 1e3}
-            for when, values in zip(("before", "after"), self.expected, strict=True)
+            when: {
+                "mean": float(values.mean()) * 1e3,
+                "max": float(values.max()) * 1e3,
+                "interval_90": [1e3 * low, 1e3 * high],
+            }
+            for when, values, (low, high) in zip(("before", "after"), self.expected, self.intervals, strict=True)
         }
 
     def _not_better_summary(self, row: int) -> dict[str, Any]:
@@ -151,23 +176,42 @@ class FileCorrection(Record):
         }
 
     @property
-    def expected_line(self) -> str | None:
-        """What is expected of its targets, in words and figures; None if that is not known."""
-        if self.expected is None:
-            return None
+    def headline(self) -> str:
+        """What is expected of its targets before and now, in words and figures."""
+        if self.expected is None or self.intervals is None:
+            return f"{self.name}  {self.language}: the error to expect is not known"
+        low, high = self.intervals[1]
         (mean, most), (mean_now, most_now) = ((v.mean() * 1e3, v.max() * 1e3) for v in self.expected)
         return (
-            f"  {self.name}, distance from its targets to expect: {mean:.3f} mm on average and {most:.3f} mm at most "
-            f"before, {mean_now:.3f} and {most_now:.3f} mm now"
+            f"{self.name}  {self.language}: error to expect {mean:.3f} mm before, {mean_now:.3f} mm now "
+            f"(90 %: {low * 1e3:.3f} to {high * 1e3:.3f}), at most {most:.3f} and {most_now:.3f} mm"
         )
 
+    @property
+    def count_words(self) -> str:
+        """What became of its targets, in words and figures that add up."""
+        parts = [f"{self.corrected} corrected", *(f"{number} kept ({why})" for why, number in self.kept.items())]
+        parts += [f"{len(self.skipped)} left unchanged"] if self.skipped else []
+        return f"{counted(self.targets, 'target')}: {', '.join(parts)}"
+
     def lines(self) -> list[str]:
-        """Return how many targets were corrected and by how much, and what was skipped."""
-        text = (
-            f"{self.name}  {self.language}: {self.corrected} of {self.targets} targets corrected, "
-            f"moved by {self.mean_shift * 1e3:.3f} mm on average, {self.largest_shift * 1e3:.3f} mm at most"
+        """Return the error to expect, what became of the targets, and what was skipped."""
+        moved = (
+            f"; moved by {self.mean_shift * 1e3:.3f} mm on average, {self.largest_shift * 1e3:.3f} mm at most"
+            if self.corrected
+            else ""
         )
-        return [text, *(f"  {self.name}, line {one.line}: {one.reason}" for one in self.skipped)]
+        skipped = [f"  {self.name}, line {one.line}: {one.reason}" for one in self.skipped]
+        return [self.headline, f"  {self.name}, {self.count_words}{moved}", *skipped]
+
+
+def _shift_summary(shift: Array) -> dict[str, list[float]]:
+    """Return a shift ``(4, 4)`` as a record holds it."""
+    turned = turns_between(np.eye(4)[None], shift[None])[0]
+    return {
+        "mm": [round(float(v) * 1e3, 6) for v in shift[:3, 3]],
+        "rotation_vector_deg": [round(math.degrees(v), 7) for v in turned.tolist()],
+    }
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,14 +284,11 @@ class ProgramCorrection(Record):
 
     def lines(self) -> list[str]:
         """Return a line for each file, what was skipped and what to know."""
-        width = max(len(file.name) for file in self.files)
-        parts = [(file, file.lines()) for file in self.files]
-        text = [f"{file.name:{width}}{head.removeprefix(file.name)}" for file, (head, *_) in parts]
-        skipped = [line for _, (_, *lines) in parts for line in lines]
-        expected = [file.expected_line for file in self.files if file.expected_line is not None]
-        text += expected
-        if expected and self.lower_bound:
-            text.append("  These are lower bounds: the calibration cannot know all errors of the robot.")
+        parts = [file.lines() for file in self.files]
+        text = [line for first, second, *_ in parts for line in (first, second)]
+        skipped = [line for _, _, *lines in parts for line in lines]
+        if self.lower_bound and any(file.expected is not None for file in self.files):
+            text.append("  These errors are lower bounds: the calibration cannot know all errors of the robot.")
         text += skipped[:_EXPLAINED]
         if len(skipped) > _EXPLAINED:
             text.append(f"  and {len(skipped) - _EXPLAINED} more; the JSON summary lists all")
@@ -266,31 +307,36 @@ class ProgramCorrection(Record):
     @property
     def frame_words(self) -> list[str]:
         """What was taken for the real base and flange, in words."""
-        return frame_words(self.result.frames)
+        return frame_words(self.result)
 
     def applied(self) -> dict[str, Any]:
         """Return what the records beside the programs say was applied, in mm and deg."""
-        frames, payload = self.result.frames, self.robot.payload
+        frames, choice = self.result.frames, self.result.choice
         made: dict[str, Any] = {
             "robot": self.robot.name,
             "history": list(self.robot.history),
             "proof": None if self.robot.proof is None else self.robot.proof.summary(),
-            "payload_kg": payload.mass,
+            "payload_kg": self._masses(),
             "tools": frames.tools,
             "frames": frames.frames,
         }
-        for name, provenance, shift in (
-            ("base", frames.frames, frames.base),
-            ("flange", frames.tools, frames.flange),
-        ):
-            if provenance == "assumed":
-                made[f"{name}_shift"] = {
-                    "mm": [round(float(v) * 1e3, 6) for v in shift[:3, 3]],
-                    "rotation_vector_deg": [
-                        round(math.degrees(v), 7) for v in turns_between(np.eye(4)[None], shift[None])[0].tolist()
-                    ],
-                }
+        if choice.taught is not None:
+            made["taught"] = sorted(choice.taught)
+        if frames.tools == "assumed":
+            made["flange_shift"] = _shift_summary(frames.flange)
+        if frames.frames == "assumed":
+            each = choice.was_taught("frames")
+            made["base_shift"] = (
+                {name: _shift_summary(shift) for name, shift in frames.bases.items()}
+                if each
+                else _shift_summary(frames.base)
+            )
         return made
+
+    def _masses(self) -> float | dict[str, float]:
+        """Return what the robot carries [kg], by the tool where the programs say it."""
+        own = self.robot.payload.mass
+        return {tool: own if load is None else load.mass for tool, load in self.result.loads.items()} or own
 
     def as_written(self) -> tuple[Program, ...]:
         """Return the programs as they are read again from their new texts."""

@@ -13,6 +13,7 @@ from typing import Literal, NamedTuple, NoReturn
 
 from truearm.errors import InputError
 from truearm.modeling.orientations import Orientation
+from truearm.modeling.parts import Payload
 from truearm.modeling.transform import Transform
 
 MoveKind = Literal["joint", "linear", "circular"]
@@ -228,6 +229,9 @@ class Program:
         What looks like a target and cannot be corrected, with the reason.
     unknown
         How often an instruction occurs that the reader does not know and leaves alone, by its first word.
+    loads
+        By the name of a tool, what the program says that the robot carries with it; the centre of gravity in the
+        controller's flange frame.
     """
 
     language: str
@@ -238,6 +242,7 @@ class Program:
     frames: Mapping[str, Transform] = field(default_factory=dict)
     skipped: tuple[Skipped, ...] = ()
     unknown: Mapping[str, int] = field(default_factory=dict)
+    loads: Mapping[str, Payload] = field(default_factory=dict)
 
 
 class Edit(NamedTuple):

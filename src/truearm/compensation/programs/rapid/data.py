@@ -38,6 +38,7 @@ import numpy as np
 from truearm.compensation.programs.numbers import LARGEST, NUMBER
 from truearm.compensation.programs.program import Configuration, Form
 from truearm.modeling.orientations import MOVING_XYZ_ANGLES, QUATERNION
+from truearm.modeling.parts import Payload
 from truearm.modeling.transform import Transform, rotation_from_quaternion
 
 _DEGREE: Final = pi / 180.0
@@ -73,6 +74,7 @@ JOINTTARGET_TEXT: Final = re.compile(_JOINTTARGET)
 ROBTARGET_TAIL: Final = re.compile(rf"\s*+\]\s*+,{_row(_NUMBER, 4)},{_row(_NUMBER, 6)}\]")
 NUMBER_TEXT: Final = re.compile(_CAUGHT)
 _TOOL_TEXT: Final = re.compile(rf"\s*+\[\s*+(TRUE|FALSE)\s*+,{_POSE},", re.I)
+_LOAD_TEXT: Final = re.compile(rf"\s*+\[\s*+(?:TRUE|FALSE)\s*+,{_POSE},\s*+\[{_CAUGHT},{_row(_CAUGHT, 3)},", re.I)
 _FRAME_TEXT: Final = re.compile(
     rf"\s*+\[\s*+(TRUE|FALSE)\s*+,\s*+(TRUE|FALSE)\s*+,\s*+\"[^\"]*+\"\s*+,{_POSE},{_POSE}\]", re.I
 )
@@ -155,6 +157,16 @@ def tool_of(text: str, start: int, stop: int) -> tuple[Transform | None, str | N
     if found[1].upper() == "FALSE":
         return None, "is not held by the robot"
     return _transform(found.groups()[1:]), None
+
+
+def load_of(text: str, start: int, stop: int) -> Payload | None:
+    """Return the load that tooldata written out have, in the controller's flange frame; None if there is none."""
+    found = _LOAD_TEXT.match(text, start, stop)
+    mass, *cog = [0.0] if found is None else [float(number) for number in found.groups()[7:]]
+    if not all(isfinite(number) and abs(number) < LARGEST for number in (mass, *cog)) or mass <= 0.0:
+        return None
+    x, y, z = (value / 1000 for value in cog)
+    return Payload(mass, (x, y, z))
 
 
 def frame_of(text: str, start: int, stop: int) -> tuple[Transform | None, str | None]:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Final
 
-from truearm.compensation.programs.rapid.data import RefusedPoseError, frame_of, tool_of
+from truearm.compensation.programs.rapid.data import RefusedPoseError, frame_of, load_of, tool_of
 from truearm.compensation.programs.rapid.listing import Datum, Instruction, Listing
+from truearm.modeling.parts import Payload
 from truearm.modeling.transform import Transform
 
 _IDENTIFIER: Final = re.compile(r"[^\W\d]\w*+")
@@ -50,18 +51,20 @@ class _Kind:
     def _read(self, datum: Datum) -> tuple[Transform | None, str | None]:
         return self.reader(self.listing.codes[datum.source], datum.start, datum.stop)
 
+    def unchanged(self) -> Iterator[Datum]:
+        """Go through those that the program defines once and does not change."""
+        return (data[0] for data in self.declared.values() if len(data) == 1 and not data[0].written)
+
     def defined(self) -> dict[str, Transform]:
         """Return those that the program defines and does not change, by name."""
         found: dict[str, Transform] = {}
-        for data in self.declared.values():
-            if len(data) > 1 or data[0].written:
-                continue
+        for datum in self.unchanged():
             try:
-                transform, _ = self._read(data[0])
+                transform, _ = self._read(datum)
             except RefusedPoseError:  # of one that no move uses: those that are used are refused before
                 continue
             if transform is not None:
-                found[data[0].name] = transform
+                found[datum.name] = transform
         return found
 
 
@@ -92,3 +95,9 @@ class Frames:
     def defined(self) -> tuple[dict[str, Transform], dict[str, Transform]]:
         """Return the tools and the frames that the program defines, by name."""
         return self._tools.defined(), self._frames.defined()
+
+    def loads(self) -> dict[str, Payload]:
+        """Return what the robot carries with each tool, by name, where the program says it."""
+        codes = self._tools.listing.codes
+        found = {datum.name: load_of(codes[datum.source], datum.start, datum.stop) for datum in self._tools.unchanged()}
+        return {name: load for name, load in found.items() if load is not None}

@@ -76,6 +76,7 @@ class Finder:
             frames,
             tuple(sorted(self.skipped, key=lambda one: (one.source, one.line))),
             dict(self.unknown),
+            self.frames.loads(),
         )
 
     def _skip(self, source: int, place: int, reason: str) -> None:

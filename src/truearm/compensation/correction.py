@@ -1,0 +1,72 @@
+"""One program corrected: its targets before and after, and what became of each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.compensation.chosen_targets import Kept
+from truearm.compensation.expected_errors import ExpectedErrors
+from truearm.compensation.gauge import turns_between
+from truearm.compensation.programs.program import Edit, Program, Skipped
+from truearm.modeling.chain import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Correction:
+    """One program corrected.
+
+    Attributes
+    ----------
+    program
+        As it was.
+    edits
+        What changes in its text.
+    corrected
+        Which targets, ``(n,)``.
+    skipped
+        What stays as it is, and why: what the reader could not use, and targets that cannot be computed.
+    before, after
+        Tips of the targets in their frames, ``(n, 4, 4)`` [m], before and after the correction.
+    tips
+        Tips of the targets in the controller's base frame, ``(n, 4, 4)`` [m].
+    joints
+        Joint positions of the model with which the real robot reaches the targets [rad or m], ``(n, joints)``.
+    on_edge
+        Corrected targets with a joint that leaves the ranges of its configuration, by less than controllers
+        refuse.
+    expected
+        How far the real robot is expected to miss the targets before and after; None if nothing is known of that.
+    not_better
+        Targets whose correction would rather do harm: they stay as they are, unless the path that they belong to is
+        better corrected as a whole, or all were asked for.
+    kept
+        Targets that stay because they shall, by their index, and why.
+    """
+
+    program: Program
+    edits: tuple[Edit, ...]
+    corrected: NDArray[np.bool_]
+    skipped: tuple[Skipped, ...]
+    before: Array
+    after: Array
+    tips: Array
+    joints: Array
+    on_edge: tuple[int, ...]
+    expected: ExpectedErrors | None = None
+    not_better: tuple[int, ...] = ()
+    kept: Mapping[int, Kept] = field(default_factory=dict)
+
+    @cached_property
+    def moved(self) -> Array:
+        """By how much each target was moved [m], ``(n,)``; zero where it was not corrected."""
+        return np.asarray(np.linalg.norm(self.after[:, :3, 3] - self.before[:, :3, 3], axis=1))
+
+    @cached_property
+    def turned(self) -> Array:
+        """By how much each target was turned [rad], ``(n,)``."""
+        return np.asarray(np.linalg.norm(turns_between(self.before, self.after), axis=1))

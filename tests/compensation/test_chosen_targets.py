@@ -1,0 +1,162 @@
+"""Which targets are corrected, and what becomes of those that were taught."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import truearm
+from truearm.compensation.fake_targets import matrices
+from truearm.compensation.program_correction import commanded
+from truearm.errors import InputError
+from truearm.library import load_robot
+from truearm.modeling.parts import Payload
+from truearm.modeling.robot import Robot
+
+POSE = "[[{x:.3f},{y:.3f},300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
+
+
+def worn(effects: tuple[str, ...] = ()) -> Robot:
+    """Return an IRB 120 that is another one."""
+    robot = load_robot("irb120").with_effects(effects)
+    values = {"a_3": 0.2706, "theta_offset_3": 0.002, "alpha_4": -1.5690, "theta_offset_2": -1.5690}
+    if effects:
+        values |= {"compliance_2": 6e-6, "compliance_3": 8e-6}
+    return robot.with_values(values)
+
+
+def plate(folder: Path, change: tuple[str, str] = ("", "")) -> Path:
+    path = folder / "plate.mod"
+    path.write_text((files("truearm.examples") / "plate.mod").read_text().replace(*change))
+    return path
+
+
+def corrected_lines(made: truearm.ProgramCorrection) -> list[str]:
+    """Return the names of the targets that were corrected."""
+    (one,) = made.result.corrections
+    return [t.name for t, done in zip(one.program.targets, one.corrected.tolist(), strict=True) if done]
+
+
+def test_home_stays_unless_it_is_asked_for(tmp_path: Path) -> None:
+    made = truearm.compensate(worn(), [plate(tmp_path)])
+    (one,) = made.result.corrections
+    homes = [i for i, target in enumerate(one.program.targets) if target.form.kind == "joints"]
+    assert [one.kept.get(i) for i in homes] == ["given by joints"]
+    again = made.as_written()[0].targets
+    assert again[homes[0]].values == one.program.targets[homes[0]].values
+    asked = truearm.compensate(worn(), [plate(tmp_path)], joint_targets="correct")
+    assert asked.files[0].kept.total() == 0
+    assert asked.as_written()[0].targets[homes[0]].values != one.program.targets[homes[0]].values
+
+
+def test_only_some_and_without_some(tmp_path: Path) -> None:
+    program = plate(tmp_path)
+    some = truearm.compensate(worn(), [program], only=["pHole1*", "PHOLE2"], keep=["phole12"])
+    names = corrected_lines(some)
+    assert {"pHole1", "pHole10", "pHole11", "pHole2"} <= set(names)
+    assert all(name.startswith("pHole1") or name == "pHole2" for name in names)
+    assert "pHole12" not in names
+    file = some.files[0]
+    assert file.targets == file.corrected + file.kept.total() + len(file.skipped)
+    assert f"{file.kept['not in `only`']} kept (not in `only`)" in file.count_words
+    for parameter in ("only", "keep"):
+        with pytest.raises(InputError, match="no target of the programs has this name; got 'pHoel1'") as refusal:
+            truearm.compensate(worn(), [program], **{parameter: ["pHoel1"]})  # type: ignore[arg-type]
+        assert refusal.value.parameter == parameter
+        assert "Did you mean pHole1" in str(refusal.value)
+
+
+def test_taught_points_stay_byte_for_byte(tmp_path: Path) -> None:
+    program = plate(tmp_path)
+    made = truearm.compensate(worn(), [program], taught=["points"])
+    offsets = {t.name for t in made.result.corrections[0].program.targets if t.parent is not None}
+    assert set(corrected_lines(made)) <= offsets
+    assert "computed-or-taught" not in {notice.code for notice in made.warnings}
+    alone = tmp_path / "alone.mod"
+    alone.write_text("\n".join(line for line in program.read_text().splitlines() if "Offs" not in line))
+    assert truearm.compensate(worn(), [alone], taught=["points"]).files[0].text == alone.read_bytes()
+
+
+@pytest.mark.parametrize("offset", ["Offs(p1,120,-80,60)", "RelTool(p1,120,80,-60)"])
+def test_an_offset_from_a_taught_point_is_as_long_as_it_says(tmp_path: Path, offset: str) -> None:
+    """The real robot is asked where it is at the point, and 150 mm beside it."""
+    path = tmp_path / "m.mod"
+    path.write_text(
+        f"MODULE m\n  CONST robtarget p1:={POSE.format(x=400, y=100)};\n  PROC main()\n"
+        f"    MoveJ p1,v100,fine,tool0;\n    MoveL {offset},v100,fine,tool0;\n  ENDPROC\nENDMODULE\n"
+    )
+    robot = worn()
+    made = truearm.compensate(robot, [path], taught=["points", "frames", "tools"])
+    (one,) = made.result.corrections
+    assert one.corrected.tolist() == [False, True]
+    wanted = np.linalg.norm([120, 80, 60]) * 1e-3
+    lengths = []
+    for program in (one.program, made.as_written()[0]):
+        tips = matrices(robot, commanded(robot, program))[:, :3, 3]
+        lengths.append(float(np.linalg.norm(tips[1] - tips[0])))
+    assert abs(lengths[0] - wanted) > 5e-5
+    assert lengths[1] == pytest.approx(wanted, abs=2e-6)
+
+
+def test_frames_that_were_taught_each_have_a_shift_of_their_own(tmp_path: Path) -> None:
+    """Two plates far apart, each located by its own points: each pattern stays where it was."""
+    lines = ["MODULE m"]
+    for name, (x, y) in {"wLeft": (250, 150), "wRight": (250, -300)}.items():
+        lines.append(f'  PERS wobjdata {name}:=[FALSE,TRUE,"",[[{x},{y},100],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];')
+    lines += ["  PROC main()", "    ConfJ\\Off;"]
+    pose = "[[{x},{y},150],[0,0,1,0],[{q},0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
+    for name, quadrant in (("wLeft", 0), ("wRight", -1)):
+        lines += [
+            f"    MoveJ {pose.format(x=x, y=y, q=quadrant)},v100,fine,tool0\\WObj:={name};"
+            for x in (0, 80, 160)
+            for y in (10, 60, 110)
+        ]
+    path = tmp_path / "m.mod"
+    path.write_text("\n".join([*lines, "  ENDPROC", "ENDMODULE", ""]))
+    for taught, apart in ((["none"], True), (["frames"], False)):
+        (one,) = truearm.compensate(worn(), [path], taught=taught).result.corrections
+        assert one.corrected.all()
+        shifts = (one.after - one.before)[:, :3, 3].reshape(2, 9, 3).mean(axis=1)
+        assert (np.linalg.norm(shifts, axis=1) > 2e-5).all() == apart
+        if not apart:
+            np.testing.assert_allclose(shifts, 0.0, atol=2e-7)
+
+
+def test_what_was_taught_is_asked_and_contradictions_are_refused(tmp_path: Path) -> None:
+    program = plate(tmp_path)
+    (asked,) = [n for n in truearm.compensate(worn(), [program]).warnings if n.code == "computed-or-taught"]
+    assert "`taught=points`, `taught=frames`, `taught=tools`, or `taught=none`" in asked.message
+    answered = truearm.compensate(worn(), [program], taught=["none"])
+    assert "computed-or-taught" not in {notice.code for notice in answered.warnings}
+    for wrong, words in (
+        (["none", "points"], "what was taught is not clear"),
+        ([], "what was taught is not clear"),
+        (["holes"], "there is no answer of this name"),
+    ):
+        with pytest.raises(InputError, match=words):
+            truearm.compensate(worn(), [program], taught=wrong)
+    cell = tmp_path / "cell.yaml"
+    cell.write_text("truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\ntools:\n  tProbe: {of: flange}\n")
+    with pytest.raises(InputError, match="the tools cannot be both taught and measured"):
+        truearm.compensate(worn(), [program], tools=cell, taught=["tools"])
+
+
+def test_the_arm_bends_by_what_the_program_says_that_its_tool_weighs(tmp_path: Path) -> None:
+    robot = worn(("compliance",)).with_payload(Payload(1.0, (0.0, 0.0, 0.05)))
+    program = plate(tmp_path)
+    made = truearm.compensate(robot, [program], taught=["none"])
+    assert made.result.loads == {"tProbe": Payload(2.7, (0.05, 0.025, 0.1))}
+    given = truearm.compensate(robot, [program], taught=["none"], payload="2.7kg,50mm,25mm,100mm")
+    assert given.files[0].text == made.files[0].text
+    assert given.result.loads == {}
+    other = truearm.compensate(robot, [program], taught=["none"], payload="1kg,0mm,0mm,50mm")
+    assert other.files[0].text != made.files[0].text
+    dummy = plate(tmp_path, ("[2.7,[50,25,100]", "[0.001,[0,0,0.001]"))
+    assert truearm.compensate(robot, [dummy], taught=["none"]).result.loads == {"tProbe": None}
+    (said,) = [n for n in truearm.compensate(robot, [dummy]).warnings if n.code == "loads-taken"]
+    assert "No mass is known of tProbe: there the 1 kg of the calibration are kept." in said.message
+    assert replace(said).level == "note"

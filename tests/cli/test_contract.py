@@ -287,8 +287,7 @@ def test_too_few_readings_for_a_model_are_said(truearm: Truearm, small: Path, tm
     noisy = replace(data, position=data.position + np.random.default_rng(0).normal(0.0, 20e-3, data.position.shape))
     (tmp_path / "data.csv").write_text(csv_text(noisy.of_configurations(np.arange(12))))
     words = ["calibrate", "irb120", tmp_path / "data.csv", "--redundancy", "drop", "--out", tmp_path / "out", "--json"]
-    found = {w["code"] for seed in range(5) for w in json.loads(truearm(*words, "--seed", seed).out)["warnings"]}
-    assert "not-better" in found
+    assert "not-better" in {w["code"] for w in json.loads(truearm(*words).out)["warnings"]}
 
 
 def test_convert_writes_the_same_robot_in_another_convention(truearm: Truearm, tmp_path: Path) -> None:

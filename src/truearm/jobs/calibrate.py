@@ -20,10 +20,13 @@ from truearm.identification.judging.arrival_lag import check_arrival_lag
 from truearm.identification.judging.changes import check_changes
 from truearm.identification.judging.expected_error import as_residuals_allow, expected_error
 from truearm.identification.judging.implausible import check_plausible
+from truearm.identification.judging.large_remainder import check_remainder
 from truearm.identification.judging.left_over import LeftOver
-from truearm.identification.judging.narrow_data import check_narrow_data
+from truearm.identification.judging.narrow_data import check_narrow_data, check_narrow_data_without_geometry
 from truearm.identification.judging.one_sided import check_one_sided
-from truearm.identification.judging.sigma import check_sigma
+from truearm.identification.judging.payload import check_payload
+from truearm.identification.judging.separate_visits import check_separate_visits
+from truearm.identification.judging.sigma import check_sigma, check_sigma_beside_joints
 from truearm.identification.judging.transmission import check_transmission
 from truearm.identification.solving.bounds import Bounds, read_bounds
 from truearm.identification.solving.fit import Status, identify, place
@@ -50,7 +53,7 @@ from truearm.jobs.check import notices_of
 from truearm.jobs.validate import trained_on
 from truearm.library import urdf_source
 from truearm.measurement.dataset import Dataset, IntArray
-from truearm.measurement.repeats import copies, revisits
+from truearm.measurement.repeats import copies, readings_digest, revisits
 from truearm.measurement.statistics import Errors, errors_of
 from truearm.measurement.table_motion import without_table_motion
 from truearm.modeling.effects import EFFECTS
@@ -174,7 +177,7 @@ def calibrate(
             asked = named.also(effects)
             asked.free(asked.prepared(nominal_robot))
     progress("reading the data")
-    readings = readings_argument(nominal_robot, data)
+    readings = as_read = readings_argument(nominal_robot, data)
     sha256 = None
     if isinstance(data, str | Path):
         sha256 = hashlib.sha256(read_bytes(path_argument(data, "data"))).hexdigest()
@@ -238,12 +241,18 @@ def calibrate(
     expected = expected_error(as_residuals_allow(fit, first), plausible=not unlike)
     left_over = LeftOver.of(fit, readings)
     wrong_sigma = check_sigma(left_over)
-    narrow = (
-        []  # more configurations do not mend these
-        if unlike or wrong_sigma
-        else check_narrow_data(fit, expected, first, validation or train_errors, held_out=validation is not None)
-    )
-    digest = "" if sha256 is None else f" (sha256 {sha256[:12]})"
+    hidden = [] if unlike or has_error(wrong_sigma) else check_sigma_beside_joints(left_over)
+    explained = [*check_changes(left_over), *check_arrival_lag(left_over)]
+    doubted = has_error([*unlike, *noticed])
+    if not explained and not doubted and not any(notice.code == "joints-rounded" for notice in noticed):
+        explained = check_remainder(left_over)
+    narrow: list[Notice] = []
+    if not unlike and (hidden or not wrong_sigma):  # more configurations do not mend these
+        by, seen = validation or train_errors, validation is not None
+        if chosen.groups and "geometry" not in chosen.groups:
+            narrow = check_narrow_data_without_geometry(fit, first, by, loss, held_out=seen)
+        narrow = narrow or check_narrow_data(fit, expected, first, by, held_out=seen)
+    digest = f" ({'' if sha256 is None else f'sha256 {sha256[:12]}, '}readings {readings_digest(as_read)[:12]})"
     history = (
         f"calibrated by truearm {__version__}: model {' + '.join([chosen.name, *effects])},"
         f" {count} of {n} configurations of {Path(readings.source).name}{digest}, seed {seed}, loss {loss},"
@@ -260,15 +269,16 @@ def calibrate(
             *unlike,
             *_check_proof(before, validation),
             *_check_copies(readings, training, held_out),
-            *_check_trained_before(nominal_robot, sha256, (count, n, seed)),
+            *_check_trained_before(nominal_robot, as_read, sha256, (count, n, seed)),
             *moved,
-            *check_fit(fit, expected, doubted=has_error([*unlike, *noticed])),
+            *check_payload(nominal_robot),
+            *check_fit(fit, expected, doubted=doubted),
             *narrow,
             *(notice for notice in noticed if notice.level != "error"),
             *check_one_sided(fit, first),
-            *wrong_sigma,
-            *check_changes(left_over),
-            *check_arrival_lag(left_over),
+            *(hidden or wrong_sigma),
+            *([] if doubted else check_separate_visits(left_over)),
+            *explained,
             *check_transmission(fit, first),
         ),
         data=readings,
@@ -380,23 +390,25 @@ def _check_copies(data: Dataset, training: IntArray, held_out: IntArray) -> list
     ]
 
 
-def _check_trained_before(robot: Robot, sha256: str | None, split: tuple[int, int, int]) -> list[Notice]:
+def _check_trained_before(robot: Robot, data: Dataset, sha256: str | None, split: tuple[int, int, int]) -> list[Notice]:
     """Say if the robot to begin with has been trained on what is held out now.
 
     Parameters
     ----------
+    data
+        As they were read.
     sha256
-        Of the data; None if they are no file.
+        Of their file; None if they are in none.
     split
         How many configurations are trained on, of how many, and the seed.
     """
-    before = None if sha256 is None else trained_on(robot, sha256)
+    before = trained_on(robot, data, sha256)
     if before is None or before == split or split[0] == split[1]:
         return []
     return [
         Notice(
             "training-data",
-            f"The robot to begin with was calibrated with this file already, on {before[0]} of its {before[1]} "
+            f"The robot to begin with was calibrated with these readings already, on {before[0]} of its {before[1]} "
             f"configurations (seed {before[2]}): what is held out now was partly seen then, and the held-out errors "
             "flatter it. Begin with the nominal robot, or with the same `train` and `seed`.",
         )

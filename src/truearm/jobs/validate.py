@@ -10,6 +10,8 @@ from typing import Final
 
 from truearm.errors import InputError, refusals_of
 from truearm.files import path_argument, read_bytes
+from truearm.identification.judging.beyond_proof import check_proof
+from truearm.identification.judging.payload import check_payload
 from truearm.identification.judging.same_frames import check_frames
 from truearm.identification.judging.target_names import check_names
 from truearm.jobs.arguments import (
@@ -22,6 +24,7 @@ from truearm.jobs.arguments import (
 )
 from truearm.jobs.proof import changed_since
 from truearm.measurement.dataset import Dataset
+from truearm.measurement.repeats import readings_digest
 from truearm.measurement.statistics import errors_of
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
@@ -59,6 +62,7 @@ def validate(
         with refusals_of("data"):
             digest = hashlib.sha256(read_bytes(path_argument(data, "data"))).hexdigest()
     changed = changed_since(robot)
+    as_calibrated = robot_argument(robot)
     robot, data = as_measured(robot, data, payload, gravity)
     identified = {p.group for p in robot.parameters.values() if p.deviation is not None}
     if data.anchored and robot.fixtures and identified and "base" not in identified:
@@ -70,32 +74,47 @@ def validate(
             "'truearm distances'.",
         )
     errors = errors_of(robot, data)
-    mistaken = check_names(robot, data, errors) or check_frames(robot, data, errors)
-    return Validation(data.source, errors, (*changed, *mistaken, *_seen_in_training(robot, data, digest)))
+    mistaken = (
+        check_names(robot, data, errors)
+        or check_frames(robot, data, errors)
+        or check_proof(as_calibrated, data, errors)
+    )
+    return Validation(
+        data.source, errors, (*changed, *mistaken, *check_payload(robot), *_seen_in_training(robot, data, digest))
+    )
 
 
-#: How a calibration says in the robot's history which configurations of which file it was trained on.
-_TRAINED: Final = re.compile(r"(\d+) of (\d+) configurations of .*?\(sha256 ([0-9a-f]+)\), seed (\d+)")
+#: How a calibration says in the robot's history which configurations of which data it was trained on: by the hash of
+#: the file, of the readings, or of both.
+_TRAINED: Final = re.compile(
+    r"(\d+) of (\d+) configurations of .*?\((?:sha256 ([0-9a-f]+))?(?:, )?(?:readings ([0-9a-f]+))?\), seed (\d+)"
+)
 
 
-def trained_on(robot: Robot, digest: str) -> tuple[int, int, int] | None:
-    """Return how many configurations of a file a robot was trained on, of how many, and the seed; None if on none.
+def trained_on(robot: Robot, data: Dataset, digest: str | None) -> tuple[int, int, int] | None:
+    """Return how many configurations of data a robot was trained on, of how many, and the seed; None if on none.
 
     Parameters
     ----------
+    data
+        As they were read.
     digest
-        SHA-256 of the file.
+        SHA-256 of their file, by which older calibrations know them; None if they are in none.
     """
+    readings = readings_digest(data)
     for line in robot.history:
         found = _TRAINED.search(line)
-        if found is not None and found[3] == digest[: len(found[3])]:
-            return int(found[1]), int(found[2]), int(found[4])
+        if found is None:
+            continue
+        same_file = found[3] is not None and digest is not None and found[3] == digest[: len(found[3])]
+        if same_file or (found[4] is not None and found[4] == readings[: len(found[4])]):
+            return int(found[1]), int(found[2]), int(found[5])
     return None
 
 
 def _seen_in_training(robot: Robot, data: Dataset, digest: str | None) -> list[Notice]:
-    """Say if the readings are from the file that the robot was calibrated with, and how many it was trained on."""
-    trained = None if digest is None else trained_on(robot, digest)
+    """Say if the readings are those that the robot was calibrated with, and how many it was trained on."""
+    trained = trained_on(robot, data, digest)
     if trained is None:
         return []
     count, of, _ = trained
@@ -103,8 +122,8 @@ def _seen_in_training(robot: Robot, data: Dataset, digest: str | None) -> list[N
     return [
         Notice(
             "training-data",
-            f"The robot was calibrated with this file: {count} of its {of} configurations are those it was trained "
-            f"on{held_out}. These errors flatter it. Validate with measurements that were not used.",
+            f"The robot was calibrated with these readings: {count} of their {of} configurations are those it was "
+            f"trained on{held_out}. These errors flatter it. Validate with measurements that were not used.",
         )
     ]
 

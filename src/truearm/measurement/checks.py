@@ -6,6 +6,7 @@ readings of a real instrument agree to the last digit.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from typing import Final, Protocol
 
@@ -282,6 +283,11 @@ def _misnamed(data: Dataset) -> list[Notice]:
                 labels = _listed([data.labels[c] for c in sorted(at)])
                 found.append(f"{name} at {labels}, where {other} is missing: did you mean {other}?")
                 break
+    written = {_as_meant(name): name for name in reversed(data.targets)}
+    for t, name in enumerate(data.targets):
+        first = written[_as_meant(name)]
+        if first != name and seen[t] and not seen[t] & seen[data.targets.index(first)] and not _told(name, found):
+            found.append(f"{first} and {name} are never read together: are they one target?")
     for t, c in twice:
         lost = [data.targets[o] for o in often if c not in seen[o]]
         if len(lost) == 1:
@@ -296,6 +302,15 @@ def _misnamed(data: Dataset) -> list[Notice]:
             "error",
         )
     ]
+
+
+def _as_meant(name: str) -> str:
+    """Return a name without what is easily written in two ways: case, blanks, hyphens and leading zeros."""
+    return re.sub(r"(?<![0-9])0+(?=[0-9])", "", re.sub(r"[\s_-]", "", name.casefold()))
+
+
+def _told(name: str, found: Sequence[str]) -> bool:
+    return any(words.startswith(f"{name} at ") for words in found)
 
 
 def _are(things: Sequence[object]) -> str:

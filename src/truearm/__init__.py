@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from truearm.jobs.plan import plan
     from truearm.jobs.revert import revert
     from truearm.jobs.robots import robots
+    from truearm.jobs.show import show
     from truearm.jobs.simulate import simulate
     from truearm.jobs.study import study
     from truearm.jobs.tolerance import tolerance
@@ -91,6 +92,7 @@ __all__ = [
     "plan",
     "revert",
     "robots",
+    "show",
     "simulate",
     "study",
     "tolerance",

@@ -146,7 +146,8 @@ def _new(folder: Path, name: str) -> Path:
 #: Arguments of a call of each job, made in a folder of its own.
 EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
     "load_robot": lambda _: {"robot": "irb120"},
-    "load_data": lambda folder: {"data": _data(folder)},
+    "show": lambda _: {"robot": "lrmate200ic", "joints": [0.1, 0.2, 0.3, 0.4, 0.5, 0.6], "joints_are": "model"},
+    "load_data": lambda folder: {"data": _data(folder), "robot": "irb120"},
     "check": lambda folder: {"robot": load_robot("irb120"), "data": _data(folder), "device": "tracker"},
     "calibrate": lambda folder: {
         "robot": "irb120",

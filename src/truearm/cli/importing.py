@@ -11,6 +11,16 @@ from truearm.cli.options import Commands
 from truearm.cli.output import Json, print_json, print_record
 from truearm.errors import InputError
 
+JointsAreText = Annotated[
+    str | None,
+    typer.Option(
+        "--joints-are",
+        metavar="controller|model",
+        help="Whose joint positions they are: as the robot's controller shows them, or its model's.",
+        show_default="the model's",
+    ),
+]
+
 app = Commands(
     help="Turn measurement files into the canonical CSV, and a controller's kinematics into a robot file.",
     no_args_is_help=True,
@@ -34,6 +44,7 @@ def matrices(
             help="Positions of a fixed point beside the robot; repeat for each.",
         ),
     ] = None,
+    joints_are: JointsAreText = None,
 ) -> None:
     """White-space separated matrices, one configuration a row. A row of zeros or NaN is a missing reading."""
     from truearm.jobs.import_matrices import import_matrices
@@ -44,6 +55,7 @@ def matrices(
         _named(references or [], "references"),
         angle_unit=angle_unit,
         length_unit=length_unit,
+        joints_are=joints_are or "model",  # type: ignore[arg-type]
         out=out,
     )
     print_record(imported)
@@ -54,11 +66,13 @@ def table(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A CSV or SpatialAnalyzer ASCII file.")],
     mapping: Annotated[Path, typer.Option("--map", metavar="MAPPING.yaml", help="Which column is what.")],
     out: Annotated[Path, typer.Option("--out", metavar="DATA.csv", help="File to write.")],
+    joints_are: JointsAreText = None,
 ) -> None:
     """Any table of points, by a mapping that says which column is what (the guide has complete ones)."""
     from truearm.jobs.import_table import import_table
 
-    print_record(import_table(file, mapping, out=out))
+    imported = import_table(file, mapping, joints_are=joints_are, out=out)  # type: ignore[arg-type]
+    print_record(imported)
 
 
 @app.command()

@@ -12,6 +12,7 @@ from typing import Final
 #: Every job, in the order of the work.
 JOBS: Final = (
     "load_robot",
+    "show",
     "load_data",
     "import_table",
     "import_matrices",

@@ -38,7 +38,6 @@ from truearm.jobs.arguments import (
     choice_argument,
     choices_argument,
     command_argument,
-    data_argument,
     files_of,
     folder_for,
     gravity_argument,
@@ -46,6 +45,7 @@ from truearm.jobs.arguments import (
     payload_argument,
     progress_argument,
     python_call,
+    readings_argument,
     refuse_swapped,
     robot_argument,
     whole_argument,
@@ -53,7 +53,6 @@ from truearm.jobs.arguments import (
 from truearm.jobs.check import notices_of
 from truearm.jobs.validate import trained_on
 from truearm.library import urdf_source
-from truearm.measurement.checks import check_joints
 from truearm.measurement.dataset import Dataset, IntArray
 from truearm.measurement.repeats import copies, readings_digest, revisits
 from truearm.measurement.statistics import Errors, errors_of
@@ -179,7 +178,7 @@ def calibrate(
             asked = named.also(effects)
             asked.free(asked.prepared(nominal_robot))
     progress("reading the data")
-    readings = as_read = data_argument(data)
+    readings = as_read = readings_argument(nominal_robot, data)
     sha256 = None
     if isinstance(data, str | Path):
         sha256 = hashlib.sha256(read_bytes(path_argument(data, "data"))).hexdigest()
@@ -188,7 +187,6 @@ def calibrate(
         with refusals_of("bounds"):
             bounds = read_bounds(path_argument(bounds, "bounds"))
     with refusals_of("data"):
-        check_joints(nominal_robot, readings)
         n = readings.configurations
         count = _train_count(train, n, readings.source)
         order = np.random.default_rng(seed).permutation(n)

@@ -14,9 +14,15 @@ from truearm.identification.judging.beyond_proof import check_proof
 from truearm.identification.judging.payload import check_payload
 from truearm.identification.judging.same_frames import check_frames
 from truearm.identification.judging.target_names import check_names
-from truearm.jobs.arguments import data_argument, gravity_argument, payload_argument, refuse_swapped, robot_argument
+from truearm.jobs.arguments import (
+    data_argument,
+    gravity_argument,
+    payload_argument,
+    readings_argument,
+    refuse_swapped,
+    robot_argument,
+)
 from truearm.jobs.proof import changed_since
-from truearm.measurement.checks import check_joints
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.repeats import readings_digest
 from truearm.measurement.statistics import errors_of
@@ -55,10 +61,9 @@ def validate(
     if isinstance(data, str | Path):
         with refusals_of("data"):
             digest = hashlib.sha256(read_bytes(path_argument(data, "data"))).hexdigest()
-    data = data_argument(data)
     changed = changed_since(robot)
     as_calibrated = robot_argument(robot)
-    robot = as_measured(robot, data, payload, gravity)
+    robot, data = as_measured(robot, data, payload, gravity)
     identified = {p.group for p in robot.parameters.values() if p.deviation is not None}
     if data.anchored and robot.fixtures and identified and "base" not in identified:
         raise InputError(
@@ -123,9 +128,9 @@ def _seen_in_training(robot: Robot, data: Dataset, digest: str | None) -> list[N
     ]
 
 
-def as_measured(robot: object, data: Dataset, payload: object, gravity: object) -> Robot:
-    """Return the robot with what it carried when data were measured, or refuse what it cannot be judged by."""
-    robot = robot_argument(robot)
+def as_measured(robot: object, data: object, payload: object, gravity: object) -> tuple[Robot, Dataset]:
+    """Return the robot with what it carried when data were measured, and those, or refuse what cannot be judged."""
+    measured, robot = data_argument(data), robot_argument(robot)
     if not robot.targets:
         raise InputError(
             "the robot has no targets, so its positions cannot be compared with the readings",
@@ -133,8 +138,7 @@ def as_measured(robot: object, data: Dataset, payload: object, gravity: object) 
             where=robot.name,
             cure="Use the calibrated.yaml that 'truearm calibrate' wrote: it holds base and targets.",
         )
-    with refusals_of("data"):
-        check_joints(robot, data)
+    data = readings_argument(robot, measured)
     robot = robot.with_payload(payload_argument(payload), gravity_argument(gravity))
     if data.temperature is None and any(effect.warmed for effect in robot.effects):
         raise InputError(
@@ -152,4 +156,4 @@ def as_measured(robot: object, data: Dataset, payload: object, gravity: object) 
         raise InputError(
             "there is no reading", parameter="data", where=data.source, cure="Fill in x, y and z, or distance."
         )
-    return robot
+    return robot, data

@@ -19,6 +19,7 @@ from truearm.measurement.places import constellation, places_of
 from truearm.measurement.repeats import check_duplicates, repeated_joints, repeated_joints_notices
 from truearm.measurement.rigid_tool import DEVIATIONS, OTHER_REFLECTOR, SAME_POINT, UNMOVED, Suspect, rigid_suspects
 from truearm.modeling.chain import Array
+from truearm.modeling.formats.joint_columns import COLUMN
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.shown import counted
@@ -210,20 +211,21 @@ def check_joints(robot: Robot, data: Dataset) -> None:
     InputError
         Naming the counts, or the joint whose unit does not fit.
     """
+    column = COLUMN["model" if data.joints_are == "model" else "controller"]
     if data.joints.shape[1] != len(robot.joints):
         raise InputError(
             "the number of joints differs from the robot's",
             where=data.source,
             came=counted(data.joints.shape[1], "joint column"),
             allowed=f"{len(robot.joints)} ({robot.name})",
-            cure="Give one column joint_i for each joint of the robot, base first.",
+            cure=f"Give one column {column}_i for each joint of the robot, base first.",
         )
     for number, (joint, kind) in enumerate(zip(robot.joints, data.joint_kinds, strict=True), 1):
         if joint.kind != kind:
             units = {"revolute": "deg or rad", "prismatic": "mm, m, um or in"}
             raise InputError(
                 f"joint {number} of {robot.name} is {joint.kind}, but its column has a unit of a {kind} joint",
-                where=f"{data.source}, column joint_{number}",
+                where=f"{data.source}, column {column}_{number}",
                 allowed=units[joint.kind],
             )
 

@@ -108,7 +108,8 @@ def test_another_robot_is_not_this_one(folder: Path) -> None:
     found = told("calibrate", "lrmate200ic", file, "--out", folder / "lrmate")
     assert found.code == 3
     assert found.summary["status"] == "implausible"
-    assert found.says("implausible", "error", "Check that it is this robot")
+    assert found.says("implausible", "error")
+    assert found.says("wrong-robot", "error", "not of lrmate200ic, by its lengths")
 
 
 def test_three_configurations_determine_no_robot(folder: Path) -> None:

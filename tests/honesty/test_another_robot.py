@@ -47,8 +47,8 @@ def test_the_check_tells_it_before_anything_is_fitted(folder: Path) -> None:
 
 def test_no_program_is_corrected_with_it_until_it_is_accepted(folder: Path) -> None:
     calibrated("ur10", folder)
-    words = ("compensate", folder / "ur10" / "calibrated.yaml", folder / "job.script", "--controller-kinematics")
-    words = (*words, "nominal", "--out")
+    arm, program = folder / "ur10" / "calibrated.yaml", folder / "job.script"
+    words = ("compensate", arm, program, "--controller-kinematics", "nominal", "--out")
     refused = told(*words, folder / "out")
     assert refused.code == 2
     assert "ur10e of the library" in refused.refusal

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from ruamel.yaml import YAML
 from tests import ur_controller as ur
 
 from truearm.errors import InputError
@@ -16,6 +17,7 @@ from truearm.modeling.formats.export import exported
 from truearm.modeling.formats.robot_file import read_robot, robot_text
 from truearm.modeling.formats.ur_kinematics import (
     controller_robot,
+    mean_angle,
     mean_distance,
     read_kinematics,
     refuse_far,
@@ -154,7 +156,8 @@ def test_a_type_of_another_kind_is_refused(robot: str, tmp_path: Path) -> None:
         ("-0.103609197138685979", "1e400", "finite|range|large|six numbers"),
         ("calibration_status = 2", "calibration_status = 1", "does not compute with these kinematics"),
         (r"delta_a = ", "delta_d = ", "an entry is given twice"),
-        ("0x6e0f7bf", "0x6\x07", "one line of text"),
+        ("0x6e0f7bf", "0x6\x07", "joint_checksum: this is no checksum; .* one line of up to 200 characters"),
+        ("0x6e0f7bf", "0x6e0f7bf" * 10_000, "joint_checksum: this is no checksum"),
     ],
 )
 def test_a_damaged_file_is_refused(old: str, new: str, said: str, tmp_path: Path) -> None:
@@ -170,6 +173,62 @@ def test_a_damaged_file_is_refused(old: str, new: str, said: str, tmp_path: Path
 def test_a_damaged_file_of_the_ros_driver_is_refused(old: str, new: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"ros\.yaml, kinematics"):
         read_kinematics(written(tmp_path, ROS.replace(old, new), "ros.yaml"))
+
+
+@pytest.mark.parametrize("end", ["  hash: ''\n", "", "without its yaw"])
+def test_a_file_of_the_ros_driver_without_its_end_is_refused(end: str, tmp_path: Path) -> None:
+    text = ROS.partition("  hash")[0] + end
+    if end == "without its yaw":  # as a copy that broke off leaves it
+        text = "kinematics:\n" + "".join(
+            f"  {link}:\n" + "".join(f"    {name}: {value}\n" for name, value in re.findall(r"(\w+): ([^,}\s]+)", row))
+            for link, row in re.findall(r"  (\w+): \{([^}]*)\}", ROS)
+        )
+        text = re.sub(r"yaw: -3\.1\d+\n$", "yaw: -3.1", text)
+        assert text.endswith("yaw: -3.1")
+    with pytest.raises(InputError, match=r"ros\.yaml, kinematics: the hash is missing, so the file is not whole"):
+        read_kinematics(written(tmp_path, text, "ros.yaml"))
+
+
+@pytest.mark.parametrize("text", ["\n" * 300_000 + "x: 1\n", "delta_" + "a" * 300_000, "delta_a" + " " * 300_000 + "b"])
+def test_a_file_of_blanks_is_refused_at_once(text: str, tmp_path: Path) -> None:
+    # Of so many blank lines each was once read again from every one before it, which would take ten minutes.
+    with pytest.raises(InputError, match=r"some\.yaml"):
+        read_kinematics(written(tmp_path, text, "some.yaml"))
+
+
+def test_blanks_before_a_list_are_read(tmp_path: Path) -> None:
+    text = ur.UR10_CONF.replace("[mounting]\n", "\n\n").replace("delta_", "\t  delta_")
+    found = read_kinematics(written(tmp_path, text))
+    assert found.deltas == read_kinematics(written(tmp_path, ur.UR10_CONF)).deltas
+
+
+def with_turned_flange(angle: float) -> str:
+    """Return a published file with another zero of joint 6, which moves no flange."""
+    theta, a, d, alpha = ur.deltas(ur.UR10_CONF)
+    return ur.conf_of(theta + np.array([0, 0, 0, 0, 0, angle]), a, d, alpha)
+
+
+def test_a_flange_that_is_turned_far_is_refused(tmp_path: Path) -> None:
+    type_ = load_robot("ur10")
+    plain, turned = (made(tmp_path, with_turned_flange(angle), "ur10") for angle in (0.0, 0.09))
+    assert mean_distance(turned, type_) == pytest.approx(mean_distance(plain, type_))
+    assert np.degrees(mean_angle(plain, type_)) == pytest.approx(0.362, abs=1e-3)
+    assert np.degrees(mean_angle(turned, type_)) == pytest.approx(np.degrees(0.09), abs=0.1)
+    refuse_far(plain, type_, "calibration.conf")
+    with pytest.raises(InputError, match="got 'a flange turned by 5.18 deg from that of ur10 on average'") as refusal:
+        refuse_far(turned, type_, "calibration.conf")
+    assert "allowed: 1 deg" in str(refusal.value)
+
+
+def test_joint_zeros_that_cancel_at_the_flange_are_refused_at_the_link(tmp_path: Path) -> None:
+    # Axes 2 and 3 are parallel: the flange is not turned, and that of a short arm moves less than 20 mm.
+    arm = load_robot("ur3e").with_values({"theta_offset_2": 0.045, "theta_offset_3": -0.045})
+    assert mean_angle(arm, load_robot("ur3e")) < 1e-6
+    assert mean_distance(arm, load_robot("ur3e")) < 0.02
+    with pytest.raises(InputError, match=r"does not come to lie beside the nominal one.* 2\.58 deg") as refusal:
+        refuse_far(arm, load_robot("ur3e"), "calibration.conf")
+    assert "allowed: 50 mm, 2 deg" in str(refusal.value)
+    assert "link 2" in str(refusal.value)
 
 
 def test_what_is_no_kinematics_file_is_refused(tmp_path: Path) -> None:
@@ -238,11 +297,66 @@ def test_a_robot_file_says_it_in_a_word(word: str, tmp_path: Path) -> None:
         ("12", "text|known|kinematics"),
         ("{kind: own}", "one row belongs here for each joint"),
         ("{kind: nominal, joints: [{theta_offset: 0, d: 0, a: 0, alpha: 0}]}", "nominal kinematics have no rows"),
-        ("{kind: secret}", "kinematics"),
+        ("{kind: secret}", r"controller\.kinematics\.kind: this value is not known"),
+        (
+            "{kind: proprietary, joints: [{theta_offset: 0, d: 0, a: 0, alpha: 0}]}",
+            "proprietary kinematics have no rows",
+        ),
+        ("{kind: own, identity: {hash: " + "a" * 201 + "}}", r"kinematics\.identity\.hash: this is no checksum"),
+        (
+            "{kind: own, joints: [{theta_offset: 0, d: .nan, a: 0, alpha: 0}]}",
+            r"kinematics\.joints\[1\]\.d: .*not a num",
+        ),
+        ("{kind: own, joints: [{theta_offset: 0, a: 0, alpha: 0}]}", r"kinematics\.joints\[1\]\.d: this entry is mis"),
+        ("{kind: own, rows: []}", r"kinematics\.rows: this entry is not known here; allowed: kind, source, identity"),
+        ("", r"controller\.kinematics: this does not say .* got nothing; allowed: nominal, prop"),
+        ("''", r"controller\.kinematics: this does not say .* got ''; allowed: nominal, prop"),
+        ("3", r"controller\.kinematics: this does not say .* got 3; allowed: nominal, prop"),
+        ("[nominal]", r"controller\.kinematics: this does not say .* got \[nominal\]; allowed: nominal, prop"),
+        ("{kind: own, joints: [" + "{theta_offset: 0, d: 0, a: 0, alpha: 0}, " * 6 + "]}", "another type of robot"),
     ],
 )
 def test_kinematics_that_nobody_can_read_are_refused(entry: str, said: str, tmp_path: Path) -> None:
     written(tmp_path, ur.UR3E_CONF, "other.conf")
     text = robot_text(load_robot("ur10")).replace("controller:\n", f"controller:\n  kinematics: {entry}\n")
     with pytest.raises(InputError, match=said):
+        read_robot(written(tmp_path, text, "arm.yaml"))
+
+
+@pytest.mark.parametrize("kind", ["nominal", "proprietary", "unknown"])
+def test_a_robot_file_says_where_a_word_is_known_from(kind: str, tmp_path: Path) -> None:
+    entry = f"  kinematics: {{kind: {kind}, source: the order}}"
+    text = robot_text(load_robot("ur10")).replace("controller:\n", f"controller:\n{entry}\n")
+    arm = read_robot(written(tmp_path, text, "arm.yaml"))
+    assert (arm.controller.kinematics.kind, arm.controller.kinematics.source) == (kind, "the order")
+    assert read_robot(written(tmp_path, robot_text(arm), "again.yaml")) == arm
+
+
+@pytest.mark.parametrize(
+    ("row", "column", "wrong", "said"),
+    [
+        (1, "a", 60.0, r"another type of robot; got 'a flange .* mm from that of ur10"),
+        (5, "theta_offset", 5.0, "no arm of this type"),
+        (1, "beta", 30.0, "another type of robot"),
+    ],
+)
+def test_rows_of_another_arm_in_a_robot_file_are_refused(
+    row: int, column: str, wrong: float, said: str, tmp_path: Path
+) -> None:
+    yaml = YAML(typ="safe")
+    content = yaml.load(robot_text(made(tmp_path, ur.UR10_CONF, "ur10")))
+    rows = content["controller"]["kinematics"]["joints"]
+    rows[row][column] = rows[row].get(column, 0.0) + wrong
+    with (tmp_path / "arm.yaml").open("w") as stream:
+        yaml.dump(content, stream)
+    with pytest.raises(InputError, match=rf"arm\.yaml, controller\.kinematics: .*{said}"):
+        read_robot(tmp_path / "arm.yaml")
+
+
+def test_rows_of_a_robot_of_another_kind_are_refused(tmp_path: Path) -> None:
+    arm = load_robot("katana450")
+    rows = ", ".join(["{theta_offset: 0, d: 0, a: 0, alpha: 0}"] * len(arm.joints))
+    text = f"{robot_text(arm)}controller:\n  kinematics: {{kind: own, joints: [{rows}]}}\n"
+    assert text.count("controller:") == 1
+    with pytest.raises(InputError, match=r"another kind is given|must have the table and the frames"):
         read_robot(written(tmp_path, text, "arm.yaml"))

@@ -10,7 +10,6 @@ from truearm.jobs.arguments import new_file_for, robot_argument
 from truearm.library import library, load_robot
 from truearm.modeling.formats.robot_file import robot_text
 from truearm.modeling.formats.ur_kinematics import (
-    MOST_APART,
     FactoryKinematics,
     mean_distance,
     read_kinematics,
@@ -80,8 +79,8 @@ def _fitting(found: FactoryKinematics, type_: Robot) -> dict[str, float]:
             continue
         try:
             made = with_kinematics(other, found)
-            if mean_distance(made, other) <= MOST_APART:
-                names[name] = largest_zero(made)
-        except InputError:  # no arm of this kind
+            refuse_far(made, other, name)
+        except InputError:  # no arm of this kind, or far from this one
             continue
+        names[name] = largest_zero(made)
     return names

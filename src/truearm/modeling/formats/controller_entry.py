@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, Field, StringConstraints
+from pydantic import AfterValidator, BaseModel, Field, PlainValidator
 
 from truearm.errors import InputError, did_you_mean
-from truearm.modeling.controller import Controller, ControllerKinematics
-from truearm.modeling.formats.entries import STRICT, Name, Number, Place, place_entry
+from truearm.modeling.controller import Controller, ControllerKinematics, KinematicsKind
+from truearm.modeling.formats.entries import STRICT, Checksum, Name, Number, Place, place_entry
 from truearm.modeling.parts import Joint
 from truearm.modeling.transform import IDENTITY
 from truearm.shown import counted
@@ -24,6 +24,8 @@ STATED: Final[Mapping[str, ControllerKinematics]] = {
     "proprietary": ControllerKinematics("proprietary"),
     "unknown": ControllerKinematics(),
 }
+#: What may be said of a controller's kinematics.
+ALLOWED: Final = f"{', '.join(STATED)}, or a kinematics file: calibration.conf, or that of the ROS driver"
 
 
 def _direction(sign: int) -> int:
@@ -70,13 +72,22 @@ class KinematicsRow(BaseModel):
 
 
 class KinematicsEntry(BaseModel):
-    """With what the controller computes poses: the table of the robot file, or rows of its own."""
+    """With what the controller computes poses: what may be said in a word, with a source, or rows of its own."""
 
     model_config = STRICT
-    kind: Literal["nominal", "own"]
+    kind: KinematicsKind
     source: str = ""
-    identity: dict[Name, str] = {}
+    identity: dict[Name, Checksum] = {}
     joints: list[KinematicsRow] = []
+
+
+def _said(said: object) -> str | KinematicsEntry:
+    """Return a word, the name of a file or named entries as they are; of a union every fault would name all of them."""
+    if isinstance(said, Mapping):
+        return KinematicsEntry.model_validate(said)
+    if isinstance(said, str) and said.strip():
+        return said
+    raise InputError("this does not say with what the controller computes", came=said, allowed=ALLOWED)
 
 
 class ControllerEntry(BaseModel):
@@ -87,7 +98,7 @@ class ControllerEntry(BaseModel):
 
     model_config = STRICT
     source: str = ""
-    kinematics: Annotated[str, StringConstraints(strict=True)] | KinematicsEntry = "unknown"
+    kinematics: Annotated[str | KinematicsEntry, PlainValidator(_said)] = "unknown"
     joints: list[CountedJoint] = []
     base: Place = Place()
     flange: Place = Place()
@@ -172,7 +183,9 @@ class ControllerEntry(BaseModel):
             return STATED.get(entry, ControllerKinematics())
         if len(entry.joints) != (len(joints) if entry.kind == "own" else 0):
             raise InputError(
-                "one row belongs here for each joint" if entry.kind == "own" else "nominal kinematics have no rows",
+                "one row belongs here for each joint"
+                if entry.kind == "own"
+                else f"{entry.kind} kinematics have no rows",
                 where=f"{where}.joints",
                 came=counted(len(entry.joints), "row"),
                 allowed=str(len(joints)) if entry.kind == "own" else "none",

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Final
 
 from truearm.errors import InputError, did_you_mean
 from truearm.files import exists
-from truearm.modeling.formats.controller_entry import STATED
-from truearm.modeling.formats.ur_kinematics import read_kinematics, refuse_far, with_kinematics
+from truearm.modeling.formats.controller_entry import ALLOWED, STATED
+from truearm.modeling.formats.ur_kinematics import (
+    controller_robot,
+    read_kinematics,
+    refuse_far,
+    with_kinematics,
+)
 from truearm.modeling.robot import Robot
-
-#: What may be said of a controller's kinematics.
-ALLOWED: Final = f"{', '.join(STATED)}, or a kinematics file: calibration.conf, or that of the ROS driver"
 
 
 def with_controller_kinematics(robot: Robot, said: str, folder: Path) -> Robot:
@@ -46,3 +47,19 @@ def with_controller_kinematics(robot: Robot, said: str, folder: Path) -> Robot:
         refuse_far(made, robot, str(path))
         kinematics = made.controller.kinematics
     return replace(robot, controller=replace(robot.controller, kinematics=kinematics))
+
+
+def refuse_rows_of_another_type(robot: Robot, where: str) -> None:
+    """Refuse rows of a controller that no arm of the robot's type has, as those of a file are refused.
+
+    Parameters
+    ----------
+    where
+        Names the rows in messages.
+
+    Raises
+    ------
+    InputError
+        With how far the flange or a link is from the nominal one; or if the robot is of another kind.
+    """
+    refuse_far(controller_robot(robot), robot, where)

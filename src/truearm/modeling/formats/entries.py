@@ -10,11 +10,15 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstra
 
 from truearm.errors import InputError
 from truearm.modeling.transform import IDENTITY, Transform
+from truearm.printable import is_one_line
 from truearm.units import sized_si, written
 
 #: What a robot and a joint may be called.
 NAME: Final = r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}"
 NAME_IN_WORDS: Final = "up to 100 letters, digits, _ . and -, starting with a letter or digit"
+
+#: Checksums of a controller have fewer characters: those of six joints about 70.
+LONGEST_CHECKSUM: Final = 200
 
 #: Of an entry that has known keys only.
 STRICT: Final = ConfigDict(extra="forbid", frozen=True)
@@ -32,6 +36,27 @@ def _name(text: str) -> str:
 
 
 Name = Annotated[str, StringConstraints(strict=True), AfterValidator(_name)]
+
+
+def checksum(text: str) -> str:
+    """Return a text that tells the kinematics of controllers apart, as it is printed: one line, and short.
+
+    Raises
+    ------
+    InputError
+        If it is another text.
+    """
+    if not is_one_line(text) or len(text) > LONGEST_CHECKSUM:
+        raise InputError(
+            "this is no checksum",
+            came=text,
+            allowed=f"one line of up to {LONGEST_CHECKSUM} characters",
+            cure="Copy it, or the file that it stands in, again.",
+        )
+    return text
+
+
+Checksum = Annotated[str, StringConstraints(strict=True), AfterValidator(checksum)]
 
 
 def _unit_length(q: tuple[float, float, float, float]) -> tuple[float, float, float, float]:

@@ -117,16 +117,19 @@ def _robot(content: RobotFile, where: str) -> Robot:
 
 
 def _with_controller(robot: Robot, content: RobotFile, where: str) -> Robot:
-    """Return a robot with what its controller computes with, where the file names another file for it."""
-    entry = content.controller.kinematics
-    if not isinstance(entry, str) or entry in STATED:
+    """Return a robot with what its controller computes with, which the file has in rows or names another file for."""
+    entry, here = content.controller.kinematics, f"{where}, controller.kinematics"
+    if entry in STATED if isinstance(entry, str) else not entry.joints:
         return robot
-    from truearm.modeling.formats.controller_kinematics import with_controller_kinematics  # few files need it
+    from truearm.modeling.formats.controller_kinematics import refuse_rows_of_another_type, with_controller_kinematics
 
+    if not isinstance(entry, str):
+        refuse_rows_of_another_type(robot, here)
+        return robot
     try:
         return with_controller_kinematics(robot, entry, Path(where).parent)
     except InputError as error:
-        name_place(error, f"{where}, controller.kinematics: {error.where}")
+        name_place(error, f"{here}: {error.where}")
         raise
 
 

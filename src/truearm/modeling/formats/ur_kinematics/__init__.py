@@ -7,8 +7,8 @@ robot's type, and in the kinematics file of the ROS driver as a chain of frames.
 from __future__ import annotations
 
 from truearm.modeling.formats.ur_kinematics.placing import (
-    MOST_APART,
     controller_robot,
+    mean_angle,
     mean_distance,
     refuse_far,
     with_kinematics,
@@ -19,10 +19,10 @@ from truearm.modeling.formats.ur_kinematics.writing import KINEMATICS_FILE, LINK
 __all__ = [
     "KINEMATICS_FILE",
     "LINKS",
-    "MOST_APART",
     "FactoryKinematics",
     "controller_robot",
     "kinematics_text",
+    "mean_angle",
     "mean_distance",
     "read_kinematics",
     "refuse_far",

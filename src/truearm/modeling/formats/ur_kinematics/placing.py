@@ -8,6 +8,7 @@ frame before (Hayati and Mirmirani 1985), which is beside the nominal one. No po
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Final
@@ -28,10 +29,14 @@ from truearm.shown import counted
 
 #: An arm whose flange is farther from the nominal one on average [m] is of another type: measured ones are 1 to 3 mm.
 MOST_APART: Final = 0.02
+#: A flange that is turned more from the nominal one on average [rad] is that of no arm: measured ones are 0.3 to 0.41
+#: deg, four of them.
+MOST_TURNED: Final = math.radians(1.0)
 #: Configurations at which flanges are compared.
 _CONFIGURATIONS: Final = 300
-#: Frames of links so near [m] and so little turned [rad] are the nominal ones with the errors of an arm.
-_BESIDE: Final = (0.05, 0.1)
+#: Frames of links so near [m] and so little turned [rad] are the nominal ones with the errors of an arm: measured ones
+#: are up to 4 mm and 0.6 deg.
+_BESIDE: Final = (0.05, math.radians(2.0))
 #: Conventions whose rows are the controller's own.
 _TABLES: Final = ("standard-dh", "hayati")
 #: Smaller [m, rad] is rounding.
@@ -106,14 +111,14 @@ def _with_rows(robot: Robot, rows: Sequence[Mapping[str, float]]) -> Robot:
 
 
 def refuse_far(made: Robot, type_: Robot, where: str) -> None:
-    """Refuse kinematics of an arm of another type than `type_`.
+    """Refuse kinematics of an arm of another type than `type_`, or of none.
 
     Raises
     ------
     InputError
-        With the mean distance of the flange from the nominal one.
+        With how far the flange is from the nominal one on average, or how far it is turned; or a link.
     """
-    apart = mean_distance(made, type_)
+    apart, turned = mean_distance(made, type_), mean_angle(made, type_)
     if not apart <= MOST_APART:
         raise InputError(
             "these are the kinematics of another type of robot",
@@ -122,10 +127,18 @@ def refuse_far(made: Robot, type_: Robot, where: str) -> None:
             allowed=f"{MOST_APART * 1e3:g} mm",
             cure="Give the type that stands on the arm.",
         )
+    if not turned <= MOST_TURNED:
+        raise InputError(
+            "the flange is turned as that of no arm of this type, so a number is wrong",
+            where=where,
+            came=f"a flange turned by {np.degrees(turned):.3g} deg from that of {type_.name} on average",
+            allowed=f"{np.degrees(MOST_TURNED):.2g} deg",
+            cure="Copy the file from the controller again, whole.",
+        )
     pairs = zip(_link_frames(_bare(made)), _link_frames(_plain(type_)), strict=True)
     for number, (ours, theirs) in enumerate(pairs, 1):
         gap = float(np.linalg.norm(ours[:3, 3] - theirs[:3, 3]))
-        turned = float(np.arccos(np.clip((np.trace(ours[:3, :3].T @ theirs[:3, :3]) - 1.0) / 2.0, -1.0, 1.0)))
+        turned = float(_angles(ours[:3, :3], theirs[:3, :3]))
         if gap > _BESIDE[0] or turned > _BESIDE[1]:
             raise InputError(
                 "the frame of a link does not come to lie beside the nominal one",
@@ -138,9 +151,27 @@ def refuse_far(made: Robot, type_: Robot, where: str) -> None:
 
 def mean_distance(made: Robot, type_: Robot) -> float:
     """Return how far the flange of an arm is from that of a type on average, at random joint positions [m]."""
-    joints = np.random.default_rng(0).uniform(-np.pi, np.pi, (_CONFIGURATIONS, len(made.joints)))
-    places = [robot.world_poses(joints)[0] for robot in (_bare(made), _plain(type_))]
-    return float(np.linalg.norm(places[0] - places[1], axis=1).mean())
+    (ours, _), (theirs, _) = _flanges(made, type_)
+    return float(np.linalg.norm(ours - theirs, axis=1).mean())
+
+
+def mean_angle(made: Robot, type_: Robot) -> float:
+    """Return how far the flange of an arm is turned from that of a type on average, at random joint positions [rad]."""
+    (_, ours), (_, theirs) = _flanges(made, type_)
+    return float(_angles(ours, theirs).mean())
+
+
+def _flanges(made: Robot, type_: Robot) -> list[tuple[Array, Array]]:
+    """Return positions ``(n, 3)`` [m] and rotations ``(n, 3, 3)`` of the flange of both, at random joint positions."""
+    joints = np.random.default_rng(0).uniform(-np.pi, np.pi, (_CONFIGURATIONS, JOINTS))
+    plain = _plain(type_)  # refuses a type of another kind before anything is compared
+    return [robot.world_poses(joints) for robot in (_bare(made), plain)]
+
+
+def _angles(ours: Array, theirs: Array) -> Array:
+    """Return the angles between rotations ``(..., 3, 3)`` [rad]."""
+    traces = np.einsum("...ij,...ij->...", ours, theirs)
+    return np.asarray(np.arccos(np.clip((traces - 1.0) / 2.0, -1.0, 1.0)), float)
 
 
 def _plain(type_: Robot) -> Robot:

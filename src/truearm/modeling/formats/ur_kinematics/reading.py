@@ -22,11 +22,10 @@ from typing import Final
 import numpy as np
 from pydantic import BaseModel
 
-from truearm.errors import InputError
+from truearm.errors import InputError, refusals_at
 from truearm.files import read_text, read_yaml
 from truearm.modeling.chain import Array
-from truearm.modeling.formats.entries import STRICT, Number
-from truearm.printable import is_one_line
+from truearm.modeling.formats.entries import STRICT, Number, checksum
 from truearm.units import as_number, sized_si
 
 #: Joints of an arm, and numbers of a list.
@@ -39,9 +38,9 @@ _DELTAS: Final = {
     "alpha": ("delta_alpha", "rad"),
 }
 _SECTION: Final = re.compile(r"\[(\w+)\]")
-_ENTRY: Final = re.compile(r"(\w+)\s*=\s*(.*)")
-#: What only the controller's own file has.
-_CONF: Final = re.compile(r"^\s*(?:\[mounting\]|delta_\w+\s*=)", re.M)
+_ENTRY: Final = re.compile(r"(\w++)\s*+=\s*+(.*)")
+#: What only the controller's own file has. It stands on one line: blank ones would be read again from each of them.
+_CONF: Final = re.compile(r"^[ \t]*+(?:\[mounting\]|delta_\w++[ \t]*+=)", re.M)
 #: What a controller says of its calibration: 2 is what it computes with.
 _IN_USE: Final = "2"
 #: Entries that say whose kinematics these are; how their values come about is not published.
@@ -49,6 +48,7 @@ _IDENTITY: Final[tuple[str, ...]] = ("joint_checksum", "calibration_status", "jo
 #: Below this angle [rad] a frame is not pitched.
 _NO_PITCH: Final = 1e-9
 _CURE: Final = "Copy the file from the controller again, whole."
+_ROS_CURE: Final = "Let the driver's program write the file again, and copy it whole."
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ def _conf(text: str, path: Path) -> FactoryKinematics:
             cure="Let the arm be calibrated by its maker, and copy the file again.",
         )
     identity = {name: found[name][1].strip("[] ") for name in _IDENTITY if name in found}
-    _refuse_unprintable(identity, path)
+    _check_identity(identity, path)
     return FactoryKinematics(path, deltas, None, identity)
 
 
@@ -165,6 +165,13 @@ class _RosFile(BaseModel):
 
 def _ros(path: Path) -> FactoryKinematics:
     chain = read_yaml(path, _RosFile).kinematics
+    if not chain.hash:  # it is written last, and the driver does not start without it
+        raise InputError(
+            "the hash is missing, so the file is not whole",
+            where=f"{path}, kinematics",
+            allowed="hash: TEXT, as the driver's program writes it after the six links",
+            cure=_ROS_CURE,
+        )
     links = [chain.shoulder, chain.upper_arm, chain.forearm, chain.wrist_1, chain.wrist_2, chain.wrist_3]
     as_dh_links = all(abs(math.sin(link.pitch)) < _NO_PITCH for link in (links[1], links[4], links[5]))
     frames = np.tile(np.eye(4), (JOINTS, 1, 1))
@@ -172,8 +179,8 @@ def _ros(path: Path) -> FactoryKinematics:
         x, y, z = _about(0, link.roll), _about(1, link.pitch), _about(2, link.yaw)
         frame[:3, :3] = x @ y @ z if as_dh_links else z @ y @ x
         frame[:3, 3] = [sized_si(value, "m", f"{path}, kinematics") for value in (link.x, link.y, link.z)]
-    identity = {"hash": chain.hash} if chain.hash else {}
-    _refuse_unprintable(identity, path)
+    identity = {"hash": chain.hash}
+    _check_identity(identity, path)
     return FactoryKinematics(path, {}, frames, identity)
 
 
@@ -187,7 +194,7 @@ def _about(axis: int, angle: float) -> Array:
     return made
 
 
-def _refuse_unprintable(identity: Mapping[str, str], path: Path) -> None:
+def _check_identity(identity: Mapping[str, str], path: Path) -> None:
     for name, value in identity.items():
-        if not is_one_line(value):
-            raise InputError("one line of text belongs here", where=f"{path}, {name}", came=value, cure=_CURE)
+        with refusals_at(f"{path}, {name}"):
+            checksum(value)

@@ -215,7 +215,7 @@ def test_a_flange_that_is_turned_far_is_refused(tmp_path: Path) -> None:
     assert np.degrees(mean_angle(plain, type_)) == pytest.approx(0.362, abs=1e-3)
     assert np.degrees(mean_angle(turned, type_)) == pytest.approx(np.degrees(0.09), abs=0.1)
     refuse_far(plain, type_, "calibration.conf")
-    with pytest.raises(InputError, match="got 'a flange turned by 5.18 deg from that of ur10 on average'") as refusal:
+    with pytest.raises(InputError, match=r"got 'a flange turned by 5\.18 deg from that of ur10 on average'") as refusal:
         refuse_far(turned, type_, "calibration.conf")
     assert "allowed: 1 deg" in str(refusal.value)
 

@@ -24,6 +24,7 @@ from truearm.compensation.programs.program import Edit
 from truearm.compensation.split import ProgramSplit, check_tolerance, split_program
 from truearm.errors import InputError, refusals_of
 from truearm.files import path_argument
+from truearm.identification.judging.payload import check_payload
 from truearm.jobs.arguments import (
     choice_argument,
     choices_argument,
@@ -43,6 +44,7 @@ from truearm.modeling.formats.controller_entry import STATED
 from truearm.modeling.formats.controller_kinematics import with_controller_kinematics
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
+from truearm.notices import Notice
 from truearm.results.program_correction import REPORT, FileCorrection, ProgramCorrection
 
 
@@ -209,6 +211,7 @@ def compensate(
             *known_of(arm),
             *foreign,
             *controller_notices(arm, read),
+            *_payloads_unlikely(arm, result),
             *check_correction(arm, result, splits),
         ),
         command=invocation,
@@ -218,6 +221,12 @@ def compensate(
         with refusals_of("out"):
             made.save(folder, progress)
     return made
+
+
+def _payloads_unlikely(arm: Robot, result: CorrectedPrograms) -> list[Notice]:
+    """Say which loads no arm of this size carries."""
+    loads = [load for load in dict.fromkeys(result.loads.values()) if load is not None]
+    return [notice for load in [arm.payload, *loads] for notice in check_payload(arm.with_payload(load))][:1]
 
 
 def _with_controller(arm: Robot, said: str | Path | None) -> Robot:

@@ -280,6 +280,7 @@ class ProgramCorrection(Record):
         return {
             "programs": [file.summary() for file in self.files],
             "expected_is_lower_bound": self.lower_bound,
+            "expected_is_relative": bool(self.relative),
             "warnings": notice_summaries(self.warnings),
         }
 
@@ -288,7 +289,10 @@ class ProgramCorrection(Record):
         parts = [file.lines() for file in self.files]
         text = [line for first, second, *_ in parts for line in (first, second)]
         skipped = [line for _, _, *lines in parts for line in lines]
-        if self.lower_bound and any(file.expected is not None for file in self.files):
+        known = any(file.expected is not None for file in self.files)
+        if known and self.relative:
+            text.append(f"  {self.relative}")
+        if self.lower_bound and known:
             text.append("  These errors are lower bounds: the calibration cannot know all errors of the robot.")
         text += skipped[:_EXPLAINED]
         if len(skipped) > _EXPLAINED:
@@ -304,6 +308,17 @@ class ProgramCorrection(Record):
     def lower_bound(self) -> bool:
         """Whether the errors to expect may be larger, for a reason that the calibration knows."""
         return self.robot.proof is not None and self.robot.proof.lower_bound
+
+    @property
+    def relative(self) -> str:
+        """What the errors to expect are relative to, in words; empty where frames were measured."""
+        frames, choice = self.result.frames, self.result.choice
+        if frames.frames == "identified" or choice.was_taught("points"):
+            return ""
+        each = "in each frame" if choice.was_taught("frames") else "of all programs together"
+        return (
+            f"These errors are of the targets relative to each other, {each}: where a frame is as a whole is not known."
+        )
 
     @property
     def frame_words(self) -> list[str]:

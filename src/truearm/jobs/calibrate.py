@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from numbers import Integral
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import Final, Literal, get_args
 
 import numpy as np
 
-from truearm.errors import InputError, nearest_names, refusals_of, wrong_kind
+from truearm.errors import InputError, did_you_mean, nearest_names, refusals_of, wrong_kind
 from truearm.files import path_argument, read_bytes
 from truearm.identification.base_changes import with_one_base
 from truearm.identification.choosing.selection import AUTO, select
@@ -39,6 +40,7 @@ from truearm.jobs.arguments import (
     folder_for,
     gravity_argument,
     names_argument,
+    notes_argument,
     payload_argument,
     progress_argument,
     python_call,
@@ -69,6 +71,9 @@ Train = int | Literal["all"] | None
 #: Every model that can be asked for by name; None chooses.
 _MODELS: Final[dict[str, Model | None]] = {m.name: m for m in (FRAMES, *MODELS)} | {AUTO: None}
 
+#: The hash by which the history tells which configurations were left out.
+_LEFT_OUT: Final = re.compile(r"; ([0-9a-f]{8})\),")
+
 
 def calibrate(
     robot: Robot | str | Path,
@@ -85,6 +90,8 @@ def calibrate(
     payload: Payload | str | None = None,
     gravity: Sequence[float] | None = None,
     base_changes: Sequence[str] = (),
+    without: Sequence[str] = (),
+    notes: Mapping[str, str] | None = None,
     command: str | None = None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Calibration:
@@ -123,6 +130,11 @@ def calibrate(
         Configurations from which on, in the order of measurement, the instrument or the robot's base stood elsewhere.
         The motion is found along with the model (``geometric`` for ``auto``) from the training configurations, and
         taken out of the readings; no deviation contains what is not known of it.
+    without
+        Configurations that are left out, by their labels: neither part of the split knows them.
+    notes
+        What to write on the report and into result.json, by its name: ``date``, ``serial``, ``operator``,
+        ``instrument``, or any other.
     command
         How to run it again, for the report; None writes the call in Python.
     progress
@@ -144,6 +156,8 @@ def calibrate(
             cure="Name another model.",
         )
     base_changes = names_argument(base_changes, "base_changes")
+    without = names_argument(without, "without")
+    notes = notes_argument(notes)
     choice_argument(loss, "loss", {name: name for name in LOSSES})
     choice_argument(redundancy, "redundancy", {name: name for name in get_args(Redundant)})
     seed = whole_argument(seed, "seed")
@@ -160,6 +174,8 @@ def calibrate(
         bounds=bounds,
         effects=list(effects) or None,
         base_changes=list(base_changes) or None,
+        without=list(without) or None,
+        notes=notes or None,
         payload=payload,
         gravity=fall,
     )
@@ -179,6 +195,7 @@ def calibrate(
     sha256 = None
     if isinstance(data, str | Path):
         sha256 = hashlib.sha256(read_bytes(path_argument(data, "data"))).hexdigest()
+    readings = _left_out(readings, without)
     bounds_file = str(bounds) if isinstance(bounds, str | Path) else "bounds"
     if bounds is not None and not isinstance(bounds, Bounds):
         with refusals_of("bounds"):
@@ -249,6 +266,7 @@ def calibrate(
     history = (
         f"calibrated by truearm {__version__}: model {' + '.join([chosen.name, *effects])},"
         f" {count} of {n} configurations of {Path(readings.source).name}{digest}, seed {seed}, loss {loss},"
+        f"{_without_words(without)}"
         f" redundancy {redundancy}{f', another base from {listed(base_changes)} on' if base_changes else ''}"
     )
     calibration = Calibration(
@@ -262,7 +280,7 @@ def calibrate(
             *unlike,
             *_check_proof(before, validation),
             *_check_copies(readings, training, held_out),
-            *_check_trained_before(nominal_robot, sha256, (count, n, seed)),
+            *_check_trained_before(nominal_robot, sha256, (count, n, seed), _without_words(without)),
             *moved,
             *check_fit(fit, expected, doubted=has_error([*unlike, *noticed])),
             *narrow,
@@ -282,10 +300,48 @@ def calibrate(
         inputs=inputs,
         selection=selection,
         known_before=_known_before(nominal_robot),
+        without=without,
+        notes=notes,
     )
     if folder is not None:
         calibration.save(folder, progress)
     return calibration
+
+
+def _left_out(data: Dataset, labels: Sequence[str]) -> Dataset:
+    """Return the data without some configurations.
+
+    Raises
+    ------
+    InputError
+        For a configuration that the data do not have, or if none would be left.
+    """
+    if not labels:
+        return data
+    known = set(data.labels)
+    for label in labels:
+        if label not in known:
+            raise InputError(
+                "there is no configuration of this name",
+                parameter="without",
+                where=data.source,
+                came=label,
+                cure=did_you_mean(label, data.labels) or "Name configurations of the data.",
+            )
+    kept = [i for i, label in enumerate(data.labels) if label not in set(labels)]
+    if not kept:
+        raise InputError(
+            "no configuration would be left", parameter="without", where=data.source, cure="Leave out fewer."
+        )
+    return data.of_configurations(kept)
+
+
+def _without_words(labels: Sequence[str]) -> str:
+    """Return how the history says which configurations were left out: the first few by name, all of them by a hash."""
+    if not labels:
+        return ""
+    digest = hashlib.sha256("\n".join(sorted(labels)).encode()).hexdigest()[:8]
+    return f" without {counted(len(labels), 'configuration')} ({listed(labels)}; {digest}),"
 
 
 def _known_before(robot: Robot) -> Proof | None:
@@ -382,7 +438,7 @@ def _check_copies(data: Dataset, training: IntArray, held_out: IntArray) -> list
     ]
 
 
-def _check_trained_before(robot: Robot, sha256: str | None, split: tuple[int, int, int]) -> list[Notice]:
+def _check_trained_before(robot: Robot, sha256: str | None, split: tuple[int, int, int], without: str) -> list[Notice]:
     """Say if the robot to begin with has been trained on what is held out now.
 
     Parameters
@@ -391,9 +447,15 @@ def _check_trained_before(robot: Robot, sha256: str | None, split: tuple[int, in
         Of the data; None if they are no file.
     split
         How many configurations are trained on, of how many, and the seed.
+    without
+        What the history says of those left out.
     """
     before = None if sha256 is None else trained_on(robot, sha256)
-    if before is None or before == split or split[0] == split[1]:
+    alike = any(
+        sha256 is not None and sha256[:12] in line and _LEFT_OUT.findall(line) == _LEFT_OUT.findall(without)
+        for line in robot.history
+    )
+    if before is None or (before == split and alike) or split[0] == split[1]:
         return []
     return [
         Notice(

@@ -70,7 +70,9 @@ def validate(
 
 
 #: How a calibration says in the robot's history which configurations of which file it was trained on.
-_TRAINED: Final = re.compile(r"(\d+) of (\d+) configurations of .*?\(sha256 ([0-9a-f]+)\), seed (\d+)")
+_TRAINED: Final = re.compile(
+    r"(\d+) of (\d+) configurations of .*?\(sha256 ([0-9a-f]+)\), seed (\d+)(?:.*? without (\d+) configuration)?"
+)
 
 
 def trained_on(robot: Robot, digest: str) -> tuple[int, int, int] | None:
@@ -81,20 +83,29 @@ def trained_on(robot: Robot, digest: str) -> tuple[int, int, int] | None:
     digest
         SHA-256 of the file.
     """
+    found = _training_of(robot, digest)
+    return None if found is None else (int(found[1]), int(found[2]), int(found[4]))
+
+
+def _training_of(robot: Robot, digest: str) -> re.Match[str] | None:
     for line in robot.history:
         found = _TRAINED.search(line)
         if found is not None and found[3] == digest[: len(found[3])]:
-            return int(found[1]), int(found[2]), int(found[4])
+            return found
     return None
 
 
 def _seen_in_training(robot: Robot, data: Dataset, digest: str | None) -> list[Notice]:
     """Say if the readings are from the file that the robot was calibrated with, and how many it was trained on."""
-    trained = None if digest is None else trained_on(robot, digest)
-    if trained is None:
+    found = None if digest is None else _training_of(robot, digest)
+    if found is None:
         return []
-    count, of, _ = trained
-    held_out = "; the rest was held out, and its errors are in the result of the calibration" if of > count else ""
+    count, used, left_out = int(found[1]), int(found[2]), int(found[5] or 0)
+    of = used + left_out
+    rest = f"; {left_out} were left out" if left_out else ""
+    held_out = (
+        f"{rest}; the rest was held out, and its errors are in the result of the calibration" if used > count else rest
+    )
     return [
         Notice(
             "training-data",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -12,7 +12,17 @@ from truearm.errors import InputError, refusals_of
 from truearm.files import path_argument, read_bytes
 from truearm.identification.judging.same_frames import check_frames
 from truearm.identification.judging.target_names import check_names
-from truearm.jobs.arguments import data_argument, gravity_argument, payload_argument, refuse_swapped, robot_argument
+from truearm.identification.refit import MOVED
+from truearm.identification.refit import refit as find_moved
+from truearm.jobs.arguments import (
+    choice_argument,
+    data_argument,
+    gravity_argument,
+    notes_argument,
+    payload_argument,
+    refuse_swapped,
+    robot_argument,
+)
 from truearm.jobs.proof import changed_since
 from truearm.measurement.checks import check_joints
 from truearm.measurement.dataset import Dataset
@@ -29,6 +39,8 @@ def validate(
     *,
     payload: Payload | str | None = None,
     gravity: Sequence[float] | None = None,
+    refit: str | None = None,
+    notes: Mapping[str, str] | None = None,
 ) -> Validation:
     """Judge a calibrated robot on new data taken in the same frames.
 
@@ -41,13 +53,21 @@ def validate(
     payload, gravity
         What the robot carried (an object, or a text such as ``2.7kg,50mm,25mm,100mm``) and free fall in its base frame
         [m/s^2] this time, if they differ from the calibration.
+    refit
+        What was moved since and is found anew from these readings, while everything else stays: ``base`` (the
+        instrument, or the robot's base), ``targets`` (each by itself), or ``tool`` (all targets as one rigid body). The
+        errors of each configuration are then those of what was found without it.
+    notes
+        What to write beside the figures, by its name: ``date``, ``serial``, ``operator``, ``instrument``, or any other.
 
     Raises
     ------
     InputError
-        If the robot has no targets, or the data name others.
+        If the robot has no targets, the data name others, or there are too few of them for `refit`.
     """
     refuse_swapped(robot, data, "validate")
+    moved = None if refit is None else choice_argument(refit, "refit", {kind: kind for kind in MOVED})
+    notes = notes_argument(notes)
     digest = None
     if isinstance(data, str | Path):
         with refusals_of("data"):
@@ -56,17 +76,25 @@ def validate(
     changed = changed_since(robot)
     robot = as_measured(robot, data, payload, gravity)
     identified = {p.group for p in robot.parameters.values() if p.deviation is not None}
-    if data.anchored and robot.fixtures and identified and "base" not in identified:
+    if moved != "base" and data.anchored and robot.fixtures and identified and "base" not in identified:
         raise InputError(
             "the robot was calibrated without the frame of an instrument, so the place of this instrument is unknown",
             parameter="data",
             where=data.source,
-            cure="Place it first: calibrate the calibrated robot with `model=frames`, or compare distances with "
-            "'truearm distances'.",
+            cure="Find its place with `refit=base`, calibrate the calibrated robot with `model=frames`, or compare "
+            "distances with 'truearm distances'.",
         )
-    errors = errors_of(robot, data)
-    mistaken = check_names(robot, data, errors) or check_frames(robot, data, errors)
-    return Validation(data.source, errors, (*changed, *mistaken, *_seen_in_training(robot, data, digest)))
+    errors, found = errors_of(robot, data), None
+    judged, mistaken = robot, list[Notice]()
+    if moved is not None:
+        # Names that were exchanged would pass for targets that moved.
+        mistaken = [] if moved == "base" else check_names(robot, data, errors)
+        with refusals_of("refit"):
+            found = find_moved(robot, data, moved)
+        judged, errors = found.robot, found.errors
+    mistaken = mistaken or check_names(judged, data, errors) or check_frames(judged, data, errors, moved)
+    warnings = (*changed, *mistaken, *_seen_in_training(robot, data, digest))
+    return Validation(data.source, errors, warnings, found, notes)
 
 
 #: How a calibration says in the robot's history which configurations of which file it was trained on.

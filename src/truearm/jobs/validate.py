@@ -92,7 +92,9 @@ def validate(
         with refusals_of("refit"):
             found = find_moved(robot, data, moved)
         judged, errors = found.robot, found.errors
-    mistaken = mistaken or check_names(judged, data, errors) or check_frames(judged, data, errors, moved)
+    # Configurations that decide much alone err more without themselves: that is no sign of anything else.
+    agreed = errors if found is None else errors_of(judged, data)
+    mistaken = mistaken or check_names(judged, data, agreed) or check_frames(judged, data, agreed, moved)
     warnings = (*changed, *mistaken, *_seen_in_training(robot, data, digest))
     return Validation(data.source, errors, warnings, found, notes)
 

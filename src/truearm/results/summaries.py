@@ -13,7 +13,7 @@ from truearm.identification.solving.fit import Fit
 from truearm.measurement.observations import OBSERVATIONS
 from truearm.measurement.statistics import Errors, Spread
 from truearm.modeling.parts import Payload
-from truearm.shown import counted, listed
+from truearm.shown import counted, degrees, listed, millimetres
 from truearm.units import from_si
 
 
@@ -63,9 +63,9 @@ def refit_summary(found: Refit) -> dict[str, Any]:
 def refit_lines(found: Refit) -> list[str]:
     """Return what was found anew, by how much it moved, and what that means for the errors."""
     from_these = f"found anew from {counted(found.readings, 'reading')} ({counted(found.parameters, 'number')})"
-    turned = "" if found.turn is None else f" and turned by {math.degrees(found.turn):.3g} deg"
-    moved = f"moved by {found.shift * 1e3:.3g} mm"
-    each = listed([f"{name} {shift * 1e3:.3g}" for name, shift in found.shifts.items()])
+    turned = "" if found.turn is None else f" and turned by {degrees(found.turn)} deg"
+    moved = f"moved by {millimetres(found.shift)} mm"
+    each = listed([f"{name} {millimetres(shift)}" for name, shift in found.shifts.items()])
     words = {
         "base": f"The base was {from_these}: the readings {moved} at their middle{turned}.",
         "tool": f"The tool was {from_these}: it {moved} at the middle of its targets{turned}.",

@@ -22,6 +22,7 @@ from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 from truearm.notices import Level, Notice
+from truearm.shown import degrees, millimetres
 
 #: Readings that are off by less need no explanation [m].
 _NEAR: Final = 1e-4
@@ -29,8 +30,10 @@ _NEAR: Final = 1e-4
 _LEAST_IMPROVEMENT: Final = 2.5
 #: Another motion cannot be told from the best one if it leaves no more than so many times as much.
 _ALIKE: Final = 1.5
+#: Errors up to so many times what the calibration's own joint errors make need no explanation.
+_USUAL: Final = 3.0
 #: Configurations below which a motion can be found for anything.
-_FEWEST: Final = 6
+_FEWEST: Final = 8
 
 
 def check_frames(robot: Robot, data: Dataset, errors: Errors, known: Moved | None = None) -> list[Notice]:
@@ -52,6 +55,8 @@ def check_frames(robot: Robot, data: Dataset, errors: Errors, known: Moved | Non
         return []
     reach = float(np.linalg.norm(robot.with_frames(Transform(), {}).world_poses(data.postures)[0], axis=1).max())
     beyond = float(np.median(off)) > LARGEST_SHARE_LEFT * reach
+    if not beyond and _rms(off) <= _USUAL * _of_joint_errors(robot, data):
+        return []
     if len(np.unique(data.configuration[data.has_reading])) >= _FEWEST:
         told = _moved(robot, data, off, known, reach, beyond=beyond)
         if told is not None:
@@ -61,7 +66,7 @@ def check_frames(robot: Robot, data: Dataset, errors: Errors, known: Moved | Non
     return [
         Notice(
             "implausible",
-            f"Half of the readings are off by more than {float(np.median(off)) * 1e3:.3g} mm, where the arm "
+            f"Half of the readings are off by more than {millimetres(float(np.median(off)))} mm, where the arm "
             f"reaches {reach * 1e3:.0f} mm (allowed: {LARGEST_SHARE_LEFT:g} of that): these are not readings of this "
             "robot, or their units, joints or targets are mistaken. Look at them with 'truearm check'.",
             "error",
@@ -72,6 +77,20 @@ def check_frames(robot: Robot, data: Dataset, errors: Errors, known: Moved | Non
 def _sizes(errors: Errors) -> Array:
     """Return how far positions are off, or lengths where no position was read [m]."""
     return errors.position_norms if len(errors.position_norms) else errors.length_norms
+
+
+def _of_joint_errors(robot: Robot, data: Dataset) -> float:
+    """Return how far the joint errors that the calibration found move targets, as a root mean square [m].
+
+    They are repeatability and what the model cannot express, which is alike at poses that are near each other.
+    """
+    if robot.proof is None or not any(robot.proof.joint_error):
+        return 0.0
+    at = robot.loaded(data.postures)
+    moved = np.array([robot.joint_jacobian(at, name)[:, :3] for name in data.targets])
+    size = np.sum((moved * np.array(robot.proof.joint_error)) ** 2, axis=(2, 3))
+    read = data.has_reading
+    return float(np.sqrt(size[data.target[read], data.configuration[read]].mean()))
 
 
 def _extent(data: Dataset) -> float:
@@ -109,13 +128,17 @@ def _moved(
     again, left = found[best]
     alike = [kind for kind, (_, other) in found.items() if kind != best and other <= _ALIKE * left and other <= limit]
     if left > limit:
-        return None if known is not None else _both_moved(robot, data, off, limit, beyond=beyond)
+        both = math.inf if known is not None else _left_with_both(robot, data, len(off))
+        if both > limit:
+            return None
+        if both * _ALIKE < left:
+            return _both_moved(both, off, beyond=beyond)
     level: Level = "error" if beyond else "warning"
-    with_errors = f"{left * 1e3:.3g} mm instead of {_rms(off) * 1e3:.3g} (root mean square)"
+    with_errors = f"{millimetres(left)} mm instead of {millimetres(_rms(off))} (root mean square)"
     other = "instrument or base" if alike and alike[0] == "base" else "tool"
     doubt = (
         f" These configurations do not tell that from a moved {other}: "
-        f"`refit={alike[0]}` would leave {found[alike[0]][1] * 1e3:.3g} mm."
+        f"`refit={alike[0]}` would leave {millimetres(found[alike[0]][1])} mm."
         if alike
         else ""
     )
@@ -138,33 +161,32 @@ def _moved(
     far = max(again.shifts, key=lambda name: again.shifts[name])
     message = (
         f"The readings agree with the robot if its targets sit elsewhere on the flange: target {far} by "
-        f"{again.shifts[far] * 1e3:.3g} mm, which moved farthest; then they are off by {with_errors}. Targets were put "
-        f"on anew since the calibration{hedge}.{doubt} Judge the robot with `refit=targets`, {new}."
+        f"{millimetres(again.shifts[far])} mm, which moved farthest; then they are off by {with_errors}. Targets were "
+        f"put on anew since the calibration{hedge}.{doubt} Judge the robot with `refit=targets`, {new}."
     )
     return Notice("tool-moved", message, level)
 
 
-def _both_moved(robot: Robot, data: Dataset, off: Array, limit: float, *, beyond: bool) -> Notice | None:
-    """Return a notice if base and targets together explain the errors."""
-    if data.fixture is not None or not data.has_position.any():
-        return None
-    unknowns, numbers = 6 + 3 * len(data.targets), 3 * len(off)
-    if numbers <= 2 * unknowns:
-        return None
-    left = _rms(_sizes(errors_of(place(robot, data), data))) * math.sqrt(numbers / (numbers - unknowns))
-    if left > limit:
-        return None
+def _left_with_both(robot: Robot, data: Dataset, readings: int) -> float:
+    """Return the root mean square [m] that another base and other targets together leave, for their freedom."""
+    unknowns, numbers = 6 + 3 * len(data.targets), 3 * readings
+    if data.fixture is not None or not data.has_position.any() or numbers <= 2 * unknowns:
+        return math.inf
+    return _rms(_sizes(errors_of(place(robot, data), data))) * math.sqrt(numbers / (numbers - unknowns))
+
+
+def _both_moved(left: float, off: Array, *, beyond: bool) -> Notice:
     return Notice(
         "frames-differ",
         f"The readings agree with the robot only with another base and other targets: they are then off by "
-        f"{left * 1e3:.3g} mm instead of {_rms(off) * 1e3:.3g} (root mean square). Both the instrument (or the base) "
-        "and the tool were moved since the calibration. Find them with 'truearm calibrate' and `model=frames`.",
+        f"{millimetres(left)} mm instead of {millimetres(_rms(off))} (root mean square). Both the instrument (or the "
+        "base) and the tool were moved since the calibration. Find them with 'truearm calibrate' and `model=frames`.",
         "error" if beyond else "warning",
     )
 
 
 def _motion(again: Refit) -> str:
     """Return in words how far something moved."""
-    turned = "" if again.turn is None else f" and turned by {math.degrees(again.turn):.2g} deg"
+    turned = "" if again.turn is None else f" and turned by {degrees(again.turn)} deg"
     what = "at their middle" if again.moved == "base" else "at the middle of its targets"
-    return f"moved by {again.shift * 1e3:.3g} mm {what}{turned} as a whole"
+    return f"moved by {millimetres(again.shift)} mm {what}{turned} as a whole"

@@ -85,7 +85,9 @@ def path_figure(corrections: Sequence[Correction]) -> Figure:
     view = _flat_view(points) or _IN_SPACE
     longest = max(max(float(c.moved.max(initial=0.0)) for c in corrections) * 1e3, 1e-9)
     size = max(float(np.ptp(points, axis=0).max()), 1.0)
-    stretch = 10.0 ** math.floor(math.log10(max(_ARROW * size / longest, 1.0)))
+    wanted = max(_ARROW * size / longest, 1.0)
+    decade = 10.0 ** math.floor(math.log10(wanted))
+    stretch = decade * max(step for step in (1, 2, 5) if step * decade <= wanted)
     for number, correction in enumerate(corrections):
         rows = _evenly(np.flatnonzero(correction.corrected))
         tips = correction.tips[rows]
@@ -115,6 +117,7 @@ def path_figure(corrections: Sequence[Correction]) -> Figure:
                 "marker": {
                     "size": 4 if view is _IN_SPACE else 7,
                     "color": moved,
+                    "line": {"color": "#9aa0a6", "width": 1},
                     "colorscale": "Viridis",
                     "reversescale": True,
                     "cmin": 0,

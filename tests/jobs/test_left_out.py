@@ -40,7 +40,7 @@ def test_what_is_left_out_changes_nothing(csv: Path, tmp_path: Path) -> None:
     assert json.loads((tmp_path / "result" / "result.json").read_text())["without"] == ["3", "7"]
     assert "Left out" in (tmp_path / "result" / "report.html").read_text()
     (notice,) = [n for n in validate(out.robot, csv).warnings if n.code == "training-data"]
-    assert "15 of its 24 configurations" in notice.message
+    assert "15 of their 24 configurations" in notice.message
     assert "2 were left out" in notice.message
 
 

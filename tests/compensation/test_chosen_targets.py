@@ -84,7 +84,10 @@ def test_taught_points_stay_byte_for_byte(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("offset", ["Offs(p1,120,-80,60)", "RelTool(p1,120,80,-60)"])
-def test_an_offset_from_a_taught_point_is_as_long_as_it_says(tmp_path: Path, offset: str) -> None:
+@pytest.mark.parametrize("said", [{"taught": ["points"]}, {"taught": ["none"], "keep": ["p1"]}])
+def test_an_offset_from_a_point_that_stays_is_as_long_as_it_says(
+    tmp_path: Path, said: dict[str, list[str]], offset: str
+) -> None:
     """The real robot is asked where it is at the point, and 150 mm beside it."""
     path = tmp_path / "m.mod"
     path.write_text(
@@ -92,7 +95,7 @@ def test_an_offset_from_a_taught_point_is_as_long_as_it_says(tmp_path: Path, off
         f"    MoveJ p1,v100,fine,tool0;\n    MoveL {offset},v100,fine,tool0;\n  ENDPROC\nENDMODULE\n"
     )
     robot = worn()
-    made = truearm.compensate(robot, [path], taught=["points", "frames", "tools"])
+    made = truearm.compensate(robot, [path], **said)  # type: ignore[arg-type]
     (one,) = made.result.corrections
     assert one.corrected.tolist() == [False, True]
     wanted = np.linalg.norm([120, 80, 60]) * 1e-3

@@ -7,15 +7,21 @@ by joints do not pass through the kinematics.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from dataclasses import replace
 from typing import Final
 
+from truearm.compensation.fake_targets import nominal_robot
+from truearm.compensation.gauge import disagreement
 from truearm.compensation.programs import LANGUAGES
 from truearm.compensation.programs.program import MakersCalibration, Program
 from truearm.errors import InputError
+from truearm.modeling.controller import ControllerKinematics
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 
+#: Accepts kinematics that are another arm's.
+OTHER_ARM: Final = "other-kinematics"
 _ANSWER: Final = (
     "`controller_kinematics=nominal` says that it computes with the table of the robot file, "
     "`controller_kinematics=proprietary` that it has a calibration which nobody else can read"
@@ -60,10 +66,47 @@ def refuse_unknown_controller(robot: Robot, programs: Sequence[Program]) -> None
         )
 
 
+def refuse_kinematics_of_another_arm(robot: Robot, accepted: Collection[str]) -> None:
+    """Refuse kinematics of a controller that agree worse with the calibrated arm than the table of the robot file does.
+
+    What a factory measured of this arm is nearer to it than the data sheet is.
+
+    Raises
+    ------
+    InputError
+        With how far both are from the calibrated arm.
+    """
+    if robot.controller.kinematics.kind != "own" or OTHER_ARM in accepted:
+        return
+    table = replace(robot, controller=replace(robot.controller, kinematics=ControllerKinematics("nominal")))
+    own, sheet = (disagreement(robot, nominal_robot(one)) for one in (robot, table))
+    if own > sheet:
+        raise InputError(
+            "the controller's kinematics are not those of this arm: they are farther from what calibration found than "
+            "the data sheet is",
+            parameter="controller_kinematics",
+            where=robot.name,
+            came=f"{own * 1e3:.2f} mm apart on average, the data sheet {sheet * 1e3:.2f} mm",
+            cure="Take the file of the controller that runs this arm, and check that the measurements are of it. "
+            f"`accept={OTHER_ARM}` uses them all the same.",
+        )
+
+
 def controller_notices(robot: Robot, programs: Sequence[Program]) -> list[Notice]:
     """Say where it was not told with what a controller computes, and its maker offers a calibration."""
-    calibration = _calibration(programs)
-    if robot.controller.kinematics.kind != "unknown" or calibration is None or not _poses(programs):
+    calibration, kind = _calibration(programs), robot.controller.kinematics.kind
+    if calibration is None or not _poses(programs):
+        return []
+    if kind == "nominal" and calibration.always:
+        return [
+            Notice(
+                "controller-nominal",
+                f"Controllers of {calibration.maker} compute with what the factory measured of each arm, and the poses "
+                "were corrected for one that computes with the data sheet, as was said. On an arm with its own "
+                "controller that makes programs worse; give its file with `controller_kinematics`.",
+            )
+        ]
+    if kind != "unknown":
         return []
     return [
         Notice(

@@ -5,8 +5,8 @@ arrival. With the predicted correction ``d`` of a target, and the error ``e`` of
 ``d + e`` before and by ``e`` after. It gets worse if ``|e| > |d + e|``, that is if ``e`` reaches beyond half of ``-d``,
 with the probability ``Phi(-|d| / (2 s))`` where ``s`` is the deviation of ``e`` along ``d``.
 
-What all targets share and the program's frame takes up is left out of ``e`` as it is left out of ``d``, by the same
-rules (:mod:`truearm.compensation.gauge`): an uncertain place of the base, or of the flange, makes no target worse.
+Where the program's frame is free, what all targets share is left out of ``e`` as it is left out of ``d``, by the same
+rules (:mod:`truearm.compensation.gauge`): an uncertain place of the base, or of the flange, makes no target worse then.
 """
 
 from __future__ import annotations
@@ -39,13 +39,15 @@ _IN_COMMON: Final = 0.5
 #: programs hold as often as they say (docs/simulations.md).
 _FREEDOM: Final = 12
 _INTERVAL: Final = (5.0, 95.0)
+#: A tip so near to a target of the calibration is that target [m]: files have a thousandth of a millimetre.
+_AT_TARGET: Final = 1e-5
 #: Corrections below this are none [m]: programs are written with fewer digits.
 _NOTHING: Final = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """Points that were taught with the real robot, and that targets are offsets from.
+    """Points that stay, and that some targets are offsets from.
 
     Attributes
     ----------
@@ -53,10 +55,17 @@ class Start:
         Where the controller sends the joints there, as the model counts them, ``(n, joints)`` [rad or m].
     turned
         Whether the offset is in the axes of the tool, ``(n,)``.
+    anchored
+        Which targets are such offsets, ``(n,)``; the others have joints that mean nothing here.
     """
 
     joints: Array
     turned: NDArray[np.bool_]
+    anchored: NDArray[np.bool_]
+
+    def some(self, rows: NDArray[np.intp]) -> Start:
+        """Return it for some targets."""
+        return Start(self.joints[rows], self.turned[rows], self.anchored[rows])
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +87,7 @@ class TargetsReached:
     arms, arm
         The robot with each load, and which of them it is at each target, ``(n,)``.
     start
-        The taught points that they are offsets from; None if they are not.
+        Points that stay and that some of them are offsets from; None if there are none.
     """
 
     joints: Array
@@ -90,9 +99,14 @@ class TargetsReached:
     arm: NDArray[np.intp]
     start: Start | None = None
 
+    @property
+    def alone(self) -> NDArray[np.bool_]:
+        """Which are no offsets from points that stay, ``(n,)``."""
+        return np.ones(len(self.joints), dtype=bool) if self.start is None else ~self.start.anchored
+
     def some(self, rows: NDArray[np.intp]) -> TargetsReached:
         """Return some of them."""
-        start = None if self.start is None else Start(self.start.joints[rows], self.start.turned[rows])
+        start = None if self.start is None else self.start.some(rows)
         joints, tips, shifts = (values[rows] for values in (self.joints, self.tips, self.shifts))
         groups, frames, arm = (numbers[rows] for numbers in (self.groups, self.frames, self.arm))
         return TargetsReached(joints, tips, shifts, groups, frames, self.arms, arm, start)
@@ -184,11 +198,12 @@ def expected_errors(
     programs
         Their targets.
     tools, frames
-        Whether the places of tools and frames were given, or assumed. Places that were given are taken as exact: frames
-        in the world of the calibration, tools on the target that is nearest to them.
+        Whether the places of tools and frames were given, or assumed. Frames that were given are taken as exact in the
+        world of the calibration. A tool whose tip is a target of the calibration is known as well as that; any other
+        only as well as the flange, which a shift of the tool against the last joint leaves to the priors.
     """
     model = _ModelErrors(robot, proof, tools == "assumed", frames == "assumed")
-    if frames == "assumed" and not any(one.start for one in programs):
+    if frames == "assumed":
         model = replace(model, shared=model.shared_by(programs))
     return tuple(_expected(model, one) for one in programs)
 
@@ -293,24 +308,25 @@ class _ModelErrors:
             moved, _, tips = self._motions(robot, targets.joints[rows], tip)
             by_joints = self._by_joints(robot, targets.joints[rows], tip)
             for number, common in self.shared.items():
-                mine = targets.frames[rows] == number
+                mine = (targets.frames[rows] == number) & targets.alone[rows]
                 moved[mine] -= common.of(tips[mine])
             if targets.start is not None:
-                start, turned = targets.start.joints[rows], targets.start.turned[rows, None, None]
-                before, turn, from_there = self._motions(robot, start, tip)
-                moved -= before + turned * np.cross(turn, (tips - from_there)[:, :, None], axis=-2)
-                by_joints = np.concatenate([by_joints, self._by_joints(robot, start, tip)], axis=2)
+                start = targets.start.some(rows)
+                on, turned = start.anchored[:, None, None], start.turned[:, None, None]
+                before, turn, from_there = self._motions(robot, start.joints, tip)
+                moved -= on * (before + turned * np.cross(turn, (tips - from_there)[:, :, None], axis=-2))
+                by_joints = np.concatenate([by_joints, on * self._by_joints(robot, start.joints, tip)], axis=2)
             yield rows, moved, by_joints
 
     def shared_by(self, programs: Sequence[TargetsReached]) -> dict[int, CommonMotion]:
         """Return what each frame takes up of all errors of its targets, as of their corrections."""
-        numbers = {number for targets in programs for number in targets.frames.tolist()}
+        numbers = {number for targets in programs for number in targets.frames[targets.alone].tolist()}
         return {number: common_motion(self._motions_in(programs, number)) for number in sorted(numbers)}
 
     def _motions_in(self, programs: Sequence[TargetsReached], number: int) -> Iterator[tuple[Array, Array, Array]]:
         for targets in programs:
             for rows in _parts(targets):
-                mine = rows[targets.frames[rows] == number]
+                mine = rows[(targets.frames[rows] == number) & targets.alone[rows]]
                 if len(mine):
                     robot = targets.arms[targets.arm[mine[0]]]
                     moved, turned, tips = self._motions(robot, targets.joints[mine], targets.tips[mine])
@@ -324,7 +340,7 @@ class _ModelErrors:
         moved, turned = (np.moveaxis(rate, 2, 0).swapaxes(1, 2) for rate in robot.jacobians(kinematics, q, names))
         arm = (R @ tip[:, :, None])[:, :, 0]
         moved, turned = moved @ self._root, turned @ self._root
-        if self.assumed_tools:
+        if self.assumed_tools and self.assumed_frames:
             moved = moved - R @ self._flange[:3]
             turned = turned - R @ self._flange[3:]
         else:
@@ -332,9 +348,9 @@ class _ModelErrors:
         return moved + np.cross(turned, arm[:, :, None], axis=-2), turned, kinematics.position.T + arm
 
     def _tip_on_flange(self, tips: Array) -> Array:
-        """Return by what the nearest target is uncertain on the flange, for each tip ``(m, 3, parameters)``."""
+        """Return by what the target at each tip is uncertain on the flange, ``(m, 3, parameters)``; 0 without one."""
         robot, names, root = self.robot, list(self.proof.names), self._root
-        rates = np.zeros((max(len(robot.targets), 1), 3, root.shape[1]))
+        rates = np.zeros((len(robot.targets) + 1, 3, root.shape[1]))
         places = np.full((len(rates), 3), np.inf)
         for number, target in enumerate(robot.targets):
             own = [target.parameter(axis) for axis in "xyz"]
@@ -342,8 +358,9 @@ class _ModelErrors:
             for axis, name in enumerate(own):
                 if name in names:
                     rates[number, axis] = root[names.index(name)]
-        nearest = np.argmin(np.linalg.norm(tips[:, None] - places, axis=2), axis=1)
-        return np.asarray(rates[nearest])
+        away = np.linalg.norm(tips[:, None] - places, axis=2)
+        away[:, -1] = _AT_TARGET
+        return np.asarray(rates[np.argmin(away, axis=1)])
 
     def _by_joints(self, robot: Robot, q: Array, tip: Array) -> Array:
         """Return the errors of tips by the errors of the joints at an arrival, ``(m, 3, joints)``."""

@@ -48,7 +48,17 @@ def best_agreement(robot: Robot) -> tuple[Array, Array]:
     base, flange
         ``T_base_nominalbase`` and ``T_flange_nominalflange``, ``(4, 4)`` each [m].
     """
-    nominal = nominal_robot(robot)
+    base, flange, _ = _agreement(robot, nominal_robot(robot))
+    return base, flange
+
+
+def disagreement(robot: Robot, nominal: Robot) -> float:
+    """Return how far the flange of a nominal robot is from the identified one where both agree best [m], on average."""
+    return _agreement(robot, nominal)[2]
+
+
+def _agreement(robot: Robot, nominal: Robot) -> tuple[Array, Array, float]:
+    """Return where base and flange of a nominal robot agree best with the identified ones, and what is left [m]."""
     joints = robot.random_configurations(_CONFIGURATIONS, np.random.default_rng(0))
     nominal_poses, real_poses = matrices(nominal, joints), np.linalg.inv(robot.base.matrix) @ matrices(robot, joints)
     weight = np.repeat([1.0, reach(nominal, None)], 3)
@@ -61,7 +71,8 @@ def best_agreement(robot: Robot) -> tuple[Array, Array]:
         rows = np.concatenate([_by_base(expected), _by_flange(expected)], axis=2)
         step, *_ = np.linalg.lstsq((rows * weight[:, None]).reshape(-1, 12), (missed * weight).ravel(), rcond=None)
         base, before_flange = _small(step[:6]) @ base, before_flange @ _small(step[6:])
-    return base, np.asarray(np.linalg.inv(before_flange))
+    left = real_poses[:, :3, 3] - (base @ nominal_poses @ before_flange)[:, :3, 3]
+    return base, np.asarray(np.linalg.inv(before_flange)), float(np.linalg.norm(left, axis=1).mean())
 
 
 def flange_rates(robot: Robot, names: Sequence[str]) -> Array:

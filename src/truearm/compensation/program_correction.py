@@ -137,9 +137,9 @@ def corrected_programs(
     if "assumed" in (tools, frames):
         start, flange = best_agreement(robot)
     progress("resolving the configurations")
-    arms, taught = arms_of_tools(robot, loads), choice.was_taught("points")
+    arms = arms_of_tools(robot, loads)
     resolved = [
-        ResolvedProgram(robot, nominal, program, cell, arms, kept, taught=taught)
+        ResolvedProgram(robot, nominal, program, cell, arms, kept)
         for program, kept in zip(programs, kept_by_choice(programs, choice), strict=True)
     ]
     names = tuple(dict.fromkeys(name for one in resolved for name in one.frames))
@@ -147,8 +147,6 @@ def corrected_programs(
         # What is given by joints stays where it is to the first frame that was measured.
         measured = next(one.measured_base for one in resolved if one.measured_base is not None)
         bases = dict.fromkeys(names, measured)
-    elif taught:
-        bases = dict.fromkeys(names, start)
     else:
         progress("finding where the base is")
         together = [(name,) for name in names] if choice.was_taught("frames") else [names]

@@ -68,9 +68,7 @@ class ResolvedProgram:
     arms
         The calibrated robot as it carries each tool, by the tool's name.
     kept
-        Targets that stay, by their index.
-    taught
-        Whether targets were taught with the robot: then those that are offsets from them go along with the real robot.
+        Targets that stay, by their index. Those that are offsets from them go along with the real robot.
     """
 
     def __init__(
@@ -81,10 +79,8 @@ class ResolvedProgram:
         cell: Cell,
         arms: Mapping[str, Robot] | None = None,
         kept: Mapping[int, Kept] | None = None,
-        *,
-        taught: bool = False,
     ) -> None:
-        self._robot, self._nominal, self._program, self._taught = robot, nominal, program, taught
+        self._robot, self._nominal, self._program = robot, nominal, program
         self._kept = {} if kept is None else kept
         by_tool = {} if arms is None else arms
         carried = [by_tool.get(target.tool, robot) for target in program.targets]
@@ -118,8 +114,11 @@ class ResolvedProgram:
         stays = np.isin(np.arange(len(targets)), list(self._kept))
         self._found_joints: NDArray[np.bool_] = np.asarray(~np.isnan(found.joints).any(axis=1))
         self._usable: NDArray[np.bool_] = self._found_joints & ~stays
-        if taught:
-            self._usable &= np.isin(np.arange(len(targets)), self._going_along())
+        first = np.array([self._first(row) for row in range(len(targets))], dtype=np.intp)
+        self._firsts = first
+        #: Which are offsets from targets that stay.
+        self._anchored: NDArray[np.bool_] = ~stays & stays[first] & (first != np.arange(len(targets)))
+        self._usable &= ~self._anchored | self._found_joints[first]
 
     @property
     def frames(self) -> tuple[str, ...]:
@@ -133,7 +132,7 @@ class ResolvedProgram:
 
     def some(self, count: int, frames: Collection[str]) -> NDArray[np.intp]:
         """Return up to `count` targets that are corrected, in some frames, evenly along the program."""
-        usable = np.flatnonzero(self._usable & self._base.among(frames))
+        usable = np.flatnonzero(self._usable & ~self._anchored & self._base.among(frames))
         evenly = np.linspace(0, len(usable) - 1, min(count, len(usable))).astype(int)
         return np.asarray(usable[np.unique(evenly)])
 
@@ -186,7 +185,7 @@ class ResolvedProgram:
     def _why_not(self, row: int) -> str:
         """Return why a target that shall be corrected cannot be computed."""
         if self._found_joints[row]:
-            return "it is an offset from a taught point that the nominal robot does not reach: check its tool and frame"
+            return "the nominal robot does not reach the point that it is an offset from: check its tool and frame"
         if self._resolved.reachable[row]:
             return (
                 "the nominal robot reaches it in no posture of the configuration that the program states, or only in a "
@@ -212,7 +211,7 @@ class ResolvedProgram:
             frames=self._base.numbers(frames)[rows],
             arms=self._arms,
             arm=self._arm[rows],
-            start=self._start(rows) if self._taught else None,
+            start=self._start(rows),
         )
 
     def judged(self, correction: Correction, expected: ExpectedErrors, *, every: bool) -> Correction:
@@ -247,14 +246,9 @@ class ResolvedProgram:
         return fakes, found.solutions.usable
 
     def _found(self, rows: NDArray[np.intp], base: Shift, flange: Array) -> FakeTargets:
-        poses = self._meant(base, flange) if self._taught else self._poses
+        poses = self._meant(base, flange)
         wanted = self._base.real(rows, base) @ poses[rows] @ np.linalg.inv(self._tool.real(rows, flange))
         return fake_targets_of(self._arms, self._arm[rows], wanted, self._resolved.joints[rows])
-
-    def _going_along(self) -> list[int]:
-        """Return the targets that are offsets from others that the nominal robot reaches."""
-        rows = [row for row, target in enumerate(self._program.targets) if target.parent is not None]
-        return [row for row in rows if self._found_joints[self._first(row)]]
 
     def _first(self, row: int) -> int:
         """Return the target that the offsets up to this one begin at."""
@@ -263,36 +257,37 @@ class ResolvedProgram:
         return row
 
     def _meant(self, base: Shift, flange: Array) -> Array:
-        """Return the poses of offsets from taught points in their real frames, ``(n, 4, 4)``.
+        """Return where tips shall be in the real frames, ``(n, 4, 4)``: as the program says, but for offsets that stay.
 
-        A taught point is where the real robot is when it is sent there. What is an offset from it has to be that far
-        from there.
+        A target that stays is where the real robot is when it is sent there. What is an offset from it has to be that
+        far from there.
         """
-        program, rows = self._program, np.flatnonzero(self._found_joints)
-        firsts = np.array(sorted({self._first(row) for row in rows.tolist()} & set(rows.tolist())), dtype=np.intp)
-        poses = self._poses.copy()
-        if not len(firsts):
-            return poses
+        anchored = self._usable & self._anchored
+        if not anchored.any():
+            return self._poses
+        program, poses, before = self._program, self._poses.copy(), self._poses
+        firsts = np.unique(self._firsts[anchored])
         there = np.zeros((len(firsts), 4, 4))
         for number, arm in enumerate(self._arms):
             mine = self._arm[firsts] == number
             there[mine] = np.linalg.inv(arm.base.matrix) @ matrices(arm, self._resolved.joints[firsts[mine]])
         poses[firsts] = np.linalg.inv(self._base.real(firsts, base)) @ there @ self._tool.real(firsts, flange)
         for row in offsets_in_order(program):
-            target, before = program.targets[row], self._poses
-            if target.parent is None:
-                continue
-            step = np.linalg.inv(before[target.parent]) @ before[row]
-            poses[row] = poses[target.parent] @ step
-            if not target.turned:
-                poses[row, :3, 3] = poses[target.parent, :3, 3] + before[row, :3, 3] - before[target.parent, :3, 3]
+            target = program.targets[row]
+            if target.parent is not None and self._anchored[row]:
+                poses[row] = poses[target.parent] @ np.linalg.inv(before[target.parent]) @ before[row]
+                if not target.turned:
+                    poses[row, :3, 3] = poses[target.parent, :3, 3] + before[row, :3, 3] - before[target.parent, :3, 3]
         return poses
 
-    def _start(self, rows: NDArray[np.intp]) -> Start:
-        """Return the taught points that targets are offsets from."""
-        firsts = np.array([self._first(row) for row in rows.tolist()], dtype=np.intp)
+    def _start(self, rows: NDArray[np.intp]) -> Start | None:
+        """Return the targets that stay and that others are offsets from; None if there are none."""
+        anchored = self._anchored[rows]
+        if not anchored.any():
+            return None
+        firsts = np.where(anchored, self._firsts[rows], rows)
         turned = np.array([self._program.targets[row].turned for row in rows.tolist()], dtype=bool)
-        return Start(self._resolved.joints[firsts], turned)
+        return Start(self._resolved.joints[firsts], turned, anchored)
 
     def _changed_turns(self, rows: NDArray[np.intp], joints: Array, reasons: Mapping[int, str]) -> dict[int, str]:
         """Return the targets that would leave the ranges of their configuration, with the reason."""

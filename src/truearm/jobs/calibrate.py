@@ -477,11 +477,12 @@ def _check_trained_before(
         return []
     if before.split == split and _LEFT_OUT.findall(before.line) == _LEFT_OUT.findall(without):
         return []
+    count, of, seed = before.split
     return [
         Notice(
             "training-data",
-            f"The robot to begin with was calibrated with these readings already, on {before.split[0]} of its {before.split[1]} "
-            f"configurations (seed {before.split[2]}): what is held out now was partly seen then, and the held-out errors "
+            f"The robot to begin with was calibrated with these readings already, on {count} of its {of} "
+            f"configurations (seed {seed}): what is held out now was partly seen then, and the held-out errors "
             "flatter it. Begin with the nominal robot, or with the same `train` and `seed`.",
         )
     ]

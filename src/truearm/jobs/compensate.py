@@ -10,9 +10,13 @@ from pathlib import Path
 
 from truearm.arrays import finite_number
 from truearm.compensation.advice import check_correction
-from truearm.compensation.cell import Cell, read_frames, read_tools
+from truearm.compensation.cell import Cell, Placed, read_frames, read_tools
 from truearm.compensation.chosen_targets import TAUGHT, Choice, Taught
-from truearm.compensation.controller_model import controller_notices, refuse_unknown_controller
+from truearm.compensation.controller_model import (
+    controller_notices,
+    refuse_kinematics_of_another_arm,
+    refuse_unknown_controller,
+)
 from truearm.compensation.correction import Correction
 from truearm.compensation.program_correction import CorrectedPrograms, corrected_programs
 from truearm.compensation.program_files import edited, language_called, program_files, read_programs
@@ -101,8 +105,9 @@ def compensate(
     accept
         What may speak against the robot's calibration or against a correction, by name: ``rank-loss``,
         ``not-converged``, ``implausible``, or a notice of the level error that the calibration ended with, such as
-        ``wrong-robot``; ``maker`` for programs in the language of another maker; and ``not-better-here`` to correct
-        also the targets that would rather get worse.
+        ``wrong-robot``; ``maker`` for programs in the language of another maker; ``other-kinematics`` for kinematics of
+        the controller that are not this arm's; and ``not-better-here`` to correct also the targets that would rather
+        get worse.
     notes
         What to write on the report, by its name: ``date``, ``serial``, ``operator``, or any other.
     command
@@ -131,7 +136,7 @@ def compensate(
         joint_targets=choice_argument(joint_targets, "joint_targets", {"keep": False, "correct": True}),
         only=names_argument(only, "only"),
         keep=names_argument(keep, "keep"),
-        taught=_taught(taught, tools=tool_file is not None, frames=frame_file is not None),
+        taught=_taught(taught),
     )
     folder = (
         None
@@ -164,6 +169,7 @@ def compensate(
     with refusals_of("frames"):
         frames_given = read_frames(arm, frame_file)
     cell = Cell(tools_given, frames_given)
+    _refuse_taught_and_measured(choice, cell)
     with refusals_of("programs"):
         files = program_files(paths, again=again)
         progress("reading the programs")
@@ -171,6 +177,8 @@ def compensate(
     language = language_called(read[0].language)
     foreign = check_maker(arm, language, accepted)
     refuse_unknown_controller(arm, read)
+    with refusals_of("robot"):
+        refuse_kinematics_of_another_arm(arm, accepted)
     with refusals_of("robot"):
         result = corrected_programs(
             arm,
@@ -231,7 +239,7 @@ def _kinematics_file(said: str | Path | None) -> tuple[str | Path, ...]:
     return () if said is None or str(said) in STATED else (said,)
 
 
-def _taught(taught: object, *, tools: bool, frames: bool) -> frozenset[Taught] | None:
+def _taught(taught: object) -> frozenset[Taught] | None:
     """Return what was taught; None if that was not said."""
     if taught is None:
         return None
@@ -243,14 +251,21 @@ def _taught(taught: object, *, tools: bool, frames: bool) -> frozenset[Taught] |
             came=", ".join(named) or "nothing",
             allowed=f"none, or some of {', '.join(TAUGHT)}",
         )
-    for what, measured in (("tools", tools), ("frames", frames)):
-        if measured and what in named:
+    return frozenset(what for what in TAUGHT if what in named)
+
+
+def _refuse_taught_and_measured(choice: Choice, cell: Cell) -> None:
+    """Refuse tools or frames that are said to be taught and have a measured place; what the controller has is none."""
+    kinds: tuple[tuple[Taught, dict[str, Placed]], ...] = (("tools", cell.tools), ("frames", cell.frames))
+    for what, places in kinds:
+        measured = [name for name, placed in places.items() if placed.identified is not None]
+        if measured and choice.was_taught(what):
             raise InputError(
                 f"the {what} cannot be both taught and measured",
                 parameter=f"taught, {what}",
-                cure=f"Leave {what} out of `taught`, or leave out `{what}`.",
+                came=measured[0] or ("flange" if what == "tools" else "base"),
+                cure=f"Leave {what} out of `taught`, or say with `of: controller` what the controller has.",
             )
-    return frozenset(what for what in TAUGHT if what in named)
 
 
 def _refuse_skipped(result: CorrectedPrograms) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
+from truearm.compensation.controller_model import OTHER_ARM
 from truearm.compensation.programs.program import Language
 from truearm.errors import InputError
 from truearm.files import exists
@@ -29,7 +30,7 @@ NOT_BETTER: Final = "not-better-here"
 
 def accept_argument(accept: object, robot: Robot) -> tuple[str, ...]:
     """Return the names of what is accepted although it speaks against a correction."""
-    known = dict.fromkeys((*_UNSOUND, _ELSEWHERE, _WRONG, *_against(robot), OTHER_MAKER, NOT_BETTER))
+    known = dict.fromkeys((*_UNSOUND, _ELSEWHERE, _WRONG, *_against(robot), OTHER_MAKER, OTHER_ARM, NOT_BETTER))
     return choices_argument(accept, "accept", list(known), "status or notice")
 
 

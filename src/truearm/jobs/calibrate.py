@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from numbers import Integral
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import Final, Literal, get_args
 
 import numpy as np
 
-from truearm.errors import InputError, nearest_names, refusals_of, wrong_kind
+from truearm.errors import InputError, did_you_mean, nearest_names, refusals_of, wrong_kind
 from truearm.files import path_argument, read_bytes
 from truearm.identification.base_changes import with_one_base
 from truearm.identification.choosing.selection import AUTO, select
@@ -42,6 +43,7 @@ from truearm.jobs.arguments import (
     folder_for,
     gravity_argument,
     names_argument,
+    notes_argument,
     payload_argument,
     progress_argument,
     python_call,
@@ -51,7 +53,7 @@ from truearm.jobs.arguments import (
     whole_argument,
 )
 from truearm.jobs.check import notices_of
-from truearm.jobs.validate import trained_on
+from truearm.jobs.validate import training_of
 from truearm.library import urdf_source
 from truearm.measurement.dataset import Dataset, IntArray
 from truearm.measurement.repeats import copies, readings_digest, revisits
@@ -72,6 +74,9 @@ Train = int | Literal["all"] | None
 #: Every model that can be asked for by name; None chooses.
 _MODELS: Final[dict[str, Model | None]] = {m.name: m for m in (FRAMES, *MODELS)} | {AUTO: None}
 
+#: The hash by which the history tells which configurations were left out.
+_LEFT_OUT: Final = re.compile(r"; ([0-9a-f]{8})\),")
+
 
 def calibrate(
     robot: Robot | str | Path,
@@ -88,6 +93,8 @@ def calibrate(
     payload: Payload | str | None = None,
     gravity: Sequence[float] | None = None,
     base_changes: Sequence[str] = (),
+    without: Sequence[str] = (),
+    notes: Mapping[str, str] | None = None,
     command: str | None = None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Calibration:
@@ -126,6 +133,11 @@ def calibrate(
         Configurations from which on, in the order of measurement, the instrument or the robot's base stood elsewhere.
         The motion is found along with the model (``geometric`` for ``auto``) from the training configurations, and
         taken out of the readings; no deviation contains what is not known of it.
+    without
+        Configurations that are left out, by their labels: neither part of the split knows them.
+    notes
+        What to write on the report and into result.json, by its name: ``date``, ``serial``, ``operator``,
+        ``instrument``, or any other.
     command
         How to run it again, for the report; None writes the call in Python.
     progress
@@ -147,6 +159,8 @@ def calibrate(
             cure="Name another model.",
         )
     base_changes = names_argument(base_changes, "base_changes")
+    without = names_argument(without, "without")
+    notes = notes_argument(notes)
     choice_argument(loss, "loss", {name: name for name in LOSSES})
     choice_argument(redundancy, "redundancy", {name: name for name in get_args(Redundant)})
     seed = whole_argument(seed, "seed")
@@ -163,6 +177,8 @@ def calibrate(
         bounds=bounds,
         effects=list(effects) or None,
         base_changes=list(base_changes) or None,
+        without=list(without) or None,
+        notes=notes or None,
         payload=payload,
         gravity=fall,
     )
@@ -182,6 +198,7 @@ def calibrate(
     sha256 = None
     if isinstance(data, str | Path):
         sha256 = hashlib.sha256(read_bytes(path_argument(data, "data"))).hexdigest()
+    readings = _left_out(readings, without)
     bounds_file = str(bounds) if isinstance(bounds, str | Path) else "bounds"
     if bounds is not None and not isinstance(bounds, Bounds):
         with refusals_of("bounds"):
@@ -265,6 +282,7 @@ def calibrate(
     history = (
         f"calibrated by truearm {__version__}: model {' + '.join([chosen.name, *effects])},"
         f" {count} of {n} configurations of {Path(readings.source).name}{digest}, seed {seed}, loss {loss},"
+        f"{_without_words(without)}"
         f" redundancy {redundancy}{f', another base from {listed(base_changes)} on' if base_changes else ''}"
     )
     calibration = Calibration(
@@ -279,7 +297,7 @@ def calibrate(
             *wrong_robot,
             *_check_proof(before, validation),
             *_check_copies(readings, training, held_out),
-            *_check_trained_before(nominal_robot, as_read, sha256, (count, n, seed)),
+            *_check_trained_before(nominal_robot, as_read, sha256, (count, n, seed), _without_words(without)),
             *moved,
             *check_payload(nominal_robot),
             *check_fit(fit, expected, doubted=doubted),
@@ -300,10 +318,48 @@ def calibrate(
         inputs=inputs,
         selection=selection,
         known_before=_known_before(nominal_robot),
+        without=without,
+        notes=notes,
     )
     if folder is not None:
         calibration.save(folder, progress)
     return calibration
+
+
+def _left_out(data: Dataset, labels: Sequence[str]) -> Dataset:
+    """Return the data without some configurations.
+
+    Raises
+    ------
+    InputError
+        For a configuration that the data do not have, or if none would be left.
+    """
+    if not labels:
+        return data
+    known = set(data.labels)
+    for label in labels:
+        if label not in known:
+            raise InputError(
+                "there is no configuration of this name",
+                parameter="without",
+                where=data.source,
+                came=label,
+                cure=did_you_mean(label, data.labels) or "Name configurations of the data.",
+            )
+    kept = [i for i, label in enumerate(data.labels) if label not in set(labels)]
+    if not kept:
+        raise InputError(
+            "no configuration would be left", parameter="without", where=data.source, cure="Leave out fewer."
+        )
+    return data.of_configurations(kept)
+
+
+def _without_words(labels: Sequence[str]) -> str:
+    """Return how the history says which configurations were left out: the first few by name, all of them by a hash."""
+    if not labels:
+        return ""
+    digest = hashlib.sha256("\n".join(sorted(labels)).encode()).hexdigest()[:8]
+    return f" without {counted(len(labels), 'configuration')} ({listed(labels)}; {digest}),"
 
 
 def _known_before(robot: Robot) -> Proof | None:
@@ -400,7 +456,9 @@ def _check_copies(data: Dataset, training: IntArray, held_out: IntArray) -> list
     ]
 
 
-def _check_trained_before(robot: Robot, data: Dataset, sha256: str | None, split: tuple[int, int, int]) -> list[Notice]:
+def _check_trained_before(
+    robot: Robot, data: Dataset, sha256: str | None, split: tuple[int, int, int], without: str
+) -> list[Notice]:
     """Say if the robot to begin with has been trained on what is held out now.
 
     Parameters
@@ -411,15 +469,20 @@ def _check_trained_before(robot: Robot, data: Dataset, sha256: str | None, split
         Of their file; None if they are in none.
     split
         How many configurations are trained on, of how many, and the seed.
+    without
+        What the history says of those left out.
     """
-    before = trained_on(robot, data, sha256)
-    if before is None or before == split or split[0] == split[1]:
+    before = training_of(robot, data, sha256)
+    if before is None or split[0] == split[1]:
         return []
+    if before.split == split and _LEFT_OUT.findall(before.line) == _LEFT_OUT.findall(without):
+        return []
+    count, of, seed = before.split
     return [
         Notice(
             "training-data",
-            f"The robot to begin with was calibrated with these readings already, on {before[0]} of its {before[1]} "
-            f"configurations (seed {before[2]}): what is held out now was partly seen then, and the held-out errors "
+            f"The robot to begin with was calibrated with these readings already, on {count} of its {of} "
+            f"configurations (seed {seed}): what is held out now was partly seen then, and the held-out errors "
             "flatter it. Begin with the nominal robot, or with the same `train` and `seed`.",
         )
     ]

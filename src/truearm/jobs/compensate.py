@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -33,6 +33,7 @@ from truearm.jobs.arguments import (
     flag_argument,
     folder_for,
     names_argument,
+    notes_argument,
     paths_argument,
     payload_argument,
     progress_argument,
@@ -65,6 +66,7 @@ def compensate(
     keep: Sequence[str] = (),
     taught: Sequence[str] | None = None,
     accept: Sequence[str] = (),
+    notes: Mapping[str, str] | None = None,
     command: str | None = None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> ProgramCorrection:
@@ -108,6 +110,8 @@ def compensate(
         ``wrong-robot``; ``maker`` for programs in the language of another maker; ``other-kinematics`` for kinematics of
         the controller that are not this arm's; and ``not-better-here`` to correct also the targets that would rather
         get worse.
+    notes
+        What to write on the report, by its name: ``date``, ``serial``, ``operator``, or any other.
     command
         How to do it again, for the report; None writes the call in Python.
     progress
@@ -125,6 +129,7 @@ def compensate(
     tool_file = None if tools is None else path_argument(tools, "tools")
     frame_file = None if frames is None else path_argument(frames, "frames")
     payload = payload_argument(payload)
+    notes = notes_argument(notes)
     strict, again = flag_argument(strict, "strict"), flag_argument(again, "again")
     if split is not None:
         split = finite_number(split, "split")
@@ -158,6 +163,7 @@ def compensate(
         keep=list(choice.keep) or None,
         taught=None if choice.taught is None else sorted(choice.taught) or ["none"],
         accept=list(accepted) or None,
+        notes=notes or None,
     )
     refuse_unaccepted(arm, accepted)
     with refusals_of("tools"):
@@ -216,6 +222,7 @@ def compensate(
         ),
         command=invocation,
         inputs=files_of(robot, tools, frames, *_kinematics_file(controller_kinematics)),
+        notes=notes,
     )
     if folder is not None:
         with refusals_of("out"):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
@@ -35,7 +35,7 @@ from truearm.results.summaries import (
     noise_summary,
     selection_summary,
 )
-from truearm.shown import counted
+from truearm.shown import counted, listed
 from truearm.units import SHOWN_AS, from_si
 from truearm.writing import output_folder, write_files
 
@@ -78,6 +78,10 @@ class Calibration(Record):
         The files that were read: none of them is overwritten.
     known_before
         What was known of the robot from an earlier calibration; None if nothing was.
+    without
+        Labels of the configurations that were left out; `data` does not have them.
+    notes
+        What the user noted, by its name.
     """
 
     fit: Fit
@@ -95,6 +99,8 @@ class Calibration(Record):
     selection: Selection | None = None
     inputs: tuple[Path, ...] = ()
     known_before: Proof | None = None
+    without: tuple[str, ...] = ()
+    notes: dict[str, str] = field(default_factory=dict)
 
     @cached_property
     def robot(self) -> Robot:
@@ -138,6 +144,8 @@ class Calibration(Record):
             "train": errors_summary(self.train),
             "validation": None if self.validation is None else errors_summary(self.validation),
             "expected_mm": expected_summary(self.expected),
+            **({"without": list(self.without)} if self.without else {}),
+            **({"notes": self.notes} if self.notes else {}),
         }
 
     def result(self) -> dict[str, Any]:
@@ -165,6 +173,8 @@ class Calibration(Record):
             text.append(f"Nothing was held out; on the {counted(self.train.configurations, 'training configuration')}:")
             text.append(f"  nominal     {error_line(self.nominal)}")
         text.append(f"  calibrated  {error_line(self.train)}")
+        if self.without:
+            text.append(f"Left out: {counted(len(self.without), 'configuration')} ({listed(self.without)})")
         text += expected_lines(self.expected)
         text += noise_lines(self.fit, self.repeatability)
         if self.selection is not None:

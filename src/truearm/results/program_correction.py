@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
@@ -264,6 +264,8 @@ class ProgramCorrection(Record):
         What a simulated robot does with the programs, where there is one.
     inputs
         The files that were read besides the programs: none of them is overwritten.
+    notes
+        What the user noted, by its name.
     """
 
     robot: Robot
@@ -274,6 +276,7 @@ class ProgramCorrection(Record):
     command: str
     simulated: SimulatedRun | None = None
     inputs: tuple[Path, ...] = ()
+    notes: dict[str, str] = field(default_factory=dict)
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it, lengths in mm."""
@@ -281,6 +284,7 @@ class ProgramCorrection(Record):
             "programs": [file.summary() for file in self.files],
             "expected_is_lower_bound": self.lower_bound,
             "expected_is_relative": bool(self.relative),
+            **({"notes": self.notes} if self.notes else {}),
             "warnings": notice_summaries(self.warnings),
         }
 
@@ -330,6 +334,7 @@ class ProgramCorrection(Record):
         frames, choice = self.result.frames, self.result.choice
         made: dict[str, Any] = {
             "robot": self.robot.name,
+            **({"notes": self.notes} if self.notes else {}),
             "history": list(self.robot.history),
             "proof": None if self.robot.proof is None else self.robot.proof.summary(),
             "payload_kg": self._masses(),

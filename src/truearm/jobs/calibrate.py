@@ -17,11 +17,12 @@ from truearm.identification.base_changes import with_one_base
 from truearm.identification.choosing.selection import AUTO, select
 from truearm.identification.judging.advice import check_fit
 from truearm.identification.judging.arrival_lag import check_arrival_lag
-from truearm.identification.judging.changes import check_changes
+from truearm.identification.judging.changes import find_change, notices_of_change
 from truearm.identification.judging.expected_error import as_residuals_allow, expected_error
 from truearm.identification.judging.implausible import check_plausible
 from truearm.identification.judging.left_over import LeftOver
 from truearm.identification.judging.narrow_data import check_narrow_data
+from truearm.identification.judging.next_steps import Judged, steps_after_fit
 from truearm.identification.judging.one_sided import check_one_sided
 from truearm.identification.judging.sigma import check_sigma
 from truearm.identification.judging.transmission import check_transmission
@@ -251,28 +252,43 @@ def calibrate(
         f" {count} of {n} configurations of {Path(readings.source).name}{digest}, seed {seed}, loss {loss},"
         f" redundancy {redundancy}{f', another base from {listed(base_changes)} on' if base_changes else ''}"
     )
+    change = find_change(left_over)
+    warnings = (
+        *(notice for notice in noticed if notice.level == "error"),
+        *unlike,
+        *_check_proof(before, validation),
+        *_check_copies(readings, training, held_out),
+        *_check_trained_before(nominal_robot, sha256, (count, n, seed)),
+        *moved,
+        *check_fit(fit, expected, doubted=has_error([*unlike, *noticed])),
+        *narrow,
+        *(notice for notice in noticed if notice.level != "error"),
+        *check_one_sided(fit, first),
+        *wrong_sigma,
+        *notices_of_change(left_over, change),
+        *check_arrival_lag(left_over),
+        *check_transmission(fit, first),
+    )
+    steps = steps_after_fit(
+        Judged(
+            left_over,
+            Status.IMPLAUSIBLE if unlike else fit.status,
+            warnings,
+            change,
+            validation or train_errors,
+            validation is not None,
+            expected,
+            first,
+        )
+    )
     calibration = Calibration(
         fit=fit,
         nominal=before,
         train=train_errors,
         validation=validation,
         expected=expected,
-        warnings=(
-            *(notice for notice in noticed if notice.level == "error"),
-            *unlike,
-            *_check_proof(before, validation),
-            *_check_copies(readings, training, held_out),
-            *_check_trained_before(nominal_robot, sha256, (count, n, seed)),
-            *moved,
-            *check_fit(fit, expected, doubted=has_error([*unlike, *noticed])),
-            *narrow,
-            *(notice for notice in noticed if notice.level != "error"),
-            *check_one_sided(fit, first),
-            *wrong_sigma,
-            *check_changes(left_over),
-            *check_arrival_lag(left_over),
-            *check_transmission(fit, first),
-        ),
+        warnings=warnings,
+        next=steps,
         data=readings,
         training=training,
         held_out=held_out,

@@ -210,7 +210,11 @@ def _judged(
 
 def check_changes(left: LeftOver) -> list[Notice]:
     """Return a notice if something moved during the campaign."""
-    change = find_change(left)
+    return notices_of_change(left, find_change(left))
+
+
+def notices_of_change(left: LeftOver, change: Change | None) -> list[Notice]:
+    """Return a notice of what moved during the campaign, if anything did."""
     if change is None:
         return []
     data = left.problem.data

@@ -1,0 +1,350 @@
+"""What to do next after a fit and after a check: the most useful first, with the gain to expect.
+
+Every gain is an estimate near the solution of the fit and costs no other fit. A gain of an effect, or of leaving
+configurations out, is a share of what the fit leaves, times the error that is known. More configurations gain what the
+variance of the parameters adds to the predictions: twice as many halve it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from truearm.identification.judging.changes import Change, find_change
+from truearm.identification.judging.expected_error import ExpectedError
+from truearm.identification.judging.left_over import LeftOver
+from truearm.identification.judging.narrow_data import joints_that_moved_little, least_known
+from truearm.identification.judging.next_step import MOST, NextStep, most_useful_first
+from truearm.identification.judging.off_configurations import Off, OffConfiguration, off_configurations
+from truearm.identification.judging.unmodelled import GEOMETRY, LOADS, PAYLOAD, Explanation, explanation
+from truearm.identification.solving.fit import Fit, Status
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.statistics import Errors
+from truearm.modeling.chain import Array
+from truearm.notices import Notice
+from truearm.shown import counted, listed
+
+#: Share of the error that twice as many configurations must gain for more to be advised.
+_LEAST_GAIN: Final = 0.1
+#: Root mean square of what is left over the declared deviation, up to which it is the instrument's noise.
+_AT_THE_NOISE: Final = 1.3
+#: Share of the variance of what is left that errors of the joints may have where it is called noise.
+_OF_THE_JOINTS: Final = 0.5
+#: Mean length of three normal coordinates over the deviation of one.
+_LENGTH: Final = 2.0 * math.sqrt(2.0 / math.pi)
+#: Configurations named one by one.
+_NAMED: Final = 3
+#: Errors that steps of their own are about.
+_OWN_STEP: Final = frozenset(
+    {"instrument-moved", "target-moved", "joint-zero-jumped", "narrow-data", "rank-loss", "not-converged"}
+)
+#: Warnings whose cure comes before more configurations.
+_CURED_FIRST: Final = (
+    "parallel-axes",
+    "no-loads",
+    "reference-moved",
+    "targets-swapped",
+    "target-mistaken",
+    "joints-mistaken",
+    "outliers",
+    "joints-not-settled",
+    "transmission-error",
+    "not-better",
+)
+#: Those that configurations which are off explain.
+_OF_CONFIGURATIONS: Final = frozenset(
+    {"outliers", "joints-mistaken", "targets-swapped", "target-mistaken", "not-better"}
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """A fit and what is known of it.
+
+    Attributes
+    ----------
+    left
+        What it leaves of all readings.
+    status
+        How it ended.
+    notices
+        What was noticed about data and fit.
+    change
+        What moved during the campaign.
+    errors
+        Of the readings that judge it.
+    held_out
+        Whether the fit has not seen these.
+    expected
+        Error to expect over the workspace.
+    training
+        The readings that the fit was made from.
+    """
+
+    left: LeftOver
+    status: Status
+    notices: Sequence[Notice]
+    change: Change | None
+    errors: Errors
+    held_out: bool
+    expected: ExpectedError
+    training: Dataset
+
+
+def steps_after_fit(judged: Judged) -> tuple[NextStep, ...]:
+    """Return at most three things to do after a fit, the most useful first; one at least."""
+    first = _to_mend(judged.notices)
+    if judged.status in (Status.NOT_CONVERGED, Status.IMPLAUSIBLE):
+        first = first or [NextStep("mend-data", judged.status.advice)]
+    if first:
+        return tuple(first)
+    left, known = judged.left, _known(judged.errors)
+    steps, now = _of_left_over(left, known, judged.change, checked=False)
+    spoiled = judged.change is not None or any(step.code == "measure-again" for step in steps)
+    if judged.status is not Status.RANK_LOSS and not spoiled:
+        steps += _more(judged, now)
+    steps += _cures(judged.notices, steps)
+    if judged.status is Status.AT_BOUND:
+        steps.append(NextStep("widen-bound", Status.AT_BOUND.advice))
+    if not judged.held_out:
+        steps.append(NextStep("hold-out", "Hold configurations out to judge the fit: leave `train=all` out."))
+    if judged.status is Status.RANK_LOSS:
+        more = NextStep("measure-more", _where(judged, f"determine {listed(left.fit.unobservable)}"))
+        return (more, *most_useful_first(steps))[:MOST]
+    return most_useful_first(steps or [_end(left)])
+
+
+def steps_after_check(
+    notices: Sequence[Notice], left: LeftOver | None = None, errors: Errors | None = None
+) -> tuple[NextStep, ...]:
+    """Return at most three things to do after a check, the most useful first; one at least.
+
+    Parameters
+    ----------
+    left
+        What a robust geometric fit leaves of the readings; None without one.
+    errors
+        Of that fit.
+    """
+    mend = _to_mend(notices)
+    if mend:
+        return tuple(mend)
+    steps: list[NextStep] = []
+    if left is not None and errors is not None:
+        steps, _ = _of_left_over(left, _known(errors), find_change(left), checked=True)
+    steps += _cures(notices, steps)
+    if not any(step.code in ("other-model", "give-loads") for step in steps):
+        how = "with the robot" if left is None else "with `model=geometric`"
+        also = "" if left is None else ": no other effect explains more of the readings"
+        steps.append(
+            NextStep("check-robot", "Check them together with the nominal robot too.")
+            if left is None
+            else NextStep("calibrate", f"Calibrate {how}{also}.")
+        )
+    return most_useful_first(steps)
+
+
+def _of_left_over(
+    left: LeftOver, known: float, change: Change | None, *, checked: bool
+) -> tuple[list[NextStep], float]:
+    """Return what to do about what a fit leaves, and the error without configurations that are off [m]."""
+    off = off_configurations(left)
+    steps = _measured_again(left, off, known, checked=checked)
+    now = known * off.left
+    if change is not None:
+        steps.append(_about(left, change, now))
+    found = explanation(left, off.indices)
+    if found is not None:
+        steps.append(_other_model(left.fit, found, now))
+    return steps, now
+
+
+def _known(errors: Errors) -> float:
+    """Return the mean error of positions, or else of lengths [m]."""
+    spread = errors.position or errors.length
+    return 0.0 if spread is None else spread.mean
+
+
+def _to_mend(notices: Sequence[Notice]) -> list[NextStep]:
+    """Return the step that mends what makes all other advice worthless."""
+    codes = list(dict.fromkeys(n.code for n in notices if n.level == "error" and n.code not in _OWN_STEP))
+    if not codes:
+        return []
+    what = "the error" if len(codes) == 1 else "the errors"
+    return [NextStep("mend-data", f"Mend first what {what} {listed(codes)} names: nothing else can be judged before.")]
+
+
+def _cures(notices: Sequence[Notice], steps: Sequence[NextStep]) -> list[NextStep]:
+    """Return the step that cures what warnings are about, if no other step does."""
+    again = any(step.code == "measure-again" for step in steps)
+    present = [n.code for n in notices if n.level != "note" or n.code == "outliers"]
+    codes = [code for code in _CURED_FIRST if code in present and not (again and code in _OF_CONFIGURATIONS)]
+    if "not-better" in codes and len(steps):
+        codes.remove("not-better")
+    if not codes:
+        return []
+    what = "the warning" if len(codes) == 1 else "the warnings"
+    return [NextStep("see-warning", f"Do what {what} {listed(codes)} below {'says' if len(codes) == 1 else 'say'}.")]
+
+
+def _measured_again(left: LeftOver, off: Off, known: float, *, checked: bool) -> list[NextStep]:
+    """Return the step for configurations that are off one by one."""
+    if not off.configurations:
+        return []
+    said = [_off_by(left, one) for one in off.configurations[:_NAMED]]
+    rest = len(off.configurations) - len(said)
+    if rest:
+        others = [left.problem.data.labels[one.index] for one in off.configurations[_NAMED:]]
+        said.append(f"{counted(rest, 'more configuration')} ({listed(others)})")
+    labels = ",".join(left.problem.data.labels[index] for index in off.indices)
+    out = "leave them out" if len(off.configurations) > 1 else "leave it out"
+    way = f"{out} of the calibration" if checked else f"{out} (`without={labels}`)"
+    what = "Measure these again" if len(off.configurations) > 1 else "Measure again"
+    return [NextStep("measure-again", f"{what}, or {way}: {'; '.join(said)}.", known * (1.0 - off.left))]
+
+
+def _off_by(left: LeftOver, off: OffConfiguration) -> str:
+    """Say what is wrong with a configuration."""
+    label = left.problem.data.labels[off.index]
+    if off.joints:
+        joints = left.fit.robot.joints
+        turns = joints[off.joints[0] - 1].kind == "revolute"
+        size = f"{math.degrees(abs(off.error)):.2g} deg" if turns else f"{abs(off.error) * 1e3:.2g} mm"
+        which = " or ".join(f"{number}" for number in off.joints[:_NAMED])
+        return f"joint {which} of configuration {label} looks off by about {size}"
+    where = f"target {off.target} of " if off.target else ""
+    return f"{where}configuration {label} is off by {off.distance * 1e3:.2g} mm"
+
+
+def _about(left: LeftOver, change: Change, known: float) -> NextStep:
+    """Return the step for what moved during the campaign."""
+    label = left.problem.data.labels[change.first]
+    gain = known * (1.0 - math.sqrt(max(1.0 - change.share, 0.0)))
+    words = {
+        "instrument-moved": f"The instrument or the robot's base moved before configuration {label}: name it in "
+        f"`base_changes={label}`, or measure again from there.",
+        "target-moved": f"Target {change.what} was seated anew before configuration {label}: give it another name from "
+        "there on.",
+        "joint-zero-jumped": f"The zero of joint {change.what} jumped before configuration {label}: find out why, and "
+        "measure again from there or calibrate the parts apart.",
+        "drift": "Everything drifted during the campaign: measure reference points along with the targets, or let the "
+        "arm and the instrument warm up first.",
+    }
+    return NextStep(change.kind, words[change.kind], gain)
+
+
+def _other_model(fit: Fit, found: Explanation, known: float) -> NextStep:
+    """Return the step for what would explain what is left."""
+    gain = known * (1.0 - found.left)
+    share = f"{1.0 - found.left:.0%}"
+    if found.cause == PAYLOAD:
+        now = f"{fit.robot.payload.mass:g} kg" if fit.robot.payload.mass else "none"
+        words = (
+            f"Give what the robot carried (`payload`): about {found.mass:.2g} kg on the flange instead of {now} would "
+            f"explain {share} of what is left."
+        )
+        return NextStep("give-payload", words, gain)
+    if found.cause == LOADS:
+        words = (
+            f"Joints that give way explain {share} of what is left, but the robot has no masses: give masses in the "
+            "robot file or what it carried (`payload`), and use `model=elastic`."
+        )
+        return NextStep("give-loads", words, gain)
+    if found.cause == GEOMETRY:
+        words = f"Use `model=geometric`: free geometry and joint zeros explain {share} of what is left."
+        return NextStep("other-model", words, gain)
+    plain = "geometry" in fit.model.groups and not fit.model.effects
+    if found.cause == "compliance" and plain:
+        return NextStep(
+            "other-model", f"Use `model=elastic`: joints that give way explain {share} of what is left.", gain
+        )
+    words = f"Add `effects={found.cause}`, or let `model=auto` choose: it explains {share} of what is left."
+    return NextStep("other-model", words, gain)
+
+
+def _more(judged: Judged, known: float) -> list[NextStep]:
+    """Return the step for more configurations, if they would gain something."""
+    noise, parameters = _variances(judged)
+    narrow = any(notice.code == "narrow-data" for notice in judged.notices)
+    before, after = (math.sqrt(noise + part * parameters) for part in (1.0, 0.5))
+    if not narrow and (before == 0.0 or 1.0 - after / before < _LEAST_GAIN):
+        return []
+    n = judged.training.configurations
+    gain = None if narrow and 1.0 - after / before < _LEAST_GAIN else _LENGTH * (before - after)
+    return [NextStep("measure-more", _where(judged, f"halve what {n} leave uncertain, as {n} more would"), gain)]
+
+
+def _where(judged: Judged, purpose: str) -> str:
+    """Say where to measure more."""
+    few = joints_that_moved_little(judged.left.fit, judged.training)
+    if few:
+        where = f"in which these joints move further: {'; '.join(few[:_NAMED])}"
+    elif judged.status is Status.RANK_LOSS or judged.left.fit.gauge_freedoms:
+        where = "all over the workspace"
+    else:
+        where = f"also {least_known(judged.left.fit)}"
+    return f"Measure more configurations to {purpose}: {where}."
+
+
+def _variances(judged: Judged) -> tuple[float, float]:
+    """Return the variance of a coordinate by what the fit leaves, and by its parameters [m^2].
+
+    The parameters' is that at the measured configurations, or that over the workspace if it is larger.
+    """
+    left = judged.left
+    metres = _metres(left)
+    used = metres > 0.0
+    if not used.any():
+        return 0.0, 0.0
+    J = left.jacobian[used] * metres[used][:, None]
+    parameters = float(np.mean(np.sum((J @ left.fit.covariance) * J, axis=1)))
+    r = left.without_parameters(left.residual)[used] * metres[used]
+    noise = float(r @ r) / len(r) * len(left.residual) / max(left.freedom, 1)
+    if not left.fit.joint_error.any() and not left.fit.gauge_freedoms:
+        parameters = max(parameters, (judged.expected.overall.mean / _LENGTH) ** 2)
+    return noise, parameters
+
+
+def _metres(left: LeftOver) -> Array:
+    """Return the deviation of each row [m], zero for angles."""
+    blocks = left.problem.blocks
+    return np.concatenate(
+        [np.repeat(b.sigma if b.observation.unit == "m" else 0.0 * b.sigma, b.observation.components) for b in blocks]
+    )
+
+
+def _end(left: LeftOver) -> NextStep:
+    """Say that it is done, or that nothing known here explains what is left."""
+    fit = left.fit
+    metres = _metres(left)
+    used = metres > 0.0
+    r = left.without_parameters(left.residual)
+    spread = math.sqrt(len(left.residual) / max(left.freedom, 1))
+    size = spread * float(np.sqrt(np.mean((r[used] * metres[used]) ** 2))) if used.any() else 0.0
+    noise = float(np.sqrt(np.mean(metres[used] ** 2))) if used.any() else 0.0
+    said = f"{size * 1e3:.2g} mm in each coordinate"
+    if fit.declared and size > _AT_THE_NOISE * noise:
+        return NextStep(
+            "unexplained",
+            f"What is left ({said}) is {size / noise:.2g} times the declared noise, and no effect known here explains "
+            "it. Visit a few postures again to see how well the robot repeats, and check sigma.",
+        )
+    if not fit.declared and fit.joint_error.any():
+        vector = np.array([fit.robot.values[name] for name in fit.free.names])
+        shared = (left.problem.at(vector).by_joints[used] * metres[used][:, None]) ** 2 @ fit.joint_error**2
+        if float(np.mean(shared)) > _OF_THE_JOINTS * size**2:
+            return NextStep(
+                "unexplained",
+                f"What is left ({said}) is shared by the readings of a configuration, and no effect known here "
+                "explains it. Visit a few postures again: if they scatter as much, that is how well the robot repeats.",
+            )
+    known = "is the instrument's noise" if fit.declared else "looks like the instrument's noise"
+    better = "" if fit.declared else " If the instrument is better than that, say so in a column sigma."
+    return NextStep(
+        "stop",
+        f"Stop here: what is left ({said}) {known}, and no effect known here explains more of it.{better}",
+    )

@@ -20,7 +20,7 @@ from truearm.identification.judging.left_over import LeftOver
 from truearm.identification.judging.narrow_data import joints_that_moved_little, least_known
 from truearm.identification.judging.next_step import MOST, NextStep, most_useful_first
 from truearm.identification.judging.off_configurations import Off, OffConfiguration, off_configurations
-from truearm.identification.judging.unmodelled import GEOMETRY, LOADS, PAYLOAD, Explanation, explanation
+from truearm.identification.judging.unmodelled import GEOMETRY, LOADS, PAYLOAD, Explanation, explanation, with_causes
 from truearm.identification.solving.fit import Fit, Status
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import Errors
@@ -153,11 +153,17 @@ def _of_left_over(
 ) -> tuple[list[NextStep], float]:
     """Return what to do about what a fit leaves, and the error without configurations that are off [m]."""
     off = off_configurations(left)
+    found = explanation(left, off.indices)
+    if found is not None and off.configurations:
+        # What a model lacks may be large at a few configurations, which are then not wrong.
+        still = off_configurations(with_causes(left, GEOMETRY, "compliance", LOADS, found.cause))
+        if still.indices != off.indices:
+            off = still
+            found = explanation(left, off.indices)
     steps = _measured_again(left, off, known, checked=checked)
     now = known * off.left
     if change is not None:
         steps.append(_about(left, change, now))
-    found = explanation(left, off.indices)
     if found is not None:
         steps.append(_other_model(left.fit, found, now))
     return steps, now
@@ -243,9 +249,10 @@ def _other_model(fit: Fit, found: Explanation, known: float) -> NextStep:
     share = f"{1.0 - found.left:.0%}"
     if found.cause == PAYLOAD:
         now = f"{fit.robot.payload.mass:g} kg" if fit.robot.payload.mass else "none"
+        what = f"about {found.mass:.2g} kg" if found.mass else "another load"
         words = (
-            f"Give what the robot carried (`payload`): about {found.mass:.2g} kg on the flange instead of {now} would "
-            f"explain {share} of what is left."
+            f"Give what the robot carried (`payload`): {what} on the flange instead of {now} would explain {share} of "
+            "what is left."
         )
         return NextStep("give-payload", words, gain)
     if found.cause == LOADS:
@@ -275,7 +282,10 @@ def _more(judged: Judged, known: float) -> list[NextStep]:
         return []
     n = judged.training.configurations
     gain = None if narrow and 1.0 - after / before < _LEAST_GAIN else _LENGTH * (before - after)
-    return [NextStep("measure-more", _where(judged, f"halve what {n} leave uncertain, as {n} more would"), gain)]
+    held_out = judged.left.problem.data.configurations - n
+    train = " Or train on more of them: `train`." if held_out >= n else ""
+    where = _where(judged, f"halve what {n} leave uncertain, as {n} more would")
+    return [NextStep("measure-more", where + train, gain)]
 
 
 def _where(judged: Judged, purpose: str) -> str:

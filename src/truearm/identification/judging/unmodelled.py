@@ -47,8 +47,11 @@ _LEAST_DEVIATIONS: Final = 2.0
 _LARGEST_CHANCE: Final = 1e-3
 #: Equations beyond the parameters, of three a configuration, without which nothing is said.
 _LEAST_FREEDOM: Final = 12
-#: A cause that is more likely beforehand is preferred if it gains so large a share of what the best one does.
-_AS_GOOD: Final = 0.85
+#: A cause that is more likely beforehand is preferred if it gains so large a share of what the best one does. Every arm
+#: gives way, and what else it does is seen better after that.
+_AS_GOOD: Final = {GEOMETRY: 0.5, "compliance": 0.5, LOADS: 0.85, PAYLOAD: 0.85}
+#: No arm carries more than this share of its own mass; where more comes out, its mass is not told.
+_LARGEST_PAYLOAD: Final = 0.7
 _STEPS: Final = 30
 _FINAL_STEP: Final = 1e-6
 #: What a payload may be [kg], and its moment [kg m], before anything is known.
@@ -72,13 +75,26 @@ class Explanation:
     chance
         Probability that noise alone shows as much with any of the causes tried.
     mass
-        Of the payload [kg]; zero for other causes.
+        Of the payload [kg]; zero for other causes, and where it cannot be told.
     """
 
     cause: str
     left: float
     chance: float
     mass: float = 0.0
+
+
+def with_causes(left: LeftOver, *causes: str) -> LeftOver:
+    """Return what a fit leaves whose free parameters could also take what causes explain, as far as they are open."""
+    problem = replace(left.problem, free=FreeParameters(()))
+    robot, groups = _candidates(left, problem)
+    free = FreeParameters(tuple(p for cause in dict.fromkeys(causes) for p in groups.get(cause, ())))
+    if not free.parameters:
+        return left
+    J = replace(problem, robot=robot, free=free).at(free.start).jacobian * free.prior
+    columns = left.without_parameters(J)
+    U, s, _ = np.linalg.svd(columns, full_matrices=False)
+    return replace(left, basis=np.concatenate([left.basis, U[:, s > 1.0]], axis=1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,8 +156,8 @@ def explanation(left: LeftOver, without: Sequence[int] = ()) -> Explanation | No
     if not judged:
         return None
     best = min(judged, key=lambda e: e.left)
-    likely = [e for cause in (GEOMETRY, "compliance", LOADS, PAYLOAD) for e in judged if e.cause == cause]
-    return next((e for e in likely if 1.0 - e.left >= _AS_GOOD * (1.0 - best.left)), best)
+    likely = [(e, share) for cause, share in _AS_GOOD.items() for e in judged if e.cause == cause]
+    return next((e for e, share in likely if 1.0 - e.left >= share * (1.0 - best.left)), best)
 
 
 def _some(left: LeftOver, without: Sequence[int]) -> NDArray[np.intp]:
@@ -266,6 +282,8 @@ def _payload(left: LeftOver, rest: _Remainder) -> Iterator[tuple[str, Array, flo
     moment = robot.payload.mass * np.array(robot.payload.cog) + load[1:]
     if mass <= 0.0 or float(np.linalg.norm(moment)) > _FARTHEST_COG * mass:
         return
+    if mass > _LARGEST_PAYLOAD * sum(link.mass for link in robot.masses):
+        mass = 0.0
     scale = np.array([_MASS_PRIOR, *[_MOMENT_PRIOR] * 3])
     together = np.einsum("rja,j->ra", added, compliance) * scale
     yield PAYLOAD, rest.without_parameters(together), mass

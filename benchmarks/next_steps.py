@@ -170,11 +170,12 @@ def main(count: int, first: int) -> None:
         steps = [step.summary() for step in found.next]
         rows.append({"fault": fault, "robot": drawn.robot, "seed": seed, "right": right, "next": steps})
         if not right:
-            print(fault, drawn.robot, seed, drawn.right[0], *(step.line for step in found.next), sep="\n    ")
+            said = (f"{fault}, {drawn.robot}, seed {seed}", *(step.line for step in found.next))
+            sys.stdout.write("\n    ".join(said) + "\n")
     of = {f: [row["right"] for row in rows if row["fault"] == f] for f in FAULTS}
     figures = {f: {"robots": len(r), "right_first": sum(r)} for f, r in of.items() if r}
     total = {"robots": len(rows), "right_first": sum(row["right"] for row in rows)}
-    print(json.dumps({"all": total, **figures}, indent=1))
+    sys.stdout.write(json.dumps({"all": total, **figures}, indent=1) + "\n")
     if (count, first) == (30, 0):
         text = json.dumps({"all": total, "faults": figures, "robots": rows}, indent=1)
         Path(__file__).with_suffix(".json").write_text(text + "\n", encoding="utf-8")

@@ -53,7 +53,7 @@ def check(
         )
     noticed, fit, part = _compared(measured, None if robot is None else robot_argument(robot), device)
     if fit is None or part is None:
-        return DataCheck(measured, noticed, steps_after_check(noticed))
+        return DataCheck(measured, noticed, steps_after_check(noticed, robot=robot is not None))
     steps = steps_after_check(noticed, LeftOver.of(fit, part), errors_of(fit.robot, part))
     return DataCheck(measured, noticed, steps)
 

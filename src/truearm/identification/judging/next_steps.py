@@ -20,7 +20,15 @@ from truearm.identification.judging.left_over import LeftOver
 from truearm.identification.judging.narrow_data import joints_that_moved_little, least_known
 from truearm.identification.judging.next_step import MOST, NextStep, most_useful_first
 from truearm.identification.judging.off_configurations import Off, OffConfiguration, off_configurations
-from truearm.identification.judging.unmodelled import GEOMETRY, LOADS, PAYLOAD, Explanation, explanation, with_causes
+from truearm.identification.judging.unmodelled import (
+    GEOMETRY,
+    LOADS,
+    PAYLOAD,
+    Explanation,
+    can_explain,
+    explanation,
+    with_causes,
+)
 from truearm.identification.solving.fit import Fit, Status
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import Errors
@@ -119,7 +127,7 @@ def steps_after_fit(judged: Judged) -> tuple[NextStep, ...]:
 
 
 def steps_after_check(
-    notices: Sequence[Notice], left: LeftOver | None = None, errors: Errors | None = None
+    notices: Sequence[Notice], left: LeftOver | None = None, errors: Errors | None = None, *, robot: bool = True
 ) -> tuple[NextStep, ...]:
     """Return at most three things to do after a check, the most useful first; one at least.
 
@@ -129,6 +137,8 @@ def steps_after_check(
         What a robust geometric fit leaves of the readings; None without one.
     errors
         Of that fit.
+    robot
+        Whether the data were compared with a robot.
     """
     mend = _to_mend(notices)
     if mend:
@@ -137,14 +147,12 @@ def steps_after_check(
     if left is not None and errors is not None:
         steps, _ = _of_left_over(left, _known(errors), find_change(left), checked=True)
     steps += _cures(notices, steps)
-    if not any(step.code in ("other-model", "give-loads") for step in steps):
-        how = "with the robot" if left is None else "with `model=geometric`"
-        also = "" if left is None else ": no other effect explains more of the readings"
-        steps.append(
-            NextStep("check-robot", "Check them together with the nominal robot too.")
-            if left is None
-            else NextStep("calibrate", f"Calibrate {how}{also}.")
-        )
+    if not robot:
+        steps.append(NextStep("check-robot", "Check them together with the nominal robot too."))
+    elif not any(step.code in ("other-model", "give-loads") for step in steps):
+        told = left is not None and can_explain(left)
+        also = ": no joint effect would explain more of the readings" if told else ""
+        steps.append(NextStep("calibrate", f"Calibrate with `model=geometric`{also}."))
     return most_useful_first(steps)
 
 
@@ -353,8 +361,10 @@ def _end(left: LeftOver) -> NextStep:
                 "explains it. Visit a few postures again: if they scatter as much, that is how well the robot repeats.",
             )
     known = "is the instrument's noise" if fit.declared else "looks like the instrument's noise"
-    better = "" if fit.declared else " If the instrument is better than that, say so in a column sigma."
-    return NextStep(
-        "stop",
-        f"Stop here: what is left ({said}) {known}, and no effect known here explains more of it.{better}",
+    effects = (
+        ", and no effect known here explains more of it."
+        if can_explain(left)
+        else ". There are too few readings to tell whether joint effects would explain more of it."
     )
+    better = "" if fit.declared else " If the instrument is better than that, say so in a column sigma."
+    return NextStep("stop", f"Stop here: what is left ({said}) {known}{effects}{better}")

@@ -31,8 +31,9 @@ _ONE_TARGET: Final = 0.99
 _LARGEST_SHARE: Final = 0.1
 #: Configurations looked at in each round, those with the largest residuals.
 _LOOKED_AT: Final = 8
-#: Equations beyond the parameters without which nothing is said.
+#: Equations beyond the parameters without which nothing is said, and as a share of the parameters.
 _LEAST_FREEDOM: Final = 10
+_LEAST_SHARE_OF_PARAMETERS: Final = 0.5
 
 
 @dataclass(frozen=True)
@@ -109,7 +110,7 @@ class Off:
 def off_configurations(left: LeftOver) -> Off:
     """Return the configurations that are off one by one; none where too many look like that."""
     n = left.problem.data.configurations
-    if left.freedom < _LEAST_FREEDOM:
+    if left.freedom < max(_LEAST_FREEDOM, _LEAST_SHARE_OF_PARAMETERS * left.basis.shape[1]):
         return Off()
     rows = _in_order(left)
     out: list[int] = []

@@ -58,8 +58,8 @@ def check_against(robot: Robot, data: Dataset) -> tuple[list[Notice], list[Suspe
         slips = slips_in_lengths(robot, data)
         if slips:
             return [*slips, *found], [], None
-        unlike, suspects = _far_from_fixtures(robot, data)
-        return [*unlike, *found], suspects, None
+        unlike, suspects, fit = _far_from_fixtures(robot, data)
+        return [*unlike, *found], suspects, fit
     if not data.has_position.any():
         return found, [], None
     slips = slips_in_positions(robot, data)
@@ -105,8 +105,11 @@ def _beyond_limits(robot: Robot, data: Dataset) -> list[Notice]:
     ]
 
 
-def _far_from_fixtures(robot: Robot, data: Dataset) -> tuple[list[Notice], list[Suspect]]:
-    """Doubt readings against fixtures that a robust geometric fit leaves far off, and what is said of fixtures."""
+def _far_from_fixtures(robot: Robot, data: Dataset) -> tuple[list[Notice], list[Suspect], Fit]:
+    """Doubt readings against fixtures that a robust geometric fit leaves far off, and what is said of fixtures.
+
+    The fit is returned too.
+    """
     fit = identify(robot, data, named_model("geometric"), loss="cauchy")
     errors = errors_of(fit.robot, data)
     off = off_by(errors)
@@ -114,7 +117,7 @@ def _far_from_fixtures(robot: Robot, data: Dataset) -> tuple[list[Notice], list[
     doubted = np.flatnonzero(np.nan_to_num(off) > allowed).tolist()
     where = [(data.labels[data.configuration[r]], data.targets[data.target[r]]) for r in doubted]
     suspects = [Suspect("outliers", *at, f"{off[r] * 1e3:.3g} mm off") for r, at in zip(doubted, where, strict=True)]
-    return _unlike_its_readings(fit, data), suspects
+    return _unlike_its_readings(fit, data), suspects, fit
 
 
 def _unlike_its_readings(fit: Fit, data: Dataset) -> list[Notice]:

@@ -5,7 +5,7 @@ parameters can take is taken out of the residuals and of these columns (Frisch a
 as compared with individual trends"). The effect is then found from nine tenths of the configurations and judged on the
 last tenth, ten times over, so that what is gained is gained on readings that the estimate has not seen. Chance may
 still show a gain: of many effects the one that chance likes best is tried. So the share that an effect explains is also
-held against that of as many columns of noise, with one reading of three coordinates a configuration.
+held against that of as many columns of noise, with three equations a configuration at most.
 
 A payload is found together with the compliances that it bends: their products with it are not linear, but of so few
 unknowns that a few steps on sums of products cost nothing.
@@ -45,8 +45,10 @@ _LEAST_GAIN: Final = 0.05
 _LEAST_DEVIATIONS: Final = 2.0
 #: An effect is believed if chance would explain as much with any of those tried less often than this.
 _LARGEST_CHANCE: Final = 1e-3
-#: Equations beyond the parameters, of three a configuration, without which nothing is said.
+#: Equations beyond the parameters, of three a configuration at most, without which nothing is said; and as a share of
+#: the parameters: a fit of almost as many parameters as equations leaves nothing that could be explained.
 _LEAST_FREEDOM: Final = 12
+_LEAST_SHARE: Final = 0.5
 #: A cause that is more likely beforehand is preferred if it gains so large a share of what the best one does. Every arm
 #: gives way, and what else it does is seen better after that.
 _AS_GOOD: Final = {GEOMETRY: 0.5, "compliance": 0.5, LOADS: 0.85, PAYLOAD: 0.85}
@@ -135,8 +137,8 @@ def explanation(left: LeftOver, without: Sequence[int] = ()) -> Explanation | No
         Configurations of the dataset that are left out of account.
     """
     some = _some(left, without)
-    freedom = 3 * len(some) - left.basis.shape[1]
-    if freedom < _LEAST_FREEDOM:
+    freedom = _freedom(left, some)
+    if not _is_enough(left, freedom):
         return None
     rest = _remainder(left, some)
     total = float(rest.residual @ rest.residual)
@@ -146,7 +148,10 @@ def explanation(left: LeftOver, without: Sequence[int] = ()) -> Explanation | No
     found = []
     if groups:
         free = FreeParameters(tuple(p for group in groups.values() for p in group))
-        J = replace(rest.problem, robot=robot, free=free).at(free.start).jacobian * free.prior
+        problem = replace(rest.problem, robot=robot, free=free)
+        if rest.problem.postures.loads is not None:  # effects that do nothing yet leave the loads as they are
+            problem.__dict__["postures"] = rest.problem.postures
+        J = problem.at(free.start).jacobian * free.prior
         columns = rest.without_parameters(J)
         places = {p.name: i for i, p in enumerate(free.parameters)}
         for cause, parameters in groups.items():
@@ -158,6 +163,20 @@ def explanation(left: LeftOver, without: Sequence[int] = ()) -> Explanation | No
     best = min(judged, key=lambda e: e.left)
     likely = [(e, share) for cause, share in _AS_GOOD.items() for e in judged if e.cause == cause]
     return next((e for e, share in likely if 1.0 - e.left >= share * (1.0 - best.left)), best)
+
+
+def can_explain(left: LeftOver) -> bool:
+    """Return whether there are enough readings to tell what would explain what a fit leaves."""
+    return _is_enough(left, _freedom(left, _some(left, ())))
+
+
+def _freedom(left: LeftOver, some: NDArray[np.intp]) -> int:
+    """Return the number of equations beyond the parameters, of three a configuration at most."""
+    return int(np.minimum(np.bincount(left.configuration)[some], 3).sum()) - int(left.basis.shape[1])
+
+
+def _is_enough(left: LeftOver, freedom: int) -> bool:
+    return bool(freedom >= max(_LEAST_FREEDOM, _LEAST_SHARE * left.basis.shape[1]))
 
 
 def _some(left: LeftOver, without: Sequence[int]) -> NDArray[np.intp]:

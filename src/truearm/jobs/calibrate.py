@@ -17,12 +17,13 @@ from truearm.identification.base_changes import with_one_base
 from truearm.identification.choosing.selection import AUTO, select
 from truearm.identification.judging.advice import check_fit
 from truearm.identification.judging.arrival_lag import check_arrival_lag
-from truearm.identification.judging.changes import find_change, notices_of_change
+from truearm.identification.judging.changes import notices_of_change
 from truearm.identification.judging.expected_error import as_residuals_allow, expected_error
 from truearm.identification.judging.implausible import check_plausible
 from truearm.identification.judging.left_over import LeftOver
 from truearm.identification.judging.narrow_data import check_narrow_data
-from truearm.identification.judging.next_steps import Judged, steps_after_fit
+from truearm.identification.judging.next_steps import Judged, steps_after_fit, what_moved
+from truearm.identification.judging.off_configurations import off_configurations
 from truearm.identification.judging.one_sided import check_one_sided
 from truearm.identification.judging.sigma import check_sigma
 from truearm.identification.judging.transmission import check_transmission
@@ -252,7 +253,8 @@ def calibrate(
         f" {count} of {n} configurations of {Path(readings.source).name}{digest}, seed {seed}, loss {loss},"
         f" redundancy {redundancy}{f', another base from {listed(base_changes)} on' if base_changes else ''}"
     )
-    change = find_change(left_over)
+    off = off_configurations(left_over)
+    moved_then = what_moved(left_over, off)
     warnings = (
         *(notice for notice in noticed if notice.level == "error"),
         *unlike,
@@ -265,7 +267,7 @@ def calibrate(
         *(notice for notice in noticed if notice.level != "error"),
         *check_one_sided(fit, first),
         *wrong_sigma,
-        *notices_of_change(left_over, change),
+        *([] if moved_then is None else notices_of_change(*moved_then)),
         *check_arrival_lag(left_over),
         *check_transmission(fit, first),
     )
@@ -274,7 +276,8 @@ def calibrate(
             left_over,
             Status.IMPLAUSIBLE if unlike else fit.status,
             warnings,
-            change,
+            off,
+            moved_then,
             validation or train_errors,
             validation is not None,
             expected,

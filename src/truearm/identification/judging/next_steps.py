@@ -14,7 +14,7 @@ from typing import Final
 
 import numpy as np
 
-from truearm.identification.judging.changes import Change, find_change
+from truearm.identification.judging.changes import LEAST_ARRIVALS, Change, find_change
 from truearm.identification.judging.expected_error import ExpectedError
 from truearm.identification.judging.left_over import LeftOver
 from truearm.identification.judging.narrow_data import joints_that_moved_little, least_known
@@ -81,8 +81,10 @@ class Judged:
         How it ended.
     notices
         What was noticed about data and fit.
-    change
-        What moved during the campaign.
+    off
+        The configurations that are off one by one.
+    moved
+        What it leaves of the others, and what moved during the campaign; None if nothing did.
     errors
         Of the readings that judge it.
     held_out
@@ -96,7 +98,8 @@ class Judged:
     left: LeftOver
     status: Status
     notices: Sequence[Notice]
-    change: Change | None
+    off: Off
+    moved: tuple[LeftOver, Change] | None
     errors: Errors
     held_out: bool
     expected: ExpectedError
@@ -111,8 +114,8 @@ def steps_after_fit(judged: Judged) -> tuple[NextStep, ...]:
     if first:
         return tuple(first)
     left, known = judged.left, _known(judged.errors)
-    steps, now = _of_left_over(left, known, judged.change, checked=False)
-    spoiled = judged.change is not None or any(step.code == "measure-again" for step in steps)
+    steps, now = _of_left_over(left, judged.off, judged.moved, known, checked=False)
+    spoiled = judged.moved is not None or any(step.code == "measure-again" for step in steps)
     if judged.status is not Status.RANK_LOSS and not spoiled:
         steps += _more(judged, now)
     steps += _cures(judged.notices, steps)
@@ -145,7 +148,8 @@ def steps_after_check(
         return tuple(mend)
     steps: list[NextStep] = []
     if left is not None and errors is not None:
-        steps, _ = _of_left_over(left, _known(errors), find_change(left), checked=True)
+        off = off_configurations(left)
+        steps, _ = _of_left_over(left, off, what_moved(left, off), _known(errors), checked=True)
     steps += _cures(notices, steps)
     if not robot:
         steps.append(NextStep("check-robot", "Check them together with the nominal robot too."))
@@ -156,22 +160,44 @@ def steps_after_check(
     return most_useful_first(steps)
 
 
+def what_moved(left: LeftOver, off: Off) -> tuple[LeftOver, Change] | None:
+    """Return what a fit leaves without configurations that are off one by one, and what moved during the others.
+
+    A single configuration that is far off looks like something that moved. Nothing is returned where nothing moved.
+    """
+    rest = left.without(() if _is_a_part(off) else off.indices)
+    change = find_change(rest)
+    return None if change is None else (rest, change)
+
+
+def _is_a_part(off: Off) -> bool:
+    """Return whether what is off is a part of the campaign, so long that its beginning can be found."""
+    return off.in_a_row and len(off.configurations) >= LEAST_ARRIVALS
+
+
 def _of_left_over(
-    left: LeftOver, known: float, change: Change | None, *, checked: bool
+    left: LeftOver, off: Off, moved: tuple[LeftOver, Change] | None, known: float, *, checked: bool
 ) -> tuple[list[NextStep], float]:
     """Return what to do about what a fit leaves, and the error without configurations that are off [m]."""
-    off = off_configurations(left)
     found = explanation(left, off.indices)
-    if found is not None and off.configurations:
-        # What a model lacks may be large at a few configurations, which are then not wrong.
-        still = off_configurations(with_causes(left, GEOMETRY, "compliance", LOADS, found.cause))
+    share, wider, known_moved = 1.0, left, known
+    if found is not None:
+        # What a model lacks may be large at a few configurations, which are then not wrong, and hide others that are.
+        wider = with_causes(left, GEOMETRY, "compliance", LOADS, found.cause)
+    if found is not None and wider is not left:
+        still = off_configurations(wider)
+        share = 1.0 if off.configurations else found.left
         if still.indices != off.indices:
             off = still
-            found = explanation(left, off.indices)
-    steps = _measured_again(left, off, known, checked=checked)
+            found = explanation(left, off.indices) or found
+        if moved is None:
+            moved = what_moved(wider, off)
+            known_moved = known * found.left if found is not None else known
+    told = moved is not None and _is_a_part(off)
+    steps = [] if told else _measured_again(left, off, known * share, checked=checked)
     now = known * off.left
-    if change is not None:
-        steps.append(_about(left, change, now))
+    if moved is not None:
+        steps.append(_about(*moved, known_moved * off.left))
     if found is not None:
         steps.append(_other_model(left.fit, found, now))
     return steps, now
@@ -209,16 +235,26 @@ def _measured_again(left: LeftOver, off: Off, known: float, *, checked: bool) ->
     """Return the step for configurations that are off one by one."""
     if not off.configurations:
         return []
+    labels = ",".join(left.problem.data.labels[index] for index in sorted(off.indices))
+    gain = known * (1.0 - off.left)
+    if off.in_a_row:
+        names = [left.problem.data.labels[index] for index in sorted(off.indices)]
+        size = math.sqrt(sum(one.distance**2 for one in off.configurations) / len(names))
+        how = "them out of the calibration" if checked else f"them out (`without={labels}`)"
+        words = (
+            f"Measure configurations {names[0]} to {names[-1]} again, or leave {how}: they were measured one after the "
+            f"other and are off by about {size * 1e3:.2g} mm, so something moved meanwhile."
+        )
+        return [NextStep("measure-again", words, gain)]
     said = [_off_by(left, one) for one in off.configurations[:_NAMED]]
     rest = len(off.configurations) - len(said)
     if rest:
         others = [left.problem.data.labels[one.index] for one in off.configurations[_NAMED:]]
         said.append(f"{counted(rest, 'more configuration')} ({listed(others)})")
-    labels = ",".join(left.problem.data.labels[index] for index in off.indices)
     out = "leave them out" if len(off.configurations) > 1 else "leave it out"
     way = f"{out} of the calibration" if checked else f"{out} (`without={labels}`)"
     what = "Measure these again" if len(off.configurations) > 1 else "Measure again"
-    return [NextStep("measure-again", f"{what}, or {way}: {'; '.join(said)}.", known * (1.0 - off.left))]
+    return [NextStep("measure-again", f"{what}, or {way}: {'; '.join(said)}.", gain)]
 
 
 def _off_by(left: LeftOver, off: OffConfiguration) -> str:

@@ -21,10 +21,12 @@ from truearm.modeling.chain import Array
 
 #: Mean squares of a configuration, over those of the rest, from which it is off: six times as far as the others are.
 _LEAST_RATIO: Final = 36.0
-#: Share of the squares of a configuration that an error of one joint explains where it is what happened.
-_EXPLAINED: Final = 0.9
-#: A second joint is named where it explains the readings as well: what it leaves is below so many times the noise.
+#: An error of one joint explains the readings of a configuration if it leaves less than so many times what other
+#: configurations leave, or less than this share of them and what a straight line leaves of a turn.
 _AS_WELL: Final = 9.0
+_EXPLAINED: Final = 0.01
+#: Configurations measured one after the other that are a part of the campaign and no single ones.
+_LEAST_PART: Final = 3
 #: Share of the squares that one target holds where it alone is off.
 _ONE_TARGET: Final = 0.99
 #: Largest share of the configurations that can be off one by one; where more are, something else is wrong.
@@ -96,10 +98,13 @@ class Off:
         The worst first.
     left
         What the fit leaves without them, over what it leaves with them: mean of the configurations' root mean squares.
+    in_a_row
+        Whether they were measured one after the other, so that something moved meanwhile.
     """
 
     configurations: tuple[OffConfiguration, ...] = ()
     left: float = 1.0
+    in_a_row: bool = False
 
     @property
     def indices(self) -> tuple[int, ...]:
@@ -139,7 +144,16 @@ def off_configurations(left: LeftOver) -> Off:
         first += size
     before = _mean(rows, rows.residual, [])
     worst_first = sorted(found, key=lambda off: -off.distance)
-    return Off(tuple(worst_first), _mean(rows, now, out) / before if before else 1.0)
+    return Off(tuple(worst_first), _mean(rows, now, out) / before if before else 1.0, _in_a_row(left, out))
+
+
+def _in_a_row(left: LeftOver, out: list[int]) -> bool:
+    """Return whether configurations were measured one after the other."""
+    number = left.problem.data.number
+    if number is None or len(out) < _LEAST_PART:
+        return False
+    place = np.argsort(np.argsort(number, kind="stable"))[out]
+    return int(np.ptp(place)) == len(out) - 1
 
 
 def _mean(rows: _Rows, residual: Array, without: list[int]) -> float:
@@ -236,7 +250,9 @@ def _described(left: LeftOver, rows: _Rows, index: int, shift: Array, scale: flo
     order = np.argsort(rest)
     # Predictions of a fit without the configuration err too, so that a perfect explanation is not asked for.
     noise = _AS_WELL * max(scale, 1e-300) * len(shift)
-    joints = [int(i) for i in order if rest[i] < (1.0 - _EXPLAINED) * total]
+    turns = np.array([joint.kind == "revolute" for joint in left.fit.robot.joints])
+    straight = (_EXPLAINED + np.where(turns, np.abs(error), 0.0)) ** 2 * total
+    joints = [int(i) for i in order if rest[i] < np.maximum(noise, straight[i])]
     joints = [i for i in joints if i == joints[0] or rest[i] < rest[joints[0]] + noise]
     by_target = np.bincount(rows.target[mine], shift**2)
     several = np.count_nonzero(by_target) > 1

@@ -44,6 +44,8 @@ _AT_THE_NOISE: Final = 1.3
 _OF_THE_JOINTS: Final = 0.5
 #: Mean length of three normal coordinates over the deviation of one.
 _LENGTH: Final = 2.0 * math.sqrt(2.0 / math.pi)
+#: Share of the squares that a change must explain to be told before the model has what it lacks.
+_LEAST_SHARE: Final = 0.5
 #: Configurations named one by one.
 _NAMED: Final = 3
 #: Errors that steps of their own are about.
@@ -187,11 +189,13 @@ def _of_left_over(
     if found is not None and wider is not left:
         still = off_configurations(wider)
         share = 1.0 if off.configurations else found.left
-        if still.indices != off.indices:
-            off = still
-            found = explanation(left, off.indices) or found
+        if set(still.indices) - set(off.indices):
+            found = explanation(left, still.indices) or found
+        off = still
         if moved is None:
             moved = what_moved(wider, off)
+            # Small changes are told by the next fit, which has what this one lacks.
+            moved = None if moved is None or moved[1].share < _LEAST_SHARE else moved
             known_moved = known * found.left if found is not None else known
     told = moved is not None and _is_a_part(off)
     steps = [] if told else _measured_again(left, off, known * share, checked=checked)

@@ -46,6 +46,8 @@ _OF_THE_JOINTS: Final = 0.5
 _LENGTH: Final = 2.0 * math.sqrt(2.0 / math.pi)
 #: Share of the squares that a change must explain to be told before the model has what it lacks.
 _LEAST_SHARE: Final = 0.5
+#: Share that an effect leaves, as a root mean square, from which on it hides no more what else is wrong.
+_HIDING: Final = 0.7
 #: Configurations named one by one.
 _NAMED: Final = 3
 #: Errors that steps of their own are about.
@@ -183,7 +185,7 @@ def _of_left_over(
     """Return what to do about what a fit leaves, and the error without configurations that are off [m]."""
     found = explanation(left, off.indices)
     share, wider, known_moved = 1.0, left, known
-    if found is not None:
+    if found is not None and (off.configurations or found.left < _HIDING):
         # What a model lacks may be large at a few configurations, which are then not wrong, and hide others that are.
         wider = with_causes(left, GEOMETRY, "compliance", LOADS, found.cause)
     if found is not None and wider is not left:

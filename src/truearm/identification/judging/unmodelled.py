@@ -89,7 +89,7 @@ class Explanation:
 def with_causes(left: LeftOver, *causes: str) -> LeftOver:
     """Return what a fit leaves whose free parameters could also take what causes explain, as far as they are open."""
     problem = replace(left.problem, free=FreeParameters(()))
-    robot, groups = _candidates(left, problem)
+    robot, groups = _candidates(left, problem, causes)
     free = FreeParameters(tuple(p for cause in dict.fromkeys(causes) for p in groups.get(cause, ())))
     if not free.parameters:
         return left
@@ -200,8 +200,16 @@ def _remainder(left: LeftOver, some: NDArray[np.intp]) -> _Remainder:
     return _Remainder(problem, r - Q @ (Q.T @ r), Q, (order % _FOLDS)[place], place)
 
 
-def _candidates(left: LeftOver, problem: Problem) -> tuple[Robot, dict[str, tuple[Parameter, ...]]]:
-    """Return the causes that are tried, each with its parameters, and a robot that has them all."""
+def _candidates(
+    left: LeftOver, problem: Problem, asked: Sequence[str] | None = None
+) -> tuple[Robot, dict[str, tuple[Parameter, ...]]]:
+    """Return the causes that are tried, each with its parameters, and a robot that has them all.
+
+    Parameters
+    ----------
+    asked
+        The causes that are wanted; all of them if None.
+    """
     fit = left.fit
     robot = fit.robot
     freed = set(fit.free.names) | {r.dropped for r in fit.redundancies}
@@ -211,6 +219,8 @@ def _candidates(left: LeftOver, problem: Problem) -> tuple[Robot, dict[str, tupl
     names = open_effects(robot, closed, problem.data)
     if unloaded and "compliance" not in closed:
         robot, names = replace(robot, payload=Payload(1.0)), [*names, "compliance"]
+    if asked is not None:
+        names = [name for name in names if name in asked or (name == "compliance" and LOADS in asked)]
     robot = robot.with_effects(names)
     groups: dict[str, tuple[Parameter, ...]] = {}
     if not {"joint zero", "geometry"} <= set(fit.model.groups):

@@ -53,7 +53,8 @@ class OffConfiguration:
     target
         Name of the target that alone is off; empty if several are.
     distance
-        How far the positions of its targets are off [m], root mean square; of distances and heights likewise.
+        How far the positions of its targets are off [m], root mean square, or that of the one target; of distances and
+        heights likewise.
     """
 
     index: int
@@ -258,8 +259,9 @@ def _described(left: LeftOver, rows: _Rows, index: int, shift: Array, scale: flo
     several = np.count_nonzero(by_target) > 1
     alone = int(np.argmax(by_target)) if several and by_target.max() > _ONE_TARGET * total else None
     names = list(dict.fromkeys(block.target for block in left.problem.blocks))
-    lengths = (shift * sigma)[sigma > 0.0]
-    seen = max(len(np.unique(rows.target[mine][sigma > 0.0])), 1)
+    counted = sigma > 0.0 if alone is None else (sigma > 0.0) & (rows.target[mine] == alone)
+    lengths = (shift * sigma)[counted]
+    seen = max(len(np.unique(rows.target[mine][counted])), 1)
     return OffConfiguration(
         index,
         () if alone is not None else tuple(i + 1 for i in joints),

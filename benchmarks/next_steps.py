@@ -8,6 +8,7 @@ are measured by the twin, on its own path, with a declared deviation or without.
 from __future__ import annotations
 
 import json
+import re
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -61,6 +62,8 @@ class Case:
         What it is calibrated with.
     right
         Codes of the steps that are right, each with a text that its message holds.
+    mass
+        What the robot carried [kg].
     """
 
     fault: str
@@ -69,6 +72,7 @@ class Case:
     model: str
     payload: Payload | None
     right: tuple[tuple[str, str], ...]
+    mass: float
 
 
 def faults(count: int) -> Iterator[str]:
@@ -102,7 +106,15 @@ def case(fault: str, seed: int) -> Case:
         joints = data.joints.copy()
         joints[k, number] += np.radians(rng.choice((-1.0, 1.0)))
         data = replace(data, joints=joints)
-        return Case(fault, name, data, "elastic", tool, (("measure-again", f"{number + 1} of configuration {k + 1} "),))
+        return Case(
+            fault,
+            name,
+            data,
+            "elastic",
+            tool,
+            (("measure-again", f"{number + 1} of configuration {k + 1} "),),
+            tool.mass,
+        )
     if fault == "moved tracker":
         first = int(rng.integers(15, len(q) - 15))
         shift = rng.normal(size=3)
@@ -110,13 +122,13 @@ def case(fault: str, seed: int) -> Case:
         late = data.configuration >= first
         data = replace(data, position=np.where(late[:, None], data.position + shift, data.position))
         near = tuple(("instrument-moved", f"base_changes={first + 1 + d}`") for d in (-2, -1, 0, 1, 2))
-        return Case(fault, name, data, "elastic", tool, near)
+        return Case(fault, name, data, "elastic", tool, near, tool.mass)
     if fault == "no payload":
-        return Case(fault, name, data, "elastic", None, (("give-payload", ""),))
+        return Case(fault, name, data, "elastic", None, (("give-payload", ""),), tool.mass)
     if fault == "elastic robot, geometric model":
-        return Case(fault, name, data, "geometric", tool, (("other-model", "model=elastic"),))
+        return Case(fault, name, data, "geometric", tool, (("other-model", "model=elastic"),), tool.mass)
     right = {"worn wrist": worn, "too few poses": (("measure-more", ""),), "at the noise": (("stop", ""),)}[fault]
-    return Case(fault, name, data, "elastic", tool, right)
+    return Case(fault, name, data, "elastic", tool, right, tool.mass)
 
 
 def sprung(robot: Robot, rng: np.random.Generator) -> dict[int, JointTruth]:
@@ -160,6 +172,12 @@ def is_right(of: Case, found: Calibration) -> bool:
     return any(first.code == code and text in first.message for code, text in of.right)
 
 
+def told_mass(step: dict[str, Any]) -> float | None:
+    """Return the mass of the payload that a step tells [kg], None if it tells none."""
+    told = re.search(r"about ([0-9.]+) kg", step["message"])
+    return None if told is None else float(told[1])
+
+
 def main(count: int, first: int) -> None:
     """Judge robots, print what was wrong with the wrong ones, and write the figures."""
     rows: list[dict[str, Any]] = []
@@ -168,16 +186,19 @@ def main(count: int, first: int) -> None:
         found = calibrated(drawn)
         right = is_right(drawn, found)
         steps = [step.summary() for step in found.next]
-        rows.append({"fault": fault, "robot": drawn.robot, "seed": seed, "right": right, "next": steps})
+        row = {"fault": fault, "robot": drawn.robot, "seed": seed, "payload_kg": round(drawn.mass, 3), "right": right}
+        rows.append({**row, "next": steps})
         if not right:
             said = (f"{fault}, {drawn.robot}, seed {seed}", *(step.line for step in found.next))
             sys.stdout.write("\n    ".join(said) + "\n")
     of = {f: [row["right"] for row in rows if row["fault"] == f] for f in FAULTS}
     figures = {f: {"robots": len(r), "right_first": sum(r)} for f, r in of.items() if r}
+    masses = [(row["payload_kg"], told_mass(row["next"][0])) for row in rows if row["fault"] == "no payload"]
+    ratios = sorted(told / true for true, told in masses if told is not None)
     total = {"robots": len(rows), "right_first": sum(row["right"] for row in rows)}
-    sys.stdout.write(json.dumps({"all": total, **figures}, indent=1) + "\n")
+    sys.stdout.write(json.dumps({"all": total, **figures, "told_over_true_payload": ratios}, indent=1) + "\n")
     if (count, first) == (30, 0):
-        text = json.dumps({"all": total, "faults": figures, "robots": rows}, indent=1)
+        text = json.dumps({"all": total, "faults": figures, "told_over_true_payload": ratios, "robots": rows}, indent=1)
         Path(__file__).with_suffix(".json").write_text(text + "\n", encoding="utf-8")
 
 

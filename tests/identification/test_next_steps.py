@@ -43,8 +43,11 @@ def elastic(robot: str = "irb120", poses: int = POSES, worn: str = "", repeatabi
     nominal = load_robot(robot)
     true = truth_twin(nominal, "random", rng).robot.with_payload(LOAD)
     joints = {i: JointTruth(compliance=c) for i, c in enumerate(SPRINGS, 1)}
-    if worn:
-        joints[5] = replace(joints[5], **{worn: 8e-4})
+    size = 8e-4
+    if worn == "hysteresis":
+        joints[5] = replace(joints[5], hysteresis=size)
+    elif worn == "backlash":
+        joints[5] = replace(joints[5], backlash=size)
     q = nominal.random_configurations(poses, rng)
     reached = q + np.radians(repeatability) * rng.standard_normal(q.shape)
     return replace(measure(Twin(true, joints), reached, NOISE, rng), joints=q)

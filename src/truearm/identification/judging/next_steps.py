@@ -119,12 +119,16 @@ def steps_after_fit(judged: Judged) -> tuple[NextStep, ...]:
         return tuple(first)
     left, known = judged.left, _known(judged.errors)
     steps, now = _of_left_over(left, judged.off, judged.moved, known, checked=False)
-    spoiled = judged.moved is not None or any(step.code == "measure-again" for step in steps)
+    bound = _at_bound(judged, now)
+    spoiled = (
+        judged.moved is not None
+        or any(step.gain is not None for step in bound)
+        or any(step.code == "measure-again" for step in steps)
+    )
     if judged.status is not Status.RANK_LOSS and not spoiled:
         steps += _more(judged, now)
     steps += _cures(judged.notices, steps)
-    if judged.status is Status.AT_BOUND:
-        steps.append(NextStep("widen-bound", Status.AT_BOUND.advice))
+    steps += bound
     if not judged.held_out:
         steps.append(NextStep("hold-out", "Hold configurations out to judge the fit: leave `train=all` out."))
     if judged.status is Status.RANK_LOSS:
@@ -321,6 +325,16 @@ def _other_model(fit: Fit, found: Explanation, known: float) -> NextStep:
         )
     words = f"Add `effects={found.cause}`, or let `model=auto` choose: it explains {share} of what is left."
     return NextStep("other-model", words, gain)
+
+
+def _at_bound(judged: Judged, known: float) -> list[NextStep]:
+    """Return the step for values at bounds; without bounds the parameters would take what they can."""
+    if judged.status is not Status.AT_BOUND:
+        return []
+    r = judged.left.residual
+    before, after = float(np.linalg.norm(r)), float(np.linalg.norm(judged.left.without_parameters(r)))
+    gain = known * (1.0 - after / before) if before > 0.0 and 1.0 - after / before > _LEAST_GAIN else None
+    return [NextStep("widen-bound", f"Widen the bound of {listed(judged.left.fit.at_bound)} if it was a guess.", gain)]
 
 
 def _more(judged: Judged, known: float) -> list[NextStep]:

@@ -104,6 +104,10 @@ def test_a_forgotten_payload_is_named_with_its_mass() -> None:
     told = float(step.message.split("about ")[1].split(" kg")[0])
     assert told == pytest.approx(LOAD.mass, rel=0.5)
     assert "`payload`" in step.message
+    other = first(elastic(), payload=Payload(0.3))
+    assert other.code == "give-payload"
+    assert other.message.startswith("Check what the robot carried")
+    assert "instead of 0.3 kg" in other.message
 
 
 @pytest.mark.parametrize(("worn", "effects"), [("hysteresis", ("approach",)), ("backlash", ("backlash", "clearance"))])

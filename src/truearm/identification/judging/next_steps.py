@@ -302,11 +302,14 @@ def _other_model(fit: Fit, found: Explanation, known: float) -> NextStep:
     gain = known * (1.0 - found.left)
     share = f"{1.0 - found.left:.0%}"
     if found.cause == PAYLOAD:
-        now = f"{fit.robot.payload.mass:g} kg" if fit.robot.payload.mass else "none"
+        given = fit.robot.payload.mass
         what = f"about {found.mass:.2g} kg" if found.mass else "another load"
         words = (
-            f"Give what the robot carried (`payload`): {what} on the flange instead of {now} would explain {share} of "
-            "what is left."
+            f"Check what the robot carried (`payload`) and the masses in the robot file: {what} on the flange instead "
+            f"of {given:g} kg would explain {share} of what is left."
+            if given
+            else f"Give what the robot carried (`payload`): {what} on the flange instead of none would explain {share} "
+            "of what is left."
         )
         return NextStep("give-payload", words, gain)
     if found.cause == LOADS:

@@ -42,7 +42,7 @@ ROBOTS = ("irb120", "irb120", "lrmate200ic", "kr5", "puma560")
 CAMPAIGNS = ("narrow", "far", "few", "full")
 NOISE = 0.02e-3
 FRAME = (0.31, -0.11, 0.06)
-ACCEPTED = ("rank-loss", "not-converged", "implausible", "narrow-data")
+ACCEPTED = ("rank-loss", "not-converged", "implausible", "wrong-robot", "maker", "narrow-data")
 #: Notices that name targets.
 NAMED = ("not-better-here", "beyond-measured")
 HERE = Path(__file__).parent

@@ -1,5 +1,6 @@
 """Makes the tests' own helpers importable as ``tests.<room>.<helper>``, however pytest is started."""
 
+import gc
 import os
 import sys
 from collections.abc import Iterator
@@ -34,6 +35,12 @@ SLOW = ("tests/test_documents.py", "tests/test_measured.py", "tests/simulation/d
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Put the slow files first; the order within a file stays, as what its tests share is made once."""
     items.sort(key=lambda item: not item.nodeid.startswith(SLOW))
+
+
+def pytest_collection_finish() -> None:
+    """Keep what is loaded now, and stays, out of every later garbage collection."""
+    gc.collect()
+    gc.freeze()
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

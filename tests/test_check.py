@@ -46,7 +46,11 @@ def measured(with_references: Dataset) -> Dataset:
     return with_references.of_configurations([c for c in range(500) if c not in bad])
 
 
-@pytest.fixture(scope="module", params=["measured", "ur5", "kr5", "lrmate200ic"])
+#: Of faults, by the data that these are put into: every seed is tried twice, with another robot.
+SEEDS_OF = {"measured": SEEDS, "ur5": (0,), "kr5": (1,), "lrmate200ic": (2,)}
+
+
+@pytest.fixture(scope="module", params=SEEDS_OF)
 def clean(request: pytest.FixtureRequest) -> tuple[str, Dataset]:
     if request.param == "measured":
         data: Dataset = request.getfixturevalue("measured")
@@ -155,10 +159,10 @@ CORRUPTIONS: list[Corruption] = [
 
 
 @pytest.mark.parametrize("corrupt", CORRUPTIONS, ids=lambda c: c.__name__)
-@pytest.mark.parametrize("seed", SEEDS)
-def test_every_fault_is_found(clean: tuple[str, Dataset], corrupt: Corruption, seed: int) -> None:
+def test_every_fault_is_found(clean: tuple[str, Dataset], corrupt: Corruption) -> None:
     robot, data = clean
-    assert corrupt.__name__.replace("_", "-") in codes(corrupt(data, np.random.default_rng(seed)), robot)
+    for seed in SEEDS_OF.get(robot, SEEDS):
+        assert corrupt.__name__.replace("_", "-") in codes(corrupt(data, np.random.default_rng(seed)), robot), seed
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -233,7 +237,7 @@ def test_removing_the_motion_of_the_table_does_not_worsen_the_result(with_refere
     medians = []
     for data in (with_references, without_table_motion(with_references)):
         means = []
-        for seed in range(10):
+        for seed in range(5):
             order = np.random.default_rng(seed).permutation(data.configurations)
             fit = identify(robot, data.of_configurations(order[:300]), geometric)
             means.append(errors_of(fit.robot, data.of_configurations(order[300:])).position_norms.mean())

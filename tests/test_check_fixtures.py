@@ -57,7 +57,8 @@ def with_an_outlier(data: Dataset) -> Dataset:
 
 
 def with_a_joint_turned(data: Dataset) -> Dataset:
-    return replace(data, joints=data.joints * [1, -1, 1, 1, 1, 1])
+    some = data.of_configurations(range(0, data.configurations, 2))
+    return replace(some, joints=some.joints * [1, -1, 1, 1, 1, 1])
 
 
 def with_a_misspelled_fixture(data: Dataset) -> Dataset:
@@ -111,7 +112,7 @@ def test_strings_from_unknown_points_are_a_closed_loop(count: int) -> None:
 def test_targets_read_by_one_of_several_instruments_are_not_missing() -> None:
     _, data = campaign("ballbar")
     extra = replace(data, target=np.r_[data.target[:-5], np.ones(5, dtype=np.intp)], targets=("ball", "other"))
-    assert "missing" not in codes(extra)
+    assert "missing" not in {notice.code for notice in check(extra).warnings}
 
 
 def test_a_robot_of_a_closed_loop_does_not_know_where_an_instrument_stands() -> None:

@@ -22,10 +22,11 @@ from truearm.measurement.readers.matrices import read_matrices
 from truearm.measurement.statistics import errors_of
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
+from truearm.planning.choosing import prediction
 from truearm.planning.choosing.measurement_plan import plan_measurements, with_targets
 from truearm.results.calibration import Calibration
 
-SEEDS = range(10)
+SEEDS = range(5)
 #: The end-effector of the campaign, after Nubiola's triangular artefact, which it resembles.
 PAYLOAD = Payload(2.7, (0.05, 0.025, 0.1))
 
@@ -107,7 +108,7 @@ def test_what_beta_and_the_payload_are_worth(irb120: Dataset, calibrated: Run) -
 
 @pytest.mark.parametrize(("model", "mean"), [("full", 0.078), ("tilting", 0.080)])
 def test_models_with_more_effects_on_the_irb120(irb120: Dataset, model: str, mean: float) -> None:
-    runs = [calibrate("irb120", irb120, model=model, payload=PAYLOAD, train=300, seed=seed) for seed in range(5)]
+    runs = [calibrate("irb120", irb120, model=model, payload=PAYLOAD, train=300, seed=seed) for seed in SEEDS[:3]]
     assert np.median([mean_mm(run) for run in runs]) <= mean
 
 
@@ -214,12 +215,15 @@ def test_a_measured_file_is_written_as_it_was_read(positioner: tuple[Robot, Path
 
 
 @pytest.mark.parametrize("effects", [("compliance", "hardening"), ("compliance",)])
-def test_chosen_configurations_against_random_ones_on_the_irb120(irb120: Dataset, effects: tuple[str, ...]) -> None:
+def test_chosen_configurations_against_random_ones_on_the_irb120(
+    irb120: Dataset, effects: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """38 of 300 by O1: with hardening stiffness at least as good in the mean and better in the maximum."""
+    monkeypatch.setattr(prediction, "NUMBERS", (38,))  # what other numbers would do takes most of the time
     model = replace(next(m for m in MODELS if m.name == "elastic"), effects=effects)
     robot = load_robot("irb120").with_payload(PAYLOAD)
     chosen, drawn = [], []
-    for seed in SEEDS[:5]:
+    for seed in SEEDS:
         order = np.random.default_rng(seed).permutation(irb120.configurations)
         training, held_out = irb120.of_configurations(order[:300]), irb120.of_configurations(order[300:])
 
@@ -234,7 +238,7 @@ def test_chosen_configurations_against_random_ones_on_the_irb120(irb120: Dataset
         rng = np.random.default_rng(seed)
         plan = plan_measurements(arm, training.postures, model, poses=38, rng=rng)
         chosen.append(judged(plan.chosen))
-        drawn.append(np.median([judged(rng.permutation(300)[:38]) for _ in range(10)], axis=0))
+        drawn.append(np.median([judged(rng.permutation(300)[:38]) for _ in range(5)], axis=0))
     by_o1, by_chance = np.median(chosen, axis=0), np.median(drawn, axis=0)
     if "hardening" in effects:
         assert by_o1[0] <= by_chance[0]

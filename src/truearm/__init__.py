@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from truearm.jobs.import_circle import import_circle
     from truearm.jobs.import_matrices import import_matrices
     from truearm.jobs.import_table import import_table
+    from truearm.jobs.import_ur_kinematics import import_ur_kinematics
     from truearm.jobs.inverse import inverse
     from truearm.jobs.lines import lines
     from truearm.jobs.load_data import load_data
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
     from truearm.jobs.plan import plan
     from truearm.jobs.revert import revert
     from truearm.jobs.robots import robots
+    from truearm.jobs.show import show
     from truearm.jobs.simulate import simulate
     from truearm.jobs.study import study
     from truearm.jobs.tolerance import tolerance
@@ -81,6 +83,7 @@ __all__ = [
     "import_circle",
     "import_matrices",
     "import_table",
+    "import_ur_kinematics",
     "inverse",
     "lines",
     "load_data",
@@ -89,6 +92,7 @@ __all__ = [
     "plan",
     "revert",
     "robots",
+    "show",
     "simulate",
     "study",
     "tolerance",

@@ -74,6 +74,7 @@ def test_the_contract(truearm: Truearm, cell: Path) -> None:
     assert 0.05 < program["shift_mm"]["mean"] < program["shift_mm"]["max"] < 3.0
     assert {warning["code"] for warning in told["warnings"]} == {
         "unproven",
+        "controller-unknown",
         "frames-assumed",
         "tools-assumed",
         "computed-or-taught",
@@ -92,7 +93,8 @@ def test_the_contract(truearm: Truearm, cell: Path) -> None:
 
 
 def test_with_tool_and_frame_nothing_is_assumed(truearm: Truearm, cell: Path) -> None:
-    code, said = run(truearm, cell, "--tool", cell / "cell.yaml", "--frame", cell / "cell.yaml", "--json")
+    places = ["--tool", cell / "cell.yaml", "--frame", cell / "cell.yaml"]
+    code, said = run(truearm, cell, *places, "--controller-kinematics", "nominal", "--json")
     assert code == 0
     told = json.loads(said)
     assert [w["code"] for w in told["warnings"]] == [
@@ -320,7 +322,8 @@ def test_two_programs_of_one_name_keep_their_folders(truearm: Truearm, cell: Pat
     for path in paths:
         path.parent.mkdir()
         path.write_text(LS)
-    done = truearm("compensate", cell / "calibrated.yaml", *paths, "--out", cell / "out", "--json")
+    words = ("--accept", "maker", "--out", cell / "out", "--json")
+    done = truearm("compensate", cell / "calibrated.yaml", *paths, *words)
     assert done.code == 0
     assert [file["file"] for file in json.loads(done.out)["programs"]] == ["one/p.ls", "two/p.ls"]
     assert (cell / "out" / "two" / "p.ls.truearm.json").exists()

@@ -79,7 +79,14 @@ def test_from_plan_to_data(truearm: Truearm, tmp_path: Path) -> None:
     run = truearm("hexapod", "plan", *words, "--json")
     assert run.code == 0
     summary = json.loads(run.out)
-    assert list(summary) == ["poses", "poses_reached", "configurations", "left_out", "smallest_room_mm"]
+    assert list(summary) == [
+        "poses",
+        "poses_reached",
+        "joints_are",
+        "configurations",
+        "left_out",
+        "smallest_room_mm",
+    ]
     assert summary["poses"] == 54
     assert 10 < summary["poses_reached"] <= 54
     assert steps.read_text().count("Configuration ") == summary["configurations"]

@@ -60,11 +60,25 @@ def test_all_branches_and_json(truearm: Truearm, poses: Path, tmp_path: Path) ->
     run = truearm("ik", "irb120", poses, "--branch", "all", "--out", tmp_path / "j.csv", "--json")
     assert run.code == 0
     summary = json.loads(run.out)
-    assert list(summary) == ["poses", "poses_reached", "rows", "status", "attention", "warnings"]
+    assert list(summary) == ["poses", "poses_reached", "rows", "joints_are", "status", "attention", "warnings"]
     assert (summary["poses"], summary["poses_reached"]) == (2, 2)
     rows = _rows(tmp_path / "j.csv")
     assert len(rows) == summary["rows"] == sum(summary["status"].values()) == 16
     assert {row["branch"] for row in rows} == set(BRANCHES)
+
+
+def test_a_seed_is_of_the_kind_that_is_written(truearm: Truearm, tmp_path: Path) -> None:
+    robot, out = load_robot("lrmate200ic"), tmp_path / "j.csv"
+    shown = np.array([10.0, 20.0, 30.0, 40.0, 50.0, -300.0])
+    p, R = robot.forward(robot.controller.to_model(np.radians(shown[None])), frame="controller")
+    there = _written(tmp_path / "there.csv", p, quaternion_from_rotation(R))
+    words = ("ik", "lrmate200ic", there, "--frame", "controller", "--out", out, "--seed-joints")
+    run = truearm(*words, ",".join(map(str, shown)))
+    assert "Joint positions in the file are those that the robot's controller shows (axis_i)." in run.out
+    assert "model-frame" not in run.out
+    assert [float(_rows(out)[0][f"axis_{n} [deg]"]) for n in range(1, 7)] == pytest.approx(shown)
+    assert truearm(*words, "10,20,-50,-40,-50,300", "--joints", "model").code == 0
+    assert _joints(_rows(out)[0]) == pytest.approx([10, 20, -50, -40, -50, 300])
 
 
 def test_seed_target_frame_and_free_orientation(truearm: Truearm, poses: Path, tmp_path: Path) -> None:
@@ -107,7 +121,7 @@ def test_what_is_not_reached_is_explained_and_ends_with_3(truearm: Truearm, tmp_
     ("words", "options"),
     [
         ("--branch: there is no such branch", ["--branch", "left"]),
-        ("wrong length", ["--seed-joints", "1,2,3"]),
+        ("not as many numbers as joints; got '3 numbers'", ["--seed-joints", "1,2,3"]),
         ("numbers separated by commas", ["--seed-joints", "a,b"]),
         ("--seed-joints: NaN and infinity cannot be used here", ["--seed-joints", "nan,0,0,0,0,0"]),
         ("there is no target; got 'gripper'", ["--target", "gripper"]),

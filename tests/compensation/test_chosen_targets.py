@@ -12,6 +12,8 @@ import pytest
 import truearm
 from truearm.compensation.fake_targets import matrices
 from truearm.compensation.program_correction import commanded
+from truearm.compensation.programs.program import Source
+from truearm.compensation.programs.urscript import URSCRIPT
 from truearm.errors import InputError
 from truearm.library import load_robot
 from truearm.modeling.parts import Payload
@@ -160,3 +162,22 @@ def test_the_arm_bends_by_what_the_program_says_that_its_tool_weighs(tmp_path: P
     (said,) = [n for n in truearm.compensate(robot, [dummy]).warnings if n.code == "loads-taken"]
     assert "No mass is known of tProbe: there the 1 kg of the calibration are kept." in said.message
     assert replace(said).level == "note"
+
+
+@pytest.mark.parametrize(
+    ("calls", "load"),
+    [
+        ("set_payload(1.5, [0.01, -0.02, 0.05])", Payload(1.5, (0.01, -0.02, 0.05))),
+        ("set_target_payload(m=1.5, cog=[0, 0, 0.05], inertia=[0, 0, 0, 0, 0, 0])", Payload(1.5, (0.0, 0.0, 0.05))),
+        ("set_payload(1.5, [0, 0, 0.05])\n  set_payload(1.5, [0, 0, 0.05])", Payload(1.5, (0.0, 0.0, 0.05))),
+        ("set_payload(1.5, [0, 0, 0.05])\n  set_payload(2.5, [0, 0, 0.05])", None),
+        ("set_payload(1.5)", None),
+        ("set_payload(mass, [0, 0, 0.05])", None),
+        ("set_payload(1e9, [0, 0, 0.05])", None),
+        ("# set_payload(1.5, [0, 0, 0.05])", None),
+    ],
+)
+def test_a_script_that_says_once_what_the_robot_carries(calls: str, load: Payload | None) -> None:
+    text = f"def job():\n  set_tcp(p[0,0,0.1,0,0,0])\n  {calls}\n  movel(p[0.4,0.1,0.3,0,3.14,0])\nend\n"
+    program = URSCRIPT.read([Source(Path("job.script"), text)])
+    assert list(program.loads.values()) == ([load] if load else [])

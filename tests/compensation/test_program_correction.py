@@ -99,7 +99,7 @@ def test_an_arm_of_fewer_than_six_joints_is_refused(values: tuple[str, ...]) -> 
 def on_a_track() -> Robot:
     plain = load_robot("irb120")
     track = replace(plain.joints[0], name="track", kind="prismatic", limits=(0.0, 5.0), row={"d": 0.0})
-    return worn(replace(plain, joints=(track, *plain.joints), masses=(), effect_names=(), known={}))
+    return worn(replace(plain, joints=(track, *plain.joints), masses=(), maker="", effect_names=(), known={}))
 
 
 def test_a_track_is_reported_in_millimetres(tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ from truearm.compensation.cell import read_frames, read_tools
 from truearm.compensation.program_files import program_files, read_programs, restored
 from truearm.errors import InputError
 from truearm.identification.solving.bounds import read_bounds
+from truearm.jobs.import_ur_kinematics import import_ur_kinematics
 from truearm.jobs.load_robot import load_robot
 from truearm.library import load_robot as of_library
 from truearm.measurement.dataset import Dataset
@@ -94,6 +95,14 @@ def _matrices(folder: Path) -> None:
     _dataset(read_matrices(folder / "joints.txt", targets, references, "deg", "mm")[0], folder)
 
 
+def _kinematics(name: str) -> Reader:
+    def read(folder: Path) -> None:
+        made = import_ur_kinematics(folder / name, "ur10").robot
+        _robot(made, folder)
+
+    return Reader({name: name}, read)
+
+
 def _dh_table(name: str, convention: Any) -> Reader:
     return Reader({"dh.csv": name}, lambda folder: complete_dh_csv(read_dh_csv(folder / "dh.csv", convention), []))
 
@@ -136,6 +145,9 @@ READERS: Final[Mapping[str, Reader]] = {
     "robot-kr5": _robot_file("kr5.yaml"),
     "robot-calibrated": _robot_file("calibrated.yaml"),
     "robot-joint-errors": _robot_file("joint-errors.yaml"),
+    "robot-controller": _robot_file("ur10-controller.yaml"),
+    "ur-conf": _kinematics("calibration.conf"),
+    "ur-ros": _kinematics("ros-kinematics.yaml"),
     "urdf": _robot_file("arm.urdf"),
     "dh": _dh_table("dh.csv", "standard-dh"),
     "mdh": _dh_table("mdh.csv", "modified-dh"),

@@ -50,13 +50,23 @@ def folder() -> Path:
     """Return a folder with all of them, made once."""
     place = Path(tempfile.mkdtemp(prefix="truearm-fuzz-"))
     atexit.register(shutil.rmtree, place, ignore_errors=True)
-    for job in ("calibrate", "import_table", "import_matrices", "import_circle", "tolerance", "compensate", "revert"):
+    for job in (
+        "calibrate",
+        "import_table",
+        "import_matrices",
+        "import_circle",
+        "tolerance",
+        "compensate",
+        "revert",
+    ):
         EXAMPLES[job](place)
+    truearm.import_ur_kinematics(**EXAMPLES["import_ur_kinematics"](place))
     _rename(place, {"result/calibrated.yaml": "calibrated.yaml", "axes/joint-errors.yaml": "joint-errors.yaml"})
     _rename(place, {"corrected/plate.mod": "done.mod", "corrected/plate.mod.truearm.json": "done.mod.truearm.json"})
     for name in ("irb120", "kr5"):
         (place / f"{name}.yaml").write_text((files("truearm.library") / f"{name}.yaml").read_text())
     truearm.new_robot(place / "robot.yaml")
+    truearm.export(place / "ur10-controller.yaml", "ur-kinematics", out=place / "ros-kinematics.yaml")
     for form, name in (("urdf", "arm.urdf"), ("dh", "dh.csv"), ("mdh", "mdh.csv"), ("hayati", "hayati.csv")):
         truearm.export("puma560" if form == "mdh" else "irb1600" if form == "dh" else "irb120", form, out=place / name)
     at = load_robot("irb120").forward_kinematics(np.radians([[10.0, 20.0, -30.0, 40.0, 50.0, 60.0]]))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
@@ -19,7 +21,6 @@ from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of
 from truearm.modeling.chain import Array
-from truearm.modeling.transform import IDENTITY
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import Twin, measure
 
@@ -78,12 +79,37 @@ def test_a_campaign_over_the_workspace_does_not(folder: Path) -> None:
     assert low < true_error(None, folder) < high
 
 
+@pytest.mark.parametrize("model", ["offsets", "joints"])
+def test_a_model_without_geometry_says_so_too(model: str, folder: Path) -> None:
+    def run(half_width: float | None) -> Told:
+        file = written(folder, made(half_width)[1], f"{half_width}.csv")
+        return told("calibrate", "irb120", file, "--model", model, "--out", folder / f"{model}-{half_width}")
+
+    narrow = run(5.0)
+    assert narrow.says("narrow-data", "error", f"The {model} model takes the geometry as exact"), narrow
+    interval = re.search(r"90 %: ([0-9.]+) to ([0-9.]+)", narrow.messages["narrow-data"])
+    robot = truearm.load_robot(folder / f"{model}-5.0" / "calibrated.yaml")
+    position = errors_of(robot, more_of(made(5.0)[0], 300, 0.0, 99)).position
+    assert interval is not None
+    assert position is not None
+    assert float(interval[1]) < position.mean * 1e3 < float(interval[2])
+    assert "narrow-data" not in run(None).levels
+
+
+def test_a_payload_in_grams(folder: Path) -> None:
+    file = written(folder, made(None)[1])
+    for mass, said in (("2700kg", True), ("2.7kg", False)):
+        found = told("calibrate", "irb120", file, "--payload", f"{mass},0mm,0mm,100mm", "--out", folder / mass)
+        assert found.says("payload-unlikely", "warning", "grams called kilograms") is said, found
+
+
 def test_another_robot_is_not_this_one(folder: Path) -> None:
     file = written(folder, made(None)[1])
     found = told("calibrate", "lrmate200ic", file, "--out", folder / "lrmate")
     assert found.code == 3
     assert found.summary["status"] == "implausible"
-    assert found.says("implausible", "error", "Check that it is this robot")
+    assert found.says("implausible", "error")
+    assert found.says("wrong-robot", "error", "not of lrmate200ic, by its lengths")
 
 
 def test_three_configurations_determine_no_robot(folder: Path) -> None:
@@ -100,8 +126,9 @@ def of_many_targets(seed: int, repeatability: float, decimals: int | None = None
     """Return a robot with ten targets, whose joints stop beside their readings, by chance or by rounding [deg]."""
     rng = np.random.default_rng(seed)
     targets = {str(n): tuple(rng.uniform(0.0, 0.2, 3).tolist()) for n in range(10)}
-    nominal = load_robot("irb120").with_frames(IDENTITY, targets)
+    nominal = load_robot("irb120")
     twin = truth_twin(nominal, "random", rng)
+    twin = replace(twin, robot=twin.robot.with_frames(twin.robot.base, targets))
     joints = nominal.random_configurations(40, rng)
     read = joints if decimals is None else np.radians(np.degrees(joints).round(decimals))
     data = measure(twin, joints + np.radians(repeatability) * rng.standard_normal(joints.shape), NOISE, rng)
@@ -131,6 +158,13 @@ def test_joints_with_one_decimal_are_as_uncertain_as_that() -> None:
     assert "errors of the joints of 0.0" in "\n".join(calibration.lines())
 
 
+def test_the_error_of_the_joints_is_one_of_a_kind_of_joint(tmp_path: Path) -> None:
+    told("calibrate", "irb120", written(tmp_path, of_many_targets(0, 0.02)[1]), "--out", tmp_path / "out")
+    (of_all,) = json.loads((tmp_path / "out" / "result.json").read_text())["noise"]["joint_error"]
+    assert (of_all["kind"], of_all["joints"], of_all["unit"]) == ("revolute", [1, 2, 3, 4, 5, 6], "deg")
+    assert of_all["deviation"] == pytest.approx(0.02, abs=0.004)
+
+
 # -- validation ------------------------------------------------------------------------------------------------
 
 
@@ -140,6 +174,28 @@ def test_training_data_prove_nothing(folder: Path) -> None:
     assert told("validate", robot, folder / "None.csv").says("training-data", "warning")
     fresh = told("validate", robot, written(folder, more_of(made(None)[0], 10, NOISE, 5), "fresh.csv"))
     assert (fresh.code, fresh.levels) == (0, {})
+
+
+def test_training_data_that_were_written_again_are_known(folder: Path, tmp_path: Path) -> None:
+    calibrated(None, folder)
+    data = made(None)[1]
+    rng = np.random.default_rng(0)
+    again = written(tmp_path, data.of_configurations(rng.permutation(data.configurations)), "again.csv")
+    again.write_text(again.read_text().replace("\n", "\r\n") + "\r\n")
+    assert told("validate", folder / "None" / "calibrated.yaml", again).says("training-data", "warning", "42 of")
+    assert truearm.validate(folder / "None" / "calibrated.yaml", data).warnings[0].code == "training-data"
+
+
+def test_a_robot_that_changed_is_beyond_its_proof(folder: Path) -> None:
+    calibrated(None, folder)
+    twin = made(None)[0]
+    longer = {p.name: p.value + 1e-3 for p in twin.robot.parameters.values() if p.name in ("a_2", "d_4")}
+    for move, level in ((1.0, "error"), (0.2, "warning")):
+        values = {name: twin.robot.values[name] + move * (v - twin.robot.values[name]) for name, v in longer.items()}
+        changed = replace(twin, robot=twin.robot.with_values(values))
+        file = written(folder, more_of(changed, 10, NOISE, 5), "changed.csv")
+        found = told("validate", folder / "None" / "calibrated.yaml", file)
+        assert found.says("beyond-proof", level, "times the .* that the robot's own calibration"), found
 
 
 def test_a_second_calibration_with_the_same_data_proves_nothing(folder: Path) -> None:

@@ -116,6 +116,25 @@ def names_exchanged(data: Dataset) -> Dataset:
     return replace(data, target=np.asarray(mixed, dtype=np.intp))
 
 
+def renamed_in_half(name: str, other: str) -> Change:
+    """Call the second target by a name, and by another one at every second configuration."""
+
+    def change(data: Dataset) -> Dataset:
+        target = np.where((data.target == 1) & (data.configuration % 2 == 1), 3, data.target)
+        return replace(data, targets=(data.targets[0], name, data.targets[2], other), target=target)
+
+    return change
+
+
+def a_fifth_off(p: Array, data: Dataset) -> Array:
+    """Put a fifth of the readings off by twenty deviations."""
+    rng = np.random.default_rng(5)
+    wrong = rng.random(len(p)) < 0.2
+    far = rng.standard_normal((int(wrong.sum()), 3))
+    p[wrong] += 20 * NOISE * far / np.linalg.norm(far, axis=1, keepdims=True)
+    return p
+
+
 def each_twice(data: Dataset, *, own_readings: bool) -> Dataset:
     """Return data in which every configuration stands twice, read anew or copied with fewer digits."""
     twin, _ = honest()
@@ -139,6 +158,63 @@ def as_thousands(p: Array, _: Dataset) -> Array:
 
 
 RIGHT_SIGMA: Final = with_sigma(NOISE)
+
+
+def without_sigma(data: Dataset) -> Dataset:
+    return replace(data, sigma=None)
+
+
+def one_after_the_other(*changes: Change) -> Change:
+    def changed(data: Dataset) -> Dataset:
+        for change in changes:
+            data = change(data)
+        return data
+
+    return changed
+
+
+def missing_by(deviation: float, *, each_target: bool = False) -> Change:
+    """Read the robot with joints that miss by so much [deg] at every arrival, each target on one of its own or not."""
+
+    def change(data: Dataset) -> Dataset:
+        rng = np.random.default_rng(2)
+        position = data.position.copy()
+        for arrival in range(len(data.targets) if each_target else 1):
+            missed = np.radians(deviation) * rng.standard_normal(data.joints.shape)
+            read = measure(honest()[0], data.joints + missed, NOISE, rng).position
+            mine = data.target == arrival if each_target else np.ones(len(data.target), dtype=bool)
+            position[mine] = read[mine]
+        return replace(data, position=position)
+
+    return change
+
+
+def rounded(step: float) -> Change:
+    """Write joint positions in such steps [deg]."""
+    return with_joints(lambda q: np.radians(np.round(np.degrees(q) / step) * step))
+
+
+def commanded(step: float) -> Change:
+    """Read the robot at joint positions that were commanded in such steps [deg]."""
+
+    def change(data: Dataset) -> Dataset:
+        joints = np.radians(np.round(np.degrees(data.joints) / step) * step)
+        return replace(measure(honest()[0], joints, NOISE, np.random.default_rng(3)), approach=None, number=None)
+
+    return change
+
+
+def not_numbered(data: Dataset) -> Dataset:
+    return replace(data, labels=tuple(f"pose-{label}" for label in data.labels), number=None, approach=None)
+
+
+def shuffled(data: Dataset) -> Dataset:
+    return not_numbered(data.of_configurations(np.random.default_rng(4).permutation(data.configurations)))
+
+
+def moved_by_a_millimetre(data: Dataset) -> Dataset:
+    return replace(data, position=data.position + late(data) * [1e-3, 0.0, 0.0])
+
 
 #: The lies of data, each under the name that a metrologist would give it.
 LIES: Final[dict[str, Lie]] = {
@@ -165,6 +241,36 @@ LIES: Final[dict[str, Lie]] = {
     "a-third-of-sigma": Lie(
         with_sigma(NOISE / 3), "calibrate", "residuals-exceed-sigma", "warning", "", 0, RIGHT_SIGMA
     ),
+    "data-sheet-error-called-sigma": Lie(
+        one_after_the_other(missing_by(0.005), with_sigma(3 * NOISE)),
+        "calibrate",
+        "sigma-too-large",
+        "warning",
+        "maximum permissible error",
+        0,
+        missing_by(0.005),
+    ),
+    # visits
+    "targets-read-on-separate-visits": Lie(
+        one_after_the_other(missing_by(0.01, each_target=True), without_sigma),
+        "calibrate",
+        "separate-visits",
+        "warning",
+        "`visit`",
+        0,
+        one_after_the_other(missing_by(0.01), without_sigma),
+    ),
+    # digits
+    "joints-rounded-to-tenths": Lie(rounded(0.1), "check", "joints-rounded", "warning", r"0\.1 deg", 0, commanded(0.1)),
+    "joints-rounded-to-degrees": Lie(
+        one_after_the_other(rounded(1.0), without_sigma),
+        "calibrate",
+        "joints-rounded",
+        "warning",
+        "multiples of 1 deg",
+        0,
+        commanded(1.0),
+    ),
     # axes and signs
     "left-handed-instrument": Lie(with_positions(lambda p, _: p * [1, -1, 1]), "check", "mirrored", "error", "", 3),
     "sign-of-joint-6": Lie(
@@ -172,6 +278,13 @@ LIES: Final[dict[str, Lie]] = {
     ),
     "joint-3-counted-from-joint-2": Lie(
         with_joints(lambda q: q + q[:, 1:2] * np.eye(6)[2]), "check", "implausible", "error", "", 3
+    ),
+    # names
+    "half-of-the-rows-in-another-spelling": Lie(
+        renamed_in_half("T2", "t-2"), "check", "target-misspelt", "error", "T2 and t-2", 3, as_it_is
+    ),
+    "half-of-the-rows-misspelt": Lie(
+        renamed_in_half("reflector", "reflecter"), "check", "target-misspelt", "error", "same point", 3
     ),
     # rows
     "joints-shifted-by-a-row": Lie(
@@ -192,6 +305,7 @@ LIES: Final[dict[str, Lie]] = {
     "copies-with-fewer-digits": Lie(
         lambda data: each_twice(data, own_readings=False), "calibrate", "held-out-seen", "warning", ""
     ),
+    "a-fifth-of-the-readings-off": Lie(with_positions(a_fifth_off), "check", "outliers", "warning", "1[0-9]%"),
     # half-way
     "instrument-moved": Lie(
         with_positions(lambda p, data: p + late(data) * [2e-3, 0.0, 0.0]),
@@ -200,6 +314,33 @@ LIES: Final[dict[str, Lie]] = {
         "error",
         rf"\b{HALF + 1}\b",
         3,
+    ),
+    "instrument-moved-and-nothing-numbered": Lie(
+        one_after_the_other(moved_by_a_millimetre, without_sigma, not_numbered),
+        "calibrate",
+        "instrument-moved",
+        "warning",
+        f"configuration pose-{HALF + 1} .* order of the file",
+        0,
+        one_after_the_other(without_sigma, not_numbered),
+    ),
+    "instrument-moved-and-rows-shuffled": Lie(
+        one_after_the_other(moved_by_a_millimetre, without_sigma, shuffled),
+        "calibrate",
+        "large-remainder",
+        "warning",
+        "instrument or a base that moved",
+        0,
+        one_after_the_other(without_sigma, shuffled),
+    ),
+    "another-robot-and-no-sigma": Lie(
+        one_after_the_other(two_robots, without_sigma, shuffled),
+        "calibrate",
+        "large-remainder",
+        "warning",
+        "another robot",
+        0,
+        one_after_the_other(without_sigma, shuffled),
     ),
     "probe-bent": Lie(
         with_positions(lambda p, data: p + late(data) * (data.target == 1)[:, None] * [0.0, 0.0, 3e-3]),

@@ -65,7 +65,7 @@ def test_a_calibration_measured_far_from_the_program_does_not_make_it_worse(fold
     arm = robot("far", folder)
     found = compensated(arm, folder)
     assert found.says("narrow-data", "warning", "expected"), found
-    assert found.says("not-better-here", "warning", "plate.mod line 7"), found
+    assert found.says("not-better-here", "warning", "plate.mod line 9"), found
 
 
 @pytest.mark.parametrize("command", ["ik", "export"])

@@ -122,7 +122,7 @@ def test_stated_deviations_of_a_table_are_those_of_repetitions() -> None:
     sigma = np.full(len(perfect.position), 2e-5)
     wanted = ((1, "a"), (3, "alpha"), (2, "theta_offset"), (4, "d"))
     values = []
-    for _ in range(20):
+    for _ in range(12):
         noisy = perfect.position + rng.normal(0, 2e-5, perfect.position.shape)
         found = analyse(load_robot("irb120"), replace(perfect, position=noisy, sigma=sigma))
         joints = converted(found.framed(found.measured.robot), "hayati").joints

@@ -97,13 +97,29 @@ def test_nothing_is_told_of_honest_campaigns(robot: str) -> None:
         assert told(replace(data, number=np.arange(40.0)), robot) == []
 
 
-def test_rows_in_another_order_say_the_same_and_without_an_order_nothing() -> None:
+def test_rows_in_another_order_say_the_same() -> None:
     data = moved_instrument(honest()[1], np.array([2e-3, 0.0, 0.0]))
     shuffled = data.of_configurations(np.random.default_rng(0).permutation(50))
     (notice,) = told(shuffled)
     assert notice.message.startswith(f"From configuration {FIRST_MOVED + 1} on, all readings stand 1.9")
-    assert told(replace(data, number=None)) == []
     assert told(data.of_configurations(np.arange(FIRST_MOVED - 9, FIRST_MOVED + 9))) == []
+
+
+def test_without_an_order_that_of_the_file_is_tried_unless_it_follows_a_joint() -> None:
+    data = replace(honest()[1], number=None, approach=None)
+    moved = moved_instrument(data, np.array([2e-3, 0.0, 0.0]))
+    (notice,) = told(moved)
+    assert (notice.code, notice.level) == ("instrument-moved", "warning")
+    assert notice.message.startswith(f"From configuration {FIRST_MOVED + 1} on, all readings stand 1.9")
+    assert notice.message.endswith("the order of the file was taken for that of measurement. If it is, number them so.")
+    assert told(data) == []
+    assert told(moved.of_configurations(np.argsort(data.joints[:, 1]))) == []
+    sorted_first = data.of_configurations(np.argsort(-data.joints[:, 1]))
+    late = moved_instrument(sorted_first, np.array([2e-3, 0.0, 0.0]))
+    assert told(late) == []
+    (notice,) = told(replace(late, number=np.arange(float(late.configurations))))
+    assert notice.level == "error"
+    assert "Joint 2 moved on with the order of measurement" in notice.message
 
 
 def test_measured_campaigns_show_no_change(measured_data: Path) -> None:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from tests.identification.test_axes import runs
 from tests.simulated import campaign
+from tests.ur_controller import UR10_CONF
 
 from truearm.library import load_robot
 from truearm.measurement.hexapod.geometry import triangle
@@ -145,7 +146,8 @@ def _new(folder: Path, name: str) -> Path:
 #: Arguments of a call of each job, made in a folder of its own.
 EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
     "load_robot": lambda _: {"robot": "irb120"},
-    "load_data": lambda folder: {"data": _data(folder)},
+    "show": lambda _: {"robot": "lrmate200ic", "joints": [0.1, 0.2, 0.3, 0.4, 0.5, 0.6], "joints_are": "model"},
+    "load_data": lambda folder: {"data": _data(folder), "robot": "irb120"},
     "check": lambda folder: {"robot": load_robot("irb120"), "data": _data(folder), "device": "tracker"},
     "calibrate": lambda folder: {
         "robot": "irb120",
@@ -163,6 +165,11 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
     "import_table": _table,
     "import_matrices": _matrices,
     "import_circle": _circle,
+    "import_ur_kinematics": lambda folder: {
+        "file": _written(folder / "calibration.conf", UR10_CONF),
+        "robot": "ur10",
+        "out": _new(folder, "ur10-controller.yaml"),
+    },
     "distances": lambda folder: {"robot": _calibrated(folder), "data": _data(folder), "payload": "1kg,0mm,0mm,50mm"},
     "plan": lambda _: {"robot": "irb120", "poses": 12, "candidates": 40, "device": "ballbar", "seed": 1},
     "simulate": lambda _: {"robot": "irb120", "truth": "random", "poses": 3, "noise": 1e-4, "device": "tracker"},
@@ -198,6 +205,7 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "tools": _cell(folder),
         "frames": _cell(folder),
         "payload": "1kg,0mm,0mm,50mm",
+        "controller_kinematics": "nominal",
         "strict": True,
         "split": 5e-5,
         "accept": ["not-better-here"],

@@ -25,6 +25,8 @@ from truearm.results.program_correction import REPORT
 REFUSED = r"would be overwritten|not overwritten|of this name itself|no robot language has files of this kind"
 #: Parameters that name what a job writes.
 OUTPUTS = ("out", "steps", "file", "folder")
+#: Of these names those that a job reads.
+FILES = (("import_table", "file"), ("import_ur_kinematics", "file"))
 Arguments = dict[str, Any]
 
 
@@ -74,9 +76,14 @@ READ: dict[str, Callable[[Path], Arguments]] = {
     "compensate": lambda folder: {
         "tools": shutil.copy(EXAMPLES["compensate"](folder)["tools"], folder / "tools.yaml"),
     },
+    "import_ur_kinematics": lambda folder: {
+        "robot": _written(folder / "ur10.yaml", robot_text(truearm.load_robot("ur10")))
+    },
 }
 #: What is no file that a job reads and overwrites: a folder of data whose files have names of their own.
 FOLDERS = (("study", "data"), ("lines", "data"))
+#: What only another robot reads: tests/compensation/test_controller_model.py tries it.
+ELSEWHERE = (("compensate", "controller_kinematics"),)
 
 
 #: The names of what a job writes into the folder `out`.
@@ -105,8 +112,8 @@ def read_by(job: str) -> list[str]:
         p.name
         for p in named
         if "Path" in str(p.annotation)
-        and (p.name not in OUTPUTS or (job, p.name) == ("import_table", "file"))
-        and (job, p.name) not in FOLDERS
+        and (p.name not in OUTPUTS or (job, p.name) in FILES)
+        and (job, p.name) not in (*FOLDERS, *ELSEWHERE)
     ]
 
 

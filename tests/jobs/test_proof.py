@@ -18,7 +18,8 @@ from truearm.results.program_correction import ProgramCorrection
 from truearm.results.robot_description import RobotDescription
 
 NARROW = Notice("narrow-data", "Over the workspace it is worse.", "error")
-FAR = Notice("far-from-nominal", "Check that the nominal values are those of its controller.")
+FAR = Notice("far-from-nominal", "Check that the nominal values are those of its controller.", "note")
+WRONG = Notice("wrong-robot", "The readings are not of irb120.", "error")
 SIGNS = Notice("joint-sign", "Joint 6 turns the other way.", "error")
 
 
@@ -81,15 +82,31 @@ def test_a_warning_that_concerns_programs_is_repeated_and_refuses_nothing(
     assert "far-from-nominal" not in codes(truearm.compensate(robot, [program]))
 
 
-def test_a_calibration_keeps_the_doubt_about_its_nominal_values(robot: Robot, program: Path) -> None:
+def test_a_calibration_keeps_the_doubt_about_its_nominal_values(program: Path) -> None:
     data = campaign("irb120", 20, 2e-5, 1)[1]
-    other = truearm.load_robot("irb120")
-    a_3 = other.parameters["a_3"]
-    off = other.with_parameters([replace(a_3, nominal=a_3.nominal + 0.01, value=a_3.value + 0.01)])
-    found = truearm.calibrate(off, data).robot
-    assert codes(truearm.compensate(found, [program]))["far-from-nominal"] == "warning"
-    again = truearm.calibrate(found, data, model="frames").robot
-    assert codes(truearm.compensate(again, [program]))["far-from-nominal"] == "warning"
+    off = replace(data, joints=data.joints + np.radians([0.0, 0.0, 1.0, 0.0, 0.0, 0.0]))
+    found = truearm.calibrate("irb120", off).robot
+    assert codes(truearm.compensate(found, [program]))["far-from-nominal"] == "note"
+    again = truearm.calibrate(found, off, model="frames").robot
+    assert codes(truearm.compensate(again, [program]))["far-from-nominal"] == "note"
+
+
+def test_a_wrong_robot_corrects_no_program_unless_accepted(robot: Robot, program: Path) -> None:
+    wrong = ended(robot, "converged", WRONG)
+    with pytest.raises(InputError, match=r"got 'wrong-robot'.*not of irb120.*give `accept=wrong-robot`"):
+        truearm.compensate(wrong, [program])
+    assert codes(truearm.compensate(wrong, [program], accept=["wrong-robot"]))["wrong-robot"] == "warning"
+
+
+def test_a_program_of_another_maker_is_not_corrected_unless_accepted(robot: Robot, program: Path) -> None:
+    other = replace(robot, maker="Universal Robots")
+    with pytest.raises(InputError, match=r"RAPID runs on controllers of ABB.*`accept=maker`") as refusal:
+        truearm.compensate(other, [program])
+    assert refusal.value.parameter == "robot"
+    done = truearm.compensate(other, [program], accept=["maker"])
+    assert codes(done)["maker"] == "warning"
+    for maker in ("ABB", "abb robotics", ""):
+        assert "maker" not in codes(truearm.compensate(replace(robot, maker=maker), [program]))
 
 
 def test_narrow_data_are_judged_target_by_target(robot: Robot, program: Path) -> None:
@@ -102,11 +119,11 @@ def test_narrow_data_are_judged_target_by_target(robot: Robot, program: Path) ->
 
 
 def test_only_known_names_are_accepted(robot: Robot, program: Path) -> None:
-    known = "allowed: rank-loss, not-converged, implausible, narrow-data, not-better-here"
+    known = "allowed: rank-loss, not-converged, implausible, narrow-data, wrong-robot, maker, not-better-here"
     with pytest.raises(InputError, match=known) as refusal:
         truearm.compensate(robot, [program], accept=["rank-lost"])
     assert refusal.value.parameter == "accept"
-    with pytest.raises(InputError, match="joint-sign, not-better-here"):
+    with pytest.raises(InputError, match="joint-sign, maker, not-better-here"):
         truearm.compensate(ended(robot, "converged", SIGNS), [program], accept=["joint-signs"])
     assert codes(truearm.compensate(robot, [program], accept=["rank-loss"])) == codes(
         truearm.compensate(robot, [program])

@@ -32,7 +32,7 @@ def test_training_readings_are_noticed(calibrated: tuple[Path, Dataset]) -> None
     found = validate(folder / "result" / "calibrated.yaml", folder / "first.csv")
     (notice,) = found.warnings
     assert (notice.code, notice.level) == ("training-data", "warning")
-    assert "20 of its 30 configurations are those it was trained on; the rest was held out" in notice.message
+    assert "20 of their 30 configurations are those it was trained on; the rest was held out" in notice.message
     assert found.lines()[-1].startswith("Warning (training-data): ")
     assert found.summary()["warnings"] == [notice.summary()]
 

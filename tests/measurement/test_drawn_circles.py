@@ -65,7 +65,7 @@ def test_distances_and_heights_of_two_pages(scan: Path, tmp_path: Path) -> None:
         (HEADER, ["1,10,20,0,0", "1,10,20,60,0"], r"points\.csv, column configuration.*twice|twice.*got '1'"),
         (HEADER.replace("angle [deg]", "angle"), ["1,10,20,0,0"], r"no unit is given"),
         (HEADER.replace("height [mm]", "depth [mm]"), ["1,10,20,0,0"], r"the column is not known.*depth \[mm\]"),
-        (HEADER.replace("joint_2", "joint_3"), ["1,10,20,0,0"], r"numbered without a gap"),
+        (HEADER.replace("joint_2", "joint_3"), ["1,10,20,0,0"], r"the column joint_2 is missing"),
         (HEADER.replace("joint_2", "joint_1"), ["1,10,20,0,0"], r"joint_1 appears twice"),
         (HEADER.replace(",height [mm]", ""), ["1,10,20,0"], r"the column height is missing"),
         (HEADER, ["1,10,20,north,0"], r"line 2, column angle \[deg\].*north"),
@@ -81,6 +81,10 @@ def test_pages_that_do_not_go_together_are_refused(scan: Path, tmp_path: Path) -
     first = Page(scan, table(tmp_path, "1,10,20,0,0"))
     with pytest.raises(InputError, match=r"a configuration is on two pages.*'1'"):
         read_drawn_circles({"a": first, "b": first})
+    pendant = table(tmp_path, "2,10,20,0,0", header=HEADER.replace("joint_", "axis_"), name="pendant.csv")
+    assert read_drawn_circles({"b": Page(scan, pendant)}).joints_are == "controller"
+    with pytest.raises(InputError, match=r"the pages have joint positions of two kinds.*Name the columns"):
+        read_drawn_circles({"a": first, "b": Page(scan, pendant)})
     longer = table(tmp_path, "2,1,2,3,0,0", header=HEADER.replace(",angle", ",joint_3 [deg],angle"), name="b.csv")
     with pytest.raises(InputError, match=r"different joints.*2 and 3 joints"):
         read_drawn_circles({"a": first, "b": Page(scan, longer)})

@@ -57,6 +57,14 @@ def test_the_cups_come_back(tmp_path: Path, filled: list[dict[str, str]]) -> Non
     assert data.joints == pytest.approx(np.full((3, 6), 0.1))
 
 
+def test_joint_positions_of_the_controller_are_kept_as_such(tmp_path: Path, filled: list[dict[str, str]]) -> None:
+    shown = [{name.replace("joint_", "axis_"): value for name, value in row.items()} for row in filled]
+    assert read(tmp_path, shown).dataset().joints_are == "controller"
+    both = [row | {"axis_1 [deg]": "1"} for row in filled]
+    with pytest.raises(InputError, match="a file has joint positions of one kind"):
+        read(tmp_path, both)
+
+
 def test_a_row_without_all_its_legs_is_left_out(tmp_path: Path, filled: list[dict[str, str]]) -> None:
     leg = poses()[39].design.leg_names[2]
     filled[1][f"{leg} [mm]"] = ""

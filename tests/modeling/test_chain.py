@@ -153,15 +153,21 @@ def check_derivatives(robot: Robot, rng: np.random.Generator) -> None:
     loaded = robot.loaded(q)  # loads are held, and found once
     names = list(robot.parameters)
     h = 1e-5  # truncation and rounding are both of the order of 1e-11 here
+
+    def stepped(step: float) -> dict[str, float | Array]:
+        """Values of as many trials as there are parameters: in each another one is moved."""
+        moved = step * np.eye(len(names))[:, :, None]
+        return {name: robot.values[name] + moved[:, i] for i, name in enumerate(names)}
+
     for target in ("tip", "point"):
         kinematics = robot.forward_kinematics(q, target)
         linear, angular = robot.jacobians(kinematics, q, names)
+        ahead, behind = (robot.forward_kinematics(loaded, target, stepped(step)) for step in (h, -h))
+        turns = (ahead.matrix() - behind.matrix()) @ np.swapaxes(kinematics.matrix(), 1, 2)
+        moves = np.moveaxis(ahead.position - behind.position, 1, 0)
         for i, name in enumerate(names):
-            ahead = robot.forward_kinematics(loaded, target, {**robot.values, name: robot.values[name] + h})
-            behind = robot.forward_kinematics(loaded, target, {**robot.values, name: robot.values[name] - h})
-            turn = (ahead.matrix() - behind.matrix()) @ np.swapaxes(kinematics.matrix(), 1, 2)
-            assert_allclose(linear[i], (ahead.position - behind.position) / (2 * h), rtol=0, atol=1e-9, err_msg=name)
-            assert_allclose(angular[i], vee(turn) / (2 * h), rtol=0, atol=1e-9, err_msg=name)
+            assert_allclose(linear[i], moves[i] / (2 * h), rtol=0, atol=1e-9, err_msg=name)
+            assert_allclose(angular[i], vee(turns[i]) / (2 * h), rtol=0, atol=1e-9, err_msg=name)
 
 
 @pytest.mark.parametrize("convention", CONVENTIONS, ids=lambda c: c.name)

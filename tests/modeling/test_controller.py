@@ -294,7 +294,24 @@ def universal(d1: float, shoulder: float, a2: float, elbow: float, a3: float, d4
     )
 
 
+def described(d1: float, a2: float, a3: float, d4: float, d5: float, d6: float) -> tuple[Joints, Still, Still]:
+    """Return the joints of UniversalRobots/Universal_Robots_ROS2_Description, ur_macro.xacro, default_kinematics."""
+    joints: Joints = (
+        ((0, 0, d1), (0, 0, 180), Z),
+        (HERE, (90, 0, 0), Z),
+        ((a2, 0, 0), NONE, Z),
+        ((a3, 0, d4), NONE, Z),
+        ((0, -d5, 0), (90, 0, 0), Z),
+        ((0, d6, 0), (90, 180, 180), Z),
+    )
+    return joints, (HERE, (0, 0, 180)), (HERE, NONE)
+
+
 MODELS: dict[str, tuple[Joints, Still, Still]] = {
+    "ur3": described(151.9, -243.65, -213.25, 112.35, 85.35, 81.9),
+    "ur3e": described(151.85, -243.55, -213.2, 131.05, 85.35, 92.1),
+    "ur5e": described(162.5, -425, -392.2, 133.3, 99.7, 99.6),
+    "ur10e": described(180.7, -612.7, -571.55, 174.15, 119.85, 116.55),
     # ros-industrial/abb, irb120_3_58_macro.xacro
     "irb120": (
         (

@@ -244,7 +244,6 @@ NAMED_ELSEWHERE = {
     "identification/solving/models.py": "a model is a choice of effects",
     "identification/inclinometers/fit.py": "so is the first stage of the method with inclinometers",
     "studies/": "a study chooses models as its document does",
-    "planning/choosing/plan_table.py": "a column of a plan has the name of an effect",
 }
 
 

@@ -478,7 +478,8 @@ def test_approach_is_the_only_difference_of_the_python_file() -> None:
 
 @pytest.mark.parametrize("format_", FORMATS)
 def test_history_and_frames_go_along(format_: str) -> None:
-    robot = replace(load_robot("kr5"), title='Ünlike """ \\u "others"', history=('by "x"\n\\ """ #',))
+    arm = "ur5" if format_ == "ur-kinematics" else "kr5"
+    robot = replace(load_robot(arm), title='Ünlike """ \\u "others"', history=('by "x"\n\\ """ #',))
     made = exported(robot, format_)
     assert "Poses are those of the flange in the base frame" in made.text
     assert "Ünlike" in made.text

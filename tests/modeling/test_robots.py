@@ -14,7 +14,21 @@ from truearm.modeling.formats.robot_file import read_robot, robot_text
 from truearm.modeling.formats.urdf_writing import urdf_text
 from truearm.modeling.robot import Robot
 
-IDS = ("irb120", "irb1600", "katana450", "kr5", "li3", "lrmate200ic", "puma560", "ur10", "ur5")
+IDS = (
+    "irb120",
+    "irb1600",
+    "katana450",
+    "kr5",
+    "li3",
+    "lrmate200ic",
+    "puma560",
+    "ur10",
+    "ur10e",
+    "ur3",
+    "ur3e",
+    "ur5",
+    "ur5e",
+)
 
 
 def position(robot: Robot, degrees: list[float]) -> Array:
@@ -138,6 +152,9 @@ def test_invented_numbers_say_so() -> None:
         # Published for the UR5 by its controller at (0, 0, 0, 0, 0, 0).
         ("ur5", [0, 0, 0, 0, 0, 0], [-817.25, -191.45, -5.491]),
         ("ur10", [0, 0, 0, 0, 0, 0], [-1184.3, -256.141, 11.6]),
+        ("ur5e", [0, 0, 0, 0, 0, 0], [-425 - 392.2, -133.3 - 99.6, 162.5 - 99.7]),
+        ("ur10e", [0, -90, 0, -90, 0, 0], [0, -174.15 - 116.55, 180.7 + 612.7 + 571.55 + 119.85]),
+        ("ur10e", [0, 0, 0, 0, 0, 0], [-1184.25, -290.7, 60.85]),
         # UR robots point straight up here ("home"): d1 - a2 - a3 + d5.
         ("ur5", [0, -90, 0, -90, 0, 0], [0, -191.45, 89.159 + 425 + 392.25 + 94.65]),
     ],

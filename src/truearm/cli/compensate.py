@@ -35,6 +35,15 @@ def compensate(
         ),
     ] = None,
     payload: PayloadText = None,
+    controller_kinematics: Annotated[
+        str | None,
+        typer.Option(
+            metavar="nominal|proprietary|FILE",
+            help="What the controller computes poses with: the robot file's table, a calibration of its maker that "
+            "nobody can read, or a kinematics file (calibration.conf).",
+            show_default="as the robot file says",
+        ),
+    ] = None,
     strict: Annotated[bool, typer.Option("--strict", help="Write nothing if a target cannot be corrected.")] = False,
     split: Annotated[
         float | None,
@@ -72,8 +81,8 @@ def compensate(
         list[str] | None,
         typer.Option(
             metavar="NAME",
-            help="Accept what speaks against the calibration, as rank-loss, or against a target, not-better-here; "
-            "repeatable.",
+            help="Accept what speaks against the calibration, as rank-loss, against a target, not-better-here, or "
+            "against programs of another maker, maker; repeatable.",
             show_default=False,
         ),
     ] = None,
@@ -93,6 +102,7 @@ def compensate(
             tools=tools,
             frames=frames,
             payload=payload,
+            controller_kinematics=controller_kinematics,
             split=split,
             strict=strict or None,
             again=again or None,
@@ -114,6 +124,7 @@ def compensate(
             tools=tools,
             frames=frames,
             payload=payload,
+            controller_kinematics=controller_kinematics,
             strict=strict,
             split=None if split is None else split / 1e3,
             again=again,

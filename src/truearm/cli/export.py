@@ -17,9 +17,10 @@ def export(
     format: Annotated[
         str,
         typer.Option(
-            metavar="dh|mdh|hayati|urdf|json|python",
-            help="A standard DH, modified DH or Hayati table (CSV), a URDF, everything as JSON, or a Python file for "
-            "forward and inverse kinematics that needs only NumPy.",
+            metavar="dh|mdh|hayati|urdf|json|python|ur-kinematics",
+            help="A standard DH, modified DH or Hayati table (CSV), a URDF, everything as JSON, a Python file for "
+            "forward and inverse kinematics that needs only NumPy, or the kinematics file of the ROS driver of "
+            "Universal Robots.",
         ),
     ],
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="File to write; nothing is overwritten.")],

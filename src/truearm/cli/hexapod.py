@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from truearm.cli.loading import read_lengths, read_numbers
+from truearm.cli.loading import JointsText, read_lengths, read_numbers
 from truearm.cli.options import Commands
 from truearm.cli.output import Json, print_json, print_line, print_record
 
@@ -105,6 +105,7 @@ def plan(
         str | None, typer.Option(metavar="NAME,..", help="Only these, as front-up,back-down.", show_default="all")
     ] = None,
     arm_radius: Annotated[float, typer.Option(metavar="MM", min=0.0, help="Of the arm, for room at the bars.")] = 50.0,
+    joints: JointsText = None,
     json: Json = False,
 ) -> None:
     """Plan which configurations of a robot can be measured with the fixture at one place."""
@@ -120,6 +121,7 @@ def plan(
         distinct=distinct,
         branches=() if branches is None else branches.split(","),
         arm_radius=sized_si(arm_radius, "mm", parameter="arm_radius"),
+        joints=joints,  # type: ignore[arg-type]
     )
     _print(found, json)
     if not json:
@@ -130,7 +132,7 @@ def plan(
 def world_frame(
     robot: RobotName,
     touches: Annotated[
-        Path, typer.Argument(metavar="TOUCHES.csv", help="Columns cup, joint_1 \\[deg] ..; B1, B2, B3.")
+        Path, typer.Argument(metavar="TOUCHES.csv", help="Columns cup, joint_1 or axis_1 \\[deg] ..; B1, B2, B3.")
     ],
     base: Annotated[str, typer.Option(metavar=_THREE, help="Measured distances B1-B2, B2-B3, B3-B1.")],
     target: Annotated[str | None, typer.Option(metavar="NAME", help="Cup of the tool that touched.")] = None,

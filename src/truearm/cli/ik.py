@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from truearm.cli.loading import GravityText, PayloadText, read_gravity
+from truearm.cli.loading import GravityText, JointsText, PayloadText, read_gravity, read_joints
 from truearm.cli.output import Json, print_json, print_line, print_record
 from truearm.errors import InputError
 
@@ -29,7 +29,7 @@ def ik(
         typer.Option(
             "--seed-joints",
             metavar="DEG,DEG,..",
-            help="Joint positions to stay near to (mm if sliding).",
+            help="Joint positions to stay near to (mm if sliding), of the kind that is written.",
             show_default="zeros",
         ),
     ] = None,
@@ -37,7 +37,11 @@ def ik(
         str | None, typer.Option(metavar="NAME", help="What goes to the poses.", show_default="the flange")
     ] = None,
     frame: Annotated[
-        str, typer.Option(metavar="base|world", help="What the poses are given in: the robot's base, or the world.")
+        str,
+        typer.Option(
+            metavar="base|world|controller",
+            help="What the poses are given in: the robot's base, the world, or the base frame of its controller.",
+        ),
     ] = "base",
     orientation_free: Annotated[bool, typer.Option("--position-only", help="Leave the orientation free.")] = False,
     orientation_axis: Annotated[
@@ -45,6 +49,7 @@ def ik(
     ] = False,
     payload: PayloadText = None,
     gravity: GravityText = None,
+    joints: JointsText = None,
     json: Json = False,
 ) -> None:
     """Find the joint positions that bring a robot to poses, with its calibration and joint effects."""
@@ -59,12 +64,13 @@ def ik(
         poses,
         out=out,
         branch=branch,
-        seed=_seed(robot, seed),
+        seed=_seed(robot, seed, joints),
         target=target,
         frame=frame,  # type: ignore[arg-type]
         orientation="free" if orientation_free else "axis" if orientation_axis else "full",
         payload=payload,
         gravity=read_gravity(gravity),
+        joints=joints,  # type: ignore[arg-type]
     )
     if json:
         print_json(found.summary())
@@ -75,27 +81,16 @@ def ik(
         raise typer.Exit(3)
 
 
-def _seed(robot: str, text: str | None) -> list[float] | None:
-    """Return the joint positions [rad or m] that a text in deg or mm names, in the units of the robot's joints."""
-    from truearm.jobs.load_robot import load_robot
-    from truearm.units import to_si
-
+def _seed(robot: str, text: str | None, joints: str | None) -> list[float] | None:
+    """Return the model's joint positions [rad or m] that a text in deg or mm names, of the kind that is written."""
     if text is None:
         return None
-    loaded = load_robot(robot)
-    units = ["deg" if joint.kind == "revolute" else "mm" for joint in loaded.joints]
-    parts = text.split(",")
-    try:
-        values = [float(part) for part in parts]
-    except ValueError:
-        raise InputError(
-            "numbers separated by commas belong here", parameter="seed", came=text, allowed="0,-30,45, .."
-        ) from None
-    if len(values) != len(units):
-        raise InputError(
-            "the seed has the wrong length",
-            parameter="seed",
-            came=f"{len(values)} number{'' if len(values) == 1 else 's'}",
-            allowed=f"{len(units)}, one for each joint of {loaded.name}",
-        )
-    return [to_si(value, unit) for value, unit in zip(values, units, strict=True)]
+    import numpy as np
+
+    from truearm.jobs.arguments import joints_argument, robot_argument
+
+    loaded = robot_argument(robot)
+    given = np.array([read_joints(text, loaded, "seed")])
+    if joints_argument(joints, loaded) == "controller":
+        given = loaded.controller.to_model(given)
+    return [float(value) for value in given[0]]

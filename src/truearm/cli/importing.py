@@ -1,4 +1,4 @@
-"""``truearm import``: measurement files of other programs."""
+"""``truearm import``: files of other programs."""
 
 from __future__ import annotations
 
@@ -8,10 +8,23 @@ from typing import Annotated
 import typer
 
 from truearm.cli.options import Commands
-from truearm.cli.output import print_record
+from truearm.cli.output import Json, print_json, print_record
 from truearm.errors import InputError
 
-app = Commands(help="Turn measurement files into the canonical CSV.", no_args_is_help=True)
+JointsAreText = Annotated[
+    str | None,
+    typer.Option(
+        "--joints-are",
+        metavar="controller|model",
+        help="Whose joint positions they are: as the robot's controller shows them, or its model's.",
+        show_default="the model's",
+    ),
+]
+
+app = Commands(
+    help="Turn measurement files into the canonical CSV, and a controller's kinematics into a robot file.",
+    no_args_is_help=True,
+)
 
 
 @app.command()
@@ -31,6 +44,7 @@ def matrices(
             help="Positions of a fixed point beside the robot; repeat for each.",
         ),
     ] = None,
+    joints_are: JointsAreText = None,
 ) -> None:
     """White-space separated matrices, one configuration a row. A row of zeros or NaN is a missing reading."""
     from truearm.jobs.import_matrices import import_matrices
@@ -41,6 +55,7 @@ def matrices(
         _named(references or [], "references"),
         angle_unit=angle_unit,
         length_unit=length_unit,
+        joints_are=joints_are or "model",  # type: ignore[arg-type]
         out=out,
     )
     print_record(imported)
@@ -51,11 +66,13 @@ def table(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A CSV or SpatialAnalyzer ASCII file.")],
     mapping: Annotated[Path, typer.Option("--map", metavar="MAPPING.yaml", help="Which column is what.")],
     out: Annotated[Path, typer.Option("--out", metavar="DATA.csv", help="File to write.")],
+    joints_are: JointsAreText = None,
 ) -> None:
     """Any table of points, by a mapping that says which column is what (the guide has complete ones)."""
     from truearm.jobs.import_table import import_table
 
-    print_record(import_table(file, mapping, out=out))
+    imported = import_table(file, mapping, joints_are=joints_are, out=out)  # type: ignore[arg-type]
+    print_record(imported)
 
 
 @app.command()
@@ -85,6 +102,27 @@ def circle(
         out=out,
     )
     print_record(imported)
+
+
+@app.command("ur-kinematics")
+def ur_kinematics(
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="calibration.conf of the controller, or the ROS driver's file.")
+    ],
+    robot: Annotated[
+        str, typer.Option("--robot", metavar="ROBOT", help="The arm's type: a library id such as ur5e, or a file.")
+    ],
+    out: Annotated[Path, typer.Option("--out", metavar="ROBOT.yaml", help="File to write; nothing is overwritten.")],
+    json: Json = False,
+) -> None:
+    """Write what the controller of a Universal Robots arm computes with as a robot file."""
+    from truearm.jobs.import_ur_kinematics import import_ur_kinematics
+
+    imported = import_ur_kinematics(file, robot, out=out)
+    if json:
+        print_json(imported.summary())
+    else:
+        print_record(imported)
 
 
 def _dots(text: str | None) -> float | tuple[float, float] | None:

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from truearm.cli.loading import read_joints
 from truearm.cli.output import Json, print_json, print_record
 
 
@@ -22,13 +23,27 @@ def robots(json: Json = False) -> None:
 
 def show(
     robot: Annotated[str, typer.Argument(metavar="ROBOT", help="A library id, a robot file or a URDF.")],
+    joints: Annotated[
+        str | None,
+        typer.Option(metavar="DEG,DEG,..", help="Where the robot stands (mm if sliding): print the pose, too."),
+    ] = None,
+    joints_are: Annotated[
+        str | None,
+        typer.Option(
+            metavar="controller|model",
+            help="Whose joint positions they are: as the controller shows them, or the model's.",
+            show_default="the controller's where the robot file says that they differ",
+        ),
+    ] = None,
     json: Json = False,
 ) -> None:
-    """Show a robot: its joints, its reach at zero, what is known about it."""
+    """Show a robot: its joints, its reach at zero, what is known about it, and where it stands at joint positions."""
     from truearm.jobs.load_robot import load_robot
-    from truearm.results.robot_description import RobotDescription
+    from truearm.jobs.show import show as run
 
-    described = RobotDescription(load_robot(robot))
+    loaded = load_robot(robot)
+    given = None if joints is None else read_joints(joints, loaded, "joints")
+    described = run(loaded, joints=given, joints_are=joints_are)  # type: ignore[arg-type]
     if json:
         print_json(described.summary())
     else:

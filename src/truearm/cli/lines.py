@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from truearm.cli.loading import read_lengths
+from truearm.cli.loading import JointsText, read_lengths
 from truearm.cli.output import Json, print_json, print_line, print_record
 
 
@@ -30,6 +30,7 @@ def lines(
     noise: Annotated[float, typer.Option(metavar="MM", min=0.0, help="Of a coordinate of a repetition.")] = 0.0,
     repeats: Annotated[int, typer.Option(metavar="N", min=1, help="Repetitions on the twin.")] = 30,
     seed: Annotated[int, typer.Option(metavar="S", min=0, help="Of the noise.")] = 0,
+    joints: JointsText = None,
     out: Annotated[
         Path | None, typer.Option("--out", metavar="PLAN.csv", help="Write the joint positions to command.")
     ] = None,
@@ -49,6 +50,7 @@ def lines(
         noise=sized_si(noise, "mm", parameter="noise", deviation=True) if noise else 0.0,
         repeats=repeats,
         seed=seed,
+        joints=joints,  # type: ignore[arg-type]
         out=out,
     )
     if json:
@@ -57,4 +59,5 @@ def lines(
     print_record(found)
     if out is not None:
         said = "compensated" if found.compensated else "nominal"
-        print_line(f"{out}: {len(found.joints)} configurations, {said} joint positions.")
+        shown = " as the controller shows them (axis_i)" if found.joints_are == "controller" else ""
+        print_line(f"{out}: {len(found.joints)} configurations, {said} joint positions{shown}.")

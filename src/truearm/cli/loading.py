@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from truearm.errors import InputError
+
+if TYPE_CHECKING:
+    from truearm.modeling.robot import Robot
 
 PayloadText = Annotated[
     str | None,
@@ -26,6 +29,15 @@ GravityText = Annotated[
         show_default="as the robot file says",
     ),
 ]
+JointsText = Annotated[
+    str | None,
+    typer.Option(
+        "--joints",
+        metavar="controller|model",
+        help="Whose joint positions to write: as the controller shows them (axis_i), or the model's (joint_i).",
+        show_default="the controller's where the robot file says that they differ",
+    ),
+]
 
 
 def read_gravity(text: str | None) -> tuple[float, float, float] | None:
@@ -41,6 +53,27 @@ def read_gravity(text: str | None) -> tuple[float, float, float] | None:
         )
     x, y, z = (float(number) for number in numbers if number is not None)
     return x, y, z
+
+
+def read_joints(text: str, robot: Robot, parameter: str) -> list[float]:
+    """Return joint positions [rad or m] of a text in deg or mm, in the units of the robot's joints."""
+    from truearm.units import to_si
+
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        raise InputError(
+            "numbers separated by commas belong here", parameter=parameter, came=text, allowed="0,-30,45, .."
+        ) from None
+    if len(numbers) != len(robot.joints):
+        raise InputError(
+            "there are not as many numbers as joints",
+            parameter=parameter,
+            came=f"{len(numbers)} number{'' if len(numbers) == 1 else 's'}",
+            allowed=f"{len(robot.joints)}, one for each joint of {robot.name}",
+        )
+    units = ["deg" if joint.kind == "revolute" else "mm" for joint in robot.joints]
+    return [to_si(value, unit) for value, unit in zip(numbers, units, strict=True)]
 
 
 def read_lengths(text: str, parameter: str) -> float | list[float]:

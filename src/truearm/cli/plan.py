@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from truearm.cli.loading import GravityText, PayloadText, read_gravity
+from truearm.cli.loading import GravityText, JointsText, PayloadText, read_gravity
 from truearm.cli.options import command_line
 from truearm.cli.output import Json, print_json, print_line, print_record, progress
 
@@ -48,6 +48,7 @@ def plan(
     seed: Annotated[int, typer.Option(metavar="S", min=0, help="Of the random configurations.")] = 0,
     payload: PayloadText = None,
     gravity: GravityText = None,
+    joints: JointsText = None,
     json: Json = False,
 ) -> None:
     """Choose the configurations that tell most, in a measuring order, and say how accurate the result will be.
@@ -72,6 +73,7 @@ def plan(
             seed=seed,
             payload=payload,
             gravity=read_gravity(gravity),
+            joints=joints,  # type: ignore[arg-type]
             command=command_line(),
             progress=say,
         )

@@ -37,6 +37,13 @@ def simulate(
     seed: Annotated[int, typer.Option(metavar="S", min=0, help="Of configurations, noise and a random truth.")] = 0,
     payload: PayloadText = None,
     gravity: GravityText = None,
+    joints: Annotated[
+        str,
+        typer.Option(
+            metavar="controller|model",
+            help="Whose joint positions to write: as the controller shows them (axis_i), or the model's (joint_i).",
+        ),
+    ] = "model",
 ) -> None:
     """Measure a digital twin whose truth is known, with a simulated instrument."""
     from truearm.cli.output import print_record, progress
@@ -54,6 +61,7 @@ def simulate(
             seed=seed,
             payload=payload,
             gravity=read_gravity(gravity),
+            joints=joints,  # type: ignore[arg-type]
             progress=say,
         )
     print_record(simulated)

@@ -186,11 +186,12 @@ def _asked(result: CorrectedPrograms) -> list[Notice]:
     places += [
         what for what, known in (("frames", result.frames.frames), ("tools", result.frames.tools)) if known == "assumed"
     ]
+    words = " and ".join([*[", ".join(places[:-1])][: len(places) - 1], places[-1]])
     answers = ", ".join(f"`taught={what}`" for what in places)
     return [
         Notice(
             "computed-or-taught",
-            f"Were the {listed(places)} of these programs computed, or taught with this robot? Nothing says it, and "
+            f"Were the {words} of these programs computed, or taught with this robot? Nothing says it, and "
             "they were taken as computed. Points that were taught are right already, and a correction moves them away. "
             f"Answer with {answers}, or `taught=none`.",
         )

@@ -34,6 +34,10 @@ _DRAWS: Final = 400
 #: Share of the joints' error at an arrival that all targets of a program have in common: what the model leaves changes
 #: slowly from place to place, repeatability does not.
 _IN_COMMON: Final = 0.5
+#: Degrees of freedom of Student's distribution that the errors have at one place: how well variances are known, and how
+#: far what the model leaves there differs from its mean over what was measured. With it the intervals of simulated
+#: programs hold as often as they say (docs/simulations.md).
+_FREEDOM: Final = 12
 _INTERVAL: Final = (5.0, 95.0)
 #: Corrections below this are none [m]: programs are written with fewer digits.
 _NOTHING: Final = 1e-6
@@ -224,13 +228,14 @@ def _drawn(model: _ModelErrors, targets: TargetsReached) -> DrawnErrors:
     before, after = np.zeros((2, len(some), _DRAWS))
     rng = np.random.default_rng(0)
     drawn = rng.standard_normal((len(model.proof.names), _DRAWS))
+    scale = np.sqrt(_FREEDOM / rng.chisquare(_FREEDOM, _DRAWS))
     common: Array | None = None
     in_common = 0.0 if model.assumed_frames else _IN_COMMON  # a frame takes it up
     for part, errors, by_joints in model.errors(targets.some(some)):
         if common is None:
             common = math.sqrt(in_common) * rng.standard_normal((by_joints.shape[2], _DRAWS))
         own = math.sqrt(1.0 - in_common) * rng.standard_normal((len(part), by_joints.shape[2], _DRAWS))
-        missed = errors @ drawn + by_joints @ (common + own)
+        missed = (errors @ drawn + by_joints @ (common + own)) * scale
         after[part] = np.linalg.norm(missed, axis=1)
         before[part] = np.linalg.norm(missed + shift[part][:, :, None], axis=1)
     return DrawnErrors(some, before, after)

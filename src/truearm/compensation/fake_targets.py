@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from truearm.errors import InputError
 from truearm.modeling.chain import Array
+from truearm.modeling.formats.ur_kinematics import controller_robot
 from truearm.modeling.inverse.branches import BRANCHES, branch_rule
 from truearm.modeling.inverse.kinematics import inverse
 from truearm.modeling.inverse.solutions import JointSolutions, PoseStatus
@@ -27,7 +28,8 @@ def nominal_robot(robot: Robot) -> Robot:
     """Return the robot that the controller believes in: the table of the robot file, no joint effects, no base.
 
     However often the robot was calibrated, the rows of its joints stay what they were; what was identified stands in
-    its parameters. The world of the nominal robot is its base frame.
+    its parameters. A controller that computes with kinematics of its own, which are known, believes in those. The world
+    of the nominal robot is its base frame.
 
     Raises
     ------
@@ -42,14 +44,20 @@ def nominal_robot(robot: Robot) -> Robot:
         targets=(),
         fixtures=(),
     )
-    inside = (name for name, p in nominal.parameters.items() if p.group != "base")
-    if not robot.effect_names and all(robot.values[name] == nominal.values[name] for name in inside):
+    controllers = controller_robot(nominal)
+    if not robot.effect_names and (_same_arm(robot, nominal) or _same_arm(robot, controllers)):
         raise InputError(
-            "this robot is not calibrated: all its parameters are nominal",
+            "this robot is not calibrated: all its parameters are nominal, or those of its controller",
             where=robot.name,
             cure="Give the calibrated.yaml of truearm calibrate; a converted robot has lost its nominal values.",
         )
-    return nominal
+    return controllers
+
+
+def _same_arm(robot: Robot, other: Robot) -> bool:
+    """Return whether an arm has the values of another one, wherever both stand."""
+    inside = (name for name, p in other.parameters.items() if p.group != "base")
+    return all(robot.values.get(name) == other.values[name] for name in inside)
 
 
 @dataclass(frozen=True, eq=False)

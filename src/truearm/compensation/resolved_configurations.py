@@ -127,13 +127,11 @@ def resolved_configurations(
     form = ClosedForm(nominal, None) if rule is not None else None
     if rule is None or form is None or not form.known:
         return _by_seeds(nominal, flange, configurations, joints, wanted)
-    starts = form.starts(flange[wanted, :3, 3], flange[wanted, :3, :3])
-    candidates = starts.joints
-    possible: NDArray[np.bool_] = ~np.isnan(candidates[:, :, 0]) & ~starts.nearest
+    candidates, possible = _every_posture(nominal, flange[wanted], form)
     number, bend = np.full(possible.shape, -1), np.zeros(possible.shape)
-    kinematics = nominal.trunk.forward_kinematics(candidates[possible].T)
+    kinematics = nominal.forward_kinematics(candidates[possible])
     number[possible], bend[possible] = rule.numbers(kinematics), rule.bend(kinematics)
-    given = nominal.trunk.forward_kinematics(np.nan_to_num(known).T)
+    given = nominal.forward_kinematics(np.nan_to_num(known))
     number_given, bend_given = rule.numbers(given), rule.bend(given)
     reachable[wanted] = possible.any(axis=1)
     choice = _Candidates(nominal, candidates, possible, number, [configurations[i] for i in wanted])
@@ -171,6 +169,23 @@ def resolved_configurations(
             branch = int(number_given[index]) if bend_given[index] > _STRETCHED else None
         before = joints[index]
     return ResolvedConfigurations(joints, reachable, guessed)
+
+
+def _every_posture(nominal: Robot, flange: Array, form: ClosedForm) -> tuple[Array, NDArray[np.bool_]]:
+    """Return the joints with which the controller's arm reaches poses, eight ways a pose, and which of them do."""
+    position, rotation = flange[:, :3, 3], flange[:, :3, :3]
+    if all(p.value == p.nominal for p in nominal.parameters.values()):
+        starts = form.starts(position, rotation)
+        return starts.joints, ~np.isnan(starts.joints[:, :, 0]) & ~starts.nearest
+    # A controller with kinematics of its own has no closed form, but a nominal arm beside it has.
+    found = inverse(nominal, position, rotation, branch="all")
+    joints = np.full((len(flange), SLOTS, len(nominal.joints)), np.nan)
+    possible = np.zeros(joints.shape[:2], dtype=bool)
+    slot = np.arange(len(found.pose)) - np.searchsorted(found.pose, found.pose)
+    reached = np.array([status is not PoseStatus.UNREACHABLE for status in found.status], dtype=bool)
+    joints[found.pose[reached], slot[reached]] = found.joints[reached]
+    possible[found.pose[reached], slot[reached]] = True
+    return joints, possible
 
 
 class _Candidates:

@@ -12,10 +12,12 @@ from typing import Final
 #: Every job, in the order of the work.
 JOBS: Final = (
     "load_robot",
+    "show",
     "load_data",
     "import_table",
     "import_matrices",
     "import_circle",
+    "import_ur_kinematics",
     "check",
     "calibrate",
     "validate",

@@ -6,7 +6,7 @@ import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from numbers import Integral, Real
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeGuard, TypeVar
+from typing import TYPE_CHECKING, Final, TypeGuard, TypeVar
 
 import numpy as np
 
@@ -15,9 +15,11 @@ from truearm.errors import InputError, did_you_mean, name_parameter, refusals_of
 from truearm.files import path_argument
 from truearm.library import is_robot, load_robot, urdf_source
 from truearm.limits import limit, refuse_beyond
+from truearm.measurement.controller_joints import in_model_joints
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.readers.canonical import read_csv
 from truearm.modeling.chain import Array
+from truearm.modeling.controller import JointsOf
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
 from truearm.units import accepted_range, sized_si
@@ -27,6 +29,9 @@ if TYPE_CHECKING:
     from truearm.simulation.devices import Device
 
 T = TypeVar("T")
+
+#: Whose joint positions can be asked for.
+JOINTS_OF: Final[dict[str, JointsOf]] = {"controller": "controller", "model": "model"}
 
 
 def robot_argument(robot: object, parameter: str = "robot") -> Robot:
@@ -79,6 +84,24 @@ def data_argument(data: object, parameter: str = "data") -> Dataset:
         with refusals_of(parameter):
             return read_csv(path)
     raise wrong_kind("measurements belong here", data, parameter, "a Dataset, or a canonical CSV file")
+
+
+def readings_argument(robot: Robot, data: object, parameter: str = "data") -> Dataset:
+    """Return measurements of a robot, at the joint positions of its model, whatever those are that came."""
+    measured = data_argument(data, parameter)
+    with refusals_of(parameter):
+        return in_model_joints(robot, measured)
+
+
+def joints_argument(joints: object, robot: Robot, parameter: str = "joints") -> JointsOf:
+    """Return whose joint positions a file shall hold: for None the controller's, where they differ from the model's."""
+    if joints is None:
+        return "controller" if robot.controller.counts_otherwise else "model"
+    chosen = choice_argument(joints, parameter, JOINTS_OF)
+    if chosen == "controller":
+        with refusals_of(parameter):
+            robot.controller.check_counts(robot.name)
+    return chosen
 
 
 def folder_for(names: Iterable[str], out: object, *read: object, parameter: str = "out", ours: bool = False) -> Path:

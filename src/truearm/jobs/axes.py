@@ -10,10 +10,10 @@ from truearm.errors import refusals_of
 from truearm.identification.axes.analysis import analyse
 from truearm.jobs.arguments import (
     choice_argument,
-    data_argument,
     files_of,
     folder_for,
     progress_argument,
+    readings_argument,
     refuse_swapped,
     robot_argument,
 )
@@ -58,7 +58,8 @@ def axes(
     in_robot_frame = choice_argument(frame, "frame", _FRAMES)
     refuse_swapped(robot, data, "axes")
     folder = None if out is None else folder_for(AXIS_FILES, out, robot, data, ours=True)
-    nominal, readings = robot_argument(robot), data_argument(data)
+    nominal = robot_argument(robot)
+    readings = readings_argument(nominal, data)
     progress("fitting circles and axes")
     with refusals_of("data"):
         found = AxisCalibration(analyse(nominal, readings, in_robot_frame=in_robot_frame), files_of(robot, data))

@@ -20,13 +20,17 @@ from truearm.identification.judging.arrival_lag import check_arrival_lag
 from truearm.identification.judging.changes import notices_of_change
 from truearm.identification.judging.expected_error import as_residuals_allow, expected_error
 from truearm.identification.judging.implausible import check_plausible
+from truearm.identification.judging.large_remainder import check_remainder
 from truearm.identification.judging.left_over import LeftOver
-from truearm.identification.judging.narrow_data import check_narrow_data
+from truearm.identification.judging.narrow_data import check_narrow_data, check_narrow_data_without_geometry
 from truearm.identification.judging.next_steps import Judged, steps_after_fit, what_moved
 from truearm.identification.judging.off_configurations import off_configurations
 from truearm.identification.judging.one_sided import check_one_sided
-from truearm.identification.judging.sigma import check_sigma
+from truearm.identification.judging.payload import check_payload
+from truearm.identification.judging.separate_visits import check_separate_visits
+from truearm.identification.judging.sigma import check_sigma, check_sigma_beside_joints
 from truearm.identification.judging.transmission import check_transmission
+from truearm.identification.judging.wrong_robot import WRONG_ROBOT, check_robot, judges_lengths
 from truearm.identification.solving.bounds import Bounds, read_bounds
 from truearm.identification.solving.fit import Status, identify, place
 from truearm.identification.solving.losses import LOSSES, Loss
@@ -36,7 +40,6 @@ from truearm.jobs.arguments import (
     choice_argument,
     choices_argument,
     command_argument,
-    data_argument,
     files_of,
     folder_for,
     gravity_argument,
@@ -44,6 +47,7 @@ from truearm.jobs.arguments import (
     payload_argument,
     progress_argument,
     python_call,
+    readings_argument,
     refuse_swapped,
     robot_argument,
     whole_argument,
@@ -51,9 +55,8 @@ from truearm.jobs.arguments import (
 from truearm.jobs.check import notices_of
 from truearm.jobs.validate import trained_on
 from truearm.library import urdf_source
-from truearm.measurement.checks import check_joints
 from truearm.measurement.dataset import Dataset, IntArray
-from truearm.measurement.repeats import copies, revisits
+from truearm.measurement.repeats import copies, readings_digest, revisits
 from truearm.measurement.statistics import Errors, errors_of
 from truearm.measurement.table_motion import without_table_motion
 from truearm.modeling.effects import EFFECTS
@@ -177,7 +180,7 @@ def calibrate(
             asked = named.also(effects)
             asked.free(asked.prepared(nominal_robot))
     progress("reading the data")
-    readings = data_argument(data)
+    readings = as_read = readings_argument(nominal_robot, data)
     sha256 = None
     if isinstance(data, str | Path):
         sha256 = hashlib.sha256(read_bytes(path_argument(data, "data"))).hexdigest()
@@ -186,7 +189,6 @@ def calibrate(
         with refusals_of("bounds"):
             bounds = read_bounds(path_argument(bounds, "bounds"))
     with refusals_of("data"):
-        check_joints(nominal_robot, readings)
         n = readings.configurations
         count = _train_count(train, n, readings.source)
         order = np.random.default_rng(seed).permutation(n)
@@ -238,37 +240,53 @@ def calibrate(
     train_errors = errors_of(fit.robot, first)
     # What the robust fit of the check could not explain, the fit itself may.
     noticed = tuple(notice for notice in noticed if notice.code != Status.IMPLAUSIBLE.value)
-    unlike = check_plausible(fit, first, noticed)
-    expected = expected_error(as_residuals_allow(fit, first), plausible=not unlike)
     left_over = LeftOver.of(fit, readings)
+    off = off_configurations(left_over)
+    moved_then = what_moved(left_over, off)
+    changes = [] if moved_then is None else notices_of_change(*moved_then)
+    told = [notice for notice in noticed if notice.code == WRONG_ROBOT]
+    noticed = tuple(notice for notice in noticed if notice.code != WRONG_ROBOT)
+    wrong_robot = check_robot(fit, first) if judges_lengths(fit) else told
+    if has_error([*noticed, *changes]):  # what is wrong with the data bends the robot too
+        wrong_robot = []
+    unlike = check_plausible(fit, first, (*noticed, *wrong_robot, *told))
+    if unlike:
+        wrong_robot = wrong_robot or told
+    expected = expected_error(as_residuals_allow(fit, first), plausible=not unlike)
     wrong_sigma = check_sigma(left_over)
-    narrow = (
-        []  # more configurations do not mend these
-        if unlike or wrong_sigma
-        else check_narrow_data(fit, expected, first, validation or train_errors, held_out=validation is not None)
-    )
-    digest = "" if sha256 is None else f" (sha256 {sha256[:12]})"
+    hidden = [] if unlike or has_error(wrong_sigma) else check_sigma_beside_joints(left_over)
+    explained = [*changes, *check_arrival_lag(left_over)]
+    doubted = has_error([*unlike, *wrong_robot, *noticed])
+    if not explained and not doubted and not any(notice.code == "joints-rounded" for notice in noticed):
+        explained = check_remainder(left_over)
+    narrow: list[Notice] = []
+    if not unlike and (hidden or not wrong_sigma):  # more configurations do not mend these
+        by, seen = validation or train_errors, validation is not None
+        if chosen.groups and "geometry" not in chosen.groups:
+            narrow = check_narrow_data_without_geometry(fit, first, by, loss, held_out=seen)
+        narrow = narrow or check_narrow_data(fit, expected, first, by, held_out=seen)
+    digest = f" ({'' if sha256 is None else f'sha256 {sha256[:12]}, '}readings {readings_digest(as_read)[:12]})"
     history = (
         f"calibrated by truearm {__version__}: model {' + '.join([chosen.name, *effects])},"
         f" {count} of {n} configurations of {Path(readings.source).name}{digest}, seed {seed}, loss {loss},"
         f" redundancy {redundancy}{f', another base from {listed(base_changes)} on' if base_changes else ''}"
     )
-    off = off_configurations(left_over)
-    moved_then = what_moved(left_over, off)
     warnings = (
         *(notice for notice in noticed if notice.level == "error"),
         *unlike,
+        *wrong_robot,
         *_check_proof(before, validation),
         *_check_copies(readings, training, held_out),
-        *_check_trained_before(nominal_robot, sha256, (count, n, seed)),
+        *_check_trained_before(nominal_robot, as_read, sha256, (count, n, seed)),
         *moved,
-        *check_fit(fit, expected, doubted=has_error([*unlike, *noticed])),
+        *check_payload(nominal_robot),
+        *check_fit(fit, expected, doubted=doubted),
         *narrow,
         *(notice for notice in noticed if notice.level != "error"),
         *check_one_sided(fit, first),
-        *wrong_sigma,
-        *([] if moved_then is None else notices_of_change(*moved_then)),
-        *check_arrival_lag(left_over),
+        *(hidden or wrong_sigma),
+        *([] if doubted else check_separate_visits(left_over)),
+        *explained,
         *check_transmission(fit, first),
     )
     steps = steps_after_fit(
@@ -401,23 +419,25 @@ def _check_copies(data: Dataset, training: IntArray, held_out: IntArray) -> list
     ]
 
 
-def _check_trained_before(robot: Robot, sha256: str | None, split: tuple[int, int, int]) -> list[Notice]:
+def _check_trained_before(robot: Robot, data: Dataset, sha256: str | None, split: tuple[int, int, int]) -> list[Notice]:
     """Say if the robot to begin with has been trained on what is held out now.
 
     Parameters
     ----------
+    data
+        As they were read.
     sha256
-        Of the data; None if they are no file.
+        Of their file; None if they are in none.
     split
         How many configurations are trained on, of how many, and the seed.
     """
-    before = None if sha256 is None else trained_on(robot, sha256)
+    before = trained_on(robot, data, sha256)
     if before is None or before == split or split[0] == split[1]:
         return []
     return [
         Notice(
             "training-data",
-            f"The robot to begin with was calibrated with this file already, on {before[0]} of its {before[1]} "
+            f"The robot to begin with was calibrated with these readings already, on {before[0]} of its {before[1]} "
             f"configurations (seed {before[2]}): what is held out now was partly seen then, and the held-out errors "
             "flatter it. Begin with the nominal robot, or with the same `train` and `seed`.",
         )

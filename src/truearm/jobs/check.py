@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from truearm.errors import InputError, refusals_of
+from truearm.errors import InputError
 from truearm.identification.judging.left_over import LeftOver
 from truearm.identification.judging.next_steps import steps_after_check
 from truearm.identification.judging.plausibility import check_against
 from truearm.identification.solving.fit import Fit
-from truearm.jobs.arguments import data_argument, device_argument, refuse_swapped, robot_argument
+from truearm.jobs.arguments import data_argument, device_argument, readings_argument, refuse_swapped, robot_argument
 from truearm.limits import limit
-from truearm.measurement.checks import check_data, check_joints, check_range
+from truearm.measurement.checks import check_data, check_range
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of
 from truearm.measurement.table_motion import without_table_motion
@@ -45,15 +45,16 @@ def check(
     if data is None:
         robot, data = None, robot
     refuse_swapped(robot, data, "check")
-    measured = data_argument(data)
+    against = None if robot is None else robot_argument(robot)
+    measured = data_argument(data) if against is None else readings_argument(against, data)
     parts = [measured] if measured.references is None else [measured, measured.references]
     if not any(part.has_reading.any() for part in parts):
         raise InputError(
             "there is no reading", parameter="data", where=measured.source, cure="Fill in x, y and z, or distance."
         )
-    noticed, fit, part = _compared(measured, None if robot is None else robot_argument(robot), device)
+    noticed, fit, part = _compared(measured, against, device)
     if fit is None or part is None:
-        return DataCheck(measured, noticed, steps_after_check(noticed, robot=robot is not None))
+        return DataCheck(measured, noticed, steps_after_check(noticed, robot=against is not None))
     steps = steps_after_check(noticed, LeftOver.of(fit, part), errors_of(fit.robot, part))
     return DataCheck(measured, noticed, steps)
 
@@ -84,8 +85,6 @@ def _compared(
         ranged = tuple(check_range(data, device_argument(device)))
     if robot is None:
         return (*ranged, *check_data(data)), None, None
-    with refusals_of("data"):
-        check_joints(robot, data)
     still = without_table_motion(data) if steady is None else steady
     part = thinned(still, len(robot.parameters), limit("derivatives") // 2)
     if part is None:

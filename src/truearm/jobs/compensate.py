@@ -12,6 +12,7 @@ from truearm.arrays import finite_number
 from truearm.compensation.advice import check_correction
 from truearm.compensation.cell import Cell, read_frames, read_tools
 from truearm.compensation.chosen_targets import TAUGHT, Choice, Taught
+from truearm.compensation.controller_model import controller_notices, refuse_unknown_controller
 from truearm.compensation.correction import Correction
 from truearm.compensation.program_correction import CorrectedPrograms, corrected_programs
 from truearm.compensation.program_files import edited, language_called, program_files, read_programs
@@ -33,7 +34,9 @@ from truearm.jobs.arguments import (
     python_call,
     robot_argument,
 )
-from truearm.jobs.proof import NOT_BETTER, accept_argument, changed_since, known_of, refuse_unaccepted
+from truearm.jobs.proof import NOT_BETTER, accept_argument, changed_since, check_maker, known_of, refuse_unaccepted
+from truearm.modeling.formats.controller_entry import STATED
+from truearm.modeling.formats.controller_kinematics import with_controller_kinematics
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
 from truearm.results.program_correction import REPORT, FileCorrection, ProgramCorrection
@@ -47,6 +50,7 @@ def compensate(
     tools: str | Path | None = None,
     frames: str | Path | None = None,
     payload: Payload | str | None = None,
+    controller_kinematics: str | Path | None = None,
     strict: bool = False,
     split: float | None = None,
     again: bool = False,
@@ -74,6 +78,10 @@ def compensate(
     payload
         What the flange carries in production (an object, or a text such as ``2.7kg,50mm,25mm,100mm``); None for what
         the program says of each tool, and what it carried in calibration where the program does not say it.
+    controller_kinematics
+        With what the controller turns poses into joint positions: ``nominal`` (the table of the robot file),
+        ``proprietary`` (a calibration of its maker that nobody else can read), ``unknown``, or the file of its
+        kinematics, as :func:`truearm.import_ur_kinematics` reads it; None for what the robot file says.
     strict
         Refuse if a target cannot be corrected.
     split
@@ -90,8 +98,9 @@ def compensate(
         it is not known: then all is taken as computed off-line.
     accept
         What may speak against the robot's calibration or against a correction, by name: ``rank-loss``,
-        ``not-converged``, ``implausible``, or a notice of the level error that the calibration ended with; and
-        ``not-better-here`` to correct also the targets that would rather get worse.
+        ``not-converged``, ``implausible``, or a notice of the level error that the calibration ended with, such as
+        ``wrong-robot``; ``maker`` for programs in the language of another maker; and ``not-better-here`` to correct
+        also the targets that would rather get worse.
     command
         How to do it again, for the report; None writes the call in Python.
     progress
@@ -101,7 +110,8 @@ def compensate(
     ------
     InputError
         If a program cannot be read or was corrected already, the robot is not calibrated or its calibration ended
-        badly, a tool or frame is not defined, or with `strict` a target cannot be corrected.
+        badly or is another maker's, a tool or frame is not defined, it is not known with what the controller computes
+        and its maker calibrates every arm, or with `strict` a target cannot be corrected.
     """
     progress_argument(progress)
     paths = paths_argument(programs, "programs", "program")
@@ -118,8 +128,12 @@ def compensate(
         keep=names_argument(keep, "keep"),
         taught=_taught(taught, tools=tool_file is not None, frames=frame_file is not None),
     )
-    folder = None if out is None else folder_for((REPORT,), out, robot, tools, frames, *paths)
-    arm = robot_argument(robot).with_payload(payload)
+    folder = (
+        None
+        if out is None
+        else folder_for((REPORT,), out, robot, tools, frames, *_kinematics_file(controller_kinematics), *paths)
+    )
+    arm = _with_controller(robot_argument(robot).with_payload(payload), controller_kinematics)
     accepted = accept_argument(accept, arm)
     invocation = command_argument(command) or python_call(
         "compensate",
@@ -128,6 +142,7 @@ def compensate(
         tools=tools,
         frames=frames,
         payload=payload,
+        controller_kinematics=controller_kinematics,
         strict=strict or None,
         split=split,
         again=again or None,
@@ -147,6 +162,9 @@ def compensate(
         files = program_files(paths, again=again)
         progress("reading the programs")
         read = read_programs(files)
+    language = language_called(read[0].language)
+    foreign = check_maker(arm, language, accepted)
+    refuse_unknown_controller(arm, read)
     with refusals_of("robot"):
         result = corrected_programs(
             arm,
@@ -158,7 +176,6 @@ def compensate(
         )
     if strict:
         _refuse_skipped(result)
-    language = language_called(read[0].language)
     splits: tuple[ProgramSplit, ...] = ()
     if split is not None:
         progress("splitting moves")
@@ -179,14 +196,32 @@ def compensate(
         files=tuple(corrected),
         result=result,
         splits=splits,
-        warnings=(*changed_since(robot), *known_of(arm), *check_correction(arm, result, splits)),
+        warnings=(
+            *changed_since(robot),
+            *known_of(arm),
+            *foreign,
+            *controller_notices(arm, read),
+            *check_correction(arm, result, splits),
+        ),
         command=invocation,
-        inputs=files_of(robot, tools, frames),
+        inputs=files_of(robot, tools, frames, *_kinematics_file(controller_kinematics)),
     )
     if folder is not None:
         with refusals_of("out"):
             made.save(folder, progress)
     return made
+
+
+def _with_controller(arm: Robot, said: str | Path | None) -> Robot:
+    """Return a robot with what was said of its controller's kinematics."""
+    if said is None:
+        return arm
+    with refusals_of("controller_kinematics"):
+        return with_controller_kinematics(arm, str(path_argument(said, "controller_kinematics")), Path())
+
+
+def _kinematics_file(said: str | Path | None) -> tuple[str | Path, ...]:
+    return () if said is None or str(said) in STATED else (said,)
 
 
 def _taught(taught: object, *, tools: bool, frames: bool) -> frozenset[Taught] | None:

@@ -98,7 +98,13 @@ def _corrected_plate(
     cell = folder / "cell.yaml"
     write_files(folder, {cell.name: _CELL.format(place=f"{x}, {y}, {z}", quaternion=quaternion)})
     correction = compensate(
-        folder / "calibrated.yaml", [folder / _PLATE], tools=cell, frames=cell, taught=["none"], progress=progress
+        folder / "calibrated.yaml",
+        [folder / _PLATE],
+        tools=cell,
+        frames=cell,
+        taught=["none"],
+        controller_kinematics="nominal",  # so does the twin's
+        progress=progress,
     )
     progress("running the program on the twin")
     before, after = correction.result.corrections[0].program, correction.as_written()[0]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from truearm.errors import refusals_of
-from truearm.jobs.arguments import data_argument, refuse_swapped
+from truearm.jobs.arguments import refuse_swapped
 from truearm.jobs.validate import as_measured
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of
@@ -41,8 +41,8 @@ def distances(
         If the robot has no targets, the data name others, or there are positions at one configuration only.
     """
     refuse_swapped(robot, data, "distances")
-    readings = data_argument(data)
-    predicted = errors_of(as_measured(robot, readings, payload, gravity), readings).position_errors
+    arm, readings = as_measured(robot, data, payload, gravity)
+    predicted = errors_of(arm, readings).position_errors
     seen = readings.has_position
     measured = readings.position[seen]
     with refusals_of("data"):

@@ -22,8 +22,9 @@ def export(robot: Robot | str | Path, format: str, *, out: str | Path | None = N
         A robot, or what :func:`truearm.load_robot` takes.
     format
         ``dh`` (standard DH table), ``mdh`` (modified DH table), ``hayati`` (standard DH table with beta between nearly
-        parallel axes), ``urdf``, ``json`` (everything, schema ``truearm-model/1``) or ``python`` (a module for forward
-        and inverse kinematics that needs only NumPy).
+        parallel axes), ``urdf``, ``json`` (everything, schema ``truearm-model/1``), ``python`` (a module for forward
+        and inverse kinematics that needs only NumPy) or ``ur-kinematics`` (the kinematics file of the ROS driver of
+        Universal Robots).
     out
         File to write, which must not exist yet; None writes nothing.
 

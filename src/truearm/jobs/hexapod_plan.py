@@ -13,6 +13,7 @@ from truearm.jobs.arguments import (
     array_argument,
     file_for,
     flag_argument,
+    joints_argument,
     length_argument,
     lengths_argument,
     name_argument,
@@ -21,6 +22,7 @@ from truearm.jobs.arguments import (
 from truearm.measurement.hexapod.poses import distinct as distinct_poses
 from truearm.measurement.hexapod.poses import poses
 from truearm.measurement.readers.rows import QUATERNION_TOLERANCE, unit_quaternions
+from truearm.modeling.controller import JointsOf
 from truearm.modeling.inverse.branches import BRANCHES
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
@@ -41,6 +43,7 @@ def hexapod_plan(
     distinct: bool = False,
     branches: Sequence[str] = (),
     arm_radius: float = ARM_RADIUS,
+    joints: JointsOf | None = None,
 ) -> HexapodPlan:
     """Plan which configurations of a robot can be measured with the base fixture at one place.
 
@@ -63,6 +66,9 @@ def hexapod_plan(
         Only branches whose names begin so, such as ``front-up``; all of them if empty.
     arm_radius
         Of the arm's links, for the room at the bars [m].
+    joints
+        Whose joint positions the files hold: the ``model``'s, or as the ``controller`` shows them; None for the
+        controller's where the robot file says that they differ.
 
     Raises
     ------
@@ -79,6 +85,7 @@ def hexapod_plan(
         raise InputError("the sheet and the steps must be different files", parameter="steps", came=str(text))
     name = None if tool is None else name_argument(tool, "tool")
     loaded = robot_argument(robot)
+    joints_are = joints_argument(joints, loaded)
     with refusals_of("tool"):
         arm, cups = with_cups(loaded, name)
         wanted = poses(cups)
@@ -90,7 +97,7 @@ def hexapod_plan(
             arm_radius=radius,
             branches=wanted_branches,
         )
-    plan = HexapodPlan(arm, found)
+    plan = HexapodPlan(arm, found, joints_are)
     files = {sheet: plan.sheet_text(), text: plan.steps_text()}
     written = {file.absolute(): content for file, content in files.items() if file is not None}
     if written:

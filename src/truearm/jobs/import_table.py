@@ -6,14 +6,17 @@ from pathlib import Path
 
 from truearm.errors import refusals_of
 from truearm.files import path_argument
-from truearm.jobs.arguments import file_for
+from truearm.jobs.arguments import JOINTS_OF, choice_argument, file_for
 from truearm.measurement.readers.canonical import csv_text
 from truearm.measurement.readers.table import files_read, read_table
+from truearm.modeling.controller import JointsOf
 from truearm.results.imported import Imported
 from truearm.writing import write_text
 
 
-def import_table(file: str | Path, mapping: str | Path, *, out: str | Path | None = None) -> Imported:
+def import_table(
+    file: str | Path, mapping: str | Path, *, joints_are: JointsOf | None = None, out: str | Path | None = None
+) -> Imported:
     """Read any table of points, by a mapping that says which column is what.
 
     Parameters
@@ -22,6 +25,9 @@ def import_table(file: str | Path, mapping: str | Path, *, out: str | Path | Non
         A CSV or SpatialAnalyzer ASCII file.
     mapping
         Mapping file, schema ``truearm-mapping/1``.
+    joints_are
+        Whose joint positions they are: the ``model``'s, or as the robot's ``controller`` shows them; None for what the
+        mapping says, the model's if it says nothing.
     out
         Canonical CSV file to write; None writes nothing.
 
@@ -31,11 +37,12 @@ def import_table(file: str | Path, mapping: str | Path, *, out: str | Path | Non
         If a file cannot be used; the message names the line and the column.
     """
     table, columns = path_argument(file, "file"), path_argument(mapping, "mapping")
+    whose = None if joints_are is None else choice_argument(joints_are, "joints_are", JOINTS_OF)
     with refusals_of("mapping"):
         read = files_read(table, columns)
     target = None if out is None else file_for(out, *read)
     with refusals_of("file"):
-        data = read_table(table, columns)
+        data = read_table(table, columns, whose)
     if target is not None:
         write_text(target, csv_text(data))
     return Imported(data, target)

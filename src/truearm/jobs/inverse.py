@@ -13,19 +13,23 @@ from truearm.jobs.arguments import (
     choice_argument,
     file_for,
     gravity_argument,
+    joints_argument,
     payload_argument,
     robot_argument,
 )
 from truearm.jobs.proof import told_of
 from truearm.measurement.readers.poses import read_poses
 from truearm.modeling.chain import Array
+from truearm.modeling.controller import JointsOf
+from truearm.modeling.formats.joint_columns import counting
 from truearm.modeling.formats.joint_table import joints_csv
-from truearm.modeling.frames import Frame
+from truearm.modeling.frames import FRAMES, Frame
 from truearm.modeling.inverse import inverse as inverse_kinematics
 from truearm.modeling.inverse.pose_solver import Orientation
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
-from truearm.modeling.transform import rotation_from_quaternion
+from truearm.modeling.transform import IDENTITY, rotation_from_quaternion
+from truearm.notices import Notice
 from truearm.results.joint_table import JointTable
 from truearm.writing import write_text
 
@@ -43,6 +47,7 @@ def inverse(
     orientation: Orientation = "full",
     payload: Payload | str | None = None,
     gravity: Sequence[float] | None = None,
+    joints: JointsOf | None = None,
 ) -> JointTable:
     """Find the joints that bring a robot to poses, with its calibration and joint effects.
 
@@ -61,17 +66,21 @@ def inverse(
     branch
         A branch by name, as ``front-up-noflip``; ``all``; or None for the one nearest to the seed within the limits.
     seed
-        Joint positions ``(joints,)`` or ``(n, joints)`` [rad; m for prismatic joints] near which the answer shall lie;
-        zero if None.
+        Joint positions of the model ``(joints,)`` or ``(n, joints)`` [rad; m for prismatic joints] near which the
+        answer shall lie; zero if None.
     target
         Name of the target that shall be there; the flange if None.
     frame
-        What the poses are given in: ``base``, the robot's base, or ``world``, the instrument's frame.
+        What the poses are given in: ``base``, the robot's base; ``world``, the instrument's frame; or ``controller``,
+        the base frame of the robot's controller. There the flange is the controller's too, where a tool is all zeros.
     orientation
         ``full``; ``axis`` if only the direction of the z axis counts; ``free`` if only the position does.
     payload, gravity
         What the robot carries (an object, or a text such as ``2.7kg,50mm,25mm,100mm``) and free fall in its base frame
         [m/s^2]; None for what its file says.
+    joints
+        Whose joint positions the file holds: the ``model``'s, or as the ``controller`` shows them; None for the
+        controller's where the robot file says that they differ.
 
     Raises
     ------
@@ -79,9 +88,10 @@ def inverse(
         For anything that cannot be used, with a message that says what to do.
     """
     file = None if out is None else file_for(out, robot, poses)
-    choice_argument(frame, "frame", dict.fromkeys(("base", "world")))
+    choice_argument(frame, "frame", dict.fromkeys(FRAMES))
     choice_argument(orientation, "orientation", dict.fromkeys(("full", "axis", "free")))
     arm = robot_argument(robot).with_payload(payload_argument(payload), gravity_argument(gravity))
+    joints_are = joints_argument(joints, arm)
     if target is not None:
         choice_argument(target, "target", {known.name: known for known in arm.targets})
     if branch is not None and not isinstance(branch, str):
@@ -106,8 +116,24 @@ def inverse(
             arm, positions, turned, target=target, frame=frame, branch=branch, seed=near, orientation=orientation
         )
     if file is not None:
-        write_text(file, joints_csv(solutions, labels, arm.joints))
-    return JointTable(labels, solutions, tuple(told_of(arm)))
+        write_text(file, joints_csv(solutions, labels, arm.joints, counting(arm, joints_are)))
+    return JointTable(labels, solutions, (*told_of(arm), *_other_frame(arm, frame, target)), joints_are)
+
+
+def _other_frame(robot: Robot, frame: Frame, target: str | None) -> list[Notice]:
+    """Say if poses were taken in the model's base frame, and a pendant would show them in another."""
+    controller = robot.controller
+    alike = controller.base == IDENTITY and (target is not None or controller.flange == IDENTITY)
+    if frame != "base" or alike:
+        return []
+    return [
+        Notice(
+            "model-frame",
+            "The poses were taken as those of the model's flange in its base frame. The controller has them elsewhere "
+            "('truearm show' says where): for poses that the pendant shows use `frame=controller`.",
+            "note",
+        )
+    ]
 
 
 def _poses(poses: object, rotations: object) -> tuple[tuple[str, ...], Array, Array | None]:

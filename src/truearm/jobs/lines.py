@@ -13,16 +13,17 @@ from truearm.files import path_argument
 from truearm.identification.solving.fit import place
 from truearm.jobs.arguments import (
     count_argument,
-    data_argument,
     file_for,
     files_of,
+    joints_argument,
     length_argument,
     lengths_argument,
+    readings_argument,
     robot_argument,
     whole_argument,
 )
-from truearm.measurement.checks import check_joints
 from truearm.measurement.dataset import Dataset
+from truearm.modeling.controller import JointsOf
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY
 from truearm.planning.poses.seven_lines import seven_lines, usable_joints
@@ -42,6 +43,7 @@ def lines(
     noise: float = 0.0,
     repeats: int = 30,
     seed: int = 0,
+    joints: JointsOf | None = None,
     out: str | Path | None = None,
 ) -> LineTest:
     """Test a robot along seven directions of a box, and compensate it off-line through its joint errors.
@@ -64,6 +66,9 @@ def lines(
         Repetitions on the twin.
     seed
         Of the noise, and of a random truth.
+    joints
+        Whose joint positions the file holds: the ``model``'s, or as the ``controller`` shows them; None for the
+        controller's where the robot file says that they differ.
     out
         CSV file for the joint positions to command; None writes nothing.
 
@@ -83,27 +88,27 @@ def lines(
     errors = None if joint_errors is None else robot_argument(joint_errors, "joint_errors")
     with refusals_of("size"):
         poses = seven_lines(middle, sides)
+    joints_are = joints_argument(joints, nominal)
     with refusals_of("centre"):
-        joints = poses.joints(nominal)
-    commanded = joints
+        at_poses = poses.joints(nominal)
+    commanded = at_poses
     if errors is not None:
         _check_design(nominal, errors)
         with refusals_of("centre"):
-            commanded = usable_joints(fake_targets(errors, joints).solutions, poses.labels, "compensated line test")
+            commanded = usable_joints(fake_targets(errors, at_poses).solutions, poses.labels, "compensated line test")
     before: LineErrors | None = None
     after: LineErrors | None = None
     if truth is not None:
         rng = np.random.default_rng(seed)
         with refusals_of("truth"):
             twin = truth_twin(nominal, str(path_argument(truth, "truth")), rng)
-        before = on_twin(poses, twin, joints, scatter, repeats, rng)
+        before = on_twin(poses, twin, at_poses, scatter, repeats, rng)
         after = None if errors is None else on_twin(poses, twin, commanded, scatter, repeats, rng)
     elif data is not None:
-        measured = data_argument(data)
+        measured = readings_argument(nominal, data)
         with refusals_of("data"):
-            check_joints(nominal, measured)
             before = from_data(poses, _placed(nominal, errors, measured), measured)
-    found = LineTest(nominal, poses, commanded, errors is not None, before, after, inputs)
+    found = LineTest(nominal, poses, commanded, errors is not None, before, after, inputs, joints_are)
     if path is not None:
         found.save(path)
     return found

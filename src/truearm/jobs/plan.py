@@ -15,20 +15,21 @@ from truearm.jobs.arguments import (
     choice_argument,
     command_argument,
     count_argument,
-    data_argument,
     deviation_argument,
     device_argument,
     file_for,
     files_of,
     gravity_argument,
+    joints_argument,
     payload_argument,
     progress_argument,
     python_call,
+    readings_argument,
     robot_argument,
     whole_argument,
 )
-from truearm.measurement.checks import check_joints
 from truearm.measurement.dataset import Dataset
+from truearm.modeling.controller import JointsOf
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
 from truearm.planning.choosing.measurement_plan import (
@@ -57,6 +58,7 @@ def plan(
     seed: int = 0,
     payload: Payload | str | None = None,
     gravity: Sequence[float] | None = None,
+    joints: JointsOf | None = None,
     command: str | None = None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Plan:
@@ -90,6 +92,9 @@ def plan(
     payload, gravity
         What the robot carries (an object, or a text such as ``2.7kg,50mm,25mm,100mm``) and free fall in its base frame
         [m/s^2].
+    joints
+        Whose joint positions the file holds: the ``model``'s, or as the ``controller`` shows them; None for the
+        controller's where the robot file says that they differ.
     command
         How to run it again, for the page; None writes the call in Python.
     progress
@@ -132,9 +137,11 @@ def plan(
         seed=seed,
         payload=carried,
         gravity=fall,
+        joints=joints,
     )
     progress("reading the robot")
     carrying = robot_argument(robot).with_payload(carried, fall)
+    joints_are = joints_argument(joints, carrying)
     labels, readings, own = None, None, bool(carrying.targets)
     if instrument is not None:
         seen, readings, choice = device_candidates(carrying, instrument, number, rng)
@@ -143,9 +150,7 @@ def plan(
         seen = with_targets(carrying)
         choice = random_candidates(seen, number, rng)
     else:
-        data = data_argument(candidates_from, "candidates_from")
-        with refusals_of("candidates_from"):
-            check_joints(carrying, data)
+        data = readings_argument(carrying, candidates_from, "candidates_from")
         seen, choice, labels = with_targets(carrying, data), data.postures, data.labels
         own = own or bool(data.has_position.any())
     progress(f"choosing among {len(choice)} configurations")
@@ -163,7 +168,7 @@ def plan(
         seen_from_the_origin=own,
         readings=readings,
     )
-    planned = Plan(made, call, files_of(robot, candidates_from, constraints), deviation)
+    planned = Plan(made, call, files_of(robot, candidates_from, constraints), deviation, joints_are)
     if table is not None:
         progress("writing the files")
         planned.save(table)

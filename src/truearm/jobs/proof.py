@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
+from truearm.compensation.programs.program import Language
 from truearm.errors import InputError
 from truearm.files import exists
 from truearm.jobs.arguments import choices_argument
@@ -18,13 +19,17 @@ _UNSOUND: Final = ("rank-loss", "not-converged", "implausible")
 #: Speaks against other regions than those that were measured. Programs need not be refused for it: every target is
 #: judged by what is known of the robot there, if that is known.
 _ELSEWHERE: Final = "narrow-data"
+#: The calibration is of another robot than the file says.
+_WRONG: Final = "wrong-robot"
+#: Programs of another maker's robots.
+OTHER_MAKER: Final = "maker"
 #: Targets that would rather get worse, see :mod:`truearm.compensation.kept_targets`.
 NOT_BETTER: Final = "not-better-here"
 
 
 def accept_argument(accept: object, robot: Robot) -> tuple[str, ...]:
     """Return the names of what is accepted although it speaks against a correction."""
-    known = dict.fromkeys((*_UNSOUND, _ELSEWHERE, *_against(robot), NOT_BETTER))
+    known = dict.fromkeys((*_UNSOUND, _ELSEWHERE, _WRONG, *_against(robot), OTHER_MAKER, NOT_BETTER))
     return choices_argument(accept, "accept", list(known), "status or notice")
 
 
@@ -49,6 +54,29 @@ def refuse_unaccepted(robot: Robot, accept: tuple[str, ...]) -> None:
             came=name,
             cure=f"{message}{others} To correct programs all the same, give {words}.",
         )
+
+
+def check_maker(robot: Robot, language: Language, accept: tuple[str, ...]) -> list[Notice]:
+    """Return what is to be said of programs in the language of another maker's robots, if that is accepted.
+
+    Raises
+    ------
+    InputError
+        If it is not. A robot whose maker is not known may be anyone's.
+    """
+    if not robot.maker or language.runs_on(robot.maker):
+        return []
+    theirs = f"{language.name} runs on controllers of {language.makers[0]}"
+    if OTHER_MAKER in accept:
+        return [Notice(OTHER_MAKER, f"{theirs}, and {robot.name} is of {robot.maker}. It was accepted.")]
+    raise InputError(
+        "the programs are for robots of another maker",
+        parameter="robot",
+        where=robot.name,
+        came=f"a robot of {robot.maker} and programs in {language.name}",
+        cure=f"{theirs}: give the calibration of the robot that runs them. If it is this one, mend the entry maker of "
+        f"its file, or give `accept={OTHER_MAKER}`.",
+    )
 
 
 def known_of(robot: Robot) -> list[Notice]:

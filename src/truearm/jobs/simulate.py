@@ -12,18 +12,23 @@ from truearm.arrays import finite_number
 from truearm.errors import InputError, refusals_of, wrong_kind
 from truearm.files import path_argument
 from truearm.jobs.arguments import (
+    JOINTS_OF,
+    choice_argument,
     count_argument,
     deviation_argument,
     device_argument,
     file_for,
     gravity_argument,
+    joints_argument,
     payload_argument,
     progress_argument,
     robot_argument,
     whole_argument,
 )
 from truearm.limits import refuse_beyond
+from truearm.measurement.controller_joints import in_controller_joints
 from truearm.measurement.readers.canonical import csv_text
+from truearm.modeling.controller import JointsOf
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
 from truearm.results.simulation import Simulation
@@ -44,6 +49,7 @@ def simulate(
     seed: int = 0,
     payload: Payload | str | None = None,
     gravity: Sequence[float] | None = None,
+    joints: JointsOf = "model",
     progress: Callable[[str], None] = lambda _: None,
 ) -> Simulation:
     """Measure a digital twin whose truth is known, with a simulated instrument.
@@ -71,6 +77,8 @@ def simulate(
     payload, gravity
         What the robot truly carries (an object, or a text such as ``2.7kg,50mm,25mm,100mm``) and free fall in its base
         frame [m/s^2]; None for what its file says.
+    joints
+        Whose joint positions the data hold: the ``model``'s, or as the ``controller`` shows them.
     progress
         Called with a few words at each step.
 
@@ -94,6 +102,7 @@ def simulate(
     file = None if out is None else file_for(out, robot, truth)
     rng = np.random.default_rng(whole_argument(seed, "seed"))
     nominal = robot_argument(robot)
+    joints_are = joints_argument(choice_argument(joints, "joints", JOINTS_OF), nominal)
     with refusals_of("truth"):
         twin = truth_twin(nominal, truth, rng)
     twin = replace(twin, robot=twin.robot.with_payload(payload_argument(payload), gravity_argument(gravity)))
@@ -104,6 +113,8 @@ def simulate(
         data = measure(twin, nominal.random_configurations(count, rng), sigma, rng)
     else:
         data = measured_with(instrument, nominal, twin, count, rng, sigma)
+    if joints_are == "controller":
+        data = in_controller_joints(nominal, data)
     if file is not None:
         write_text(file, csv_text(data))
     return Simulation(nominal.name, truth.name if isinstance(truth, Robot) else str(truth), data, file)

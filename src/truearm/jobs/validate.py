@@ -10,12 +10,21 @@ from typing import Final
 
 from truearm.errors import InputError, refusals_of
 from truearm.files import path_argument, read_bytes
+from truearm.identification.judging.beyond_proof import check_proof
+from truearm.identification.judging.payload import check_payload
 from truearm.identification.judging.same_frames import check_frames
 from truearm.identification.judging.target_names import check_names
-from truearm.jobs.arguments import data_argument, gravity_argument, payload_argument, refuse_swapped, robot_argument
+from truearm.jobs.arguments import (
+    data_argument,
+    gravity_argument,
+    payload_argument,
+    readings_argument,
+    refuse_swapped,
+    robot_argument,
+)
 from truearm.jobs.proof import changed_since
-from truearm.measurement.checks import check_joints
 from truearm.measurement.dataset import Dataset
+from truearm.measurement.repeats import readings_digest
 from truearm.measurement.statistics import errors_of
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
@@ -52,9 +61,9 @@ def validate(
     if isinstance(data, str | Path):
         with refusals_of("data"):
             digest = hashlib.sha256(read_bytes(path_argument(data, "data"))).hexdigest()
-    data = data_argument(data)
     changed = changed_since(robot)
-    robot = as_measured(robot, data, payload, gravity)
+    as_calibrated = robot_argument(robot)
+    robot, data = as_measured(robot, data, payload, gravity)
     identified = {p.group for p in robot.parameters.values() if p.deviation is not None}
     if data.anchored and robot.fixtures and identified and "base" not in identified:
         raise InputError(
@@ -65,32 +74,47 @@ def validate(
             "'truearm distances'.",
         )
     errors = errors_of(robot, data)
-    mistaken = check_names(robot, data, errors) or check_frames(robot, data, errors)
-    return Validation(data.source, errors, (*changed, *mistaken, *_seen_in_training(robot, data, digest)))
+    mistaken = (
+        check_names(robot, data, errors)
+        or check_frames(robot, data, errors)
+        or check_proof(as_calibrated, data, errors)
+    )
+    return Validation(
+        data.source, errors, (*changed, *mistaken, *check_payload(robot), *_seen_in_training(robot, data, digest))
+    )
 
 
-#: How a calibration says in the robot's history which configurations of which file it was trained on.
-_TRAINED: Final = re.compile(r"(\d+) of (\d+) configurations of .*?\(sha256 ([0-9a-f]+)\), seed (\d+)")
+#: How a calibration says in the robot's history which configurations of which data it was trained on: by the hash of
+#: the file, of the readings, or of both.
+_TRAINED: Final = re.compile(
+    r"(\d+) of (\d+) configurations of .*?\((?:sha256 ([0-9a-f]+))?(?:, )?(?:readings ([0-9a-f]+))?\), seed (\d+)"
+)
 
 
-def trained_on(robot: Robot, digest: str) -> tuple[int, int, int] | None:
-    """Return how many configurations of a file a robot was trained on, of how many, and the seed; None if on none.
+def trained_on(robot: Robot, data: Dataset, digest: str | None) -> tuple[int, int, int] | None:
+    """Return how many configurations of data a robot was trained on, of how many, and the seed; None if on none.
 
     Parameters
     ----------
+    data
+        As they were read.
     digest
-        SHA-256 of the file.
+        SHA-256 of their file, by which older calibrations know them; None if they are in none.
     """
+    readings = readings_digest(data)
     for line in robot.history:
         found = _TRAINED.search(line)
-        if found is not None and found[3] == digest[: len(found[3])]:
-            return int(found[1]), int(found[2]), int(found[4])
+        if found is None:
+            continue
+        same_file = found[3] is not None and digest is not None and found[3] == digest[: len(found[3])]
+        if same_file or (found[4] is not None and found[4] == readings[: len(found[4])]):
+            return int(found[1]), int(found[2]), int(found[5])
     return None
 
 
 def _seen_in_training(robot: Robot, data: Dataset, digest: str | None) -> list[Notice]:
-    """Say if the readings are from the file that the robot was calibrated with, and how many it was trained on."""
-    trained = None if digest is None else trained_on(robot, digest)
+    """Say if the readings are those that the robot was calibrated with, and how many it was trained on."""
+    trained = trained_on(robot, data, digest)
     if trained is None:
         return []
     count, of, _ = trained
@@ -98,15 +122,15 @@ def _seen_in_training(robot: Robot, data: Dataset, digest: str | None) -> list[N
     return [
         Notice(
             "training-data",
-            f"The robot was calibrated with this file: {count} of its {of} configurations are those it was trained "
-            f"on{held_out}. These errors flatter it. Validate with measurements that were not used.",
+            f"The robot was calibrated with these readings: {count} of their {of} configurations are those it was "
+            f"trained on{held_out}. These errors flatter it. Validate with measurements that were not used.",
         )
     ]
 
 
-def as_measured(robot: object, data: Dataset, payload: object, gravity: object) -> Robot:
-    """Return the robot with what it carried when data were measured, or refuse what it cannot be judged by."""
-    robot = robot_argument(robot)
+def as_measured(robot: object, data: object, payload: object, gravity: object) -> tuple[Robot, Dataset]:
+    """Return the robot with what it carried when data were measured, and those, or refuse what cannot be judged."""
+    measured, robot = data_argument(data), robot_argument(robot)
     if not robot.targets:
         raise InputError(
             "the robot has no targets, so its positions cannot be compared with the readings",
@@ -114,8 +138,7 @@ def as_measured(robot: object, data: Dataset, payload: object, gravity: object) 
             where=robot.name,
             cure="Use the calibrated.yaml that 'truearm calibrate' wrote: it holds base and targets.",
         )
-    with refusals_of("data"):
-        check_joints(robot, data)
+    data = readings_argument(robot, measured)
     robot = robot.with_payload(payload_argument(payload), gravity_argument(gravity))
     if data.temperature is None and any(effect.warmed for effect in robot.effects):
         raise InputError(
@@ -133,4 +156,4 @@ def as_measured(robot: object, data: Dataset, payload: object, gravity: object) 
         raise InputError(
             "there is no reading", parameter="data", where=data.source, cure="Fill in x, y and z, or distance."
         )
-    return robot
+    return robot, data

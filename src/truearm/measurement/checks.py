@@ -6,6 +6,7 @@ readings of a real instrument agree to the last digit.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from typing import Final, Protocol
 
@@ -18,6 +19,7 @@ from truearm.measurement.places import constellation, places_of
 from truearm.measurement.repeats import check_duplicates, repeated_joints, repeated_joints_notices
 from truearm.measurement.rigid_tool import DEVIATIONS, OTHER_REFLECTOR, SAME_POINT, UNMOVED, Suspect, rigid_suspects
 from truearm.modeling.chain import Array
+from truearm.modeling.formats.joint_columns import COLUMN
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.shown import counted
@@ -209,20 +211,21 @@ def check_joints(robot: Robot, data: Dataset) -> None:
     InputError
         Naming the counts, or the joint whose unit does not fit.
     """
+    column = COLUMN["model" if data.joints_are == "model" else "controller"]
     if data.joints.shape[1] != len(robot.joints):
         raise InputError(
             "the number of joints differs from the robot's",
             where=data.source,
             came=counted(data.joints.shape[1], "joint column"),
             allowed=f"{len(robot.joints)} ({robot.name})",
-            cure="Give one column joint_i for each joint of the robot, base first.",
+            cure=f"Give one column {column}_i for each joint of the robot, base first.",
         )
     for number, (joint, kind) in enumerate(zip(robot.joints, data.joint_kinds, strict=True), 1):
         if joint.kind != kind:
             units = {"revolute": "deg or rad", "prismatic": "mm, m, um or in"}
             raise InputError(
                 f"joint {number} of {robot.name} is {joint.kind}, but its column has a unit of a {kind} joint",
-                where=f"{data.source}, column joint_{number}",
+                where=f"{data.source}, column {column}_{number}",
                 allowed=units[joint.kind],
             )
 
@@ -280,6 +283,11 @@ def _misnamed(data: Dataset) -> list[Notice]:
                 labels = _listed([data.labels[c] for c in sorted(at)])
                 found.append(f"{name} at {labels}, where {other} is missing: did you mean {other}?")
                 break
+    written = {_as_meant(name): name for name in reversed(data.targets)}
+    for t, name in enumerate(data.targets):
+        first = written[_as_meant(name)]
+        if first != name and seen[t] and not seen[t] & seen[data.targets.index(first)] and not _told(name, found):
+            found.append(f"{first} and {name} are never read together: are they one target?")
     for t, c in twice:
         lost = [data.targets[o] for o in often if c not in seen[o]]
         if len(lost) == 1:
@@ -294,6 +302,15 @@ def _misnamed(data: Dataset) -> list[Notice]:
             "error",
         )
     ]
+
+
+def _as_meant(name: str) -> str:
+    """Return a name without what is easily written in two ways: case, blanks, hyphens and leading zeros."""
+    return re.sub(r"(?<![0-9])0+(?=[0-9])", "", re.sub(r"[\s_-]", "", name.casefold()))
+
+
+def _told(name: str, found: Sequence[str]) -> bool:
+    return any(words.startswith(f"{name} at ") for words in found)
 
 
 def _are(things: Sequence[object]) -> str:

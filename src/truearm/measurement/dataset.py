@@ -22,6 +22,7 @@ from truearm.measurement.dataset_fields import (
     refuse_unsound,
 )
 from truearm.modeling.chain import Array
+from truearm.modeling.controller import JointsOf
 from truearm.modeling.postures import Postures, approach_of
 from truearm.shown import as_html, counted, listed, short_text
 
@@ -45,6 +46,10 @@ class Dataset:
         Joint positions [rad; m for prismatic joints], ``(configurations, joints)``.
     joint_kinds
         ``revolute`` or ``prismatic`` for each joint, as the units of the file say.
+    joints_are
+        ``model``: the joints are those of the robot's model. ``controller``: they are what its controller shows, and no
+        robot can be compared with them before :func:`~truearm.measurement.controller_joints.in_model_joints` has made
+        them the model's; they are ``converted`` then.
     targets
         Names of the targets, in order of first appearance.
     configuration, target
@@ -113,6 +118,7 @@ class Dataset:
     temperature: Array | None = None
     wrench: Array | None = None
     references: Dataset | None = None
+    joints_are: str = "model"
 
     def __post_init__(self) -> None:
         """Refuse fields that do not fit together."""
@@ -142,7 +148,8 @@ class Dataset:
         return short_text(
             [
                 f"{self.source}: {counted(self.configurations, 'configuration')} "
-                f"of {counted(len(self.joint_kinds), 'joint')}",
+                f"of {counted(len(self.joint_kinds), 'joint')}"
+                f"{' as the controller shows them' if self.joints_are == 'controller' else ''}",
                 f"{counted(len(self.targets), 'target')}: {listed(self.targets)}",
                 f"readings: {', '.join(found)}",
                 f"with: {', '.join(what for what, given in known.items() if given is not None) or 'nothing else'}",
@@ -167,6 +174,7 @@ class Dataset:
         order: ArrayLike | None = None,
         temperature: ArrayLike | None = None,
         joint_kinds: Sequence[str] | None = None,
+        joints_are: JointsOf = "model",
         source: str = "arrays",
     ) -> Dataset:
         """Make a dataset from arrays, one row a configuration.
@@ -197,6 +205,8 @@ class Dataset:
             Of the arm [degC], ``(n,)`` or a number.
         joint_kinds
             ``revolute`` or ``prismatic`` for each joint; all revolute if None.
+        joints_are
+            ``model``, or ``controller`` if they are what the robot's controller shows.
         source
             What messages call the data.
 
@@ -229,6 +239,7 @@ class Dataset:
             labels=checked_labels(configurations, "configurations", n),
             joints=q,
             joint_kinds=checked_kinds(joint_kinds, q.shape[1]),
+            joints_are=joints_are,
             targets=names,
             configuration=np.repeat(np.arange(n), k),
             target=np.tile(np.arange(k), n),
@@ -244,7 +255,19 @@ class Dataset:
 
     @property
     def postures(self) -> Postures:
-        """What the arm's shape depended on at each configuration."""
+        """What the arm's shape depended on at each configuration.
+
+        Raises
+        ------
+        InputError
+            If the joints are the controller's.
+        """
+        if self.joints_are == "controller":
+            raise InputError(
+                "the joint positions are the controller's, and the model's belong here",
+                where=self.source,
+                cure="Load them with the robot, truearm.load_data(data, robot), which knows how its controller counts.",
+            )
         return Postures(
             self.joints,
             approach=self.approach,

@@ -26,6 +26,7 @@ IntArray = NDArray[np.intp]
 #: The length of a quaternion may be off by this much, as by rounding.
 _UNIT: Final = 1e-6
 _KINDS: Final = ("revolute", "prismatic")
+_JOINTS_ARE: Final = ("model", "controller", "converted")
 #: Highest place in the order of measurement: whole numbers are exact up to here.
 _LAST: Final = 2.0**53
 #: What a label ends with that was there before: #2 or more, of a copy of a copy again.
@@ -52,6 +53,13 @@ def refuse_unsound(data: Dataset) -> None:
     if not isinstance(data.joint_kinds, tuple):
         raise wrong_kind("a kind of each joint belongs here", data.joint_kinds, "joint_kinds", "a tuple of texts")
     checked_kinds(data.joint_kinds, len(data.joint_kinds))
+    if data.joints_are not in _JOINTS_ARE:
+        raise InputError(
+            "there is no such kind of joint positions",
+            parameter="joints_are",
+            came=str(data.joints_are),
+            allowed=", ".join(_JOINTS_ARE),
+        )
     _places(data.target, "target", "readings", len(data.targets))
     n, m = len(data.labels), len(data.target)
     _array(data.joints, "joints", (n, len(data.joint_kinds)))
@@ -91,6 +99,8 @@ def refuse_unsound(data: Dataset) -> None:
         part = getattr(data, field)
         if part is not None and not isinstance(part, type(data)):
             raise wrong_kind("a dataset belongs here", part, field, "a Dataset, or None")
+    if data.references is not None and data.references.joints_are != data.joints_are:
+        raise InputError("the joints of the reference points are of another kind", parameter="references")
     if data.references is not None and data.references.labels != data.labels:
         raise InputError("the reference points belong to other configurations", parameter="references")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from typing import Final
 
@@ -56,6 +57,20 @@ def copies(data: Dataset, some: IntArray, others: IntArray) -> list[str]:
     content = [(joints.tobytes(), *sorted(rows)) for joints, rows in zip(data.joints, read, strict=True)]
     known = {content[c] for c in others if read[c]}
     return [data.labels[c] for c in some if content[c] in known]
+
+
+def readings_digest(data: Dataset) -> str:
+    """Return a SHA-256 of joint positions and readings, whatever their order, units, names and file.
+
+    Values are rounded to a ten-thousandth of a millimetre and a hundred-thousandth of a degree, so that the same file
+    written again is the same.
+    """
+    turning = np.array([kind == "revolute" for kind in data.joint_kinds])
+    joints = np.where(turning, np.degrees(data.joints) * 10.0, data.joints * 1e3)
+    values = [joints[data.configuration], data.position * 1e3]
+    values += [v.reshape(len(v), -1) * 1e3 for v in (data.quaternion, data.distance, data.height) if v is not None]
+    rows = np.round(np.hstack(values)[data.has_reading], 4) + 0.0
+    return hashlib.sha256(b"".join(sorted(row.tobytes() for row in rows))).hexdigest()
 
 
 def revisits(data: Dataset, some: IntArray, others: IntArray) -> list[str]:

@@ -9,13 +9,41 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 
 from truearm.errors import InputError
 from truearm.modeling.chain import Array
 from truearm.modeling.transform import IDENTITY, Transform
+
+#: Whose joint positions numbers are: the ``controller``'s, as its pendant shows them, or the ``model``'s.
+JointsOf = Literal["controller", "model"]
+#: With what a controller computes poses: nobody said; the table of the robot file; rows of its own, which are known;
+#: a model that nobody outside can read.
+KinematicsKind = Literal["unknown", "nominal", "own", "proprietary"]
+
+
+@dataclass(frozen=True)
+class ControllerKinematics:
+    """With what the controller turns poses into joint positions.
+
+    Attributes
+    ----------
+    kind
+        ``nominal`` if it is the table of the robot file, ``own`` if it is `rows`.
+    rows
+        Of ``own``: rows of the convention ``hayati``, from the robot's base frame to its flange, one a joint.
+    source
+        Where this is known from.
+    identity
+        What its maker knows the kinematics by, such as checksums, as they were read.
+    """
+
+    kind: KinematicsKind = "unknown"
+    rows: tuple[Mapping[str, float], ...] = ()
+    source: str = ""
+    identity: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -42,6 +70,8 @@ class Controller:
         ``T_flange_controllerflange``: the controller's flange frame in the robot's.
     source
         Where this is known from.
+    kinematics
+        With what the controller computes poses.
     """
 
     signs: tuple[int, ...] = ()
@@ -51,6 +81,17 @@ class Controller:
     base: Transform = IDENTITY
     flange: Transform = IDENTITY
     source: str = ""
+    kinematics: ControllerKinematics = ControllerKinematics()
+
+    @property
+    def counts_known(self) -> bool:
+        """Whether it is said how the joints are counted, be it as the model does; a source says so."""
+        return self.counts_otherwise or any(self.pulses) or bool(self.source)
+
+    @property
+    def counts_otherwise(self) -> bool:
+        """Whether the joints are counted otherwise than by the model."""
+        return bool(self.signs or any(self.zeros) or self.couplings)
 
     def coupling(self, count: int) -> Array:
         """Return which joints the counts of `count` joints include, before signs and zeros, ``(count, count)``."""
@@ -72,7 +113,33 @@ class Controller:
         coupled = turned * self.signs if self.signs else turned
         if not self.couplings:
             return coupled
-        return np.asarray(np.linalg.solve(self.coupling(counted.shape[1]), coupled.T).T, float)
+        # Summed row by row: equal readings give joint positions that are equal to the last digit, wherever they stand.
+        undone = np.linalg.inv(self.coupling(counted.shape[1]))
+        return np.asarray((undone * coupled[:, None, :]).sum(axis=2), float)
+
+    def check_counts(self, robot: str, where: str | None = None) -> None:
+        """Refuse joint positions of a controller of which it is not said how it counts.
+
+        Parameters
+        ----------
+        robot
+            Whose controller it is, for the message.
+        where
+            Names the joint positions in it, if they come from a file.
+
+        Raises
+        ------
+        InputError
+            If nothing is said.
+        """
+        if not self.counts_known:
+            raise InputError(
+                f"it is not known how the controller of {robot} counts the joints",
+                where=where,
+                allowed="a robot file with the entry controller",
+                cure="Say under controller, joints, how its readings follow from the model's joint positions, or give "
+                "the source that says they are the same. Or use the model's joint positions, joint_1 [deg] and so on.",
+            )
 
     def to_pulses(self, counted: Array) -> Array:
         """Return the pulses ``(n, joints)`` of the motors at joints ``(n, joints)`` [rad or m] of the controller.

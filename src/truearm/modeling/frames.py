@@ -11,14 +11,17 @@ from numpy.typing import ArrayLike
 from truearm.arrays import axes, number_array
 from truearm.errors import InputError, did_you_mean
 from truearm.modeling.chain import Array
+from truearm.modeling.controller import AS_THE_MODEL
 from truearm.modeling.postures import Postures
+from truearm.modeling.transform import IDENTITY, Transform
 
 if TYPE_CHECKING:
     from truearm.modeling.robot import Robot
 
-#: ``base``, the robot's base frame as it was identified; ``world``, the instrument's frame.
-Frame = Literal["base", "world"]
-FRAMES: Final[tuple[str, ...]] = ("base", "world")
+#: ``base``, the robot's base frame as it was identified; ``world``, the instrument's frame; ``controller``, the base
+#: frame of its controller.
+Frame = Literal["base", "world", "controller"]
+FRAMES: Final[tuple[str, ...]] = ("base", "world", "controller")
 #: By which joints are moved to find how deflections follow them [rad, m].
 _DIFFERENCE: Final = 1e-5
 
@@ -36,6 +39,34 @@ def checked_frame(frame: object) -> None:
     )
 
 
+def frame_and_tip(robot: Robot, frame: Frame, target: str | None) -> tuple[Transform, Transform]:
+    """Return a frame in the world, and what goes to poses in it behind the model's flange, or behind the target.
+
+    In the controller's frame the flange is the controller's, too: where a tool is that is all zeros.
+
+    Raises
+    ------
+    InputError
+        If there is no such frame, or it is the controller's and nothing is said of that.
+    """
+    checked_frame(frame)
+    if frame == "world":
+        return IDENTITY, IDENTITY
+    if frame == "base":
+        return robot.base, IDENTITY
+    controller = robot.controller
+    if controller == AS_THE_MODEL:
+        raise InputError(
+            f"it is not known where the controller of {robot.name} has its frames",
+            parameter="frame",
+            allowed="a robot file with the entry controller",
+            cure="Say under controller where its base and flange are, or give the source that says they are the "
+            "model's.",
+        )
+    base = robot.base.matrix @ controller.base.matrix
+    return Transform.from_matrix(base[:3, :3], base[:3, 3]), controller.flange if target is None else IDENTITY
+
+
 def checked_joints(robot: Robot, joints: ArrayLike, parameter: str = "joints") -> Array:
     """Return joint positions ``(n, joints)``, also of one configuration ``(joints,)``."""
     return number_array([joints] if axes(joints) == 1 else joints, parameter, ("n", len(robot.joints)))
@@ -43,17 +74,18 @@ def checked_joints(robot: Robot, joints: ArrayLike, parameter: str = "joints") -
 
 def forward(robot: Robot, joints: ArrayLike | Postures, frame: Frame, target: str | None) -> tuple[Array, Array]:
     """Return poses as :meth:`truearm.Robot.forward` does."""
-    checked_frame(frame)
+    base, tip = frame_and_tip(robot, frame, target)
     position, rotation = robot.world_poses(_postures(robot, joints), target)
     if frame == "world":
         return position, rotation
-    base = robot.base
+    if tip != IDENTITY:
+        position, rotation = position + rotation @ np.array(tip.translation), rotation @ tip.rotation
     return (position - np.array(base.translation)) @ base.rotation, base.rotation.T @ rotation
 
 
 def jacobian(robot: Robot, joints: ArrayLike | Postures, frame: Frame, target: str | None) -> Array:
     """Return Jacobians as :meth:`truearm.Robot.jacobian` does."""
-    checked_frame(frame)
+    base, tip = frame_and_tip(robot, frame, target)
     at = robot.loaded(_postures(robot, joints))
     kinematics = robot.forward_kinematics(at, target)
     if not robot.effects:
@@ -65,7 +97,11 @@ def jacobian(robot: Robot, joints: ArrayLike | Postures, frame: Frame, target: s
         found = np.einsum("vcn,vjn->ncj", by_variable, rates[moved])
     if frame == "world":
         return found
-    turned = robot.base.rotation.T @ found.reshape(len(found), 2, 3, found.shape[2])
+    if tip != IDENTITY:  # a point that is carried along moves by the turn across its distance, too
+        ahead = robot.world_poses(at, target)[1] @ np.array(tip.translation)
+        found = found.copy()
+        found[:, :3] += np.cross(found[:, 3:].swapaxes(1, 2), ahead[:, None]).swapaxes(1, 2)
+    turned = base.rotation.T @ found.reshape(len(found), 2, 3, found.shape[2])
     return turned.reshape(found.shape)
 
 

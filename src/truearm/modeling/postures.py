@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truearm.modeling.chain import Array
+
+#: A joint that moved by no more did not move: joints computed from those that a controller shows are rounded [rad, m].
+_ROUNDING: Final = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +97,7 @@ def approach_of(joints: Array, order: NDArray[np.int64]) -> Array:
     rows = np.argsort(order, kind="stable")
     for before, row in pairwise(rows):
         if order[row] == order[before] + 1:
-            moved = np.sign(joints[row] - joints[before])
+            way = joints[row] - joints[before]
+            moved = np.where(np.abs(way) <= _ROUNDING, 0.0, np.sign(way))
             signs[row] = np.where(moved == 0.0, signs[before], moved)
     return signs

@@ -44,7 +44,7 @@ class Proof:
         Rows of the lower triangular factor of their correlation matrix, each one longer than the one before; zero for
         parameters that are not uncertain.
     warnings
-        Notices of the level warning that whoever corrects programs should hear again.
+        Notes of the calibration that whoever corrects programs should hear again.
     lower_bound
         Whether the error may be larger than covariance and joint error say, for a reason that is known.
     digest

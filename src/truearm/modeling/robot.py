@@ -263,7 +263,8 @@ class Robot(RobotData):
             arm is at rest under its own weight and its payload, and what depends on the order of measurement or the
             temperature is in its middle; postures say more (``data.postures``).
         frame
-            What the poses are given in: ``base``, the robot's base frame, or ``world``, the instrument's frame.
+            What the poses are given in: ``base``, the robot's base frame; ``world``, the instrument's frame; or
+            ``controller``, the base frame of its controller, in which the flange is the controller's, too.
         target
             Name of a target; the flange if None. A target without orientation has the flange's.
 
@@ -300,7 +301,8 @@ class Robot(RobotData):
         rotations
             Rotation matrices ``(n, 3, 3)``; None with ``orientation="free"``.
         frame
-            What the poses are given in: ``base``, the robot's base frame, or ``world``, the instrument's frame.
+            What the poses are given in: ``base``, the robot's base frame; ``world``, the instrument's frame; or
+            ``controller``, the base frame of its controller, in which the flange is the controller's, too.
         seed
             Joint positions ``(joints,)`` or ``(n, joints)`` near which the answer shall lie; zero if None.
         target

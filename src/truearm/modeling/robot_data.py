@@ -83,6 +83,8 @@ class RobotData:
         How the robot's controller counts the joints, and where it has its frames.
     tools, truths
         For simulation.
+    maker
+        Who made it; empty if that is not known.
     history
         One line for each thing done to the robot.
     proof
@@ -107,6 +109,7 @@ class RobotData:
     controller: Controller = AS_THE_MODEL
     tools: Mapping[str, Tool] = field(default_factory=dict)
     truths: Mapping[str, Truth] = field(default_factory=dict)
+    maker: str = ""
     history: tuple[str, ...] = ()
     proof: Proof | None = None
 

@@ -6,6 +6,7 @@ import json
 import platform
 import re
 from collections.abc import Mapping
+from functools import cache
 from importlib.metadata import version as installed_version
 from importlib.resources import files
 from typing import Any, Final
@@ -36,6 +37,29 @@ def page(template: str, figures: Mapping[str, Figure], **content: Any) -> str:
     content
         What the template tells about.
     """
+    return (
+        _environment()
+        .get_template(template)
+        .render(
+            **content,
+            drawn=set(figures),
+            heights={name: figure["layout"]["height"] for name, figure in figures.items()},
+            figures=Markup(json_for_script(figures)),
+            plotly=Markup(_plotly()),
+            versions={
+                "truearm": __version__,
+                "Python": platform.python_version(),
+                "NumPy": np.__version__,
+                "SciPy": installed_version("scipy"),
+            },
+            colours={"before": BEFORE, "after": AFTER},
+        )
+    )
+
+
+@cache
+def _environment() -> Environment:
+    """Return what reads the templates, each of which it compiles once."""
     environment = Environment(
         loader=PackageLoader("truearm.reporting", ""),
         autoescape=True,
@@ -45,20 +69,7 @@ def page(template: str, figures: Mapping[str, Figure], **content: Any) -> str:
         finalize=_shown,
     )
     environment.filters["with_code"] = with_code
-    return environment.get_template(template).render(
-        **content,
-        drawn=set(figures),
-        heights={name: figure["layout"]["height"] for name, figure in figures.items()},
-        figures=Markup(json_for_script(figures)),
-        plotly=Markup(_plotly()),
-        versions={
-            "truearm": __version__,
-            "Python": platform.python_version(),
-            "NumPy": np.__version__,
-            "SciPy": installed_version("scipy"),
-        },
-        colours={"before": BEFORE, "after": AFTER},
-    )
+    return environment
 
 
 def _shown(value: object) -> object:

@@ -14,7 +14,7 @@ from truearm.modeling.parameters import PLACES
 from truearm.modeling.proof import Proof
 from truearm.notices import Notice
 
-#: A warning of the calibration that concerns every program: its controller may not have the nominal values of the file.
+#: A note of the calibration that concerns every program: its controller may not have the nominal values of the file.
 _REPEATED: Final = "far-from-nominal"
 _SOUND: Final = (Status.CONVERGED.value, Status.AT_BOUND.value)
 

@@ -17,10 +17,12 @@ from truearm.measurement.hexapod.uncertainty import CupUncertainty
 from truearm.measurement.hexapod.world_frame import WorldFrame
 from truearm.measurement.readers.canonical import csv_text
 from truearm.modeling.chain import Array
+from truearm.modeling.controller import JointsOf
+from truearm.modeling.formats.joint_columns import counting
 from truearm.modeling.robot import Robot
 from truearm.planning.hexapod.reachable import Reachable
 from truearm.planning.hexapod.steps import steps_text
-from truearm.results.record import Record
+from truearm.results.record import Record, joints_lines
 from truearm.writing import output_file, write_text
 
 _CUPS: Final = ("t1", "t2", "t3")
@@ -189,10 +191,13 @@ class HexapodPlan(Record):
         With the cups as its targets.
     reachable
         The configurations in their order, and what was left out.
+    joints_are
+        Whose joint positions the files hold: the ``model``'s, or those that the ``controller`` shows.
     """
 
     robot: Robot
     reachable: Reachable
+    joints_are: JointsOf = "model"
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it, in mm."""
@@ -200,6 +205,7 @@ class HexapodPlan(Record):
         return {
             "poses": found.poses,
             "poses_reached": found.poses_reached,
+            "joints_are": self.joints_are,
             "configurations": len(found.rows),
             "left_out": dict(found.left_out),
             "smallest_room_mm": float(found.clearance.min()) * 1e3,
@@ -213,15 +219,16 @@ class HexapodPlan(Record):
             f"{said['poses_reached']} of {said['poses']} poses, {said['configurations']} configurations",
             f"Left out: {left_out or 'nothing'}",
             f"Smallest room between arm and bars: {said['smallest_room_mm']:.0f} mm",
+            *joints_lines(self.joints_are),
         ]
 
     def sheet_text(self) -> str:
         """Return the sheet to fill in, as CSV."""
-        return sheet_csv(self.reachable.rows, self.robot.joints)
+        return sheet_csv(self.reachable.rows, self.robot.joints, controller=counting(self.robot, self.joints_are))
 
     def steps_text(self) -> str:
         """Return the plan step by step, to print."""
-        return steps_text(self.reachable, self.robot)
+        return steps_text(self.reachable, self.robot, counting(self.robot, self.joints_are))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

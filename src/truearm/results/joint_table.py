@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from truearm.modeling.chain import Array
+from truearm.modeling.controller import JointsOf
 from truearm.modeling.inverse.solutions import JointSolutions, PoseStatus
 from truearm.notices import Notice
-from truearm.results.record import Record, notice_lines, notice_summaries
+from truearm.results.record import Record, joints_lines, notice_lines, notice_summaries
 
 #: Poses explained one by one where a person reads.
 _EXPLAINED: Final = 10
@@ -27,15 +28,18 @@ class JointTable(Record):
         What was found, one row a pose, or one a pose and branch.
     warnings
         What speaks against the calibration of the robot.
+    joints_are
+        Whose joint positions the file holds: the ``model``'s, or those that the ``controller`` shows.
     """
 
     labels: tuple[str, ...]
     solutions: JointSolutions
     warnings: tuple[Notice, ...] = ()
+    joints_are: JointsOf = "model"
 
     @property
     def joints(self) -> Array:
-        """Joint positions of each row [rad; m for prismatic joints], ``(rows, joints)``."""
+        """Joint positions of each row, of the model [rad; m for prismatic joints], ``(rows, joints)``."""
         return self.solutions.joints
 
     @property
@@ -71,6 +75,7 @@ class JointTable(Record):
             "poses": found.poses,
             "poses_reached": len(set(found.pose[found.usable].tolist())),
             "rows": len(found.status),
+            "joints_are": self.joints_are,
             "status": dict(Counter(status.value for status in found.status)),
             "attention": list(self.attention),
             "warnings": notice_summaries(self.warnings),
@@ -86,4 +91,4 @@ class JointTable(Record):
             text.append(f"  {name}: {entry['status']}. {entry['advice']}")
         if len(self.attention) > _EXPLAINED:
             text.append(f"  and {len(self.attention) - _EXPLAINED} more; the JSON summary lists all")
-        return text + notice_lines(self.warnings)
+        return text + joints_lines(self.joints_are) + notice_lines(self.warnings)

@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from truearm.modeling.chain import Array
+from truearm.modeling.controller import JointsOf
+from truearm.modeling.formats.joint_columns import counting, joint_cells, joint_headings
 from truearm.modeling.robot import Robot
 from truearm.planning.poses.seven_lines import DIRECTIONS, SevenLines
 from truearm.results.record import Record
-from truearm.units import from_si
 from truearm.validation.line_test import LineErrors, reduction
 from truearm.writing import output_file, write_text
 
@@ -26,7 +27,7 @@ class LineTest(Record):
     poses
         The poses, line after line.
     joints
-        Joint positions to command, ``(7 k, joints)`` [rad or m].
+        Joint positions to command, of the model, ``(7 k, joints)`` [rad or m].
     compensated
         Whether `joints` are compensated for joint errors.
     before
@@ -35,6 +36,8 @@ class LineTest(Record):
         Errors with compensation; None where it was not tried.
     inputs
         The files that were read: none of them is overwritten.
+    joints_are
+        Whose joint positions the file holds: the ``model``'s, or those that the ``controller`` shows.
     """
 
     robot: Robot
@@ -44,6 +47,7 @@ class LineTest(Record):
     before: LineErrors | None
     after: LineErrors | None
     inputs: tuple[Path, ...] = ()
+    joints_are: JointsOf = "model"
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it, in mm."""
@@ -66,12 +70,10 @@ class LineTest(Record):
 
     def csv_text(self) -> str:
         """Return the plan as CSV: one configuration a pose, joint positions in deg, those of sliding joints in mm."""
-        units = ["deg" if joint.kind == "revolute" else "mm" for joint in self.robot.joints]
-        heading = ["configuration", *(f"joint_{i} [{unit}]" for i, unit in enumerate(units, 1))]
-        rows = [
-            [label, *(repr(from_si(value, unit)) for value, unit in zip(row, units, strict=True))]
-            for label, row in zip(self.poses.labels, self.joints.tolist(), strict=True)
-        ]
+        joints, controller = self.robot.joints, counting(self.robot, self.joints_are)
+        heading = ["configuration", *joint_headings(joints, controller)]
+        cells = joint_cells(self.joints, joints, controller)
+        rows = [[label, *row] for label, row in zip(self.poses.labels, cells, strict=True)]
         return "\n".join(",".join(row) for row in [heading, *rows]) + "\n"
 
     def save(self, file: str | Path) -> None:

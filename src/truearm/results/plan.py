@@ -8,9 +8,10 @@ from typing import Any, Final
 
 from truearm.errors import InputError
 from truearm.modeling.chain import Array
+from truearm.modeling.controller import JointsOf
 from truearm.planning.choosing.measurement_plan import MeasurementPlan
 from truearm.planning.choosing.plan_table import plan_csv
-from truearm.results.record import Record
+from truearm.results.record import Record, joints_lines
 from truearm.writing import output_file, write_files
 
 #: What the page beside a plan ends with.
@@ -31,16 +32,19 @@ class Plan(Record):
         The files that were read: none of them is overwritten.
     noise
         Standard deviation of a coordinate about the model that was assumed [m].
+    joints_are
+        Whose joint positions the file holds: the ``model``'s, or those that the ``controller`` shows.
     """
 
     made: MeasurementPlan
     command: str
     inputs: tuple[Path, ...] = ()
     noise: float = 1e-4
+    joints_are: JointsOf = "model"
 
     @property
     def joints(self) -> Array:
-        """Where to measure [rad; m for prismatic joints], ``(n, joints)``."""
+        """Where to measure, by the model [rad; m for prismatic joints], ``(n, joints)``."""
         return self.made.joints
 
     @property
@@ -74,6 +78,7 @@ class Plan(Record):
         return {
             "poses": len(made.joints),
             "objective": made.objective,
+            "joints_are": self.joints_are,
             "indices": dict(made.indices),
             "candidates": made.candidates,
             "usable": made.usable,
@@ -102,7 +107,7 @@ class Plan(Record):
         text.append("  " + "  ".join(f"{name} {value:.4g}" for name, value in made.indices.items()))
         for name, place in made.fixtures.items():
             text.append(f"  {name} at ({', '.join(f'{v * 1e3:.1f}' for v in place)}) mm in the base frame")
-        return [*text, *self.answer]
+        return [*text, *self.answer, *joints_lines(self.joints_are)]
 
     def save(self, file: str | Path) -> tuple[Path, Path]:
         """Write the plan as CSV, and a page with the same name that ends in ``.html``.
@@ -117,5 +122,7 @@ class Plan(Record):
         if table.suffix == PAGE:
             raise InputError("the plan is a CSV file", parameter="file", came=table.name, allowed="PLAN.csv")
         page = output_file(table.with_suffix(PAGE), self.inputs)
-        write_files(table.parent, {table.name: plan_csv(self.made), page.name: plan_html(self)}, self.command)
+        write_files(
+            table.parent, {table.name: plan_csv(self.made, self.joints_are), page.name: plan_html(self)}, self.command
+        )
         return table, page

@@ -21,6 +21,7 @@ from truearm.compensation.program_files import ProgramFile, language_called, rec
 from truearm.compensation.programs.program import Program, Skipped, Source
 from truearm.compensation.split import ProgramSplit
 from truearm.modeling.chain import Array
+from truearm.modeling.formats.controller_entry import controller_summary
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.results.record import Record, notice_lines, notice_summaries
@@ -317,6 +318,7 @@ class ProgramCorrection(Record):
             "history": list(self.robot.history),
             "proof": None if self.robot.proof is None else self.robot.proof.summary(),
             "payload_kg": self._masses(),
+            "controller": controller_summary(self.robot.controller.kinematics),
             "tools": frames.tools,
             "frames": frames.frames,
         }

@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import Any
 
+from truearm.modeling.controller import JointsOf
 from truearm.notices import Notice, worst_first
 from truearm.shown import as_html, short_text
 
@@ -26,6 +27,13 @@ class Record(ABC):
 
     def _repr_html_(self) -> str:
         return as_html(repr(self))
+
+
+def joints_lines(joints_are: JointsOf) -> list[str]:
+    """Return what is to know about joint positions in files that are not the model's; nothing of those that are."""
+    if joints_are == "model":
+        return []
+    return ["Joint positions in the file are those that the robot's controller shows (axis_i)."]
 
 
 def notice_lines(notices: Sequence[Notice]) -> list[str]:

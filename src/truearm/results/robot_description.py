@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from truearm.modeling.formats.robot_file import is_intact
 from truearm.modeling.parts import GRAVITY
 from truearm.modeling.robot import Robot
 from truearm.results.record import Record
+from truearm.results.shown_pose import ShownPose
 from truearm.simulation.truths import truth_names
 from truearm.units import SHOWN_AS, from_si, written
 
@@ -25,9 +26,12 @@ class RobotDescription(Record):
     ----------
     robot
         The robot.
+    at
+        Where it stands, if joint positions were given.
     """
 
     robot: Robot
+    at: ShownPose | None = None
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it, lengths in mm and angles in deg."""
@@ -48,6 +52,7 @@ class RobotDescription(Record):
         return {
             "name": robot.name,
             "title": robot.title,
+            "maker": robot.maker or None,
             "source": robot.source,
             "convention": robot.convention_name,
             "units": {"length": "mm", "angle": "deg"},
@@ -68,6 +73,7 @@ class RobotDescription(Record):
             "targets": [target.name for target in robot.targets],
             "proof": None if robot.proof is None else {**robot.proof.summary(), "intact": is_intact(robot)},
             "history": list(robot.history),
+            "at": None if self.at is None else self.at.summary(),
         }
 
     def lines(self) -> list[str]:
@@ -98,14 +104,29 @@ class RobotDescription(Record):
         if content["proof"]:
             words = ", ".join(dict.fromkeys([content["proof"]["status"], *content["proof"]["errors"]]))
             text.append(f"Calibration: {words}{'' if content['proof']['intact'] else '; values were changed since'}")
-        return text + [f"History: {line}" for line in robot.history]
+        text += [f"History: {line}" for line in robot.history]
+        return text if self.at is None else [*text, *self.at.lines()]
+
+
+#: What the words of robot files say of a controller's kinematics.
+_KINEMATICS: Final = {
+    "unknown": "not known",
+    "nominal": "the nominal values",
+    "proprietary": "a calibration of its maker that nobody else can read",
+}
 
 
 def _controller_lines(entry: dict[str, Any], joints: list[dict[str, Any]]) -> Iterator[str]:
     """Say what of a controller differs from the model; `entry` is what a robot file would say of it."""
     units = {joint["name"]: "deg" if joint["type"] == "revolute" else "mm" for joint in joints}
+    number = {joint["name"]: place for place, joint in enumerate(joints, 1)}
+    kinematics = entry.get("kinematics", "unknown")
+    if not isinstance(kinematics, str):
+        kinematics = f"{kinematics['kind']}, from {kinematics.get('source') or 'the robot file'}"
+    yield f"computes poses with: {_KINEMATICS.get(kinematics, kinematics)}"
     for row in entry.get("joints", []):
-        counted = [row["joint"], *(_share(value, name) for name, value in row.get("coupling", {}).items())]
+        others = row.get("coupling", {}).items()
+        counted = [f"joint_{number[row['joint']]}", *(_share(v, f"joint_{number[name]}") for name, v in others)]
         text = " + ".join(counted).replace("+ -", "- ")
         if "sign" in row:
             text = f"-({text})" if len(counted) > 1 else f"-{text}"
@@ -116,7 +137,7 @@ def _controller_lines(entry: dict[str, Any], joints: list[dict[str, Any]]) -> It
             for unit in ("degree", "mm")
             if f"pulses_per_{unit}" in row
         )
-        yield f"reading of {row['joint']} = {text}"
+        yield f"axis_{number[row['joint']]} = {text}"
     for name in ("base", "flange"):
         if name in entry:
             x, y, z = entry[name]["translation"]

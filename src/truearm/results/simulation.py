@@ -38,6 +38,7 @@ class Simulation(Record):
             "robot": self.robot,
             "truth": self.truth,
             "configurations": self.data.configurations,
+            "joints_are": self.data.joints_are,
             "readings": len(self.data.target),
             "targets": list(self.data.targets),
             "fixtures": list(self.data.fixtures),

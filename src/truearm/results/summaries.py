@@ -58,17 +58,26 @@ def joint_error_text(fit: Fit) -> str:
 
 
 def noise_summary(fit: Fit, again: Repeatability | None) -> dict[str, Any]:
-    """Return the deviations of readings and joints, as JSON holds them: mm, mrad and deg."""
+    """Return the deviations of readings and joints, as JSON holds them: mm, mrad and deg.
+
+    That of the joints is one for all of a kind, as it is estimated.
+    """
     units = {observation.name: observation.unit for observation in OBSERVATIONS}
-    units_shown = ["deg" if joint.kind == "revolute" else "mm" for joint in fit.robot.joints]
-    errors = fit.joint_error.tolist()
+    of_kind: dict[str, list[int]] = {}
+    for number, joint in enumerate(fit.robot.joints, 1):
+        of_kind.setdefault(joint.kind, []).append(number)
     return {
         "sigma": {f"{name}_{'mm' if units[name] == 'm' else 'mrad'}": value * 1e3 for name, value in fit.sigma.items()},
         "declared": fit.declared,
         "excess": fit.excess,
         "joint_error": [
-            {"joint": k, "unit": unit, "deviation": from_si(error, unit)}
-            for k, (unit, error) in enumerate(zip(units_shown, errors, strict=True), 1)
+            {
+                "kind": kind,
+                "joints": joints,
+                "unit": (unit := "deg" if kind == "revolute" else "mm"),
+                "deviation": from_si(float(fit.joint_error[joints[0] - 1]), unit),
+            }
+            for kind, joints in of_kind.items()
         ],
         "scattered": fit.scattered,
         "repeatability": None

@@ -6,6 +6,8 @@ corrects the program puts other numbers in those places, and no other byte chang
 
 from __future__ import annotations
 
+import re
+import unicodedata
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -299,6 +301,24 @@ class SplitEdits(NamedTuple):
     unsplit: list[int]
 
 
+class MakersCalibration(NamedTuple):
+    """How the maker of a controller may have calibrated the arm itself.
+
+    Attributes
+    ----------
+    maker
+        Of robot and controller.
+    name
+        What the maker calls it.
+    always
+        Whether every arm is delivered so, or only where it was ordered.
+    """
+
+    maker: str
+    name: str
+    always: bool = False
+
+
 @dataclass(frozen=True)
 class Language:
     """A robot language.
@@ -309,6 +329,8 @@ class Language:
         Its name.
     suffixes
         Of its files, lower case with the dot. The suffix decides the language; what is in the file has to agree.
+    makers
+        Whose controllers run it, by the names that the maker has; the first is the usual one.
     is_one
         Whether a text looks like this language.
     read
@@ -319,15 +341,24 @@ class Language:
         Whether files that are given together are one program and share names; else each is one for itself.
     companions
         Pairs of suffixes: beside a file of the first may lie one of the second that belongs to it.
+    calibration
+        How controllers that run it may have been calibrated by their maker; None if nothing is known of that.
     """
 
     name: str
     suffixes: tuple[str, ...]
+    makers: tuple[str, ...]
     is_one: Callable[[str], bool]
     read: Callable[[Sequence[Source]], Program]
     split: Callable[[Program, Sequence[Split]], SplitEdits] | None = None
     together: bool = False
     companions: tuple[tuple[str, str], ...] = ()
+    calibration: MakersCalibration | None = None
+
+    def runs_on(self, maker: str) -> bool:
+        """Return whether controllers of a maker run it, whatever else is in the maker's full name."""
+        words = _words(maker)
+        return any(_words(name) <= words for name in self.makers)
 
     def programs(self, sources: Sequence[Source]) -> tuple[Program, ...]:
         """Read files that may be of several programs.
@@ -341,3 +372,9 @@ class Language:
             key = (source.path.parent if several else None) if self.together else source.path
             groups.setdefault(key, []).append(source)
         return tuple(self.read(group) for group in groups.values())
+
+
+def _words(name: str) -> set[str]:
+    """Return the words of a name, without capitals and accents."""
+    plain = unicodedata.normalize("NFKD", name.casefold())
+    return set(re.findall(r"[^\W_]+", "".join(c for c in plain if not unicodedata.combining(c))))

@@ -6,24 +6,18 @@ import math
 from itertools import combinations
 from typing import Final
 
-import numpy as np
-
 from truearm.identification.judging.expected_error import ExpectedError
 from truearm.identification.solving.fit import Fit, Status
 from truearm.modeling.conventions import parallel_joints_without_beta
 from truearm.modeling.effects import EFFECTS, NON_NEGATIVE
 from truearm.modeling.loads import has_weight
 from truearm.notices import Notice
+from truearm.shown import listed
 
 #: Groups of parameters of the rigid arm.
 _KINEMATIC: Final = frozenset({"joint zero", "geometry", *(effect.name for effect in EFFECTS if effect.kinematic)})
-#: Priors that a parameter may move before the robot, its units or its joint order are doubted.
+#: Priors that an angle may move before it is named; of lengths see :mod:`truearm.identification.judging.wrong_robot`.
 _LARGEST_MOVE: Final = 6.0
-#: And so many along a direction that the data know. Of 27 directions of a robot that is as good as its priors say, one
-#: moves by more with a probability of 2e-4.
-_LARGEST_DIRECTION: Final = 4.5
-#: Share of the largest weight of a direction from which a parameter is named.
-_NAMED: Final = 0.5
 #: Standard deviations below zero from which a stiffness or a play is doubted.
 _NEGATIVE_DEVIATIONS: Final = 4.0
 #: Share of the prior variance that the data should remove, and of parameters of effects that may fall short of it.
@@ -39,7 +33,7 @@ def check_fit(fit: Fit, expected: ExpectedError, *, doubted: bool = False) -> li
     expected
         Of the fit, over the workspace.
     doubted
-        Whether the data are known to be wrong: wider priors are no cure then.
+        Whether the data, or the robot, are known to be wrong: nothing is said of where its parameters went then.
     """
     found = []
     robot = fit.robot
@@ -103,7 +97,7 @@ def check_fit(fit: Fit, expected: ExpectedError, *, doubted: bool = False) -> li
                 "note",
             )
         )
-    found += _far_from_nominal(fit, doubted=doubted)
+    found += [] if doubted else _far_from_nominal(fit)
     shared = fit.joint_error.any() and not fit.scattered
     if fit.excess > 1.0:
         found.append(
@@ -131,64 +125,27 @@ def check_fit(fit: Fit, expected: ExpectedError, *, doubted: bool = False) -> li
     return found
 
 
-def _far_from_nominal(fit: Fit, *, doubted: bool) -> list[Notice]:
-    """Say which parameters are farther from their nominal values than their priors let expect, alone or together."""
+def _far_from_nominal(fit: Fit) -> list[Notice]:
+    """Say which parameters, lengths apart, are farther from their nominal values than their priors let expect."""
     far = [
         p.name
         for p in fit.robot.parameters.values()
-        if p.group in _KINEMATIC and abs(p.value - p.nominal) > _LARGEST_MOVE * p.prior
+        if p.group in _KINEMATIC
+        and (p.group, p.unit) != ("geometry", "m")
+        and abs(p.value - p.nominal) > _LARGEST_MOVE * p.prior
     ]
-    together = [] if far else _far_together(fit)
-    if not far and not together:
+    if not far:
         return []
-    names = far or together
-    listed = f"{', '.join(names[:8])}{' and others' if len(names) > 8 else ''}"
-    wider = "" if doubted else " If all that holds, enter wider priors in the robot file."
-    moved = (
-        f"{listed} moved by more than {_LARGEST_MOVE:g} standard deviations of their priors."
-        if far
-        else f"{listed} moved together by more than {_LARGEST_DIRECTION:g} standard deviations of their priors."
-        if len(names) > 1
-        else f"{listed} moved by more than {_LARGEST_DIRECTION:g} standard deviations of its prior."
-    )
     return [
         Notice(
             "far-from-nominal",
-            f"{moved} Check that it is this robot, in these units, with its joints in this order, and that the nominal "
-            "values are those of its controller: corrections of programs are wrong by what they differ."
-            f"{wider}",
+            f"{listed(far)} moved by more than {_LARGEST_MOVE:g} standard deviations of "
+            f"{'its prior' if len(far) == 1 else 'their priors'}. A robot that was never mastered well is so far off. "
+            "Check that the nominal values are those of its controller: corrections of programs are wrong by what they "
+            "differ. If they are, enter wider priors in the robot file.",
+            "note",
         )
     ]
-
-
-def _far_together(fit: Fit) -> list[str]:
-    """Return the parameters of the direction that moved farthest, if it moved too far.
-
-    Parameters that move every target alike, as the distances between parallel axes, are known by their sum alone: each
-    moves by a share of what their sum does. Directions are those of the covariance in priors, of the geometry.
-    Nothing is said where parameters are held at their nominal values: another one then moves by the sum of several.
-    """
-    of = fit.robot.parameters
-    places = [
-        i
-        for i, name in enumerate(fit.free.names)
-        if of[name].group in _KINEMATIC - {"joint zero"} and name not in fit.at_bound
-    ]
-    if not places or fit.redundancies:
-        return []
-    names = [fit.free.names[i] for i in places]
-    prior = np.array([of[name].prior for name in names])
-    moves = np.array([of[name].value - of[name].nominal for name in names]) / prior
-    shares, directions = np.linalg.eigh(fit.covariance[np.ix_(places, places)] / np.outer(prior, prior))
-    known = directions[:, shares < 1.0 - _LEAST_INFORMED]
-    if not known.size:
-        return []
-    along = np.abs(moves @ known)
-    farthest = int(np.argmax(along))
-    if along[farthest] <= _LARGEST_DIRECTION:
-        return []
-    weights = np.abs(known[:, farthest] * moves)
-    return [names[i] for i in np.flatnonzero(weights >= _NAMED * weights.max())]
 
 
 def _check_effects(fit: Fit) -> list[Notice]:

@@ -10,13 +10,16 @@ The best of many is found by chance too. The chance of one alone, that of chi sq
 changes tried (Bonferroni), which for neighbouring change points is too careful, never too bold. The targets of a
 configuration share what the model leaves, so it counts as one reading of three coordinates. Between changes that differ
 in their parameters the one with the least Bayesian information criterion is named (Schwarz 1978).
+
+Where configurations are not numbered the order of the file is tried, unless it follows a joint: then parts of the
+workspace were measured after each other, and what the model lacks there looks like a change.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final, Literal
 
@@ -37,6 +40,8 @@ _LARGEST_CHANCE: Final = 1e-4
 #: follow looks like a change too where configurations that are alike were measured after each other, but explains less.
 _LEAST_SHARE: Final = 0.15
 _SPOILING_SHARE: Final = 0.5
+#: Correlation of the ranks of rows and positions from which the rows are sorted by a joint.
+_SORTED: Final = 0.6
 #: Change points tried first; those between the best of them and its neighbours are tried then.
 _COARSE: Final = 64
 
@@ -59,6 +64,10 @@ class Change:
         What changed, in the parameters of its columns [SI].
     chance
         Probability that noise alone shows one as large anywhere.
+    by_file
+        Whether the order of measurement is not known, and that of the file was taken.
+    follows
+        Number of the joint that moved on with the order of measurement; 0 if none did.
     """
 
     kind: Kind
@@ -67,6 +76,8 @@ class Change:
     share: float
     values: tuple[float, ...]
     chance: float
+    by_file: bool = False
+    follows: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,12 +99,12 @@ class _Sums:
 def find_change(left: LeftOver) -> Change | None:
     """Return what best explains what a fit leaves, None if nothing does by more than chance.
 
-    None too where the order of measurement is not known, readings are against fixtures, or there are fewer than twenty
-    configurations.
+    None too where neither the order of measurement is known nor that of the file may be it, readings are against
+    fixtures, or there are fewer than twenty configurations.
     """
     data = left.problem.data
     n = data.configurations
-    if data.number is None or data.fixture is not None or n < 2 * LEAST_ARRIVALS:
+    if data.fixture is not None or n < 2 * LEAST_ARRIVALS:
         return None
     hypotheses = list(_hypotheses(left))
     residual = left.without_parameters(left.residual)
@@ -101,7 +112,10 @@ def find_change(left: LeftOver) -> Change | None:
     effective = 3 * n - left.basis.shape[1]
     if total <= 0.0 or effective < n or not hypotheses:
         return None
-    order = np.argsort(data.number, kind="stable")
+    order = np.arange(n) if data.number is None else np.argsort(data.number, kind="stable")
+    follows = _followed_joint(data.joints[order])
+    if data.number is None and follows:
+        return None
     place = np.empty(n, dtype=np.intp)
     place[order] = np.arange(n)
     rows = np.argsort(place[left.configuration], kind="stable")
@@ -135,7 +149,22 @@ def find_change(left: LeftOver) -> Change | None:
         gain = float(r @ grown @ value)
         found.append(_judged("drift", "", int(order[0]), gain / total, value, effective, tests))
     _, change = min(found, key=lambda entry: entry[0])
-    return change if change.chance < _LARGEST_CHANCE and change.share > _LEAST_SHARE else None
+    if change.chance >= _LARGEST_CHANCE or change.share <= _LEAST_SHARE:
+        return None
+    return replace(change, by_file=data.number is None, follows=follows)
+
+
+def _followed_joint(joints: Array) -> int:
+    """Return the number of a joint whose positions the rows are sorted by, by the correlation of ranks; 0 if none."""
+    at = np.arange(len(joints)) - 0.5 * (len(joints) - 1)
+    for number, positions in enumerate(joints.T, 1):
+        _, rank, times = np.unique(positions, return_inverse=True, return_counts=True)
+        ranks = (np.cumsum(times) - 0.5 * times)[rank.reshape(-1)]
+        ranks = ranks - ranks.mean()
+        size = float(np.linalg.norm(ranks) * np.linalg.norm(at))
+        if size > 0.0 and abs(float(ranks @ at)) > _SORTED * size:
+            return number
+    return 0
 
 
 def _hypotheses(left: LeftOver) -> Iterator[tuple[Kind, str, tuple[int, ...]]]:
@@ -219,7 +248,7 @@ def notices_of_change(left: LeftOver, change: Change) -> list[Notice]:
     data = left.problem.data
     label = data.labels[change.first]
     spoils = change.share > _SPOILING_SHARE and change.kind != "drift"  # a drift is slow: its mean is in the result
-    level: Literal["error", "warning"] = "error" if spoils else "warning"
+    level: Literal["error", "warning"] = "error" if spoils and not change.by_file else "warning"
     size = _size(left, change)
     explains = f"That explains {change.share:.0%} of the squared residuals."
     words = {
@@ -235,7 +264,18 @@ def notices_of_change(left: LeftOver, change: Change) -> list[Notice]:
         f"or its temperature drifted. {explains} Measure reference points beside the robot along with the targets, or "
         "let the arm warm up first.",
     }
-    return [Notice(change.kind, words[change.kind], level)]
+    if change.follows:
+        words[change.kind] += (
+            f" Joint {change.follows} moved on with the order of measurement, so what the model lacks at some of its "
+            "positions, as the periodic error of a gear, looks like that too."
+        )
+    taken = (
+        " The configurations are not numbered, so the order of the file was taken for that of measurement. If it is, "
+        "number them so."
+        if change.by_file
+        else ""
+    )
+    return [Notice(change.kind, words[change.kind] + taken, level)]
 
 
 def _size(left: LeftOver, change: Change) -> str:

@@ -45,6 +45,7 @@ CAUSES: Final = (
     "rows-unrelated",
     "quaternion-order",
     "fixtures-unlikely",
+    "wrong-robot",
 )
 
 

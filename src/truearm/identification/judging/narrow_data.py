@@ -1,7 +1,8 @@
 """Notice a workspace that is known much worse than the held-out error says.
 
 Held-out configurations are like those that were measured. Where the joints moved little, the error there stays small
-and says nothing about the rest of the workspace: the expected error does.
+and says nothing about the rest of the workspace: the expected error does. A model that takes the geometry as exact does
+not expect any error of it: there the geometry is fitted as well, and the robot found is judged by that one.
 """
 
 from __future__ import annotations
@@ -12,8 +13,16 @@ from typing import Final
 
 import numpy as np
 
-from truearm.identification.judging.expected_error import ExpectedError, PositionErrors, expected_map
-from truearm.identification.solving.fit import Fit
+from truearm.identification.judging.expected_error import (
+    ExpectedError,
+    PositionErrors,
+    as_residuals_allow,
+    expected_error,
+    expected_map,
+)
+from truearm.identification.solving.fit import Fit, identify
+from truearm.identification.solving.losses import Loss
+from truearm.identification.solving.models import named_model
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import Errors
 from truearm.notices import Notice
@@ -33,6 +42,47 @@ _LITTLE: Final = 0.5
 _PLACES: Final = 300
 _DRAWS: Final = 100
 _WORST: Final = 90.0
+
+
+def check_narrow_data_without_geometry(
+    fit: Fit, measured: Dataset, judged: Errors, loss: Loss, *, held_out: bool
+) -> list[Notice]:
+    """Say if the workspace is known much worse than the readings say, for a model that takes the geometry as exact.
+
+    Joints must have moved little: else the geometry is seen where the readings are.
+
+    Parameters
+    ----------
+    measured
+        The training part.
+    judged
+        Errors of the calibrated robot: held out, or of the training part if nothing was.
+    loss
+        Of the fit.
+    """
+    if not joints_that_moved_little(fit, measured):
+        return []
+    model = named_model("geometric").also([e for e in fit.model.effects if e not in named_model("geometric").effects])
+    nominal = fit.robot.with_values({name: p.nominal for name, p in fit.start.parameters.items()})
+    wider = identify(nominal, measured, model, loss=loss)
+    expected = expected_error(as_residuals_allow(wider, measured))
+    apart = _apart(fit, wider)
+    low, high = expected.overall.interval_90
+    overall = replace(
+        expected.overall,
+        mean=math.hypot(expected.overall.mean, apart),
+        interval_90=(max(low, apart - high), apart + high),
+    )
+    found = check_narrow_data(wider, replace(expected, overall=overall), measured, judged, held_out=held_out)
+    more = f" The {fit.model.name} model takes the geometry as exact; here it is as uncertain as its priors."
+    return [replace(notice, message=notice.message + more) for notice in found]
+
+
+def _apart(fit: Fit, other: Fit) -> float:
+    """Return how far the targets of two fits are apart over the workspace, on average [m]."""
+    joints = fit.robot.random_configurations(_PLACES, np.random.default_rng(0))
+    places = [[f.robot.world_poses(joints, t.name)[0] for t in fit.robot.targets] for f in (fit, other)]
+    return float(np.linalg.norm(np.array(places[0]) - np.array(places[1]), axis=2).mean())
 
 
 def check_narrow_data(

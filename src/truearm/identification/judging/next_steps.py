@@ -63,9 +63,16 @@ _CURED_FIRST: Final = (
     "joints-mistaken",
     "outliers",
     "joints-not-settled",
+    "joints-rounded",
+    "separate-visits",
+    "payload-unlikely",
+    "sigma-too-large",
     "transmission-error",
+    "large-remainder",
     "not-better",
 )
+#: Those that any other step may explain.
+_EXPLAINED: Final = frozenset({"not-better", "large-remainder"})
 #: Those that configurations which are off explain.
 _OF_CONFIGURATIONS: Final = frozenset(
     {"outliers", "joints-mistaken", "targets-swapped", "target-mistaken", "not-better"}
@@ -232,8 +239,7 @@ def _cures(notices: Sequence[Notice], steps: Sequence[NextStep]) -> list[NextSte
     again = any(step.code == "measure-again" for step in steps)
     present = [n.code for n in notices if n.level != "note" or n.code == "outliers"]
     codes = [code for code in _CURED_FIRST if code in present and not (again and code in _OF_CONFIGURATIONS)]
-    if "not-better" in codes and len(steps):
-        codes.remove("not-better")
+    codes = [code for code in codes if not (steps and code in _EXPLAINED)]
     if not codes:
         return []
     what = "the warning" if len(codes) == 1 else "the warnings"

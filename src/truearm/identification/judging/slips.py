@@ -8,13 +8,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
-from itertools import combinations
+from dataclasses import replace
+from functools import partial
 from typing import Final
 
 import numpy as np
 
 from truearm.errors import InputError
+from truearm.identification.judging.slip_trials import (
+    Slip,
+    angle_slips,
+    as_noted,
+    controller_slips,
+    length_slips,
+    mirrored,
+    order_slips,
+    scale_slips,
+    shifted,
+    sign_slips,
+)
 from truearm.identification.solving.models import named_model
 from truearm.identification.solving.problem import Problem
 from truearm.identification.start_values.frames import initial_frames
@@ -51,40 +63,10 @@ _ORDERS_DRAWN: Final = 19
 _ALIKE: Final = 0.8
 #: Orientations of a nominal robot agree better than this [rad]; a wrong order of a quaternion leaves 1 rad and more.
 _TURNED_WITHIN: Final = 0.1
-#: Largest ratio of the stretches along three axes that is still called a scale.
-_MOST_UNEVEN: Final = 1.2
 #: No target is farther from the flange [m].
 _LARGEST_TOOL: Final = 2.0
-#: Cosine between two axes of an instrument that are still called square.
-_SQUARE: Final = 0.1
-#: No instrument reads a robot from farther away [m].
-_FARTHEST: Final = 1e4
 #: Weight of readings against priors where slips are judged by a fit [m or rad].
 _FITTED_NOISE: Final = 1e-4
-
-
-@dataclass(frozen=True, eq=False)
-class Slip:
-    """One slip, mended.
-
-    Attributes
-    ----------
-    code
-        Of the notice.
-    words
-        What happened and what to do about it, without a full stop.
-    data
-        The data as they should be.
-    """
-
-    code: str
-    words: str
-    data: Dataset
-
-    @property
-    def notice(self) -> Notice:
-        """What is said if it explains the data."""
-        return Notice(self.code, f"{self.words}.", "error")
 
 
 def slips_in_positions(robot: Robot, data: Dataset) -> list[Notice]:
@@ -99,7 +81,12 @@ def slips_in_positions(robot: Robot, data: Dataset) -> list[Notice]:
     if not bad:
         if least <= _PLACED_WITHIN:
             return turned
-        best = _best(robot, some, _simple_slips(robot, rest), lambda: [*_sign_slips(some, 2), *_sign_slips(some, 3)])
+        best = _best(
+            robot,
+            some,
+            _simple_slips(robot, rest),
+            lambda: [slip for size in (2, 3) for slip in as_noted(robot, some, partial(sign_slips, size=size))],
+        )
         if best is not None:
             return [best.notice]
         return turned or _beyond_reach(robot, some) or _unrelated(robot, some)
@@ -107,7 +94,7 @@ def slips_in_positions(robot: Robot, data: Dataset) -> list[Notice]:
     found = []
     for t in bad:
         only = _only(some, t)
-        best = _best(robot, only, [*_length_slips(only), *_mirrored(only), *_scale_slips(robot, only)])
+        best = _best(robot, only, [*length_slips(only), *mirrored(only), *scale_slips(robot, only)])
         if best is not None:
             found.append(Notice(best.code, f"Target {some.targets[t]}: {best.words}.", "error"))
     return [*turned, *found]
@@ -116,13 +103,14 @@ def slips_in_positions(robot: Robot, data: Dataset) -> list[Notice]:
 def _simple_slips(robot: Robot, data: Dataset) -> Iterator[Slip]:
     """Try everything but several slips at once, the simplest first."""
     some = _some(data)
-    yield from _length_slips(some)
-    yield from _angle_slips(some)
-    yield from _mirrored(some)
-    yield from _sign_slips(some, 1)
-    yield from _order_slips(some)
-    yield from _shifted(data)
-    yield from _scale_slips(robot, some)
+    yield from length_slips(some)
+    yield from as_noted(robot, some, angle_slips)
+    yield from controller_slips(robot, some)
+    yield from mirrored(some)
+    yield from as_noted(robot, some, sign_slips)
+    yield from as_noted(robot, some, order_slips)
+    yield from (replace(slip, data=_some(slip.data)) for slip in shifted(data))
+    yield from scale_slips(robot, some)
 
 
 def _best(robot: Robot, data: Dataset, slips: Iterable[Slip], several: Callable[[], list[Slip]] = list) -> Slip | None:
@@ -152,7 +140,13 @@ def slips_in_lengths(robot: Robot, data: Dataset) -> list[Notice]:
     size = _misfit(robot, data)
     if size <= _PLACED_WITHIN_BY_FIXTURES:
         return []
-    for slip in (*_length_slips(data), *_angle_slips(data), *_sign_slips(data, 1), *_order_slips(data)):
+    for slip in (
+        *length_slips(data),
+        *as_noted(robot, data, angle_slips),
+        *controller_slips(robot, data),
+        *as_noted(robot, data, sign_slips),
+        *as_noted(robot, data, order_slips),
+    ):
         if np.ptp(slip.data.joints, axis=0).max() < _LEAST_TRAVEL:
             continue  # an arm that hardly moves fits any fixture
         mended = _misfit(robot, slip.data)
@@ -179,7 +173,8 @@ def slips_by_fit(robot: Robot, data: Dataset) -> list[Notice]:
     """
     some = _some(replace(_few_targets(data), quaternion=None, sigma=None, sigma_rot=None))
     given = _fitted_misfit(robot, some)
-    tried = [(_fitted_misfit(robot, slip.data), slip) for slip in (*_mirrored(some), *_sign_slips(some, 1))]
+    tries = [*controller_slips(robot, some), *mirrored(some), *as_noted(robot, some, sign_slips)]
+    tried = [(_fitted_misfit(robot, slip.data), slip) for slip in tries]
     least = min(left for left, _ in tried)
     slip = next(slip for left, slip in tried if left <= _AS_GOOD * least)
     return [slip.notice] if least * _LEAST_IMPROVEMENT < given else []
@@ -219,140 +214,6 @@ def _spread(data: Dataset) -> float:
         counted = [data.position, *(v[:, None] for v in (data.distance, data.height) if v is not None)]
         return float(np.sqrt(np.nanmean(np.concatenate([v.reshape(-1) for v in counted]) ** 2))) + 1e-3
     return float(np.sqrt(np.mean(np.var(data.position[data.has_position], axis=0)))) + 1e-12
-
-
-# -- lengths -----------------------------------------------------------------------------------------------
-
-
-def _length_slips(data: Dataset) -> Iterator[Slip]:
-    for factor, words in (
-        (1e-3, "a thousand times too large, as if mm were called m"),
-        (1e3, "a thousand times too small, as if m were called mm"),
-        (25.4, "25.4 times too small, as if inches were called mm"),
-        (1 / 25.4, "25.4 times too large, as if mm were called inches"),
-    ):
-        if factor > 1.0 and np.nanmax(np.abs(data.position), initial=0.0) * factor > _FARTHEST:
-            continue
-        what = "positions" if data.fixture is None else "lengths"
-        words = f"The {what} are {words}. Mend the unit in the header"
-        yield Slip("unit-length", words, _scaled(data, factor))
-
-
-def _scaled(data: Dataset, factor: float) -> Dataset:
-    """Return the data with all measured lengths so many times as large."""
-
-    def scaled(values: Array | None) -> Array | None:
-        return None if values is None else values * factor
-
-    setup = None if data.setup is None else _scaled(data.setup, factor)
-    more = {"distance": scaled(data.distance), "height": scaled(data.height), "setup": setup}
-    return replace(data, position=data.position * factor, **more)  # type: ignore[arg-type]
-
-
-def _scale_slips(robot: Robot, data: Dataset) -> Iterator[Slip]:
-    """Try the factor by which readings are larger than the robot, from the linear map that takes them onto it.
-
-    Of ``B y = R_c t + p_c + u`` the map B, the targets t and u are found by least squares. Where B stretches all axes
-    alike, its inverse is a turn times the factor.
-    """
-    p, R = robot.with_frames(Transform(), {}).world_poses(data.postures)
-    readings = np.flatnonzero(data.has_position)
-    where, what = data.configuration[readings], data.target[readings]
-    y = data.position[readings] - data.position[readings].mean(axis=0)
-    seen = np.unique(what)
-    unknowns = 9 + 3 * len(seen) + 3
-    if 3 * len(readings) < 2 * unknowns:
-        return
-    rows = np.zeros((len(readings), 3, unknowns))
-    for i in range(3):
-        rows[:, i, 3 * i : 3 * i + 3] = y
-    for column, t in enumerate(seen.tolist()):
-        mine = what == t
-        rows[mine, :, 9 + 3 * column : 12 + 3 * column] = -R[where[mine]]
-    rows[:, :, -3:] = -np.eye(3)
-    found = np.linalg.lstsq(rows.reshape(-1, unknowns), p[where].reshape(-1), rcond=1e-10)[0]
-    onto = np.asarray(found[:9].reshape(3, 3), dtype=float)
-    stretch = np.linalg.svd(onto, compute_uv=False)
-    if stretch[2] <= 0.0:
-        return
-    if stretch[0] > _MOST_UNEVEN * stretch[2]:
-        yield from _column_slips(data, onto)
-        return
-    factor = float(np.prod(stretch)) ** (1 / 3)
-    size = f"{1 / factor:.4g} times too large" if factor < 1 else f"{factor:.4g} times too small"
-    yield Slip(
-        "unit-length", f"The positions are {size} for this robot. Mend them or their unit", _scaled(data, factor)
-    )
-
-
-def _column_slips(data: Dataset, onto: Array) -> Iterator[Slip]:
-    """Try single columns of positions in another unit, from the linear map that takes readings onto the robot."""
-    stretch = np.linalg.norm(onto, axis=0)
-    turned = onto / stretch
-    off = np.abs(stretch - 1.0) > _MOST_UNEVEN - 1.0
-    if np.abs(turned.T @ turned - np.eye(3)).max() > _SQUARE or off.all():
-        return
-    sizes = [f"{1 / by:.4g} times too large" if by < 1 else f"{by:.4g} times too small" for by in stretch.tolist()]
-    words = " and ".join(f"the column {axis} of the positions is {sizes[i]}" for i, axis in enumerate("xyz") if off[i])
-    mended = data.position * np.where(off, stretch, 1.0)
-    words = f"For this robot {words}. Mend the unit in the header, or the numbers"
-    yield Slip("unit-length", words, replace(data, position=mended))
-
-
-def _mirrored(data: Dataset) -> Iterator[Slip]:
-    words = (
-        "The positions are mirrored: two of the columns x, y and z are exchanged, or the sign of one is wrong. The "
-        "data fit with their mirror image. Mend the columns; an instrument's axes are right-handed"
-    )
-    yield Slip("mirrored", words, replace(data, position=data.position * np.array([1.0, 1.0, -1.0])))
-
-
-# -- joints ------------------------------------------------------------------------------------------------
-
-
-def _turning(data: Dataset) -> list[int]:
-    return [i for i in range(data.joints.shape[1]) if data.joint_kinds[i] == "revolute"]
-
-
-def _angle_slips(data: Dataset) -> Iterator[Slip]:
-    turning = _turning(data)
-    for factor, words in ((math.pi / 180, "degrees are called rad"), (180 / math.pi, "radians are called deg")):
-        for group in [turning, *([i] for i in turning)]:
-            if not group:
-                continue
-            joints = data.joints.copy()
-            joints[:, group] *= factor
-            which = "The joints" if len(group) > 1 else f"Joint {group[0] + 1}"
-            words_of = f"{which}: {words}. Mend the unit in the header"
-            yield Slip("unit-angle", words_of, replace(data, joints=joints))
-
-
-def _sign_slips(data: Dataset, size: int) -> Iterator[Slip]:
-    """Try the opposite signs of so many joints at once."""
-    for group in map(list, combinations(range(data.joints.shape[1]), size)):
-        joints = data.joints.copy()
-        joints[:, group] *= -1
-        which = " and ".join(str(i + 1) for i in group)
-        words = f"The sign of joint {which} is opposite to the robot's: the data fit with it changed. "
-        yield Slip(
-            "joint-sign", words + "Change it in the data, or correct the robot file", replace(data, joints=joints)
-        )
-
-
-def _order_slips(data: Dataset) -> Iterator[Slip]:
-    for a, b in combinations(range(data.joints.shape[1]), 2):
-        joints = data.joints.copy()
-        joints[:, [a, b]] = joints[:, [b, a]]
-        words = f"Joints {a + 1} and {b + 1} are in the wrong order: the data fit with the columns exchanged. "
-        yield Slip("joint-sign", words + "Exchange their columns", replace(data, joints=joints))
-
-
-def _shifted(data: Dataset) -> Iterator[Slip]:
-    """Try the joint positions of the row before, and of the row after."""
-    for by, words in ((1, "before"), (-1, "after")):
-        joints = np.roll(data.joints, by, axis=0)
-        said = f"The readings of each configuration fit the joint positions of the one {words} it: the columns are "
-        yield Slip("rows-shifted", said + "shifted by one row. Shift them back", _some(replace(data, joints=joints)))
 
 
 def _beyond_reach(robot: Robot, data: Dataset) -> list[Notice]:

@@ -148,12 +148,11 @@ def variance_components(
         there are errors of the joints, and whether they explain the residuals, is as it was.
     """
     moments = Moments(at, len(estimated))
-    start = np.ones(len(estimated))
-    for index in np.flatnonzero(estimated).tolist():
-        start[index] = max(float(np.mean(at.residual[at.factor == index] ** 2)), float(least[index]))
-    noise = [index for index, free in enumerate(estimated) if free and start[index] > least[index]]
+    start, noise = _start(at, estimated, least)
     if before is None:
         alone, best = _with_and_without(moments, start, kinds, noise)
+        believed = 2.0 * (best.likelihood - alone.likelihood) >= _SIGNIFICANT and not _alone_in(best)
+        best = best if believed else alone
         likeliest = _variances(best, kinds, noise)
         holds = (best is alone or _agree(alone, best)) and _independent(best)
         best = best if holds else alone
@@ -182,6 +181,41 @@ def variance_components(
         squares * best.factors,
         traces * best.factors,
     )
+
+
+def largest_likelihood(
+    at: Linearised,
+    estimated: Sequence[bool],
+    least: Array,
+    kinds: Sequence[NDArray[np.intp]],
+    joints: Array | None = None,
+) -> tuple[Variances, float]:
+    """Return the variances with the largest likelihood, and its logarithm: to compare what may be said of readings.
+
+    Parameters are those of :func:`variance_components`. Errors of the joints count however little they gain. How well
+    variances are known is not asked.
+
+    Parameters
+    ----------
+    joints
+        Variance of the error of each joint where it is known, ``(joints,)``; otherwise it is estimated.
+    """
+    moments = Moments(at, len(estimated))
+    start, noise = _start(at, estimated, least)
+    if joints is not None:
+        best = _maximised(moments, Likelihood(moments, start, joints), [], noise)
+    else:
+        alone, best = _with_and_without(moments, start, kinds, noise)
+        best = max(alone, best, key=lambda state: state.likelihood)
+    return Variances(best.factors, best.joints, np.full(len(best.joints), np.inf)), best.likelihood
+
+
+def _start(at: Linearised, estimated: Sequence[bool], least: Array) -> tuple[Array, list[int]]:
+    """Return the variances of the readings to begin with, ``(factors,)``, and which of them are to be found."""
+    start = np.ones(len(estimated))
+    for index in np.flatnonzero(estimated).tolist():
+        start[index] = max(float(np.mean(at.residual[at.factor == index] ** 2)), float(least[index]))
+    return start, [index for index, free in enumerate(estimated) if free and start[index] > least[index]]
 
 
 def _variances(state: Likelihood, kinds: Sequence[NDArray[np.intp]], noise: Sequence[int]) -> Variances:
@@ -243,7 +277,7 @@ def _covariance(
 def _with_and_without(
     moments: Moments, start: Array, kinds: Sequence[NDArray[np.intp]], noise: Sequence[int]
 ) -> tuple[Likelihood, Likelihood]:
-    """Return the largest likelihood without errors of the joints and with them; the first twice if they gain little."""
+    """Return the largest likelihood without errors of the joints, and with them if any seem to help."""
     alone = _maximised(moments, Likelihood(moments, start, np.zeros(moments.M.shape[-1])), [], noise)
     best = alone
     for _ in kinds:
@@ -261,8 +295,7 @@ def _with_and_without(
             joints[kind] = step
         taken = [kind for kind in kinds if joints[kind].any()]
         best = _maximised(moments, Likelihood(moments, best.factors, joints), taken, noise)
-    believed = 2.0 * (best.likelihood - alone.likelihood) >= _SIGNIFICANT and not _alone_in(best)
-    return alone, best if believed else alone
+    return alone, best
 
 
 def _alone_in(state: Likelihood) -> bool:

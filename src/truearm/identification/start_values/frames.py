@@ -4,7 +4,7 @@ With the nominal flange poses (R_c, p_c) a reading of target t at configuration 
 ``y = R (R_c t + p_c) + p``; turned back by the base, ``R' y - p_c = R_c t + R' p``. For a given R this is linear
 in the target t and in u = R' p with a matrix that does not depend on R, so both can be projected out once and for
 all: what is left is ``|M vec(R) - m|^2``, nine numbers on the rotations, which a coarse look at all rotations and
-a few Gauss-Newton steps solve. Measured orientations add rows to it: the axis about which a target turned between
+a few Newton steps solve. Measured orientations add rows to it: the axis about which a target turned between
 two configurations is the axis about which the flange turned, seen from the instrument.
 No start needs to be given by hand, and the number of joints does not matter.
 """
@@ -127,13 +127,7 @@ def _nearest_rotation(G: Array, g: Array) -> Array:
     best = candidates[np.argsort(_cost(G, g, candidates))[:24]]
     costs = _cost(G, g, best)
     for _ in range(50):
-        # R exp(w): the columns of d vec(R) / dw are vec(R [e_k]x)
-        D = np.ascontiguousarray((best[:, None] @ _GENERATORS).reshape(-1, 3, 9).swapaxes(1, 2))
-        Dt = D.swapaxes(1, 2)
-        gradient = (Dt @ (best.reshape(-1, 9) @ G - g)[:, :, None])[:, :, 0]
-        hessian = Dt @ (G @ D)
-        damping = 1e-9 * np.trace(hessian, axis1=1, axis2=2)[:, None, None] * _IDENTITY + 1e-300 * _IDENTITY
-        step = -np.linalg.solve(hessian + damping, gradient[:, :, None])[:, :, 0]
+        step = _newton_step(G, g, best)
         size = np.linalg.norm(step, axis=1, keepdims=True)
         step *= np.minimum(1.0, 0.5 / np.maximum(size, 1e-300))
         moved = best @ _rotations(step)
@@ -142,7 +136,32 @@ def _nearest_rotation(G: Array, g: Array) -> Array:
         best, costs = np.where(better[:, None, None], moved, best), np.where(better, moved_costs, costs)
         if not better.any() or size[better].max() < 1e-12:
             break
-    return np.asarray(best[np.argmin(costs)])
+    found = best[[np.argmin(costs)]]
+    last = _newton_step(G, g, found)  # the cost is flat to rounding where the slope is not yet
+    return np.asarray((found @ _rotations(last) if np.linalg.norm(last) < _FLAT else found)[0])
+
+
+#: Angle about a minimum within which rounding hides how the cost changes, amply [rad].
+_FLAT = 1e-6
+
+
+def _newton_step(G: Array, g: Array, R: Array) -> Array:
+    """Return rotation vectors w, ``(n, 3)``, that lead from rotations R by R exp(w) to where the slope is zero.
+
+    With ``A = R' mat(G r - g)`` half the second derivative of the cost by w is ``D' G D + sym(A) - tr(A) I``, D the
+    columns of d vec(R) / dw. Where it is not positive, its eigenvalues are taken without their signs, so that every
+    step goes downhill.
+    """
+    # R exp(w): the columns of d vec(R) / dw are vec(R [e_k]x)
+    D = np.ascontiguousarray((R[:, None] @ _GENERATORS).reshape(-1, 3, 9).swapaxes(1, 2))
+    Dt = D.swapaxes(1, 2)
+    slope = R.reshape(-1, 9) @ G - g
+    A = R.swapaxes(1, 2) @ slope.reshape(-1, 3, 3)
+    bend = (A + A.swapaxes(1, 2)) / 2 - np.trace(A, axis1=1, axis2=2)[:, None, None] * _IDENTITY
+    curvature, V = np.linalg.eigh(Dt @ (G @ D) + bend)
+    curvature = np.abs(curvature)
+    curvature += 1e-9 * curvature.sum(axis=1, keepdims=True) + 1e-300
+    return np.asarray(-(V @ ((V.swapaxes(1, 2) @ (Dt @ slope[:, :, None])) / curvature[:, :, None]))[:, :, 0])
 
 
 _IDENTITY = np.eye(3)

@@ -36,6 +36,8 @@ _SEARCH_STEP: Final = 0.09
 _PLACES_KEPT: Final = 6
 #: Deviation that readings are weighed with while targets are looked for [m or rad].
 _SEARCH_DEVIATION: Final = 1e-3
+#: Step that is the last there, in priors; what is found is a start.
+_SEARCH_SMALL: Final = 1e-2
 #: How many readings are used for that.
 _READINGS_USED: Final = 120
 #: How many of one fixture, at least.
@@ -260,7 +262,8 @@ def _with_target(robot: Robot, data: Dataset, target: int, kinds: Mapping[str, F
         tried = tried.with_fixtures(_fixture_places(tried, mine, kinds))
         own = tried.target(name).chain.parameters
         free = FreeParameters(tuple(q for q in tried.parameters.values() if q.group == "fixture" or q.name in own))
-        solution = solve(Problem(tried, mine, free, dict.fromkeys(_names(), _SEARCH_DEVIATION)))
+        problem = Problem(tried, mine, free, dict.fromkeys(_names(), _SEARCH_DEVIATION))
+        solution = solve(problem, small=_SEARCH_SMALL)
         there = solution.vector[[free.names.index(tried.target(name).parameter(axis)) for axis in "xyz"]]
         found.append((float(solution.residual @ solution.residual), there))
     return _also(robot, {name: min(found, key=lambda one: one[0])[1]})

@@ -1,6 +1,7 @@
 """The sheet: one row a configuration, with the cups and the lengths between them. A plan prints it, a person fills it.
 
-Columns ``configuration``, ``design`` (``112212331``), ``solution`` (1 to 4), ``joint_1 [deg]`` .. and fifteen lengths:
+Columns ``configuration``, ``design`` (``112212331``), ``solution`` (1 to 4), ``joint_1 [deg]`` .. (or ``axis_1 [deg]``
+.., as the controller shows them) and fifteen lengths:
 ``B1-B2 [mm]``, ``T1-T2 [mm]`` and so on between cups of a fixture, ``B1-T1 [mm]`` to ``B3-T3 [mm]`` for legs. Legs that
 the design does not have stay empty. A row of which a leg could not be measured stays as well, and is left out. The
 fixtures' distances must be in the first row; where a later row leaves one empty, the one above holds.
@@ -27,6 +28,8 @@ from truearm.measurement.readers.canonical import refuse_other_separators
 from truearm.measurement.readers.cells import Cells, Layout, lines_of, read_cells
 from truearm.measurement.readers.rows import Configurations, found_configurations
 from truearm.modeling.chain import Array
+from truearm.modeling.controller import Controller
+from truearm.modeling.formats.joint_columns import JOINT_COLUMN, joint_cells, joint_headings, joint_names
 from truearm.modeling.parts import Joint
 from truearm.units import ANGLE_UNITS, LENGTH_UNITS, checked_unit, written
 
@@ -35,7 +38,6 @@ _LEGS: Final = tuple(f"B{base}-T{tool}" for base in (1, 2, 3) for tool in (1, 2,
 _PLAIN: Final = ("configuration", "pose", "branch", "design", "solution")
 _NEEDED: Final = ("configuration", "design", "solution", *_FIXTURES, *_LEGS)
 _HEADING: Final = re.compile(r"(?P<name>[^\[]*?)\s*(?:\[(?P<unit>[^\]]*)\])?")
-_JOINT: Final = re.compile(r"joint_[1-9][0-9]?")
 Choice = TypeVar("Choice", int, Design)
 
 
@@ -94,7 +96,10 @@ class Sheet:
         """
         if self.configurations is None:
             raise InputError(
-                "the sheet has no joint positions", where=self.source, allowed="joint_1 [deg] ..", cure="Add them."
+                "the sheet has no joint positions",
+                where=self.source,
+                allowed="joint_1 [deg] .., or axis_1 [deg] ..",
+                cure="Add them.",
             )
         rows = self.measured
         if not len(rows):
@@ -104,6 +109,7 @@ class Sheet:
             labels=tuple(self.labels[row] for row in rows),
             joints=self.configurations.joints[rows],
             joint_kinds=self.configurations.kinds,
+            joints_are=self.configurations.joints_are,
             targets=tuple(targets),
             configuration=np.repeat(np.arange(len(rows)), 3),
             target=np.tile(np.arange(3), len(rows)),
@@ -144,11 +150,11 @@ def read_sheet(path: Path, device: Device = DEVICE) -> Sheet:
         for row in np.flatnonzero(np.isfinite(values)).tolist():
             device.check(nominal, float(values[row]), name, cells.place(row, columns[name][0]))
     _refuse_strange_legs(cells, columns, found, legs)
-    joints = sorted((name for name in columns if _JOINT.fullmatch(name)), key=lambda name: int(name[6:]))
     configurations = None
-    if joints:
+    if any(JOINT_COLUMN.fullmatch(name) for name in columns):
+        joints_are, joints = joint_names(columns, f"{path}, line {header}")
         places, units = zip(*(columns[name] for name in joints), strict=True)
-        configurations = found_configurations(cells, labels, places, units)
+        configurations = found_configurations(cells, labels, places, units, joints_are)
     return Sheet(
         source=str(path),
         configurations=configurations,
@@ -214,7 +220,7 @@ def _columns(cells: Cells) -> dict[str, tuple[int, str]]:
             columns[name] = (place, "1")
         elif name in _FIXTURES or name in _LEGS:
             columns[name] = (place, checked_unit(unit, LENGTH_UNITS, f"{where}, {heading}"))
-        elif _JOINT.fullmatch(name):
+        elif JOINT_COLUMN.fullmatch(name):
             columns[name] = (place, checked_unit(unit, (*ANGLE_UNITS, *LENGTH_UNITS), f"{where}, {heading}"))
         else:
             near = nearest_names(name, (*_PLAIN, *_FIXTURES, *_LEGS), 1)
@@ -222,7 +228,7 @@ def _columns(cells: Cells) -> dict[str, tuple[int, str]]:
                 "the column is not known",
                 where=where,
                 came=heading,
-                allowed=f"{', '.join(_PLAIN)}, joint_1 [deg] .., and lengths such as B1-T1 [mm]",
+                allowed=f"{', '.join(_PLAIN)}, joint_1 [deg] .. or axis_1 [deg] .., and lengths such as B1-T1 [mm]",
                 cure=f"Did you mean {near[0]}?" if near else "Rename it, or leave it out.",
             )
     missing = [name for name in _NEEDED if name not in columns]
@@ -259,7 +265,12 @@ class PlannedRow:
     joints: Array
 
 
-def sheet_csv(rows: Sequence[PlannedRow], joints: Sequence[Joint], lengths: Sequence[dict[str, float]] = ()) -> str:
+def sheet_csv(
+    rows: Sequence[PlannedRow],
+    joints: Sequence[Joint],
+    lengths: Sequence[dict[str, float]] = (),
+    controller: Controller | None = None,
+) -> str:
     """Return a sheet, empty or with lengths.
 
     Parameters
@@ -270,16 +281,16 @@ def sheet_csv(rows: Sequence[PlannedRow], joints: Sequence[Joint], lengths: Sequ
         Of the robot.
     lengths
         For each row the lengths [m] by name; what is not there stays empty.
+    controller
+        Who shows the joint positions, ``axis_i``; None for the model's, ``joint_i``.
     """
-    units = ["deg" if joint.kind == "revolute" else "mm" for joint in joints]
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
-    angles = [f"joint_{number} [{unit}]" for number, unit in enumerate(units, 1)]
-    writer.writerow([*_PLAIN, *angles, *(f"{name} [mm]" for name in (*_FIXTURES, *_LEGS))])
+    positions = joint_cells(np.array([row.joints for row in rows]).reshape(-1, len(joints)), joints, controller)
+    writer.writerow([*_PLAIN, *joint_headings(joints, controller), *(f"{name} [mm]" for name in (*_FIXTURES, *_LEGS))])
     for number, row in enumerate(rows):
         known = lengths[number] if lengths else {}
-        places = (repr(written(v, unit)) for v, unit in zip(row.joints.tolist(), units, strict=True))
         cells = (repr(written(known[name], "mm")) if name in known else "" for name in (*_FIXTURES, *_LEGS))
         plain = (row.configuration, row.pose, row.branch, row.design.name, row.solution)
-        writer.writerow([*plain, *places, *cells])
+        writer.writerow([*plain, *positions[number], *cells])
     return stream.getvalue()

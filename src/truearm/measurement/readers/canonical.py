@@ -8,7 +8,6 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
@@ -23,6 +22,7 @@ from truearm.measurement.readers.cells import Cells, Layout, lines_of, read_cell
 from truearm.measurement.readers.fixtures import check_lengths, read_setup
 from truearm.measurement.readers.rows import Readings, dataset_of, found_configurations, same_everywhere
 from truearm.modeling.chain import Array
+from truearm.modeling.formats.joint_columns import COLUMN, JOINT_COLUMN, joint_names
 from truearm.units import ANGLE_UNITS, LENGTH_UNITS, SMALL_ANGLE_UNITS, checked_unit, written
 
 _POSITION: Final = ("x", "y", "z")
@@ -40,7 +40,13 @@ _UNITS: Final[dict[str, tuple[str, ...]]] = (
 _PLAIN: Final = ("configuration", "target", "role", "fixture", "visit", *_QUATERNION)
 #: Every column as one writes it, for messages.
 _SHOWN: Final = (
-    {"configuration": "configuration", "joint_1": "joint_1 [deg]", "target": "target", "role": "role"}
+    {
+        "configuration": "configuration",
+        "joint_1": "joint_1 [deg]",
+        "axis_1": "axis_1 [deg]",
+        "target": "target",
+        "role": "role",
+    }
     | {"visit": "visit", "fixture": "fixture", "distance": "distance [mm]", "height": "height [mm]"}
     | {axis: f"{axis} [mm]" for axis in _POSITION}
     | {part: part for part in _QUATERNION}
@@ -50,7 +56,6 @@ _SHOWN: Final = (
 )
 _ALLOWED: Final = ", ".join(_SHOWN.values()).replace("[deg]", "[deg] ..")
 _HEADING: Final = re.compile(r"(?P<name>[^\[]*?)\s*(?:\[(?P<unit>[^\]]*)\])?")
-_JOINT: Final = re.compile(r"joint_([1-9][0-9]{0,3})")
 _SEPARATORS: Final = {";": "semicolons", "\t": "tabs", "|": "vertical bars"}
 
 
@@ -86,9 +91,12 @@ def read_csv(path: Path) -> Dataset:
                 where=str(path),
                 cure="Give the points on the robot the role `target`.",
             )
-    joints = [columns[f"joint_{number}"] for number in _joint_numbers(columns)]
+    joints_are, names = joint_names(columns, f"{path}, line {header}")
+    joints = [columns[name] for name in names]
     labels = cells.texts(columns["configuration"].place)
-    configurations = found_configurations(cells, labels, [j.place for j in joints], [j.unit for j in joints])
+    configurations = found_configurations(
+        cells, labels, [j.place for j in joints], [j.unit for j in joints], joints_are
+    )
 
     def numbers(*names: str, deviation: bool = False) -> Array:
         found = [columns[name] for name in names]
@@ -155,7 +163,7 @@ def _columns(cells: Cells) -> dict[str, _Column]:
         match = _HEADING.fullmatch(heading)
         name, unit = (match["name"], match["unit"]) if match else (heading, None)
         units = _UNITS.get(name)
-        if _JOINT.fullmatch(name):
+        if JOINT_COLUMN.fullmatch(name):
             units = (*ANGLE_UNITS, *LENGTH_UNITS)
         if units is None and name not in _PLAIN:
             word = re.split(r"[^A-Za-z]", name)[0]
@@ -187,17 +195,7 @@ def _columns(cells: Cells) -> dict[str, _Column]:
 
 def _refuse_missing(cells: Cells, columns: dict[str, _Column]) -> None:
     where = f"{cells.source}, line {cells.header}"
-    numbers = _joint_numbers(columns)
-    there_are = set(numbers)
-    for number in range(1, max(numbers, default=1) + 1):
-        if number not in there_are:
-            raise InputError(
-                f"the column joint_{number} is missing",
-                where=where,
-                came=", ".join(f"joint_{n}" for n in numbers) or None,
-                allowed="joint_1, joint_2, .. without a gap",
-                cure=f"Add joint_{number} [deg], or with the unit it has, or renumber.",
-            )
+    joint_names(columns, where)
     lengths = [name for name in _LENGTHS if name in columns]
     positions = () if lengths and not any(axis in columns for axis in _POSITION) else _POSITION
     for name in ("configuration", "target", *positions, *(["fixture"] if lengths else [])):
@@ -259,10 +257,6 @@ def _visits(cells: Cells, place: int) -> IntArray:
     return np.array([int(text) for text in texts], dtype=np.intp)
 
 
-def _joint_numbers(columns: Iterable[str]) -> list[int]:
-    return sorted(int(match[1]) for name in columns if (match := _JOINT.fullmatch(name)))
-
-
 # -- writing -------------------------------------------------------------------------------------------
 
 
@@ -284,6 +278,7 @@ def csv_text(dataset: Dataset, length_unit: str = "mm", angle_unit: str = "deg")
     if dataset.wrench is not None:
         circumstances |= dict(zip((*_FORCE, *_MOMENT), dataset.wrench.T, strict=True))
     units = [angle_unit if kind == "revolute" else length_unit for kind in dataset.joint_kinds]
+    column = COLUMN["controller" if dataset.joints_are == "controller" else "model"]
     setup = dataset.setup
     with_visits = any(part.visit is not None for part in parts)
     with_roles = references is not None or setup is not None
@@ -293,7 +288,7 @@ def csv_text(dataset: Dataset, length_unit: str = "mm", angle_unit: str = "deg")
     with_sigma = with_sigma or setup is not None
     heading = [
         "configuration",
-        *(f"joint_{number} [{unit}]" for number, unit in enumerate(units, 1)),
+        *(f"{column}_{number} [{unit}]" for number, unit in enumerate(units, 1)),
         "target",
         *(["role"] if with_roles else []),
         *(["visit"] if with_visits else []),

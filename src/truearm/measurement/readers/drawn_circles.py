@@ -19,10 +19,11 @@ from truearm.measurement.drawn_circle.scan import read_circle
 from truearm.measurement.readers.canonical import refuse_other_separators
 from truearm.measurement.readers.cells import Cells, Layout, read_cells
 from truearm.measurement.readers.rows import Configurations, found_configurations, in_order
+from truearm.modeling.formats.joint_columns import joint_names
 from truearm.units import ANGLE_UNITS, LENGTH_UNITS, checked_unit
 
-_HEADING: Final = re.compile(r"(configuration|joint_[1-9][0-9]{0,3}|angle|height)\s*(?:\[([^\]]*)\])?")
-_ALLOWED: Final = "configuration, joint_1 [deg] .., angle [deg], height [mm]"
+_HEADING: Final = re.compile(r"(configuration|(?:joint|axis)_[1-9][0-9]{0,3}|angle|height)\s*(?:\[([^\]]*)\])?")
+_ALLOWED: Final = "configuration, joint_1 [deg] .. or axis_1 [deg] .., angle [deg], height [mm]"
 #: How well the middle of a circle lies in its paper [m].
 _PAPER_DEVIATION: Final = 1e-5
 
@@ -36,8 +37,8 @@ class Page:
     scan
         Image of the page.
     points
-        CSV with the columns ``configuration``, ``joint_1 [deg]`` .., ``angle [deg]`` on the page and ``height [mm]``
-        over it.
+        CSV with the columns ``configuration``, ``joint_1 [deg]`` .. (or ``axis_1 [deg]`` .., as the controller shows
+        them), ``angle [deg]`` on the page and ``height [mm]`` over it.
     """
 
     scan: Path
@@ -79,12 +80,13 @@ def read_drawn_circles(
     page, none = np.repeat(np.arange(len(pages)), each), np.full(len(labels), np.nan)
     rows = np.argsort(np.tile(np.arange(len(labels)), 2), kind="stable")
     centres, papers = (tuple(f"{kind}_{name}" for name in pages) for kind in ("centre", "paper"))
-    kinds = next(iter(drawn.values()))[0].kinds
+    kinds, joints_are = next(iter(drawn.values()))[0].kinds, next(iter(drawn.values()))[0].joints_are
     data = Dataset(
         source=" and ".join(str(one.points) for one in pages.values()),
         labels=labels,
         joints=joints,
         joint_kinds=kinds,
+        joints_are=joints_are,
         targets=("pencil",),
         configuration=np.tile(np.arange(len(labels)), 2)[rows],
         target=np.zeros(2 * len(labels), dtype=np.intp),
@@ -118,10 +120,12 @@ def _page(page: Page, dpi: float | tuple[float, float] | None) -> tuple[Configur
     refuse_other_separators(text, f"{page.points}, line 1")
     cells = read_cells(text, str(page.points), Layout())
     columns = _columns(cells)
-    numbers = sorted(int(name.removeprefix("joint_")) for name in columns if name.startswith("joint_"))
-    joints = [columns[f"joint_{number}"] for number in numbers]
+    joints_are, names = joint_names(columns, f"{page.points}, line {cells.header}")
+    joints = [columns[name] for name in names]
     labels = cells.texts(columns["configuration"][0])
-    found = found_configurations(cells, labels, [place for place, _ in joints], [unit for _, unit in joints])
+    found = found_configurations(
+        cells, labels, [place for place, _ in joints], [unit for _, unit in joints], joints_are
+    )
     if len(found.labels) < len(labels):
         again = Counter(labels).most_common(1)[0][0]
         raise InputError(
@@ -146,22 +150,24 @@ def _columns(cells: Cells) -> dict[str, tuple[int, str]]:
         units = {"angle": ANGLE_UNITS, "height": LENGTH_UNITS}.get(match[1], (*ANGLE_UNITS, *LENGTH_UNITS))
         unit = "1" if match[1] == "configuration" else checked_unit(match[2], units, f"{where}, {heading}")
         columns[match[1]] = place, unit
-    for name in ("configuration", "joint_1", "angle", "height"):
+    for name in ("configuration", "angle", "height"):
         if name not in columns:
             raise InputError(
                 f"the column {name} is missing", where=f"{cells.source}, line {cells.header}", allowed=_ALLOWED
             )
-    count = sum(name.startswith("joint_") for name in columns)
-    if f"joint_{count}" not in columns:
-        raise InputError(
-            "the joints are not numbered without a gap", where=f"{cells.source}, line {cells.header}", allowed=_ALLOWED
-        )
     return columns
 
 
 def _refuse_twice(pages: Mapping[str, Page], drawn: Mapping[str, tuple[Configurations, DrawnCircle]]) -> None:
     first: dict[str, str] = {}
     count = {len(found.kinds) for found, _ in drawn.values()}
+    if len({found.joints_are for found, _ in drawn.values()}) > 1:
+        raise InputError(
+            "the pages have joint positions of two kinds",
+            where=" and ".join(str(page.points) for page in pages.values()),
+            came="axis_1 [deg] .. and joint_1 [deg] ..",
+            cure="Name the columns of all pages alike.",
+        )
     if len(count) > 1:
         raise InputError(
             "the pages are of robots with different joints",

@@ -10,6 +10,7 @@ from pydantic import field_validator as validator_of
 
 from truearm.errors import InputError
 from truearm.measurement.readers.cells import Layout
+from truearm.modeling.controller import JointsOf
 from truearm.printable import is_one_line
 from truearm.shown import counted
 
@@ -182,6 +183,7 @@ class JointsEntry(_Entry):
     columns: list[Column] = Field(min_length=1)
     unit: Literal["deg", "rad", "mm", "m", "um", "in"] | None = None
     units: list[Literal["deg", "rad", "mm", "m", "um", "in"]] | None = None
+    are: JointsOf | None = None
     file: Text | None = None
     key: Column | None = None
     layout: LayoutEntry | None = None

@@ -14,6 +14,7 @@ from truearm.limits import refuse_beyond
 from truearm.measurement.dataset import Dataset, IntArray
 from truearm.measurement.readers.cells import lines_of, refuse_long, split_line
 from truearm.modeling.chain import Array
+from truearm.modeling.controller import JointsOf
 from truearm.modeling.postures import approach_of
 from truearm.printable import is_one_line
 from truearm.shown import counted
@@ -26,6 +27,7 @@ def read_matrices(
     references: Mapping[str, Path],
     angle_unit: str,
     length_unit: str,
+    joints_are: JointsOf = "model",
 ) -> tuple[Dataset, Mapping[str, int]]:
     """Read matrices of joints and positions; row n of every file is configuration ``n``.
 
@@ -41,6 +43,8 @@ def read_matrices(
         Name and file of each point on the tool and of each fixed point beside the robot; columns x, y, z.
     angle_unit, length_unit
         Units of the joints and of the positions.
+    joints_are
+        ``model``, or ``controller`` if it shows these joint positions.
 
     Returns
     -------
@@ -90,6 +94,7 @@ def read_matrices(
             labels=tuple(str(number) for number in range(1, len(values) + 1)),
             joints=values,
             joint_kinds=("revolute",) * values.shape[1],
+            joints_are=joints_are,
             targets=names,
             configuration=configuration,
             target=np.tile(np.arange(len(names), dtype=np.intp), len(values)),

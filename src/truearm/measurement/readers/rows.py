@@ -13,6 +13,7 @@ from truearm.errors import InputError
 from truearm.measurement.dataset import Dataset, IntArray
 from truearm.measurement.readers.cells import Cells
 from truearm.modeling.chain import Array
+from truearm.modeling.controller import JointsOf
 from truearm.modeling.postures import approach_of
 
 #: How far the norm of a quaternion may be from 1; files round quaternions to four digits or more.
@@ -35,16 +36,23 @@ class Configurations:
         ``revolute`` or ``prismatic`` for each joint.
     of_row
         Configuration of each row they were found in, ``(rows,)``.
+    joints_are
+        ``model``, or ``controller`` if it shows these joint positions.
     """
 
     labels: tuple[str, ...]
     joints: Array
     kinds: tuple[str, ...]
     of_row: IntArray
+    joints_are: JointsOf = "model"
 
 
 def found_configurations(
-    cells: Cells, labels: Sequence[str], columns: Sequence[int], units: Sequence[str]
+    cells: Cells,
+    labels: Sequence[str],
+    columns: Sequence[int],
+    units: Sequence[str],
+    joints_are: JointsOf = "model",
 ) -> Configurations:
     """Gather the configurations of a table in which every row has a label and all joints.
 
@@ -66,7 +74,7 @@ def found_configurations(
             cure="A configuration is one standstill of the robot: give other joints another label.",
         )
     kinds = tuple("revolute" if unit in ("deg", "rad") else "prismatic" for unit in units)
-    return Configurations(tuple(place), joints[first], kinds, of_row)
+    return Configurations(tuple(place), joints[first], kinds, of_row, joints_are)
 
 
 def same_everywhere(cells: Cells, configurations: Configurations, column: int, unit: str) -> Array:
@@ -202,6 +210,7 @@ def _part(
         labels=configurations.labels,
         joints=configurations.joints,
         joint_kinds=configurations.kinds,
+        joints_are=configurations.joints_are,
         targets=tuple(place),
         configuration=readings.configuration[rows],
         target=target,

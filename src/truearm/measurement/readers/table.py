@@ -25,18 +25,39 @@ from truearm.measurement.readers.mapping import (
 )
 from truearm.measurement.readers.rows import Configurations, Readings, dataset_of, found_configurations
 from truearm.modeling.chain import Array
+from truearm.modeling.controller import JointsOf
 from truearm.shown import counted
 from truearm.units import sized_si
 
 
-def read_table(path: Path, mapping: Path) -> Dataset:
+def read_table(path: Path, mapping: Path, joints_are: JointsOf | None = None) -> Dataset:
     """Read any delimited text as its mapping file (schema ``truearm-mapping/1``) says.
 
     An empty cell is a missing reading; zeros are zeros. A second file with the joints is looked for beside
     the mapping. With ``key`` it also gives the order of the configurations, and one that was not measured
     stays, as missing readings.
+
+    Parameters
+    ----------
+    joints_are
+        Whose joint positions they are; None for what the mapping says.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be used, or the mapping says that the joint positions are another's.
     """
     content = read_yaml(mapping, MappingFile)
+    said = content.joints.are
+    if joints_are is not None and said is not None and joints_are != said:
+        raise InputError(
+            "the mapping says whose joint positions they are",
+            parameter="joints_are",
+            where=f"{mapping}, joints.are",
+            came=f"{joints_are}, and in the mapping {said}",
+            cure="Leave one of them out.",
+        )
+    whose = joints_are or said or "model"
     cells = _read(path, content.layout)
     found: dict[str, list[str]] = {}
     if content.names is not None:
@@ -44,7 +65,7 @@ def read_table(path: Path, mapping: Path) -> Dataset:
     labels = found.get("configuration") or [str(number) for number in range(1, len(cells.lines) + 1)]
     if content.configuration is not None and content.configuration.column is not None:
         labels = list(cells.texts(_place(cells, content.configuration.column, mapping, "configuration.column")))
-    configurations, of_row = _configurations(cells, labels, content.joints, mapping)
+    configurations, of_row = _configurations(cells, labels, content.joints, whose, mapping)
     targets = _targets(cells, content, found.get("target"), mapping)
     entries = len(content.readings)
     position = np.stack(
@@ -159,7 +180,7 @@ def _split_names(cells: Cells, entry: NamesEntry, mapping: Path) -> tuple[Cells,
 
 
 def _configurations(
-    cells: Cells, labels: list[str], entry: JointsEntry, mapping: Path
+    cells: Cells, labels: list[str], entry: JointsEntry, joints_are: JointsOf, mapping: Path
 ) -> tuple[Configurations, IntArray]:
     """Return the configurations and which of them each row of the table belongs to."""
     if entry.file is None:
@@ -181,7 +202,7 @@ def _configurations(
                 allowed=counted(len(row_labels), "row"),
                 cure="Without a key, row n is the nth configuration: name the column of labels.",
             )
-    configurations = found_configurations(table, row_labels, places, entry.unit_of_each)
+    configurations = found_configurations(table, row_labels, places, entry.unit_of_each, joints_are)
     index = {label: number for number, label in enumerate(configurations.labels)}
     for row, label in enumerate(labels):
         if label not in index:

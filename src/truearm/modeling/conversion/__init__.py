@@ -16,6 +16,7 @@ import numpy as np
 
 from truearm.errors import InputError, did_you_mean
 from truearm.modeling.chain import Array
+from truearm.modeling.controller import ControllerKinematics
 from truearm.modeling.conventions import convention
 from truearm.modeling.conversion.base_frame import exponentials, zero_reference
 from truearm.modeling.conversion.common_normals import dh, hayati, s_model
@@ -82,9 +83,13 @@ def converted(robot: Robot, convention_name: str) -> Robot:
         for name, p in robot.known.items()
         if p.group not in ("geometry", "joint zero") and not (moved and p.group == "base")
     }
+    controller = robot.controller
+    if controller.kinematics.rows:  # a converted robot has lost the nominal values that they stand beside
+        controller = replace(controller, kinematics=ControllerKinematics())
     made = replace(
         robot,
         convention_name=convention_name,
+        controller=controller,
         joints=tuple(
             replace(joint, row=_tidy(row, convention(convention_name).row_units(joint.kind)))
             for joint, row in zip(robot.joints, links.rows, strict=True)
@@ -98,7 +103,7 @@ def converted(robot: Robot, convention_name: str) -> Robot:
     if moved and links.base is not None:
         x, y, z = (round(float(v), _DECIMALS) + 0.0 for v in links.base[:3, :3].T @ base[:3, :3] @ robot.gravity)
         its = np.linalg.inv(links.base) @ base @ robot.controller.base.matrix
-        controller = replace(robot.controller, base=_transform(its))
+        controller = replace(controller, base=_transform(its))
         made = replace(_based(made, links.base), gravity=(x, y, z), controller=controller)
     behind = np.linalg.inv(at_zero(made, made.rigid.trunk.elements)) @ flange
     if np.abs(behind - np.eye(4)).max() > _SAME_FRAME:

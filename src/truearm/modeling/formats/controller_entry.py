@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Annotated, Any
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Final, Literal
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, Field
+from pydantic import AfterValidator, BaseModel, Field, StringConstraints
 
 from truearm.errors import InputError, did_you_mean
-from truearm.modeling.controller import Controller
+from truearm.modeling.controller import Controller, ControllerKinematics
 from truearm.modeling.formats.entries import STRICT, Name, Number, Place, place_entry
 from truearm.modeling.parts import Joint
 from truearm.modeling.transform import IDENTITY
+from truearm.shown import counted
 from truearm.units import sized_si, to_si, written
 
 #: Couplings of worse condition leave joints that no float tells apart.
 _CONDITION = 1e9
+#: What may be stated of the controller's kinematics in a word.
+STATED: Final[Mapping[str, ControllerKinematics]] = {
+    "nominal": ControllerKinematics("nominal"),
+    "proprietary": ControllerKinematics("proprietary"),
+    "unknown": ControllerKinematics(),
+}
 
 
 def _direction(sign: int) -> int:
@@ -51,11 +58,36 @@ class CountedJoint(BaseModel):
     pulses_per_mm: Pulses | None = None
 
 
+class KinematicsRow(BaseModel):
+    """A row of what the controller computes with, in the convention ``hayati``."""
+
+    model_config = STRICT
+    theta_offset: Number
+    d: Number
+    a: Number
+    alpha: Number
+    beta: Number | None = None
+
+
+class KinematicsEntry(BaseModel):
+    """With what the controller computes poses: the table of the robot file, or rows of its own."""
+
+    model_config = STRICT
+    kind: Literal["nominal", "own"]
+    source: str = ""
+    identity: dict[Name, str] = {}
+    joints: list[KinematicsRow] = []
+
+
 class ControllerEntry(BaseModel):
-    """What differs from the model; all of it may be left out."""
+    """What differs from the model; all of it may be left out.
+
+    ``kinematics`` is ``nominal``, ``proprietary`` or ``unknown``, the name of a file, or what such a file held.
+    """
 
     model_config = STRICT
     source: str = ""
+    kinematics: Annotated[str, StringConstraints(strict=True)] | KinematicsEntry = "unknown"
     joints: list[CountedJoint] = []
     base: Place = Place()
     flange: Place = Place()
@@ -123,6 +155,7 @@ class ControllerEntry(BaseModel):
             base=self.base.transform(length, f"{where}.base"),
             flange=self.flange.transform(length, f"{where}.flange"),
             source=self.source,
+            kinematics=self._kinematics(joints, length, angle, f"{where}.kinematics"),
         )
         if np.linalg.cond(made.coupling(len(joints))) > _CONDITION:
             raise InputError(
@@ -131,6 +164,28 @@ class ControllerEntry(BaseModel):
                 came="; ".join(f"{e.joint} counts {', '.join(e.coupling)}" for e in self.joints if e.coupling),
             )
         return made
+
+    def _kinematics(self, joints: Sequence[Joint], length: str, angle: str, where: str) -> ControllerKinematics:
+        """Return with what the controller computes; the name of a file says nothing yet."""
+        entry = self.kinematics
+        if isinstance(entry, str):
+            return STATED.get(entry, ControllerKinematics())
+        if len(entry.joints) != (len(joints) if entry.kind == "own" else 0):
+            raise InputError(
+                "one row belongs here for each joint" if entry.kind == "own" else "nominal kinematics have no rows",
+                where=f"{where}.joints",
+                came=counted(len(entry.joints), "row"),
+                allowed=str(len(joints)) if entry.kind == "own" else "none",
+            )
+        units = {"d": length, "a": length}
+        rows = tuple(
+            {
+                column: sized_si(value, units.get(column, angle), f"{where}.joints[{number}].{column}")
+                for column, value in row.model_dump(exclude_none=True).items()
+            }
+            for number, row in enumerate(entry.joints, 1)
+        )
+        return ControllerKinematics(entry.kind, rows, entry.source, dict(entry.identity))
 
 
 def _number(name: str, numbers: dict[str, int], where: str) -> int:
@@ -178,5 +233,28 @@ def controller_entry(controller: Controller, joints: Sequence[Joint]) -> dict[st
     made: dict[str, Any] = {"source": controller.source} if controller.source else {}
     if rows:
         made["joints"] = rows
+    if controller.kinematics != STATED["unknown"]:
+        made["kinematics"] = _kinematics_entry(controller.kinematics)
     frames = {"base": controller.base, "flange": controller.flange}
     return made | {name: place_entry(place) for name, place in frames.items() if place != IDENTITY}
+
+
+def _kinematics_entry(kinematics: ControllerKinematics) -> str | dict[str, Any]:
+    """Return the entry of what a controller computes with; what is known in a word is one."""
+    if kinematics == STATED.get(kinematics.kind):
+        return kinematics.kind
+    made: dict[str, Any] = {"kind": kinematics.kind}
+    made |= {"source": kinematics.source} if kinematics.source else {}
+    made |= {"identity": dict(kinematics.identity)} if kinematics.identity else {}
+    if kinematics.rows:
+        units = {"d": "mm", "a": "mm"}
+        made["joints"] = [
+            {column: written(value, units.get(column, "deg")) for column, value in row.items()}
+            for row in kinematics.rows
+        ]
+    return made
+
+
+def controller_summary(kinematics: ControllerKinematics) -> dict[str, Any]:
+    """Return in short what a controller computes with, without its numbers."""
+    return {"kinematics": kinematics.kind, "source": kinematics.source, "identity": dict(kinematics.identity)}

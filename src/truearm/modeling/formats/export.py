@@ -15,6 +15,7 @@ from truearm.modeling.formats.dh_table import DHRow, DHTable, TableConvention
 from truearm.modeling.formats.model_json import model_json
 from truearm.modeling.formats.python_file import python_text
 from truearm.modeling.formats.remarks import comments, first_frame_remark, frames, left_out, masses_left_out
+from truearm.modeling.formats.ur_kinematics import KINEMATICS_FILE, kinematics_text
 from truearm.modeling.formats.urdf_writing import urdf_text
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY
@@ -47,8 +48,9 @@ def exported(robot: Robot, format_: str) -> Export:
     ----------
     format_
         ``dh`` (standard DH table), ``mdh`` (modified DH table), ``hayati`` (standard DH table with beta between nearly
-        parallel axes), ``urdf``, ``json`` (everything, schema ``truearm-model/1``) or ``python`` (a module for forward
-        and inverse kinematics that needs only NumPy).
+        parallel axes), ``urdf``, ``json`` (everything, schema ``truearm-model/1``), ``python`` (a module for forward
+        and inverse kinematics that needs only NumPy) or ``ur-kinematics`` (the kinematics file of the ROS driver of
+        Universal Robots).
 
     Raises
     ------
@@ -105,6 +107,14 @@ def _python(robot: Robot) -> Export:
     return Export(python_text(_in_base(robot), comments(robot, frames(robot), left)), frames(robot), left)
 
 
+def _ur_kinematics(robot: Robot) -> Export:
+    text, said = kinematics_text(_in_base(robot))
+    left = (*left_out(robot, KINEMATICS_FILE), *said)
+    frame = f"{frames(robot)} They are base_link_inertia and tool0 of ur_description."
+    head = "".join(f"# {line}\n" for line in comments(robot, frame, left))
+    return Export(head + text, frame, left)
+
+
 def _in_base(robot: Robot) -> Robot:
     """Return the robot with its base frame as the world."""
     known = {name: p for name, p in robot.known.items() if p.group != "base"}
@@ -123,4 +133,5 @@ FORMATS: Final[Mapping[str, Callable[[Robot], Export]]] = {
     "urdf": _urdf,
     "json": _json,
     "python": _python,
+    "ur-kinematics": _ur_kinematics,
 }

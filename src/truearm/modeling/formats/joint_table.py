@@ -7,12 +7,15 @@ import io
 import math
 from collections.abc import Sequence
 
+from truearm.modeling.controller import Controller
+from truearm.modeling.formats.joint_columns import joint_cells, joint_headings
 from truearm.modeling.inverse.solutions import JointSolutions
 from truearm.modeling.parts import Joint
-from truearm.units import written
 
 
-def joints_csv(solutions: JointSolutions, labels: Sequence[str], joints: Sequence[Joint]) -> str:
+def joints_csv(
+    solutions: JointSolutions, labels: Sequence[str], joints: Sequence[Joint], controller: Controller | None = None
+) -> str:
     """Return solutions as CSV, one row a pose and branch, joints in deg or mm.
 
     Parameters
@@ -21,8 +24,9 @@ def joints_csv(solutions: JointSolutions, labels: Sequence[str], joints: Sequenc
         Name of each pose.
     joints
         Of the robot.
+    controller
+        Who shows the joint positions, ``axis_i``; None for the model's, ``joint_i``.
     """
-    units = ["deg" if joint.kind == "revolute" else "mm" for joint in joints]
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(
@@ -30,19 +34,19 @@ def joints_csv(solutions: JointSolutions, labels: Sequence[str], joints: Sequenc
             "pose",
             "branch",
             "status",
-            *(f"joint_{number} [{unit}]" for number, unit in enumerate(units, 1)),
+            *joint_headings(joints, controller),
             "position_error [mm]",
             "orientation_error [mrad]",
         ]
     )
-    for row, positions in enumerate(solutions.joints.tolist()):
+    for row, positions in enumerate(joint_cells(solutions.joints, joints, controller)):
         angle = float(solutions.orientation_error[row])
         writer.writerow(
             [
                 labels[solutions.pose[row]],
                 solutions.branch[row],
                 solutions.status[row].value,
-                *(repr(written(value, unit)) for value, unit in zip(positions, units, strict=True)),
+                *positions,
                 f"{solutions.position_error[row] * 1e3:.6g}",
                 "" if math.isnan(angle) else f"{angle * 1e3:.6g}",
             ]

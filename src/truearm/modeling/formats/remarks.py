@@ -52,8 +52,12 @@ def masses_left_out(robot: Robot, format_: str) -> list[str]:
 
 
 def frames(robot: Robot) -> str:
-    """Say which frames all numbers of a file refer to."""
-    return f"Poses are those of the flange in the base frame, both as in the robot file of {robot.name}."
+    """Say which frames, and whose joint positions, all numbers of a file refer to."""
+    counted = " Joint positions are the model's, not those that the controller shows."
+    return (
+        f"Poses are those of the flange in the base frame, both as in the robot file of {robot.name}."
+        f"{counted if robot.controller.counts_otherwise else ''}"
+    )
 
 
 def first_frame_remark(base: Transform) -> str:

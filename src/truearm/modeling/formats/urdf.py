@@ -24,6 +24,7 @@ import numpy as np
 from truearm.errors import InputError
 from truearm.files import read_bytes
 from truearm.modeling.chain import Array
+from truearm.modeling.controller import AS_THE_MODEL, Controller
 from truearm.modeling.conventions import JointKind
 from truearm.modeling.formats.entries import NAME
 from truearm.modeling.formats.remarks import left_out
@@ -43,7 +44,7 @@ from truearm.modeling.formats.urdf_tree import (
 )
 from truearm.modeling.parts import Joint, LinkMass
 from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform
+from truearm.modeling.transform import IDENTITY, Transform
 
 #: How far the length of an axis may be from 1: files print five digits, but 0 0 2 means something else.
 _AXIS_TOLERANCE: Final = 1e-3
@@ -64,7 +65,8 @@ def read_urdf(path: Path, tip: str | None = None) -> Robot:
         ``tool0`` or else ``flange`` fixed behind the last of them, or else that joint's own link.
     """
     tree = read_tree(read_bytes(path), str(path))
-    route = tree.joints_to(_only_end(tree, path) if tip is None else tree.known(tip, str(path)))
+    end = _only_end(tree, path) if tip is None else tree.known(tip, str(path))
+    route = tree.joints_to(end)
     links, tail = _links(tree.where, route)
     if not links:
         raise InputError(
@@ -81,6 +83,30 @@ def read_urdf(path: Path, tip: str | None = None) -> Robot:
         joints=tuple(Joint(link.joint.name, link.kind, link.row, link.limits) for link in links),
         flange=Transform.from_matrix(tail[:3, :3], tail[:3, 3]),
         masses=tuple(mass for mass in masses if mass is not None),
+        controller=_controller(tree, links[-1].joint.child, end),
+    )
+
+
+def _controller(tree: Tree, last: str, end: str) -> Controller:
+    """Return where the controller has its frames, if the file has the links that ROS-Industrial calls so.
+
+    There ``base`` is the base frame of the controller, fixed to the root, and ``tool0`` its tool that is all zeros (ROS
+    REP 199, draft). How it counts the joints is not said: FANUC's and ABB's drivers change that.
+
+    Parameters
+    ----------
+    last
+        Link behind the last moving joint.
+    end
+        Of the chain.
+    """
+    bases, tools = dict(tree.fixed_behind(tree.root)), dict(tree.fixed_behind(last))
+    if "base" not in bases or "tool0" not in tools or end not in tools:
+        return AS_THE_MODEL
+    base, flange = bases["base"], np.linalg.inv(tools[end]) @ tools["tool0"]
+    return Controller(
+        base=Transform.from_matrix(base[:3, :3], base[:3, 3]),
+        flange=Transform.from_matrix(flange[:3, :3], flange[:3, 3]) if end != "tool0" else IDENTITY,
     )
 
 

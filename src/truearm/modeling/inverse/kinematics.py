@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from truearm.arrays import axes, number_array
 from truearm.errors import InputError, did_you_mean
 from truearm.modeling.chain import Array
-from truearm.modeling.frames import Frame, checked_frame, checked_joints
+from truearm.modeling.frames import Frame, checked_joints, frame_and_tip
 from truearm.modeling.inverse.branch_search import BranchSearch
 from truearm.modeling.inverse.branches import BRANCHES, branch_number, branch_rule
 from truearm.modeling.inverse.candidates import REACHED, Candidates
@@ -28,7 +28,7 @@ from truearm.modeling.inverse.closed_form import ClosedForm
 from truearm.modeling.inverse.pose_solver import ORIENTATIONS, Orientation, PoseTask, smallest_singular_value
 from truearm.modeling.inverse.solutions import JointSolutions, PoseStatus
 from truearm.modeling.robot import Robot
-from truearm.modeling.transform import quaternion_from_rotation, rotation_from_quaternion
+from truearm.modeling.transform import IDENTITY, quaternion_from_rotation, rotation_from_quaternion
 
 #: A rotation matrix may be off by this much, as by rounding; it is then made exact.
 ROTATION_TOLERANCE: Final = 1e-6
@@ -66,7 +66,8 @@ def inverse(
     target
         Name of the target that shall be there; the flange if None. A target without orientation has the flange's.
     frame
-        What the poses are given in: ``base``, the robot's base, or ``world``, the instrument's frame.
+        What the poses are given in: ``base``, the robot's base; ``world``, the instrument's frame; or ``controller``,
+        the base frame of its controller, in which the flange is the controller's, too.
     branch
         A branch by name, ``all``, or None for the one nearest to the seed that lies within the limits.
     seed
@@ -182,7 +183,7 @@ def _task(
     p = _array(positions, "positions", 3)
     if target is not None:
         robot.target(target)  # refuses an unknown one
-    checked_frame(frame)
+    base, tip = frame_and_tip(robot, frame, target)
     if not isinstance(orientation, str) or orientation not in ORIENTATIONS:
         raise InputError(
             "there is no such choice",
@@ -190,6 +191,14 @@ def _task(
             came=orientation,
             allowed=", ".join(ORIENTATIONS),
             cure=did_you_mean(orientation, ORIENTATIONS) if isinstance(orientation, str) else None,
+        )
+    if orientation != "full" and tip != IDENTITY:
+        raise InputError(
+            "the controller's flange is not the model's, so a part of a pose of it says nothing of the other",
+            parameter="orientation",
+            came=orientation,
+            allowed="full in the frame controller",
+            cure="Give whole poses, name a target, or use `frame=base`.",
         )
     if rotations is None:
         if orientation != "free":
@@ -202,8 +211,10 @@ def _task(
         R = np.broadcast_to(np.eye(3), (len(p), 3, 3))
     else:
         R = _rotations(rotations, len(p))
-    if frame == "base":
-        base = robot.base
+    if frame != "world":
+        if tip != IDENTITY:
+            R = R @ tip.rotation.T
+            p = p - R @ np.array(tip.translation)
         p, R = p @ base.rotation.T + np.array(base.translation), base.rotation @ R
     x, y, z = np.ascontiguousarray(R.transpose(2, 1, 0))
     # Without the temperature or the number of a configuration no length is known to have changed.

@@ -5,22 +5,24 @@ from __future__ import annotations
 import csv
 import io
 
+from truearm.modeling.controller import JointsOf
+from truearm.modeling.formats.joint_columns import counting, joint_cells, joint_headings
 from truearm.planning.choosing.measurement_plan import MeasurementPlan
-from truearm.units import written
 
 
-def plan_csv(plan: MeasurementPlan) -> str:
+def plan_csv(plan: MeasurementPlan, joints_are: JointsOf = "model") -> str:
     """Return a plan as CSV, one row a configuration in the order of measurement, joints in deg or mm.
 
-    ``joint_i`` is where to measure, ``approach_i`` where to stop right before, ``reads`` what a device reads there.
+    ``joint_i``, or ``axis_i`` as the controller shows it, is where to measure, ``approach_i`` likewise where to stop
+    right before, ``reads`` what a device reads there.
     """
-    units = ["deg" if joint.kind == "revolute" else "mm" for joint in plan.robot.joints]
+    joints, controller = plan.robot.joints, counting(plan.robot, joints_are)
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
-    names = [f"{name}_{number} [{unit}]" for name in ("joint", "approach") for number, unit in enumerate(units, 1)]
+    names = [*joint_headings(joints, controller), *joint_headings(joints, controller, "approach")]
     writer.writerow(["configuration", *names, *(["reads"] if plan.reads else [])])
     reads = [[words] for words in plan.reads] or [[] for _ in plan.labels]
-    for label, at, before, read in zip(plan.labels, plan.joints.tolist(), plan.before.tolist(), reads, strict=True):
-        cells = [repr(written(value, unit)) for row in (at, before) for value, unit in zip(row, units, strict=True)]
-        writer.writerow([label, *cells, *read])
+    positions = (joint_cells(values, joints, controller) for values in (plan.joints, plan.before))
+    for label, at, before, read in zip(plan.labels, *positions, reads, strict=True):
+        writer.writerow([label, *at, *before, *read])
     return stream.getvalue()

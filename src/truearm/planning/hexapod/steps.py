@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from truearm.measurement.hexapod.geometry import DEVICE, Device, side_names
+from truearm.modeling.controller import Controller
 from truearm.modeling.robot import Robot
 from truearm.planning.hexapod.reachable import Reachable
 from truearm.units import from_si
 
 
-def steps_text(plan: Reachable, robot: Robot, device: Device = DEVICE) -> str:
-    """Return the plan step by step; figures go into the sheet."""
+def steps_text(plan: Reachable, robot: Robot, controller: Controller | None = None, device: Device = DEVICE) -> str:
+    """Return the plan step by step; figures go into the sheet.
+
+    Parameters
+    ----------
+    controller
+        Who shows the joint positions; None for the model's.
+    """
     base, tool, leg = (f"{length * 1e3:g} mm" for length in (device.base, device.tool, device.leg))
     lines = [
         f"Measuring {robot.name} with one ballbar: {len(plan.rows)} configurations, {plan.poses_reached} poses.",
@@ -23,12 +32,15 @@ def steps_text(plan: Reachable, robot: Robot, device: Device = DEVICE) -> str:
         f"4. For every configuration below: move, set the bar to {leg} on its calibrator, then measure six legs.",
         "",
     ]
-    for row, room in zip(plan.rows, plan.clearance.tolist(), strict=True):
+    joints = np.array([row.joints for row in plan.rows])
+    shown = joints if controller is None else controller.from_model(joints)
+    called = "joints" if controller is None else "joints as the controller shows them"
+    for row, at, room in zip(plan.rows, shown.tolist(), plan.clearance.tolist(), strict=True):
         positions = " ".join(
             f"{from_si(value, 'deg' if joint.kind == 'revolute' else 'mm'):.3f}"
-            for joint, value in zip(robot.joints, row.joints.tolist(), strict=True)
+            for joint, value in zip(robot.joints, at, strict=True)
         )
         lines.append(f"Configuration {row.configuration}  (pose {row.pose}, {row.branch}, {room * 1e3:.0f} mm of room)")
-        lines.append(f"   joints {positions}")
+        lines.append(f"   {called} {positions}")
         lines += [f"   [ ] Attach the bar between {' and '.join(name.split('-'))}." for name in row.design.leg_names]
     return "\n".join(lines) + "\n"

@@ -35,6 +35,7 @@ from truearm.compensation.programs.program import (
     ANY_POSTURE,
     Form,
     Language,
+    MakersCalibration,
     Move,
     Program,
     ProgramTarget,
@@ -167,4 +168,12 @@ def read(sources: Sequence[Source]) -> Program:
     return Program(_NAME, tuple(sources), tuple(targets), tuple(moves), skipped=tuple(skipped), unknown=dict(unknown))
 
 
-FANUC_LS: Final = Language(_NAME, (".ls",), is_one, read, split_moves)
+FANUC_LS: Final = Language(
+    _NAME,
+    (".ls",),
+    ("FANUC",),
+    is_one,
+    read,
+    split_moves,
+    calibration=MakersCalibration("FANUC", "robot calibration (mechanism error parameters)"),
+)

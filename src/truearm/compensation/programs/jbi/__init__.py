@@ -29,6 +29,7 @@ from truearm.compensation.programs.program import (
     Configuration,
     Form,
     Language,
+    MakersCalibration,
     Move,
     Program,
     ProgramTarget,
@@ -202,4 +203,12 @@ def _interval(joint: int, degrees: float) -> tuple[int, float, float]:
     return joint, _OPEN - radians(degrees), _OPEN + radians(degrees)
 
 
-JBI: Final = Language("INFORM", (".jbi",), is_one, read, split_moves)
+JBI: Final = Language(
+    "INFORM",
+    (".jbi",),
+    ("Yaskawa", "Motoman"),
+    is_one,
+    read,
+    split_moves,
+    calibration=MakersCalibration("Yaskawa", "absolute accuracy"),
+)

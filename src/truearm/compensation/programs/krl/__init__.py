@@ -37,7 +37,7 @@ from typing import Final
 from truearm.compensation.programs.krl.reading import read
 from truearm.compensation.programs.krl.split import split_moves
 from truearm.compensation.programs.lines import BYTE_ORDER_MARK
-from truearm.compensation.programs.program import Language
+from truearm.compensation.programs.program import Language, MakersCalibration
 
 _HEADER: Final = re.compile(
     rf"(?:{BYTE_ORDER_MARK})?\s*+(?:&ACCESS\b|(?:[;&][^\r\n]*+\s*+)*+"
@@ -54,9 +54,11 @@ def is_one(text: str) -> bool:
 KRL: Final = Language(
     name="KRL",
     suffixes=(".src", ".dat", ".sub"),
+    makers=("KUKA",),
     is_one=is_one,
     read=read,
     split=split_moves,
     together=True,
     companions=((".src", ".dat"), (".sub", ".dat"), (".dat", ".src")),
+    calibration=MakersCalibration("KUKA", "the positionally accurate robot model ($ABS_ACCUR)"),
 )

@@ -21,7 +21,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from truearm.compensation.programs.lines import BYTE_ORDER_MARK
-from truearm.compensation.programs.program import Language, Program, Source
+from truearm.compensation.programs.program import Language, MakersCalibration, Program, Source
 from truearm.compensation.programs.rapid.monitoring import with_postures_left_free
 from truearm.compensation.programs.rapid.moves import MOTIONS, QUIET
 from truearm.compensation.programs.rapid.split import split_moves
@@ -43,8 +43,10 @@ def _read(sources: Sequence[Source]) -> Program:
 RAPID: Final = Language(
     name="RAPID",
     suffixes=(".mod", ".prg", ".sys", ".modx", ".prgx", ".sysx"),
+    makers=("ABB",),
     is_one=_is_one,
     read=_read,
     split=split_moves,
     together=True,
+    calibration=MakersCalibration("ABB", "Absolute Accuracy"),
 )

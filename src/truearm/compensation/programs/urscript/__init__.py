@@ -11,7 +11,8 @@ What is read:
 - ``pose_add(target, offset)``: an offset in the axes of the base;
 - ``set_tcp``: the tool, called as the script calls it, else ``tcp``, ``tcp 2`` and so on. Where none was set, the TCP
   of the robot's installation holds, which no script tells: the tool ``tcp`` (``tcp before set_tcp`` where the script
-  sets one elsewhere) is left for the user to define.
+  sets one elsewhere) is left for the user to define;
+- ``set_payload`` and ``set_target_payload`` with numbers: what the robot carries, if the script says it only once.
 
 Variables and TCPs are followed in the order of the text; see :mod:`truearm.compensation.programs.urscript.names` and
 :mod:`truearm.compensation.programs.urscript.tcp`. Every file is a program of its own.
@@ -26,22 +27,27 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Final
 
 from truearm.compensation.programs.lines import BYTE_ORDER_MARK
-from truearm.compensation.programs.program import Language, MoveKind, Program, Source
+from truearm.compensation.programs.numbers import NUMBER
+from truearm.compensation.programs.program import Language, MakersCalibration, MoveKind, Program, Source
 from truearm.compensation.programs.urscript.program import Going, made_program
 from truearm.compensation.programs.urscript.script import Call, Script
 from truearm.compensation.programs.urscript.split import split_moves
 from truearm.compensation.programs.urscript.targets import At, Spot, Targets, Use
 from truearm.compensation.programs.urscript.tcp import COMPUTED, Places, Stretch, Tcp, TcpFlow
 from truearm.compensation.programs.urscript.text import Name, Numbers, Value
+from truearm.modeling.parts import Payload
 
 _LOOKS: Final = re.compile(
     r"^[ \t]*(?:def|thread|sec)[ \t]+\w+[ \t]*\([^)\n]*\)[ \t]*:"
     r"|(?<![\w.])(?:movej|movel|movep|movec|servoj|optimovej|optimovel|set_tcp)[ \t]*\(",
     re.ASCII | re.MULTILINE,
 )
+#: Beyond this [kg, m] a number is no load.
+_MOST_LOAD: Final = 1000.0
 #: How the tip goes, and the name of the argument that says where to.
 _MOVES: Final[dict[str, tuple[MoveKind, str]]] = {
     "movej": ("joint", "q"),
@@ -53,6 +59,12 @@ _MOVES: Final[dict[str, tuple[MoveKind, str]]] = {
     "movec": ("circular", "pose_to"),
 }
 _WHOLE: Final = frozenset(_MOVES) | {"set_tcp"}
+_PAYLOAD: Final = re.compile(r"(?<![\w.])set_(?:target_)?payload[ \t]*\(", re.ASCII)
+#: Mass [kg] and centre of gravity [m] in the flange frame; without the latter the load is not known.
+_LOAD: Final = re.compile(
+    rf"\s*(?:m\s*=\s*)?({NUMBER})\s*(?:,\s*(?:cog\s*=\s*)?\[\s*({NUMBER})\s*,\s*({NUMBER})\s*,\s*({NUMBER})\s*\])\s*[,)]",
+    re.ASCII,
+)
 _QUOTED: Final = re.compile(r'"([^"\n]*)"')
 #: Functions that move nothing.
 _AT_REST: Final = re.compile(
@@ -72,7 +84,21 @@ def _read(sources: Sequence[Source]) -> Program:
     unknown: Counter[str] = Counter()
     files = [_File(source, tools, frames, unknown) for source in sources]
     parts = [(one.script, one.targets, one.goings, one.skipped) for one in files]
-    return made_program("URScript", tuple(sources), parts, tools, frames, unknown)
+    program = made_program("URScript", tuple(sources), parts, tools, frames, unknown)
+    load = _load_of([one.script for one in files])
+    return program if load is None else replace(program, loads={target.tool: load for target in program.targets})
+
+
+def _load_of(scripts: Sequence[Script]) -> Payload | None:
+    """Return what the robot carries, if all that the scripts say of it are the same numbers."""
+    said: set[Payload | None] = set()
+    for script in scripts:
+        for call in _PAYLOAD.finditer(script.code):
+            found = _LOAD.match(script.code, call.end())
+            mass, *cog = [0.0] if found is None else [float(number) for number in found.groups()]
+            plain = found is not None and mass >= 0.0 and all(abs(value) < _MOST_LOAD for value in (mass, *cog))
+            said.add(Payload(mass, (cog[0], cog[1], cog[2])) if plain else None)
+    return said.pop() if len(said) == 1 else None
 
 
 class _File:
@@ -161,4 +187,12 @@ class _File:
         return self.targets.reach(value, at)
 
 
-URSCRIPT: Final = Language("URScript", (".script", ".urscript"), _is_one, _read, split_moves)
+URSCRIPT: Final = Language(
+    "URScript",
+    (".script", ".urscript"),
+    ("Universal Robots", "UR"),
+    _is_one,
+    _read,
+    split_moves,
+    calibration=MakersCalibration("Universal Robots", "the kinematic calibration of the factory", always=True),
+)

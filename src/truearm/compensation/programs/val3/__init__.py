@@ -334,4 +334,4 @@ def _configuration(words: tuple[str, ...]) -> Configuration:
     )
 
 
-VAL3: Final = Language("VAL3", (".dtx", ".pgx", ".pjx"), is_one, read, together=True)
+VAL3: Final = Language("VAL3", (".dtx", ".pgx", ".pjx"), ("Stäubli",), is_one, read, together=True)

@@ -12,6 +12,7 @@ from truearm.files import read_yaml
 from truearm.modeling.conventions import convention
 from truearm.modeling.effects import EFFECTS, NON_NEGATIVE
 from truearm.modeling.fixtures import Fixture
+from truearm.modeling.formats.controller_entry import STATED
 from truearm.modeling.formats.robot_file.schema import JointEntry, ProofEntry, RobotFile
 from truearm.modeling.parameters import Parameter
 from truearm.modeling.parts import NO_PAYLOAD, Inertia, Joint, LinkMass, Payload, Target, Tool, Truth
@@ -71,6 +72,7 @@ def _robot(content: RobotFile, where: str) -> Robot:
     robot = Robot(
         name=content.name,
         title=content.title or content.name,
+        maker=content.maker,
         source=content.source,
         convention_name=content.convention,
         joints=joints,
@@ -111,7 +113,21 @@ def _robot(content: RobotFile, where: str) -> Robot:
         },
         history=tuple(content.history),
     )
-    return _with_values(robot, content, where)
+    return _with_values(_with_controller(robot, content, where), content, where)
+
+
+def _with_controller(robot: Robot, content: RobotFile, where: str) -> Robot:
+    """Return a robot with what its controller computes with, where the file names another file for it."""
+    entry = content.controller.kinematics
+    if not isinstance(entry, str) or entry in STATED:
+        return robot
+    from truearm.modeling.formats.controller_kinematics import with_controller_kinematics  # few files need it
+
+    try:
+        return with_controller_kinematics(robot, entry, Path(where).parent)
+    except InputError as error:
+        name_place(error, f"{where}, controller.kinematics: {error.where}")
+        raise
 
 
 def _with_values(robot: Robot, content: RobotFile, where: str) -> Robot:
@@ -217,7 +233,7 @@ def _proof(robot: Robot, entry: ProofEntry, shown: Mapping[str, str], where: str
             for number, row in enumerate(entry.correlations, 1)
         ),
         lower_bound=entry.lower_bound,
-        warnings=tuple(Notice(warning.code, warning.message) for warning in entry.warnings),
+        warnings=tuple(Notice(warning.code, warning.message, "note") for warning in entry.warnings),
         digest=entry.sha256,
     )
 

@@ -154,7 +154,7 @@ class PriorsEntry(_Entry):
 
 
 class NoticeEntry(_Entry):
-    """A notice of the level error, or of the level warning."""
+    """A notice of the level error, or a note."""
 
     code: Name
     message: str
@@ -180,6 +180,7 @@ class RobotFile(_Entry):
     truearm: Literal["truearm-robot/1"]
     name: Name
     title: str = ""
+    maker: str = ""
     source: str = ""
     units: UnitsEntry
     convention: Literal[

@@ -13,7 +13,7 @@ from truearm.modeling.proof import Proof
 from truearm.modeling.robot import Robot
 
 #: Entries of a robot file that say nothing of where the robot goes.
-_BESIDE: Final = ("truearm", "name", "title", "source", "priors", "tools", "truths", "history")
+_BESIDE: Final = ("truearm", "name", "title", "maker", "source", "priors", "tools", "truths", "history")
 
 
 def sealed(robot: Robot, proof: Proof) -> Robot:
@@ -40,6 +40,9 @@ def _digest(robot: Robot) -> str:
     The numbers are those of files: what was written and read again has the same.
     """
     content = {name: entry for name, entry in file_content(robot).items() if name not in _BESIDE}
+    # With what the controller computes says nothing of where the arm goes, and may be told after the calibration.
+    controller = {name: entry for name, entry in content.pop("controller", {}).items() if name != "kinematics"}
+    content |= {"controller": controller} if controller else {}
     content["parameters"] = {name: entry["value"] for name, entry in content.get("parameters", {}).items()}
     content["proof"] = {name: entry for name, entry in content.get("proof", {}).items() if name != "sha256"}
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

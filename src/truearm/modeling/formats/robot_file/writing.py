@@ -78,6 +78,7 @@ def file_content(robot: Robot) -> dict[str, Any]:
         "truearm": SCHEMA,
         "name": robot.name,
         "title": robot.title,
+        **({"maker": robot.maker} if robot.maker else {}),
         "source": robot.source,
         "units": flow({"length": "mm", "angle": "deg"}),
         "convention": robot.convention_name,

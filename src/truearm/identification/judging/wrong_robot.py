@@ -1,0 +1,262 @@
+"""Are the lengths that a fit found those of this robot: the rule behind `wrong-robot`.
+
+Robots of one make look alike and fit each other's readings after a calibration. What gives them away is how far the
+lengths had to go. Where parallel axes follow each other only the sum of their distances is determined, and each of them
+goes but a part of the way, within its own prior. So the combinations that the readings determine are judged: under the
+priors the squares of their deviations are chi squared.
+
+Angles are left out of account, for a robot that was mastered badly is a degree off and the same robot. Their priors are
+taken ten times as wide, so that what they do cannot pass for lengths.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from truearm.errors import InputError
+from truearm.identification.judging.implausible import LARGEST_SHARE_LEFT
+from truearm.identification.judging.left_over import chi_squared_tail
+from truearm.identification.solving.fit import Fit, place
+from truearm.identification.solving.problem import Problem
+from truearm.library import library, load_robot
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.observations import OBSERVATIONS
+from truearm.measurement.statistics import errors_of
+from truearm.modeling.chain import Array
+from truearm.modeling.parameters import FreeParameters, Parameter
+from truearm.modeling.robot import Robot
+from truearm.notices import Notice
+from truearm.shown import listed
+
+#: The code of the notice.
+WRONG_ROBOT: Final = "wrong-robot"
+#: Share of the prior variance that the readings must remove from a combination of lengths for it to count.
+_LEAST_INFORMED: Final = 0.9
+#: How much wider than they are the priors of all but lengths are taken.
+_WIDER: Final = 10.0
+#: Groups whose nominal values are in the table of the robot file.
+_TABLE: Final = ("joint zero", "geometry")
+#: Chance for a robot as good as its priors to be doubted.
+_SIGNIFICANT: Final = 1e-4
+#: Deviations of a combination from which it is named, after the first, and how many are.
+_NAMED: Final = 3.0
+_MOST_NAMED: Final = 3
+#: Share of a length in what is determined of it below which that says nothing of it, and of the largest coefficient
+#: below which a length is not named.
+_LEAST_SHARE: Final = 0.1
+#: Cosine between combinations from which they are the same.
+_SAME: Final = 0.8
+#: Configurations that robots of the library are compared on, and how many times better one must fit to be named.
+_COMPARED: Final = 60
+_SEVERAL_TIMES: Final = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class Lengths:
+    """How far the lengths of a robot moved along the combinations that readings determine.
+
+    Attributes
+    ----------
+    parameters
+        The lengths.
+    directions
+        Orthonormal combinations in priors, ``(combinations, lengths)``.
+    moved
+        How far along each [priors], ``(combinations,)``.
+    """
+
+    parameters: tuple[Parameter, ...]
+    directions: Array
+    moved: Array
+
+    @classmethod
+    def of(cls, fit: Fit, data: Dataset) -> Lengths:
+        """Find them for a fit and the readings it was made from.
+
+        The fit is taken one linear step further, to where the priors of all but lengths are wider. Parameters that it
+        held for being redundant are free again, those at a bound stay. Errors of the joints that readings of an arrival
+        share are taken for errors of single readings.
+        """
+        robot = fit.robot
+        names = [n for n in (*fit.free.names, *(r.dropped for r in fit.redundancies)) if n not in fit.at_bound]
+        order = [*robot.parameters]
+        names.sort(key=lambda name: (_is_length(robot.parameters[name]), order.index(name)))
+        free = FreeParameters(tuple(robot.parameters[name] for name in names))
+        lengths = tuple(p for p in free.parameters if _is_length(p))
+        if not lengths:
+            return cls((), np.zeros((0, 0)), np.zeros(0))
+        noise = {observation.name: fit.sigma.get(observation.name, 1.0) for observation in OBSERVATIONS}
+        problem = Problem(robot, data, free, noise)
+        r, J = problem.linearised(free.start)
+        weight = np.sqrt(np.concatenate([_weights(fit, problem, i) for i in range(len(problem.blocks))])) / fit.excess
+        count = len(lengths)
+        prior = free.prior * np.where(np.arange(len(names)) < len(names) - count, _WIDER, 1.0)
+        J = J * (weight[:, None] * prior)
+        # The controller computes with the table of the robot file, whatever earlier calibrations have found.
+        table = replace(robot, known={}).parameters
+        centre = [table[p.name].nominal if p.group in _TABLE else p.value for p in free.parameters]
+        wanted = J @ ((free.start - centre) / prior) - r * weight
+        rows = np.block([[J, wanted[:, None]], [np.eye(len(names)), np.zeros((len(names), 1))]])
+        triangle = np.asarray(np.linalg.qr(rows, mode="r"))
+        own = slice(len(names) - count, len(names))
+        U, s, Vt = np.linalg.svd(triangle[own, own])
+        known = 1.0 - 1.0 / s**2 >= _LEAST_INFORMED
+        return cls(lengths, Vt[known], (U.T @ triangle[own, len(names)])[known] / s[known])
+
+    @property
+    def chi_squared(self) -> float:
+        """Sum of the squared deviations."""
+        return float(self.moved @ self.moved)
+
+    @property
+    def chance(self) -> float:
+        """How often the lengths of a robot as good as its priors move as far."""
+        return chi_squared_tail(self.chi_squared, len(self.moved)) if len(self.moved) else 1.0
+
+    def named(self) -> list[str]:
+        """Return the combinations that moved farthest, in words, with how far.
+
+        Of all that is determined, what lies nearest to each single length is looked at: the length itself, or the sum
+        that it is known in.
+        """
+        if not len(self.moved):
+            return []
+        together = self.directions.T @ self.directions
+        share = np.sqrt(np.diag(together))
+        own = together / np.where(share > 0.0, share, 1.0)
+        along = np.where(share**2 >= _LEAST_SHARE, self.moved @ self.directions @ own, 0.0)
+        told: list[int] = []
+        for i in np.argsort(-np.abs(along), kind="stable").tolist():
+            if told and (abs(along[i]) < _NAMED or len(told) == _MOST_NAMED):
+                break
+            if all(abs(own[:, i] @ own[:, k]) < _SAME for k in told):
+                told.append(i)
+        return [self._in_words(own[:, i], float(along[i])) for i in told]
+
+    def _in_words(self, direction: Array, along: float) -> str:
+        """Name a combination of unit length in priors and how far it moved, counted in its largest member."""
+        prior = np.array([p.prior for p in self.parameters])
+        shares = np.round(np.abs(direction) / np.abs(direction).max(), 2)
+        order = np.argsort(-shares, kind="stable").tolist()
+        largest, words = order[0], ""
+        factors = direction / direction[largest] * prior[largest] / prior
+        for i in order:
+            if shares[i] < _LEAST_SHARE:
+                break
+            size = "" if abs(abs(factors[i]) - 1.0) < 0.02 else f"{abs(factors[i]):.2g}·"
+            sign = "-" if factors[i] < 0.0 else "+"
+            words += f" {sign} {size}{self.parameters[i].name}" if words else f"{size}{self.parameters[i].name}"
+        return f"{words} by {along * prior[largest] / direction[largest] * 1e3:+.3g} mm"
+
+
+def _is_length(p: Parameter) -> bool:
+    return p.group == "geometry" and p.unit == "m"
+
+
+def _weights(fit: Fit, problem: Problem, number: int) -> Array:
+    """Return what the loss left of each equation of a block."""
+    block = problem.blocks[number]
+    of = fit.weight[block.readings] if block.data is problem.data else np.ones(len(block.readings))
+    return np.repeat(np.nan_to_num(of), block.observation.components)
+
+
+def judges_lengths(fit: Fit) -> bool:
+    """Return whether a fit had the lengths of the robot to choose."""
+    return any(_is_length(p) for p in fit.free.parameters)
+
+
+def check_robot(fit: Fit, data: Dataset) -> list[Notice]:
+    """Return a notice if the lengths that a fit found are not this robot's.
+
+    Parameters
+    ----------
+    data
+        The readings it was made from.
+    """
+    lengths = Lengths.of(fit, data)
+    if lengths.chance >= _SIGNIFICANT:
+        return []
+    better = _Better.of(fit.robot, data)
+    return [
+        Notice(
+            WRONG_ROBOT,
+            f"The readings are not of {fit.robot.name}, by its lengths: {listed(lengths.named())} off nominal. A robot "
+            f"as good as its priors is so far off with a probability of {max(lengths.chance, 1e-16):.0e}."
+            f"{'' if better is None else better.text} Take the file of the robot that was measured. If this is the "
+            "one, enter the lengths that its controller computes with, or wider priors: corrections of programs are "
+            "wrong by what the lengths differ.",
+            "error",
+        )
+    ]
+
+
+def other_robot(robot: Robot, data: Dataset) -> list[Notice]:
+    """Return a notice if a robot of the library fits readings that are nothing like this one's.
+
+    What looks like a slip with units or signs may be another robot: a smaller arm of the same make reads as this one in
+    another unit.
+    """
+    better = _Better.of(robot, data)
+    if better is None:
+        return []
+    return [
+        Notice(
+            WRONG_ROBOT,
+            f"The readings are not of {robot.name}.{better.text} Take the file of the robot that was measured.",
+            "error",
+        )
+    ]
+
+
+@dataclass(frozen=True)
+class _Better:
+    """A robot of the library that fits readings, several times better than the one given, neither calibrated.
+
+    Errors are root mean squares [m], `given` that of the robot given.
+    """
+
+    name: str
+    left: float
+    given: float
+
+    @classmethod
+    def of(cls, robot: Robot, data: Dataset) -> _Better | None:
+        """Compare the robots of the library with as many joints, of the same kinds, on some of the readings."""
+        few = data
+        if data.configurations > _COMPARED:
+            few = data.of_configurations(np.linspace(0, data.configurations - 1, _COMPARED).astype(np.intp))
+        given = _uncalibrated_error(replace(robot, known={}, effect_names=(), proof=None), few)
+        kinds = [joint.kind for joint in robot.joints]
+        alike = {name: load_robot(name) for name in library()}
+        found = {
+            name: _uncalibrated_error(one, few)
+            for name, one in alike.items()
+            if [joint.kind for joint in one.joints] == kinds
+        }
+        best = min(found, key=lambda name: found[name], default=None)
+        if best is None or not found[best] * _SEVERAL_TIMES <= given < math.inf:
+            return None
+        reach = float(np.linalg.norm(alike[best].forward(few.joints)[0], axis=1).max())
+        return cls(best, found[best], given) if found[best] <= LARGEST_SHARE_LEFT * reach else None
+
+    @property
+    def text(self) -> str:
+        """Say it, as a sentence that goes on."""
+        return (
+            f" {self.name} of the library fits them {self.given / self.left:.2g} times better without calibration: "
+            f"{self.left * 1e3:.3g} mm beside {self.given * 1e3:.3g} mm (root mean square)."
+        )
+
+
+def _uncalibrated_error(robot: Robot, data: Dataset) -> float:
+    """Return the root mean square error of a robot of which base, targets and fixtures alone are fitted [m]."""
+    try:
+        errors = errors_of(place(robot, data), data)
+    except InputError:  # its frames cannot be found from these readings
+        return math.inf
+    spread = errors.position or errors.length
+    return math.inf if spread is None else spread.rms

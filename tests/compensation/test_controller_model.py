@@ -1,0 +1,146 @@
+"""What is asked of a controller before poses are corrected for it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.ur_controller import UR3E_CONF, UR10_CONF
+
+import truearm
+from truearm import InputError, Robot
+from truearm.compensation.fake_targets import nominal_robot
+from truearm.compensation.programs import LANGUAGES
+from truearm.modeling.formats.controller_entry import STATED
+from truearm.modeling.formats.robot_file import is_intact, read_robot, robot_text, sealed
+from truearm.modeling.proof import Proof
+
+POSES = (
+    "def a():\n  set_tcp(p[0,0,0,0,0,0])\n"
+    "  movel(p[-0.5, -0.3, 0.4, 0, 3.1, 0])\n  movel(p[-0.5, -0.2, 0.4, 0, 3.1, 0])\nend\n"
+)
+JOINTS = "def a():\n  set_tcp(p[0,0,0,0,0,0])\n  movej([0.1, -1.2, 1.3, -1.5, -1.5, 0.2])\nend\n"
+RAPID = (
+    "MODULE a\n  CONST robtarget p1:=[[400,0,400],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n"
+    "  PROC main()\n    MoveL p1,v100,fine,tool0;\n  ENDPROC\nENDMODULE\n"
+)
+
+
+def worn(robot: str, kinematics: str | None = None) -> Robot:
+    arm = truearm.load_robot(robot)
+    arm = arm.with_values({"a_3": arm.values["a_3"] + 1e-3, "alpha_4": arm.values["alpha_4"] + 1e-3})
+    if kinematics is None:
+        return arm
+    return replace(arm, controller=replace(arm.controller, kinematics=STATED[kinematics]))
+
+
+def program(folder: Path, text: str) -> Path:
+    path = folder / ("a.script" if text.startswith("def") else "a.mod")
+    path.write_text(text)
+    return path
+
+
+def codes(correction: truearm.results.program_correction.ProgramCorrection) -> set[str]:
+    return {notice.code for notice in correction.warnings}
+
+
+def test_a_controller_that_is_surely_calibrated_is_asked_for_its_kinematics(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="Universal Robots compute with what the factory measured") as refusal:
+        truearm.compensate(worn("ur10"), [program(tmp_path, POSES)])
+    assert refusal.value.parameter == "controller_kinematics"
+    for words in ("calibration.conf", "`controller_kinematics=nominal`", "proprietary"):
+        assert words in str(refusal.value)
+
+
+@pytest.mark.parametrize("said", ["nominal", None])
+def test_an_answer_is_taken_from_the_call_or_the_robot_file(said: str | None, tmp_path: Path) -> None:
+    robot = worn("ur10", "nominal" if said is None else None)
+    correction = truearm.compensate(robot, [program(tmp_path, POSES)], controller_kinematics=said)
+    assert "controller-unknown" not in codes(correction)
+
+
+def test_the_call_counts_more_than_the_robot_file(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="it is not known what that is here"):
+        truearm.compensate(worn("ur10", "nominal"), [program(tmp_path, POSES)], controller_kinematics="unknown")
+
+
+@pytest.mark.parametrize(("robot", "text"), [("ur10", POSES), ("irb120", RAPID)])
+def test_a_model_that_nobody_can_read_is_refused_for_poses(robot: str, text: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="a model that nobody else can read") as refusal:
+        truearm.compensate(worn(robot, "proprietary"), [program(tmp_path, text)])
+    assert "`controller_kinematics=nominal`" in str(refusal.value)
+
+
+@pytest.mark.parametrize("kinematics", ["proprietary", "unknown"])
+def test_joints_do_not_pass_through_kinematics(kinematics: str, tmp_path: Path) -> None:
+    correction = truearm.compensate(worn("ur10", kinematics), [program(tmp_path, JOINTS)])
+    assert "controller-unknown" not in codes(correction)
+
+
+def test_where_a_calibration_can_be_ordered_it_is_asked_for_in_a_warning(tmp_path: Path) -> None:
+    correction = truearm.compensate(worn("irb120"), [program(tmp_path, RAPID)])
+    (notice,) = (notice for notice in correction.warnings if notice.code == "controller-unknown")
+    assert notice.level == "warning"
+    assert "ABB delivers robots with Absolute Accuracy where it was ordered" in notice.message
+    answered = truearm.compensate(worn("irb120"), [program(tmp_path, RAPID)], controller_kinematics="nominal")
+    assert "controller-unknown" not in codes(answered)
+    assert answered.files[0].text == correction.files[0].text
+    assert [one.applied()["controller"]["kinematics"] for one in (correction, answered)] == ["unknown", "nominal"]
+    assert "controller_kinematics='nominal'" in answered.command
+
+
+def test_every_maker_who_calibrates_is_known() -> None:
+    makers = {one.calibration.maker: one.calibration.always for one in LANGUAGES if one.calibration is not None}
+    assert makers == {"ABB": False, "KUKA": False, "FANUC": False, "Universal Robots": True, "Yaskawa": False}
+
+
+def test_another_robots_file_is_refused_by_its_parameter(tmp_path: Path) -> None:
+    for name, text in (("ur3e.conf", UR3E_CONF), ("short.conf", UR10_CONF[:300])):
+        (tmp_path / name).write_text(text)
+        with pytest.raises(InputError) as refusal:
+            truearm.compensate(
+                worn("ur10"), [program(tmp_path, POSES)], controller_kinematics=tmp_path / name, out=tmp_path / "o"
+            )
+        assert refusal.value.parameter == "controller_kinematics"
+        assert not (tmp_path / "o").exists()
+
+
+@pytest.mark.parametrize("name", ["compensation.html", "a.script", "a.script.truearm.json"])
+def test_the_kinematics_file_is_not_overwritten(name: str, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / name).write_text(UR10_CONF)
+    with pytest.raises(InputError, match="overwritten"):
+        truearm.compensate(worn("ur10"), [program(tmp_path, POSES)], controller_kinematics=out / name, out=out)
+    assert (out / name).read_text() == UR10_CONF
+
+
+def test_an_imported_robot_is_not_a_calibrated_one(tmp_path: Path) -> None:
+    (tmp_path / "calibration.conf").write_text(UR10_CONF)
+    imported = truearm.import_ur_kinematics(tmp_path / "calibration.conf", "ur10").robot
+    with pytest.raises(InputError, match="not calibrated"):
+        nominal_robot(imported)
+    joints = np.zeros((1, 6))
+    assert np.allclose(
+        nominal_robot(imported.with_values({"a_3": -0.6})).forward(joints)[0], imported.forward(joints)[0]
+    )
+
+
+def test_saying_what_the_controller_has_does_not_change_what_is_known_of_a_calibration(tmp_path: Path) -> None:
+    robot = sealed(worn("ur10"), Proof("converged", (), (), (), (), (), ()))
+    text = robot_text(robot)
+    (tmp_path / "mine.yaml").write_text(text.replace("controller:\n", "controller:\n  kinematics: nominal\n"))
+    assert is_intact(read_robot(tmp_path / "mine.yaml"))
+    (tmp_path / "mine.yaml").write_text(
+        text.replace("controller:\n", "controller:\n  base: {translation: [1, 0, 0]}\n")
+    )
+    assert not is_intact(read_robot(tmp_path / "mine.yaml"))
+
+
+def test_a_conversion_says_nothing_of_the_controller_any_more(tmp_path: Path) -> None:
+    (tmp_path / "calibration.conf").write_text(UR10_CONF)
+    imported = truearm.import_ur_kinematics(tmp_path / "calibration.conf", "ur10").robot
+    assert truearm.convert(imported, "mcpc").robot.controller.kinematics.kind == "unknown"
+    assert truearm.convert(worn("ur10", "nominal"), "mcpc").robot.controller.kinematics.kind == "nominal"

@@ -1,0 +1,70 @@
+"""Readings of a look-alike calibrate the robot that was named to its last hundredth: that is told, and not used."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+
+import pytest
+from tests.honesty.telling import Told, told, written
+from tests.lookalikes import campaign_of
+
+from truearm.library import load_robot
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    made = tmp_path_factory.mktemp("another")
+    (made / "plate.mod").write_text((files("truearm.examples") / "plate.mod").read_text())
+    poses = [f"  movel(p[-0.{6 + i}, -0.3, 0.{2 + i}, 0.1, 3.1, 0.0], a=1.2, v=0.25)" for i in range(3)]
+    (made / "job.script").write_text("\n".join(["def job():", "  set_tcp(p[0, 0, 0.1, 0, 0, 0])", *poses, "end", ""]))
+    written(made, campaign_of(load_robot("ur10e"), 60, 1)[1])
+    return made
+
+
+@cache
+def calibrated(given: str, folder: Path) -> Told:
+    return told("calibrate", given, folder / "data.csv", "--out", folder / given)
+
+
+def test_readings_of_a_ur10e_are_not_those_of_a_ur10(folder: Path) -> None:
+    found = calibrated("ur10", folder)
+    assert found.code == 3
+    assert found.summary["status"] == "converged"
+    assert found.summary["validation"]["position_mm"]["mean"] < 0.15
+    assert found.says("wrong-robot", "error", r"not of ur10, by its lengths: d_2 \+ d_3 \+ d_4 by \+1\d\.\d mm")
+    assert found.says("wrong-robot", "error", r"ur10e of the library fits them \d\.\d times better")
+    assert calibrated("ur10e", folder).code == 0
+
+
+def test_the_check_tells_it_before_anything_is_fitted(folder: Path) -> None:
+    found = told("check", "ur10", folder / "data.csv")
+    assert found.code == 3
+    assert found.says("wrong-robot", "error", "ur10e of the library")
+    assert told("check", "ur10e", folder / "data.csv").code == 0
+
+
+def test_no_program_is_corrected_with_it_until_it_is_accepted(folder: Path) -> None:
+    calibrated("ur10", folder)
+    arm, program = folder / "ur10" / "calibrated.yaml", folder / "job.script"
+    words = ("compensate", arm, program, "--controller-kinematics", "nominal", "--out")
+    refused = told(*words, folder / "out")
+    assert refused.code == 2
+    assert "ur10e of the library" in refused.refusal
+    assert "--accept wrong-robot" in refused.refusal
+    assert not (folder / "out").exists()
+    accepted = told(*words, folder / "accepted", "--accept", "wrong-robot")
+    assert accepted.code == 0, accepted
+    assert accepted.says("wrong-robot", "warning", "not of ur10")
+
+
+def test_a_program_of_another_maker_is_not_corrected_until_it_is_accepted(folder: Path) -> None:
+    calibrated("ur10e", folder)
+    words = ("compensate", folder / "ur10e" / "calibrated.yaml", folder / "plate.mod", "--out")
+    refused = told(*words, folder / "rapid")
+    assert refused.code == 2
+    assert "a robot of Universal Robots and programs in RAPID" in refused.refusal
+    assert "--accept maker" in refused.refusal
+    accepted = told(*words, folder / "rapid", "--accept", "maker")
+    assert accepted.says("maker", "warning", "RAPID runs on controllers of ABB"), accepted

@@ -1,0 +1,192 @@
+"""Arms that look alike are told apart by the lengths that readings determine; the right arm is never doubted."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.lookalikes import PAIRS, campaign_of, sized
+
+from truearm.identification.judging.wrong_robot import Lengths, check_robot
+from truearm.identification.solving.fit import identify
+from truearm.identification.solving.losses import Loss
+from truearm.identification.solving.models import named_model
+from truearm.identification.solving.rounds import Redundant
+from truearm.jobs.calibrate import calibrate
+from truearm.jobs.check import check
+from truearm.jobs.simulate import simulate
+from truearm.library import load_robot
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.readers.canonical import read_csv
+from truearm.measurement.readers.matrices import read_matrices
+from truearm.modeling.robot import Robot
+from truearm.notices import Notice
+from truearm.simulation.truths import truth_twin
+from truearm.simulation.twin import measure
+
+GEOMETRIC = named_model("geometric")
+UR10, UR10E = load_robot("ur10"), load_robot("ur10e")
+
+
+def doubts(robot: Robot, data: Dataset, model: str = "geometric", loss: Loss = "linear") -> list[Notice]:
+    return check_robot(identify(robot, data, named_model(model), loss=loss), data)
+
+
+@pytest.mark.parametrize(("real", "given"), PAIRS, ids=lambda robot: robot.name)
+def test_arms_that_look_alike_are_told_apart(real: Robot, given: Robot) -> None:
+    data = campaign_of(real, 40, 0)[1]
+    (notice,) = doubts(given, data)
+    assert (notice.code, notice.level) == ("wrong-robot", "error")
+    assert notice.message.startswith(f"The readings are not of {given.name}, by its lengths: ")
+    assert doubts(real, data) == []
+
+
+def near(robot: Robot, rng: np.random.Generator) -> Robot:
+    """Return a robot with joints that may move by 15 deg to either side of some posture."""
+    ranges = [joint.range for joint in robot.joints]
+    middle = [float(rng.uniform(0.7 * low + 0.3 * high, 0.3 * low + 0.7 * high)) for low, high in ranges]
+    limits = [(m - 0.26, m + 0.26) for m in middle]
+    return replace(robot, joints=tuple(replace(j, limits=pair) for j, pair in zip(robot.joints, limits, strict=True)))
+
+
+@pytest.mark.parametrize("name", ["irb120", "ur10", "kr5", "katana450", "li3"])
+def test_robots_as_good_as_their_priors_are_not_doubted(name: str) -> None:
+    robot = load_robot(name)
+    for seed in range(10):
+        twin, data = campaign_of(robot, 30, seed, targets=3 if seed % 2 else 1)
+        if seed % 5 > 2:
+            rng = np.random.default_rng(seed)
+            data = measure(twin, near(robot, rng).random_configurations(30, rng), 5e-5, rng)
+        assert doubts(robot, data) == [], seed
+
+
+def test_a_measured_irb_120_is_not_doubted(measured_data: Path) -> None:
+    folder = measured_data / "irb120-faro"
+    targets = {str(i): folder / f"target_{i}.txt" for i in (1, 2, 3)}
+    data, _ = read_matrices(folder / "joints_commanded.txt", targets, {}, "deg", "mm")
+    robot = load_robot("irb120")
+    few = data.of_configurations(np.arange(0, data.configurations, 8))
+    lengths = Lengths.of(identify(robot, few, GEOMETRIC), few)
+    assert len(lengths.moved) == 8
+    assert lengths.chi_squared < 2.0
+    assert "wrong-robot" not in {notice.code for notice in check(robot, few).warnings}
+
+
+def test_a_measured_ur5_is_not_doubted(measured_data: Path, tmp_path: Path) -> None:
+    rows = np.genfromtxt(measured_data / "ur5-tracker" / "grid.csv", delimiter=",", skip_header=1)[::12]
+    lines = ["configuration," + ",".join(f"joint_{i} [deg]" for i in range(1, 7)) + ",target,x [mm],y [mm],z [mm]"]
+    for number, row in enumerate(rows, 1):
+        reached = row[1:4] + row[4:7]
+        lines.append(",".join([str(number), *map(repr, row[7:].tolist()), "1", *map(repr, reached.tolist())]))
+    (tmp_path / "grid.csv").write_text("\n".join(lines) + "\n")
+    data, robot = read_csv(tmp_path / "grid.csv"), load_robot("ur5")
+    lengths = Lengths.of(identify(robot, data, GEOMETRIC), data)
+    assert len(lengths.moved) >= 4
+    assert lengths.chi_squared < 2.0
+    assert "wrong-robot" not in {notice.code for notice in calibrate(robot, data).warnings}
+
+
+def test_what_is_known_by_its_sum_is_judged_by_its_sum() -> None:
+    data = campaign_of(UR10E, 40, 1)[1]
+    fit = identify(UR10, data, GEOMETRIC)
+    moved = {n: fit.robot.values[n] - fit.robot.parameters[n].nominal for n in ("d_2", "d_3", "d_4")}
+    assert max(moved.values()) < 5e-3
+    first, *_ = Lengths.of(fit, data).named()
+    assert first == f"d_2 + d_3 + d_4 by {sum(moved.values()) * 1e3:+.3g} mm"
+
+
+@pytest.mark.parametrize("redundancy", ["prior", "drop"])
+@pytest.mark.parametrize("loss", ["linear", "huber", "cauchy", "l1"])
+def test_the_way_it_was_fitted_does_not_matter(redundancy: Redundant, loss: Loss) -> None:
+    data = campaign_of(UR10E, 40, 1)[1]
+    fit = identify(UR10, data, GEOMETRIC, redundancy=redundancy, loss=loss)
+    assert Lengths.of(fit, data).named()[0].startswith("d_2 + d_3 + d_4 by +11.")
+    own = campaign_of(UR10, 40, 1)[1]
+    fit = identify(UR10, own, GEOMETRIC, redundancy=redundancy, loss=loss)
+    assert check_robot(fit, own) == []
+
+
+def test_angles_that_are_a_degree_off_do_not_pass_for_lengths() -> None:
+    robot = load_robot("irb120")
+    angles = [p for p in robot.parameters.values() if p.group in ("joint zero", "geometry") and p.unit == "rad"]
+    badly_mastered = robot.with_parameters(replace(p, prior=10.0 * p.prior) for p in angles)
+    for seed in range(6):
+        twin = campaign_of(badly_mastered, 1, seed, targets=1)[0]
+        rng = np.random.default_rng(seed)
+        data = measure(twin, near(robot, rng).random_configurations(40, rng), 5e-5, rng)
+        assert doubts(robot, data) == [], seed
+
+
+def test_the_height_of_the_base_and_the_length_of_the_flange_cannot_be_told() -> None:
+    other = sized("ur10", "taller", d_1=180.7, d_6=116.55)
+    assert doubts(UR10, campaign_of(other, 40, 0)[1]) == []
+
+
+def test_wider_priors_allow_other_lengths() -> None:
+    rough = replace(UR10, priors={"m": 5e-3})
+    assert doubts(rough, campaign_of(UR10E, 40, 0)[1]) == []
+
+
+def test_an_elastic_arm_is_itself_with_either_model() -> None:
+    nominal = load_robot("irb120")
+    rng = np.random.default_rng(3)
+    data = measure(truth_twin(nominal, "tracker-triangular", rng), nominal.random_configurations(40, rng), 5e-5, rng)
+    assert doubts(nominal, data, "geometric") == doubts(nominal, data, "elastic") == []
+
+
+def test_readings_without_an_anchor_are_judged_too() -> None:
+    ballbar = simulate(UR10E, truth="random", poses=32, device="ballbar", seed=2).data
+    (notice,) = doubts(UR10, ballbar)
+    assert "d_2 + d_3 + d_4 by +12." in notice.message
+    assert doubts(UR10E, ballbar) == []
+
+
+def test_a_model_without_free_lengths_says_nothing_of_them() -> None:
+    data = campaign_of(UR10E, 20, 1)[1]
+    lengths = Lengths.of(identify(UR10, data, named_model("offsets")), data)
+    assert (lengths.chance, lengths.named()) == (1.0, [])
+
+
+def test_outliers_of_a_robust_fit_are_left_out_of_account() -> None:
+    data = campaign_of(UR10, 40, 2)[1]
+    rng = np.random.default_rng(0)
+    position = data.position.copy()
+    position[::7] += rng.normal(0.0, 0.05, position[::7].shape)
+    assert doubts(UR10, replace(data, position=position), loss="cauchy") == []
+
+
+def test_it_is_judged_whatever_the_model_frees() -> None:
+    run = calibrate(UR10, campaign_of(UR10E, 40, 1)[1], model="joints")
+    assert [n.code for n in run.warnings if n.level == "error"] == ["wrong-robot"]
+
+
+def test_a_fit_that_began_with_a_wrong_calibration_is_judged_by_the_table() -> None:
+    data = campaign_of(UR10E, 60, 1)[1]
+    first, second = (data.of_configurations(part) for part in np.split(np.arange(60), 2))
+    once = calibrate(UR10, first)
+    again = calibrate(once.robot, second)
+    assert [n.code for n in again.warnings if n.level == "error"] == ["wrong-robot"]
+
+
+def test_the_check_names_the_robot_where_a_slip_would_explain_it_too() -> None:
+    for real, given in (("ur5", "ur10"), ("puma560", "irb120")):
+        notices = check(given, campaign_of(load_robot(real), 30, 3)[1]).warnings
+        assert [n.code for n in notices if n.level == "error"] == ["wrong-robot"]
+        assert f"{real} of the library fits them" in notices[0].message
+
+
+def test_a_slip_is_not_another_robot() -> None:
+    data = campaign_of(UR10, 30, 3)[1]
+    signs = np.array([1, 1, 1, -1, 1, 1])
+    for spoilt in (replace(data, joints=data.joints * signs), replace(data, position=1e3 * data.position)):
+        assert "wrong-robot" not in {notice.code for notice in check(UR10, spoilt).warnings}
+
+
+def test_wrong_data_are_said_before_the_robot_is_doubted() -> None:
+    data = campaign_of(UR10, 60, 4)[1]
+    moved = replace(data, position=data.position + np.where(data.configuration >= 30, 0.03, 0.0)[:, None])
+    errors = {notice.code for notice in calibrate(UR10, moved).warnings if notice.level == "error"}
+    assert "instrument-moved" in errors
+    assert "wrong-robot" not in errors

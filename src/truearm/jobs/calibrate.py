@@ -18,12 +18,14 @@ from truearm.identification.base_changes import with_one_base
 from truearm.identification.choosing.selection import AUTO, select
 from truearm.identification.judging.advice import check_fit
 from truearm.identification.judging.arrival_lag import check_arrival_lag
-from truearm.identification.judging.changes import check_changes
+from truearm.identification.judging.changes import notices_of_change
 from truearm.identification.judging.expected_error import as_residuals_allow, expected_error
 from truearm.identification.judging.implausible import check_plausible
 from truearm.identification.judging.large_remainder import check_remainder
 from truearm.identification.judging.left_over import LeftOver
 from truearm.identification.judging.narrow_data import check_narrow_data, check_narrow_data_without_geometry
+from truearm.identification.judging.next_steps import Judged, steps_after_fit, what_moved
+from truearm.identification.judging.off_configurations import off_configurations
 from truearm.identification.judging.one_sided import check_one_sided
 from truearm.identification.judging.payload import check_payload
 from truearm.identification.judging.separate_visits import check_separate_visits
@@ -256,7 +258,9 @@ def calibrate(
     # What the robust fit of the check could not explain, the fit itself may.
     noticed = tuple(notice for notice in noticed if notice.code != Status.IMPLAUSIBLE.value)
     left_over = LeftOver.of(fit, readings)
-    changes = check_changes(left_over)
+    off = off_configurations(left_over)
+    moved_then = what_moved(left_over, off)
+    changes = [] if moved_then is None else notices_of_change(*moved_then)
     told = [notice for notice in noticed if notice.code == WRONG_ROBOT]
     noticed = tuple(notice for notice in noticed if notice.code != WRONG_ROBOT)
     wrong_robot = check_robot(fit, first) if judges_lengths(fit) else told
@@ -285,30 +289,45 @@ def calibrate(
         f"{_without_words(without)}"
         f" redundancy {redundancy}{f', another base from {listed(base_changes)} on' if base_changes else ''}"
     )
+    warnings = (
+        *(notice for notice in noticed if notice.level == "error"),
+        *unlike,
+        *wrong_robot,
+        *_check_proof(before, validation),
+        *_check_copies(readings, training, held_out),
+        *_check_trained_before(nominal_robot, as_read, sha256, (count, n, seed), _without_words(without)),
+        *moved,
+        *check_payload(nominal_robot),
+        *check_fit(fit, expected, doubted=doubted),
+        *narrow,
+        *(notice for notice in noticed if notice.level != "error"),
+        *check_one_sided(fit, first),
+        *(hidden or wrong_sigma),
+        *([] if doubted else check_separate_visits(left_over)),
+        *explained,
+        *check_transmission(fit, first),
+    )
+    steps = steps_after_fit(
+        Judged(
+            left_over,
+            Status.IMPLAUSIBLE if unlike else fit.status,
+            warnings,
+            off,
+            moved_then,
+            validation or train_errors,
+            validation is not None,
+            expected,
+            first,
+        )
+    )
     calibration = Calibration(
         fit=fit,
         nominal=before,
         train=train_errors,
         validation=validation,
         expected=expected,
-        warnings=(
-            *(notice for notice in noticed if notice.level == "error"),
-            *unlike,
-            *wrong_robot,
-            *_check_proof(before, validation),
-            *_check_copies(readings, training, held_out),
-            *_check_trained_before(nominal_robot, as_read, sha256, (count, n, seed), _without_words(without)),
-            *moved,
-            *check_payload(nominal_robot),
-            *check_fit(fit, expected, doubted=doubted),
-            *narrow,
-            *(notice for notice in noticed if notice.level != "error"),
-            *check_one_sided(fit, first),
-            *(hidden or wrong_sigma),
-            *([] if doubted else check_separate_visits(left_over)),
-            *explained,
-            *check_transmission(fit, first),
-        ),
+        warnings=warnings,
+        next=steps,
         data=readings,
         training=training,
         held_out=held_out,

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from truearm.errors import InputError, did_you_mean
 from truearm.identification.choosing.selection import Selection
 from truearm.identification.judging.expected_error import ExpectedError
+from truearm.identification.judging.next_step import NextStep
 from truearm.identification.judging.repeatability import Repeatability, repeatability
 from truearm.identification.solving.fit import Fit, Status
 from truearm.measurement.dataset import Dataset
@@ -82,6 +83,8 @@ class Calibration(Record):
         Labels of the configurations that were left out; `data` does not have them.
     notes
         What the user noted, by its name.
+    next
+        What to do next, three steps at most, the most useful first.
     """
 
     fit: Fit
@@ -101,6 +104,7 @@ class Calibration(Record):
     known_before: Proof | None = None
     without: tuple[str, ...] = ()
     notes: dict[str, str] = field(default_factory=dict)
+    next: tuple[NextStep, ...] = ()
 
     @cached_property
     def robot(self) -> Robot:
@@ -128,18 +132,17 @@ class Calibration(Record):
 
     @property
     def advice(self) -> str:
-        """What to do next, in words."""
-        if self.status is not Status.CONVERGED:
-            return self.status.advice
-        if has_error(self.warnings):
+        """What to do about the status and errors, in words; what to do next is in `next`."""
+        if self.status is Status.CONVERGED and has_error(self.warnings):
             return "See the errors before you use the result."
-        return self.status.advice if self.validation else "Hold configurations out to judge the fit."
+        return self.status.advice
 
     def summary(self) -> dict[str, Any]:
         """Return the figures as ``result.json`` begins with them: errors in mm and mrad."""
         return {
             "status": self.status.value,
             "warnings": notice_summaries(self.warnings),
+            "next": [step.summary() for step in self.next],
             "nominal": errors_summary(self.nominal),
             "train": errors_summary(self.train),
             "validation": None if self.validation is None else errors_summary(self.validation),
@@ -181,7 +184,8 @@ class Calibration(Record):
             text.append(f"Chosen model: {self.fit.model.summary}")
         if self.fit.model.name == "frames":
             text += self._target_lines()
-        text.append(f"Status: {self.status.value}. {self.advice}")
+        text.append(f"Status: {self.status.value}. {self.advice}".rstrip())
+        text += [step.line for step in self.next]
         return text + notice_lines(self.warnings)
 
     def residuals(self) -> Residuals:

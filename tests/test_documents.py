@@ -249,6 +249,18 @@ def test_every_code_of_a_notice_stands_in_the_guide_with_its_level() -> None:
         assert all(any(level in cell for cell in told) for level in levels), f"{code}: {levels}, told as {told}"
 
 
+def test_every_code_of_a_next_step_stands_in_the_guide() -> None:
+    text = (ROOT / "docs" / "guide" / "results.md").read_text().split("## What to do next")[1].split("\n## ")[0]
+    codes = set(get_args(Kind))
+    for file in (ROOT / "src" / "truearm").rglob("*.py"):
+        for call in ast.walk(ast.parse(file.read_text())):
+            if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "NextStep":
+                codes |= {str(arg.value) for arg in call.args[:1] if isinstance(arg, ast.Constant)}
+    assert len(codes) > 12
+    for code in codes:
+        assert f"`{code}`" in text, code
+
+
 def test_every_limit_stands_in_the_guide() -> None:
     text = (ROOT / "docs" / "guide" / "data.md").read_text().replace(" ", "")
     for name, limit in LIMITS.items():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from html import escape
 from typing import Final
@@ -33,3 +34,17 @@ def listed(names: Sequence[str]) -> str:
 def counted(count: int, thing: str) -> str:
     """Return a count with the thing in the singular or the plural: ``1 reading``, ``2 readings``."""
     return f"{count} {thing}" if count == 1 else f"{count} {thing}s"
+
+
+def millimetres(length: float) -> str:
+    """Return a length [m] in mm with three digits, more of a long one."""
+    return _three_digits(length * 1e3)
+
+
+def degrees(angle: float) -> str:
+    """Return an angle [rad] in deg with three digits, more of a large one."""
+    return _three_digits(math.degrees(angle))
+
+
+def _three_digits(value: float) -> str:
+    return f"{value:.0f}" if abs(value) >= 1000 else f"{value:.3g}"

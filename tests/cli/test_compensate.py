@@ -56,7 +56,7 @@ def test_the_contract(truearm: Truearm, cell: Path) -> None:
     code, said = run(truearm, cell, "--json")
     assert code == 0
     told = json.loads(said)
-    assert set(told) == {"programs", "expected_is_lower_bound", "warnings"}
+    assert set(told) == {"programs", "expected_is_lower_bound", "expected_is_relative", "warnings"}
     (program,) = told["programs"]
     assert set(program) == {
         "file",
@@ -99,9 +99,9 @@ def test_with_tool_and_frame_nothing_is_assumed(truearm: Truearm, cell: Path) ->
     told = json.loads(said)
     assert [w["code"] for w in told["warnings"]] == [
         "computed-or-taught",
+        "loads-taken",
         "unproven",
         "joint-targets-kept",
-        "loads-taken",
     ]
     # The frame is half a millimetre beside what the controller has.
     assert 0.5 < told["programs"][0]["shift_mm"]["mean"] < 3.0

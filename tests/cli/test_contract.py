@@ -75,7 +75,7 @@ def test_calibrate_writes_its_files_and_prints_one_object(truearm: Truearm, smal
     run = truearm("calibrate", "irb120", small / "data.csv", "--model", "geometric", "--out", out, "--json")
     assert run.code == 0
     summary = json.loads(run.out)
-    assert list(summary) == ["status", "warnings", "nominal", "train", "validation", "expected_mm"]
+    assert list(summary) == ["status", "warnings", "next", "nominal", "train", "validation", "expected_mm"]
     assert summary["status"] == "converged"
     assert (summary["train"]["configurations"], summary["validation"]["configurations"]) == (28, 12)
     assert summary["nominal"]["configurations"] == 12

@@ -18,7 +18,11 @@ def test_the_command_names_its_option(truearm: Truearm, tmp_path: Path) -> None:
     assert refused.code == 2
     assert "--controller-kinematics nominal" in " ".join(refused.err.split())
     (tmp_path / "calibration.conf").write_text(UR10_CONF)
-    assert truearm(*given, "--controller-kinematics", tmp_path / "calibration.conf").code == 0
+    other = truearm(*given, "--controller-kinematics", tmp_path / "calibration.conf")
+    assert other.code == 2
+    assert "--accept other-kinematics" in " ".join(other.err.split())
+    accepted = ("--controller-kinematics", tmp_path / "calibration.conf", "--accept", "other-kinematics")
+    assert truearm(*given, *accepted).code == 0
 
 
 def test_the_command_imports(truearm: Truearm, tmp_path: Path) -> None:

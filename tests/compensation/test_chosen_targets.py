@@ -184,3 +184,82 @@ def test_a_script_that_says_once_what_the_robot_carries(calls: str, load: Payloa
     text = f"def job():\n  set_tcp(p[0,0,0.1,0,0,0])\n  {calls}\n  movel(p[0.4,0.1,0.3,0,3.14,0])\nend\n"
     program = URSCRIPT.read([Source(Path("job.script"), text)])
     assert list(program.loads.values()) == ([load] if load else [])
+
+
+def test_a_load_unlike_that_of_the_calibration_is_warned_of(tmp_path: Path) -> None:
+    bare = worn(("compliance",))
+    (said,) = [n for n in truearm.compensate(bare, [plate(tmp_path)]).warnings if n.code == "loads-taken"]
+    assert said.level == "warning"
+    assert "In its calibration the robot carried 0 kg." in said.message
+    robot = bare.with_payload(Payload(2.7, (0.05, 0.025, 0.1)))
+    (said,) = [n for n in truearm.compensate(robot, [plate(tmp_path)]).warnings if n.code == "loads-taken"]
+    assert said.level == "note"
+    grams = plate(tmp_path, ("[2.7,[50,25,100]", "[2700,[50,25,100]"))
+    stiff = truearm.compensate(worn(), [grams])
+    assert "payload-unlikely" in {notice.code for notice in stiff.warnings}
+
+
+@pytest.mark.parametrize(
+    "line", ["GripLoad lPart;", "tProbe.tload.mass:=6;", "MoveL pHole1,v10,z1,tProbe\\TLoad:=lPart;"]
+)
+def test_a_program_that_changes_its_load_is_warned_of(tmp_path: Path, line: str) -> None:
+    robot = worn(("compliance",)).with_payload(Payload(2.7, (0.05, 0.025, 0.1)))
+    program = plate(tmp_path, ("PROC main()", f"PROC main()\n    {line}"))
+    assert "load-changes" in {notice.code for notice in truearm.compensate(robot, [program]).warnings}
+    assert "load-changes" not in {n.code for n in truearm.compensate(robot, [plate(tmp_path)]).warnings}
+
+
+def test_a_tool_elsewhere_than_the_program_has_it_is_named(tmp_path: Path) -> None:
+    cell = tmp_path / "cell.yaml"
+    text = "truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\n"
+    text += "tools:\n  tProbe: {of: flange, translation: [X, 0, 125]}\n"
+    for x, told in (("9", True), ("1", False)):
+        cell.write_text(text.replace("X", x))
+        made = truearm.compensate(worn(), [plate(tmp_path)], tools=cell)
+        assert ("tool-apart" in {notice.code for notice in made.warnings}) == told
+
+
+def test_frames_and_tools_of_targets_that_stay_need_no_place(tmp_path: Path) -> None:
+    program = plate(tmp_path)
+    program.write_text(
+        program.read_text().replace(
+            "  PROC main()",
+            '  PERS wobjdata wOther:=[FALSE,TRUE,"",[[9,0,0],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];\n'
+            f"  CONST robtarget pFar:={POSE.format(x=300, y=10)};\n  PROC main()\n"
+            "    MoveJ pFar,v100,fine,tProbe\\WObj:=wOther;",
+            1,
+        )
+    )
+    cell = tmp_path / "cell.yaml"
+    cell.write_text(
+        "truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\nframes:\n"
+        "  wobjPlate: {of: base, translation: [310, -110, 60]}\n"
+    )
+    with pytest.raises(InputError, match="only some of the frames"):
+        truearm.compensate(worn(), [program], frames=cell)
+    made = truearm.compensate(worn(), [program], frames=cell, keep=["pFar"])
+    assert made.files[0].kept["in `keep`"] == 1
+    with pytest.raises(InputError, match="the frames cannot be both taught and measured"):
+        truearm.compensate(worn(), [program], frames=cell, taught=["frames"])
+    cell.write_text(cell.read_text().replace("of: base", "of: controller"))
+    assert truearm.compensate(worn(), [program], frames=cell, taught=["frames"]).result.frames.frames == "assumed"
+
+
+def test_without_measured_frames_the_error_is_said_to_be_relative(tmp_path: Path) -> None:
+    made = truearm.compensate(worn(), [plate(tmp_path)])
+    assert "of all programs together" in made.relative
+    assert made.summary()["expected_is_relative"] is True
+    assert "in each frame" in truearm.compensate(worn(), [plate(tmp_path)], taught=["frames"]).relative
+
+
+def test_a_record_that_is_not_ours_or_holds_the_only_original_is_not_lost(tmp_path: Path) -> None:
+    program, out = plate(tmp_path), tmp_path / "out"
+    truearm.compensate(worn(), [program], out=out)
+    truearm.compensate(worn(), [program], out=out)
+    (out / "plate.mod").rename(tmp_path / "moved.mod")
+    with pytest.raises(InputError, match="holds the original of a program that is not beside it"):
+        truearm.compensate(worn(), [program], out=out)
+    (out / "plate.mod.truearm.json").write_text("mine")
+    with pytest.raises(InputError, match="was not written by truearm or was changed since"):
+        truearm.compensate(worn(), [program], out=out)
+    assert (out / "plate.mod.truearm.json").read_text() == "mine"

@@ -107,13 +107,30 @@ def test_another_robots_file_is_refused_by_its_parameter(tmp_path: Path) -> None
         assert not (tmp_path / "o").exists()
 
 
+def test_kinematics_of_another_arm_are_refused_until_they_are_accepted(tmp_path: Path) -> None:
+    """What a factory measured of an arm is nearer to what calibration finds of it than the data sheet is."""
+    conf = tmp_path / "other.conf"
+    conf.write_text(UR10_CONF)
+    robot, job = worn("ur10"), [program(tmp_path, POSES)]
+    with pytest.raises(InputError, match=r"not those of this arm: .* the data sheet 1\.00 mm") as refusal:
+        truearm.compensate(robot, job, controller_kinematics=conf)
+    assert refusal.value.parameter == "controller_kinematics"
+    assert truearm.compensate(robot, job, controller_kinematics=conf, accept=["other-kinematics"]).files
+
+
+def test_a_controller_of_a_maker_who_calibrates_every_arm_is_doubted_to_be_nominal(tmp_path: Path) -> None:
+    made = truearm.compensate(worn("ur10"), [program(tmp_path, POSES)], controller_kinematics="nominal")
+    assert "controller-nominal" in {notice.code for notice in made.warnings}
+
+
 @pytest.mark.parametrize("name", ["compensation.html", "a.script", "a.script.truearm.json"])
 def test_the_kinematics_file_is_not_overwritten(name: str, tmp_path: Path) -> None:
     out = tmp_path / "out"
     out.mkdir()
     (out / name).write_text(UR10_CONF)
+    job, accept = [program(tmp_path, POSES)], ["other-kinematics"]
     with pytest.raises(InputError, match="overwritten"):
-        truearm.compensate(worn("ur10"), [program(tmp_path, POSES)], controller_kinematics=out / name, out=out)
+        truearm.compensate(worn("ur10"), job, controller_kinematics=out / name, out=out, accept=accept)
     assert (out / name).read_text() == UR10_CONF
 
 

@@ -189,7 +189,7 @@ def test_a_report_that_somebody_else_wrote_is_not_overwritten(tmp_path: Path) ->
         write_programs(tmp_path, [], {"m.mod": b"new", "compensation.html": b"page"})
     theirs.unlink()
     for page in (b"page", b"other page"):
-        write_programs(tmp_path, [], {"n.txt.truearm.json": b"{}", "compensation.html": page})
+        write_programs(tmp_path, [], {"n.txt": b"text", "compensation.html": page})
     assert theirs.read_bytes() == b"other page"
 
 

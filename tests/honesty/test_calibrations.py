@@ -222,8 +222,8 @@ TURN: Final = np.array([[np.cos(0.3), -np.sin(0.3), 0.0], [np.sin(0.3), np.cos(0
 @pytest.mark.parametrize(
     ("change", "code", "level", "ends", "words"),
     [
-        (lambda p: p @ TURN.T + np.array([0.1, 0.0, 0.0]), "frames-differ", "error", 3, "turned by 17 deg"),
-        (lambda p: p + np.array([5e-4, 0.0, 0.0]), "frames-differ", "warning", 0, r"moved by 0\.5"),
+        (lambda p: p @ TURN.T + np.array([0.1, 0.0, 0.0]), "base-moved", "error", 3, "turned by 17[.]. deg"),
+        (lambda p: p + np.array([5e-4, 0.0, 0.0]), "base-moved", "warning", 0, r"moved by 0\.5"),
         (lambda p: p * 1e-3, "implausible", "error", 3, "units"),
     ],
     ids=["instrument-elsewhere", "table-pushed-by-half-a-millimetre", "metres-called-millimetres"],

@@ -119,11 +119,13 @@ def test_narrow_data_are_judged_target_by_target(robot: Robot, program: Path) ->
 
 
 def test_only_known_names_are_accepted(robot: Robot, program: Path) -> None:
-    known = "allowed: rank-loss, not-converged, implausible, narrow-data, wrong-robot, maker, not-better-here"
+    known = (
+        "allowed: rank-loss, not-converged, implausible, narrow-data, wrong-robot, maker, other-kinematics, not-better"
+    )
     with pytest.raises(InputError, match=known) as refusal:
         truearm.compensate(robot, [program], accept=["rank-lost"])
     assert refusal.value.parameter == "accept"
-    with pytest.raises(InputError, match="joint-sign, maker, not-better-here"):
+    with pytest.raises(InputError, match="joint-sign, maker, other-kinematics, not-better-here"):
         truearm.compensate(ended(robot, "converged", SIGNS), [program], accept=["joint-signs"])
     assert codes(truearm.compensate(robot, [program], accept=["rank-loss"])) == codes(
         truearm.compensate(robot, [program])

@@ -25,7 +25,8 @@ from truearm.measurement.statistics import errors_of
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform, quaternion_from_rotation
 from truearm.notices import Notice
-from truearm.reporting.numbers import significant
+from truearm.reporting.drawing import DARK
+from truearm.reporting.numbers import deserved, significant, student_975
 from truearm.reporting.page import json_for_script
 from truearm.reporting.report import Report, report_html
 from truearm.results.calibration import Calibration
@@ -231,9 +232,14 @@ def test_the_first_figure_is_the_held_out_error() -> None:
     assert before is not None
     assert after is not None
     text = page(report).text
-    assert f"{significant(before.mean * 1e3)} → {significant(after.mean * 1e3)} mm" in text
+    old, new = Report(report).position[:2]
+    assert f"{old.texts[0]} → {new.texts[0]} mm" in text
+    assert float(new.texts[0]) == pytest.approx(after.mean * 1e3, abs=new.deviation)
     assert "on the 12 configurations that the fit has not seen" in text
-    assert f"the largest is {significant(after.max * 1e3)} mm (before: {significant(before.max * 1e3)} mm)" in text
+    assert f"the largest is {new.texts[3]} mm (before: {old.texts[3]} mm)" in text
+    assert new.interval is not None
+    assert f"the mean lies between {new.interval[0]} and {new.interval[1]} mm with 95 %" in text
+    assert "The noise of a reading alone would make 0.080 mm (as the data declare it)" in text
     assert "28 for training, 12 held out" in text
     assert report.fit.status.advice in text
     assert "Nothing was held out" not in text
@@ -259,7 +265,8 @@ def test_orientation_is_shown_in_mrad() -> None:
 def test_the_error_to_expect_is_on_the_first_page_with_what_it_is_of() -> None:
     found = made().expected
     text = page(made()).text
-    assert f"{significant(found.overall.mean * 1e3)} mm" in text
+    low, high = found.overall.interval_90
+    assert f"{deserved(found.overall.mean * 1e3, (high - low) * 1e3 / 3.29)} mm" in text
     assert "Mean position error to expect over the whole workspace" in text
     assert "Targets 1, 2, 3 in the instrument's frame, no payload" in text
     assert "A lower bound" not in text
@@ -415,22 +422,74 @@ def test_readings_with_little_weight_are_marked(loss: Loss) -> None:
     assert len(marks["y"]) < 12
 
 
-def test_correlations_of_all_free_parameters() -> None:
+def test_correlations_of_the_arms_own_parameters() -> None:
     report = made()
     drawn = page(report).figures["correlations"]["data"][0]
-    assert tuple(drawn["x"]) == tuple(drawn["y"]) == report.fit.free.names
-    assert np.abs(np.array(drawn["z"]) - report.fit.correlations).max() < 0.006
+    free = report.fit.free
+    own = [i for i, p in enumerate(free.parameters) if p.group not in ("base", "target", "fixture")]
+    assert tuple(drawn["x"]) == tuple(drawn["y"]) == tuple(free.names[i] for i in own)
+    r = report.fit.correlations[np.ix_(own, own)]
+    assert np.abs(np.array(drawn["z"]) - r).max() < 0.006
     pairs = re.findall(
-        r"<tr><td><code>(\S+)</code></td><td><code>(\S+)</code></td><td class=\"n\">([+-]\S+)<", report_html(report)
+        r"<tr><td><code>(\S+)</code></td><td><code>(\S+)</code></td><td class=\"n\">([+-][0-9.]+)<", report_html(report)
     )
     assert len(pairs) == 10
-    off = np.triu(np.abs(report.fit.correlations), 1)
-    names = report.fit.free.names
-    listed = [off[names.index(a), names.index(b)] for a, b, _ in pairs]
-    assert listed == sorted(off.ravel().tolist(), reverse=True)[:10]
+    listed = [abs(float(value)) for _, _, value in pairs]
+    assert listed == sorted(listed, reverse=True)
+    # The IRB 120 has parallel axes 2 and 3: only the sum of their offsets moves anything, whatever is measured.
+    assert abs(report.fit.correlations[free.names.index("d_2"), free.names.index("d_3")]) > 0.99
+    assert {"d_2", "d_3"} not in [{a, b} for a, b, _ in pairs]
+    assert not {name for a, b, _ in pairs for name in (a, b)} - {free.names[i] for i in own}
+
+
+# -- screens and paper -------------------------------------------------------------------------------------
+
+
+def test_a_dark_screen_has_colours_for_every_picture() -> None:
+    """Whatever colour a picture has, the page knows it for a dark screen."""
+    html = report_html(made(poses=True, outlier=True))
+    shown = page(made(poses=True, outlier=True))
+    used = set(re.findall(r'"(#[0-9a-f]{6})"', json.dumps(shown.figures)))
+    assert used <= set(DARK)
+    assert "prefers-color-scheme: dark" in html
+    assert "max-width: 640px" in html
+
+
+def test_the_first_page_is_a_certificate() -> None:
+    noted = replace(made(), notes={"serial": "4711", "operator": "A & B", "room": "20 degC"})
+    html = report_html(replace(noted, warnings=(Notice("odd", "Odd."), Notice("bad", "Bad.", "error"))))
+    first = html[html.index('<div class="certificate">') : html.index('<section id="warnings">')]
+    for words in ("Serial number</dt><dd>4711", "A &amp; B", "Room</dt><dd>20 degC", "converged", "Signature", "Bad."):
+        assert words in first
+    # What was not noted can be filled in by hand on paper.
+    assert '<div class="blank"><dt>Instrument</dt>' in first
+    assert '<div class="blank"><dt>Operator</dt>' not in first
+    assert "Warnings and notes, explained below: odd." in re.sub(r"\s+", " ", first)
+    assert "break-after: page" in html
 
 
 # -- digits ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("value", "deviation", "text"),
+    [
+        (3.7186, 0.25, "3.72"),
+        (0.07464, 0.0035, "0.075"),
+        (0.07464, 0.0299, "0.075"),
+        (1234.5, 20.0, "1234"),
+        (0.0004, 0.05, "0.0004"),
+        (0.07464, None, "0.0746"),
+        (0.07464, 0.0, "0.0746"),
+    ],
+)
+def test_digits_that_a_deviation_deserves(value: float, deviation: float | None, text: str) -> None:
+    assert deserved(value, deviation) == text
+
+
+@pytest.mark.parametrize(("freedom", "t"), [(1, 12.706), (2, 4.303), (3, 3.182), (5, 2.571), (17, 2.110), (99, 1.984)])
+def test_students_t(freedom: int, t: float) -> None:
+    assert student_975(freedom) == pytest.approx(t, rel=0.01)
 
 
 @pytest.mark.parametrize(

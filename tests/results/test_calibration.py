@@ -41,7 +41,7 @@ def test_residuals_are_the_errors_reading_by_reading() -> None:
 
 def test_without_a_held_out_part_all_residuals_are_of_training() -> None:
     assert set(run().residuals().part.tolist()) == {"training"}
-    assert "Status: converged. Hold configurations out to judge the fit." in repr(run())
+    assert "Next (hold-out): Hold configurations out to judge the fit" in "\n".join(run().lines())
 
 
 def test_residuals_as_a_data_frame(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from truearm.cli.loading import GravityText, PayloadText, read_gravity
+from truearm.cli.loading import GravityText, NoteTexts, PayloadText, read_gravity, read_notes
 from truearm.cli.options import command_line
 from truearm.cli.output import Json, print_json, print_line, print_record, progress
 
@@ -53,6 +53,13 @@ def calibrate(
             show_default=False,
         ),
     ] = None,
+    without: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--without", metavar="LABEL,...", help="Configurations to leave out; repeatable.", show_default=False
+        ),
+    ] = None,
+    notes: NoteTexts = None,
     json: Json = False,
 ) -> None:
     """Identify the real robot from measurements and judge it on configurations it has not seen.
@@ -76,6 +83,8 @@ def calibrate(
             payload=payload,
             gravity=read_gravity(gravity),
             base_changes=[name.strip() for name in base_changes.split(",")] if base_changes else (),
+            without=[name.strip() for text in without or () for name in text.split(",")],
+            notes=read_notes(notes),
             command=command_line(),
             progress=say,
         )

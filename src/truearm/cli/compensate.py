@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from truearm.cli.loading import PayloadText
+from truearm.cli.loading import NoteTexts, PayloadText, read_notes
 from truearm.cli.options import command_line
 from truearm.cli.output import Json, end_on_error, print_json, print_line, print_record, progress
 
@@ -86,6 +86,7 @@ def compensate(
             show_default=False,
         ),
     ] = None,
+    notes: NoteTexts = None,
     revert: Annotated[bool, typer.Option("--revert", help="Write the originals of corrected programs.")] = False,
     json: Json = False,
 ) -> None:
@@ -111,6 +112,7 @@ def compensate(
             keep=keep or None,
             taught=taught,
             accept=accept or None,
+            notes=notes or None,
         )
         return
     from truearm.jobs.compensate import compensate as run
@@ -133,6 +135,7 @@ def compensate(
             keep=keep or (),
             taught=None if taught is None else [word.strip() for word in taught.split(",")],
             accept=accept or (),
+            notes=read_notes(notes),
             command=command_line(),
             progress=say,
         )

@@ -1,4 +1,4 @@
-"""Options as texts: what a robot carries and how it is mounted (``--payload``, ``--gravity``), and lengths."""
+"""Options as texts: what a robot carries and how it is mounted (``--payload``, ``--gravity``), notes, and lengths."""
 
 from __future__ import annotations
 
@@ -29,6 +29,16 @@ GravityText = Annotated[
         show_default="as the robot file says",
     ),
 ]
+NoteTexts = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--note",
+        metavar="KEY=VALUE",
+        help="What the result shall say beside the figures: date, serial, operator, instrument, ...; repeatable.",
+        show_default=False,
+    ),
+]
+
 JointsText = Annotated[
     str | None,
     typer.Option(
@@ -38,6 +48,20 @@ JointsText = Annotated[
         show_default="the controller's where the robot file says that they differ",
     ),
 ]
+
+
+def read_notes(texts: list[str] | None) -> dict[str, str] | None:
+    """Return the notes that texts such as ``serial=1234`` hold, None for None."""
+    if not texts:
+        return None
+    notes: dict[str, str] = {}
+    for text in texts:
+        name, given, said = text.partition("=")
+        if not given or name.strip() in notes:
+            what = "a note was given twice" if given else "a note is a name and a text"
+            raise InputError(what, parameter="notes", came=text, allowed="NAME=TEXT, such as serial=1234")
+        notes[name.strip()] = said
+    return notes
 
 
 def read_gravity(text: str | None) -> tuple[float, float, float] | None:

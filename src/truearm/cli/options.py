@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Callable
 from contextvars import ContextVar
+from itertools import pairwise
 from typing import Any, TypeVar
 
 import typer
@@ -38,6 +39,8 @@ class Command(TyperCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Return what is left of the words; a value that is no number is told as jobs tell it."""
+        if "--out=" in args or ("--out", "") in pairwise(args):  # a variable of the shell that is not set
+            raise CommandError("--out: no file or folder is given; got ''.")
         try:
             return super().parse_args(ctx, args)
         except typer.BadParameter as error:

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from truearm.cli.loading import GravityText, PayloadText, read_gravity
+from truearm.cli.loading import GravityText, NoteTexts, PayloadText, read_gravity, read_notes
 from truearm.cli.output import Json, end_on_error, print_json, print_record
 
 
@@ -15,12 +15,21 @@ def validate(
     data: Annotated[str, typer.Argument(metavar="DATA.csv", help="New measurements in the same frames.")],
     payload: PayloadText = None,
     gravity: GravityText = None,
+    refit: Annotated[
+        str | None,
+        typer.Option(
+            metavar="base|targets|tool",
+            help="What was moved since the calibration and is found anew from these measurements.",
+            show_default=False,
+        ),
+    ] = None,
+    notes: NoteTexts = None,
     json: Json = False,
 ) -> None:
     """Judge a calibrated robot on new measurements taken in the same frames."""
     from truearm.jobs.validate import validate as run
 
-    validation = run(robot, data, payload=payload, gravity=read_gravity(gravity))
+    validation = run(robot, data, payload=payload, gravity=read_gravity(gravity), refit=refit, notes=read_notes(notes))
     if json:
         print_json(validation.summary())
     else:

@@ -26,6 +26,10 @@ _LARGE_MEAN: Final = 0.02
 #: With so few targets and no frame, a correction without a mean is no correction.
 _FEW_TARGETS: Final = 3
 _LISTED: Final = 5
+#: Share by which masses differ that are the same load.
+_SAME_MASS: Final = 0.1
+#: A tool is measured where the program has it, within what a calibration cannot know of the flange [m].
+_TOOL_APART: Final = 0.004
 
 
 def check_correction(
@@ -104,6 +108,15 @@ def check_correction(
             )
         )
     made += _loads(robot, result)
+    made += _apart(result)
+    if any(one.program.load_changes for one in corrections) and any(effect.loaded for effect in robot.effects):
+        made.append(
+            Notice(
+                "load-changes",
+                "The programs change what the robot carries (GripLoad, TLoad, tload). Targets were corrected for the "
+                "load of the tool alone; where the robot carries more, the arm bends further than is expected here.",
+            )
+        )
     unweighed = not result.loads or None in result.loads.values()
     if robot.payload == NO_PAYLOAD and unweighed and any(effect.loaded for effect in robot.effects):
         made.append(
@@ -219,12 +232,37 @@ def _loads(robot: Robot, result: CorrectedPrograms) -> list[Notice]:
         return []
     weighed = [f"{tool or 'the flange'} {load.mass:g} kg" for tool, load in result.loads.items() if load is not None]
     others = [tool or "the flange" for tool, load in result.loads.items() if load is None]
+    own = robot.payload.mass
+    other = any(abs(load.mass - own) > _SAME_MASS * max(load.mass, own) for load in result.loads.values() if load)
     said = [f"The programs say what their tools weigh: {', '.join(weighed)}."] if weighed else []
     if others:
         said.append(
             f"No mass is known of {listed(others)}: there the {robot.payload.mass:g} kg of the calibration are kept."
         )
-    return [Notice("loads-taken", f"{' '.join(said)} `payload` says it for all of them.", "note")]
+    said.append("`payload` says it for all of them.")
+    if not other:
+        return [Notice("loads-taken", " ".join(said), "note")]
+    said.append(
+        f"In its calibration the robot carried {own:g} kg. If it carried one of these tools then, that payload was "
+        "wrong: calibration and programs are off by what it bends, and the errors to expect do not contain that."
+    )
+    return [Notice("loads-taken", " ".join(said))]
+
+
+def _apart(result: CorrectedPrograms) -> list[Notice]:
+    """Say which tools are not where the program has them."""
+    far = {tool: apart for tool, apart in result.tools_apart.items() if apart > _TOOL_APART}
+    if not far:
+        return []
+    words = ", ".join(f"{tool or 'the flange'} by {apart * 1e3:.1f} mm" for tool, apart in far.items())
+    return [
+        Notice(
+            "tool-apart",
+            f"Tools are not where the program has them on the flange: {words}. A flange that calibration cannot place "
+            "explains one or two millimetres. Check that the target is the tip of that tool, and that the last joint "
+            "has its zero where the controller has it.",
+        )
+    ]
 
 
 def _assumed(result: CorrectedPrograms) -> list[Notice]:

@@ -79,6 +79,8 @@ class CorrectedPrograms:
         What was said of the targets.
     loads
         What the robot carries with each tool in use, by the name of the tool; None where the programs do not say it.
+    tools_apart
+        How far the tip of each tool that was measured is from where the program has it [m], by the name of the tool.
     """
 
     corrections: tuple[Correction, ...]
@@ -87,6 +89,7 @@ class CorrectedPrograms:
     between: tuple[Between, ...]
     choice: Choice
     loads: Mapping[str, Payload | None]
+    tools_apart: Mapping[str, float]
 
 
 def corrected_programs(
@@ -132,15 +135,19 @@ def corrected_programs(
     if len(set(loads.values())) == 1:
         robot = robot.with_payload(next(iter(loads.values())))
     nominal = nominal_robot(robot)
-    tools, frames = provenance(programs, cell, "tool"), provenance(programs, cell, "frame")
-    flange, start = np.eye(4), np.eye(4)
+    kept = kept_by_choice(programs, choice)
+    tools, frames = provenance(programs, cell, "tool", kept), provenance(programs, cell, "frame", kept)
+    flange = np.eye(4)
+    start, agreed = best_agreement(robot)
     if "assumed" in (tools, frames):
-        start, flange = best_agreement(robot)
+        flange = agreed
+    else:
+        start = np.eye(4)
     progress("resolving the configurations")
     arms = arms_of_tools(robot, loads)
     resolved = [
-        ResolvedProgram(robot, nominal, program, cell, arms, kept)
-        for program, kept in zip(programs, kept_by_choice(programs, choice), strict=True)
+        ResolvedProgram(robot, nominal, program, cell, arms, staying)
+        for program, staying in zip(programs, kept, strict=True)
     ]
     names = tuple(dict.fromkeys(name for one in resolved for name in one.frames))
     if frames == "identified":
@@ -171,6 +178,7 @@ def corrected_programs(
         tuple(partial(one.between, bases, flange) for one in resolved),
         choice,
         loads,
+        {name: apart for one in resolved for name, apart in one.tools_apart(agreed).items()},
     )
 
 

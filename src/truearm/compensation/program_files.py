@@ -208,6 +208,8 @@ def write_programs(
         report = name.endswith(".html") and exists(path)
         if report and all(one.files.get(name) != _hash(read_bytes(path)) for one in sets_in(folder)):
             raise _not_written_here(path)
+        if name.endswith(".truearm.json"):
+            _refuse_losing(path)
         if name.endswith((".truearm.json", ".html")):
             continue
         if exists(record_path(path)) and f"{name}.truearm.json" not in files:
@@ -225,6 +227,23 @@ def write_programs(
             raise _not_written_here(path)
     order = sorted(files, key=lambda name: not name.endswith(".truearm.json"))
     write_files(folder, {name: files[name] for name in order}, command)
+
+
+def _refuse_losing(record: Path) -> None:
+    """Refuse to replace a record that is somebody else's, or that holds the original of a program that is not there."""
+    if not exists(record):
+        return
+    program = record.with_name(record.name.removesuffix(".truearm.json"))
+    try:
+        known = _record(program)
+    except InputError as error:
+        raise _not_written_here(record) from error
+    if known is not None and not exists(program):
+        raise InputError(
+            "this record holds the original of a program that is not beside it, and is not overwritten",
+            where=str(record),
+            cure="Choose another `out`.",
+        )
 
 
 def _not_written_here(path: Path) -> InputError:

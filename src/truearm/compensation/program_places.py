@@ -22,8 +22,15 @@ Provenance = Literal["identified", "assumed"]
 Shift = Array | Mapping[str, Array]
 
 
-def provenance(programs: Sequence[Program], cell: Cell, kind: Kind) -> Provenance:
+def provenance(
+    programs: Sequence[Program], cell: Cell, kind: Kind, kept: Sequence[Collection[int]] | None = None
+) -> Provenance:
     """Return whether the real places of all tools or frames in use were given, or of none.
+
+    Parameters
+    ----------
+    kept
+        Of each program the targets that stay, by their index: where their tools and frames are does not count.
 
     Raises
     ------
@@ -33,8 +40,10 @@ def provenance(programs: Sequence[Program], cell: Cell, kind: Kind) -> Provenanc
     given = cell.tools if kind == "tool" else cell.frames
     used: set[str] = set()
     needed: dict[str, str] = {}
-    for program in programs:
-        for target in program.targets:
+    for program, staying in zip(programs, kept or [()] * len(programs), strict=True):
+        for row, target in enumerate(program.targets):
+            if row in staying:
+                continue
             name = target.tool if kind == "tool" else target.frame
             used.add(name)
             if name not in needed and (kind == "tool" or target.form.kind == "pose"):
@@ -110,6 +119,15 @@ class Places:
         """Return the place of each target's name among names of all programs, ``(n,)``; 0 if there are none."""
         number = {name: index for index, name in enumerate(names)}
         return np.asarray(np.array([number.get(name, 0) for name in self._names], dtype=np.intp)[self._index])
+
+    def apart(self, shift: Array) -> dict[str, float]:
+        """Return how far those that were measured are from the nominal ones [m], by name, with the shift of these."""
+        every = zip(self._names, self._nominal, self._real, strict=True)
+        return {
+            name: float(np.linalg.norm(real[:3, 3] - (shift @ nominal)[:3, 3]))
+            for name, nominal, real in every
+            if real is not None
+        }
 
     def real(self, rows: NDArray[np.intp], shift: Shift) -> Array:
         """Return them in the identified base or flange; where it was not measured, with the shift that is assumed."""

@@ -125,6 +125,16 @@ class ResolvedProgram:
         """The names of the frames that its targets are in."""
         return self._base.names
 
+    def tools_apart(self, flange: Array) -> dict[str, float]:
+        """Return how far tools that were measured are from where the program has them [m], by their names.
+
+        Parameters
+        ----------
+        flange
+            Where the nominal flange agrees best with the identified one.
+        """
+        return self._tool.apart(flange)
+
     @property
     def measured_base(self) -> Array | None:
         """``T_base_nominalbase`` by the first frame that was measured; None if none was."""

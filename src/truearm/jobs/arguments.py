@@ -304,6 +304,35 @@ def names_argument(values: object, parameter: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(str(value) for value in values))
 
 
+#: Characters that a note may have, its name and what it says, and how many notes there may be.
+_NOTE: Final = (40, 200)
+_MOST_NOTES: Final = 20
+
+
+def notes_argument(notes: object, parameter: str = "notes") -> dict[str, str]:
+    """Return what a person notes about a measurement, by its name, in the order given; None is nothing."""
+    if notes is None:
+        return {}
+    if not isinstance(notes, Mapping):
+        raise wrong_kind("notes by name belong here", notes, parameter, "a dict of names and texts")
+    if len(notes) > _MOST_NOTES:
+        raise InputError("there are too many notes", parameter=parameter, came=len(notes), allowed=f"{_MOST_NOTES}")
+    found = {}
+    for name, said in notes.items():
+        for text, most in zip((name, said), _NOTE, strict=True):
+            if not isinstance(text, str):
+                raise wrong_kind("a text belongs here", text, parameter, "a text")
+            if not text.strip() or len(text) > most or not text.isprintable():
+                raise InputError(
+                    "a note is a name and a text of one line",
+                    parameter=parameter,
+                    came=text,
+                    allowed=f"a name of 1 to {_NOTE[0]} characters, and a text of 1 to {_NOTE[1]}",
+                )
+        found[name.strip()] = said.strip()
+    return found
+
+
 def device_argument(device: object, parameter: str = "device") -> Device:
     """Return the instrument of a name."""
     from truearm.simulation.devices import DEVICES  # with its inverse kinematics, only where it is asked for
@@ -337,5 +366,7 @@ def _written(value: object) -> str:
     if isinstance(value, list | tuple):
         words = ", ".join(_written(entry) for entry in value)
         return f"[{words}]"
+    if isinstance(value, dict):
+        return repr(value)
     plain = value is None or isinstance(value, str | bool | int | float)
     return repr(value) if plain else type(value).__name__.upper()

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from numbers import Integral
 from pathlib import Path
@@ -11,18 +12,20 @@ from typing import Final, Literal, get_args
 
 import numpy as np
 
-from truearm.errors import InputError, nearest_names, refusals_of, wrong_kind
+from truearm.errors import InputError, did_you_mean, nearest_names, refusals_of, wrong_kind
 from truearm.files import path_argument, read_bytes
 from truearm.identification.base_changes import with_one_base
 from truearm.identification.choosing.selection import AUTO, select
 from truearm.identification.judging.advice import check_fit
 from truearm.identification.judging.arrival_lag import check_arrival_lag
-from truearm.identification.judging.changes import check_changes
+from truearm.identification.judging.changes import notices_of_change
 from truearm.identification.judging.expected_error import as_residuals_allow, expected_error
 from truearm.identification.judging.implausible import check_plausible
 from truearm.identification.judging.large_remainder import check_remainder
 from truearm.identification.judging.left_over import LeftOver
 from truearm.identification.judging.narrow_data import check_narrow_data, check_narrow_data_without_geometry
+from truearm.identification.judging.next_steps import Judged, steps_after_fit, what_moved
+from truearm.identification.judging.off_configurations import off_configurations
 from truearm.identification.judging.one_sided import check_one_sided
 from truearm.identification.judging.payload import check_payload
 from truearm.identification.judging.separate_visits import check_separate_visits
@@ -42,6 +45,7 @@ from truearm.jobs.arguments import (
     folder_for,
     gravity_argument,
     names_argument,
+    notes_argument,
     payload_argument,
     progress_argument,
     python_call,
@@ -51,7 +55,7 @@ from truearm.jobs.arguments import (
     whole_argument,
 )
 from truearm.jobs.check import notices_of
-from truearm.jobs.validate import trained_on
+from truearm.jobs.validate import training_of
 from truearm.library import urdf_source
 from truearm.measurement.dataset import Dataset, IntArray
 from truearm.measurement.repeats import copies, readings_digest, revisits
@@ -72,6 +76,9 @@ Train = int | Literal["all"] | None
 #: Every model that can be asked for by name; None chooses.
 _MODELS: Final[dict[str, Model | None]] = {m.name: m for m in (FRAMES, *MODELS)} | {AUTO: None}
 
+#: The hash by which the history tells which configurations were left out.
+_LEFT_OUT: Final = re.compile(r"; ([0-9a-f]{8})\),")
+
 
 def calibrate(
     robot: Robot | str | Path,
@@ -88,6 +95,8 @@ def calibrate(
     payload: Payload | str | None = None,
     gravity: Sequence[float] | None = None,
     base_changes: Sequence[str] = (),
+    without: Sequence[str] = (),
+    notes: Mapping[str, str] | None = None,
     command: str | None = None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Calibration:
@@ -126,6 +135,11 @@ def calibrate(
         Configurations from which on, in the order of measurement, the instrument or the robot's base stood elsewhere.
         The motion is found along with the model (``geometric`` for ``auto``) from the training configurations, and
         taken out of the readings; no deviation contains what is not known of it.
+    without
+        Configurations that are left out, by their labels: neither part of the split knows them.
+    notes
+        What to write on the report and into result.json, by its name: ``date``, ``serial``, ``operator``,
+        ``instrument``, or any other.
     command
         How to run it again, for the report; None writes the call in Python.
     progress
@@ -147,6 +161,8 @@ def calibrate(
             cure="Name another model.",
         )
     base_changes = names_argument(base_changes, "base_changes")
+    without = names_argument(without, "without")
+    notes = notes_argument(notes)
     choice_argument(loss, "loss", {name: name for name in LOSSES})
     choice_argument(redundancy, "redundancy", {name: name for name in get_args(Redundant)})
     seed = whole_argument(seed, "seed")
@@ -163,6 +179,8 @@ def calibrate(
         bounds=bounds,
         effects=list(effects) or None,
         base_changes=list(base_changes) or None,
+        without=list(without) or None,
+        notes=notes or None,
         payload=payload,
         gravity=fall,
     )
@@ -182,6 +200,7 @@ def calibrate(
     sha256 = None
     if isinstance(data, str | Path):
         sha256 = hashlib.sha256(read_bytes(path_argument(data, "data"))).hexdigest()
+    readings = _left_out(readings, without)
     bounds_file = str(bounds) if isinstance(bounds, str | Path) else "bounds"
     if bounds is not None and not isinstance(bounds, Bounds):
         with refusals_of("bounds"):
@@ -239,7 +258,9 @@ def calibrate(
     # What the robust fit of the check could not explain, the fit itself may.
     noticed = tuple(notice for notice in noticed if notice.code != Status.IMPLAUSIBLE.value)
     left_over = LeftOver.of(fit, readings)
-    changes = check_changes(left_over)
+    off = off_configurations(left_over)
+    moved_then = what_moved(left_over, off)
+    changes = [] if moved_then is None else notices_of_change(*moved_then)
     told = [notice for notice in noticed if notice.code == WRONG_ROBOT]
     noticed = tuple(notice for notice in noticed if notice.code != WRONG_ROBOT)
     wrong_robot = check_robot(fit, first) if judges_lengths(fit) else told
@@ -265,7 +286,39 @@ def calibrate(
     history = (
         f"calibrated by truearm {__version__}: model {' + '.join([chosen.name, *effects])},"
         f" {count} of {n} configurations of {Path(readings.source).name}{digest}, seed {seed}, loss {loss},"
+        f"{_without_words(without)}"
         f" redundancy {redundancy}{f', another base from {listed(base_changes)} on' if base_changes else ''}"
+    )
+    warnings = (
+        *(notice for notice in noticed if notice.level == "error"),
+        *unlike,
+        *wrong_robot,
+        *_check_proof(before, validation),
+        *_check_copies(readings, training, held_out),
+        *_check_trained_before(nominal_robot, as_read, sha256, (count, n, seed), _without_words(without)),
+        *moved,
+        *check_payload(nominal_robot),
+        *check_fit(fit, expected, doubted=doubted),
+        *narrow,
+        *(notice for notice in noticed if notice.level != "error"),
+        *check_one_sided(fit, first),
+        *(hidden or wrong_sigma),
+        *([] if doubted else check_separate_visits(left_over)),
+        *explained,
+        *check_transmission(fit, first),
+    )
+    steps = steps_after_fit(
+        Judged(
+            left_over,
+            Status.IMPLAUSIBLE if unlike else fit.status,
+            warnings,
+            off,
+            moved_then,
+            validation or train_errors,
+            validation is not None,
+            expected,
+            first,
+        )
     )
     calibration = Calibration(
         fit=fit,
@@ -273,24 +326,8 @@ def calibrate(
         train=train_errors,
         validation=validation,
         expected=expected,
-        warnings=(
-            *(notice for notice in noticed if notice.level == "error"),
-            *unlike,
-            *wrong_robot,
-            *_check_proof(before, validation),
-            *_check_copies(readings, training, held_out),
-            *_check_trained_before(nominal_robot, as_read, sha256, (count, n, seed)),
-            *moved,
-            *check_payload(nominal_robot),
-            *check_fit(fit, expected, doubted=doubted),
-            *narrow,
-            *(notice for notice in noticed if notice.level != "error"),
-            *check_one_sided(fit, first),
-            *(hidden or wrong_sigma),
-            *([] if doubted else check_separate_visits(left_over)),
-            *explained,
-            *check_transmission(fit, first),
-        ),
+        warnings=warnings,
+        next=steps,
         data=readings,
         training=training,
         held_out=held_out,
@@ -300,10 +337,48 @@ def calibrate(
         inputs=inputs,
         selection=selection,
         known_before=_known_before(nominal_robot),
+        without=without,
+        notes=notes,
     )
     if folder is not None:
         calibration.save(folder, progress)
     return calibration
+
+
+def _left_out(data: Dataset, labels: Sequence[str]) -> Dataset:
+    """Return the data without some configurations.
+
+    Raises
+    ------
+    InputError
+        For a configuration that the data do not have, or if none would be left.
+    """
+    if not labels:
+        return data
+    known = set(data.labels)
+    for label in labels:
+        if label not in known:
+            raise InputError(
+                "there is no configuration of this name",
+                parameter="without",
+                where=data.source,
+                came=label,
+                cure=did_you_mean(label, data.labels) or "Name configurations of the data.",
+            )
+    kept = [i for i, label in enumerate(data.labels) if label not in set(labels)]
+    if not kept:
+        raise InputError(
+            "no configuration would be left", parameter="without", where=data.source, cure="Leave out fewer."
+        )
+    return data.of_configurations(kept)
+
+
+def _without_words(labels: Sequence[str]) -> str:
+    """Return how the history says which configurations were left out: the first few by name, all of them by a hash."""
+    if not labels:
+        return ""
+    digest = hashlib.sha256("\n".join(sorted(labels)).encode()).hexdigest()[:8]
+    return f" without {counted(len(labels), 'configuration')} ({listed(labels)}; {digest}),"
 
 
 def _known_before(robot: Robot) -> Proof | None:
@@ -400,7 +475,9 @@ def _check_copies(data: Dataset, training: IntArray, held_out: IntArray) -> list
     ]
 
 
-def _check_trained_before(robot: Robot, data: Dataset, sha256: str | None, split: tuple[int, int, int]) -> list[Notice]:
+def _check_trained_before(
+    robot: Robot, data: Dataset, sha256: str | None, split: tuple[int, int, int], without: str
+) -> list[Notice]:
     """Say if the robot to begin with has been trained on what is held out now.
 
     Parameters
@@ -411,15 +488,20 @@ def _check_trained_before(robot: Robot, data: Dataset, sha256: str | None, split
         Of their file; None if they are in none.
     split
         How many configurations are trained on, of how many, and the seed.
+    without
+        What the history says of those left out.
     """
-    before = trained_on(robot, data, sha256)
-    if before is None or before == split or split[0] == split[1]:
+    before = training_of(robot, data, sha256)
+    if before is None or split[0] == split[1]:
         return []
+    if before.split == split and _LEFT_OUT.findall(before.line) == _LEFT_OUT.findall(without):
+        return []
+    count, of, seed = before.split
     return [
         Notice(
             "training-data",
-            f"The robot to begin with was calibrated with these readings already, on {before[0]} of its {before[1]} "
-            f"configurations (seed {before[2]}): what is held out now was partly seen then, and the held-out errors "
+            f"The robot to begin with was calibrated with these readings already, on {count} of its {of} "
+            f"configurations (seed {seed}): what is held out now was partly seen then, and the held-out errors "
             "flatter it. Begin with the nominal robot, or with the same `train` and `seed`.",
         )
     ]

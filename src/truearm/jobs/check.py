@@ -5,11 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 
 from truearm.errors import InputError
+from truearm.identification.judging.left_over import LeftOver
+from truearm.identification.judging.next_steps import steps_after_check
 from truearm.identification.judging.plausibility import check_against
+from truearm.identification.solving.fit import Fit
 from truearm.jobs.arguments import data_argument, device_argument, readings_argument, refuse_swapped, robot_argument
 from truearm.limits import limit
 from truearm.measurement.checks import check_data, check_range
 from truearm.measurement.dataset import Dataset
+from truearm.measurement.statistics import errors_of
 from truearm.measurement.table_motion import without_table_motion
 from truearm.measurement.thinning import thinned
 from truearm.modeling.robot import Robot
@@ -48,13 +52,28 @@ def check(
         raise InputError(
             "there is no reading", parameter="data", where=measured.source, cure="Fill in x, y and z, or distance."
         )
-    return DataCheck(measured, notices_of(measured, against, device))
+    noticed, fit, part = _compared(measured, against, device)
+    if fit is None or part is None:
+        return DataCheck(measured, noticed, steps_after_check(noticed, robot=against is not None))
+    steps = steps_after_check(noticed, LeftOver.of(fit, part), errors_of(fit.robot, part))
+    return DataCheck(measured, noticed, steps)
 
 
-def notices_of(
-    data: Dataset, robot: Robot | None = None, device: str | None = None, *, steady: Dataset | None = None
-) -> tuple[Notice, ...]:
+def notices_of(data: Dataset, robot: Robot, *, steady: Dataset) -> tuple[Notice, ...]:
     """Return one notice for each kind of fault; none for believable data.
+
+    Parameters
+    ----------
+    steady
+        The same data without the motion of the table.
+    """
+    return _compared(data, robot, steady=steady)[0]
+
+
+def _compared(
+    data: Dataset, robot: Robot | None, device: str | None = None, *, steady: Dataset | None = None
+) -> tuple[tuple[Notice, ...], Fit | None, Dataset | None]:
+    """Return one notice for each kind of fault, and a robust fit of the robot with the readings it was made from.
 
     Parameters
     ----------
@@ -65,14 +84,14 @@ def notices_of(
     if device is not None:
         ranged = tuple(check_range(data, device_argument(device)))
     if robot is None:
-        return (*ranged, *check_data(data))
+        return (*ranged, *check_data(data)), None, None
     still = without_table_motion(data) if steady is None else steady
     part = thinned(still, len(robot.parameters), limit("derivatives") // 2)
     if part is None:
-        return (*ranged, *check_data(data), _too_seldom(data))
-    against, suspects = check_against(robot, part)
+        return (*ranged, *check_data(data), _too_seldom(data)), None, None
+    against, suspects, fit = check_against(robot, part)
     left_out = () if part is still else (_in_part(part, still),)
-    return (*ranged, *check_data(data, suspects), *against, *left_out)
+    return (*ranged, *check_data(data, suspects), *against, *left_out), fit, part
 
 
 def _too_seldom(data: Dataset) -> Notice:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,6 +24,7 @@ from truearm.compensation.programs.program import Edit
 from truearm.compensation.split import ProgramSplit, check_tolerance, split_program
 from truearm.errors import InputError, refusals_of
 from truearm.files import path_argument
+from truearm.identification.judging.payload import check_payload
 from truearm.jobs.arguments import (
     choice_argument,
     choices_argument,
@@ -32,6 +33,7 @@ from truearm.jobs.arguments import (
     flag_argument,
     folder_for,
     names_argument,
+    notes_argument,
     paths_argument,
     payload_argument,
     progress_argument,
@@ -43,6 +45,7 @@ from truearm.modeling.formats.controller_entry import STATED
 from truearm.modeling.formats.controller_kinematics import with_controller_kinematics
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
+from truearm.notices import Notice
 from truearm.results.program_correction import REPORT, FileCorrection, ProgramCorrection
 
 
@@ -63,6 +66,7 @@ def compensate(
     keep: Sequence[str] = (),
     taught: Sequence[str] | None = None,
     accept: Sequence[str] = (),
+    notes: Mapping[str, str] | None = None,
     command: str | None = None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> ProgramCorrection:
@@ -106,6 +110,8 @@ def compensate(
         ``wrong-robot``; ``maker`` for programs in the language of another maker; ``other-kinematics`` for kinematics of
         the controller that are not this arm's; and ``not-better-here`` to correct also the targets that would rather
         get worse.
+    notes
+        What to write on the report, by its name: ``date``, ``serial``, ``operator``, or any other.
     command
         How to do it again, for the report; None writes the call in Python.
     progress
@@ -123,6 +129,7 @@ def compensate(
     tool_file = None if tools is None else path_argument(tools, "tools")
     frame_file = None if frames is None else path_argument(frames, "frames")
     payload = payload_argument(payload)
+    notes = notes_argument(notes)
     strict, again = flag_argument(strict, "strict"), flag_argument(again, "again")
     if split is not None:
         split = finite_number(split, "split")
@@ -156,6 +163,7 @@ def compensate(
         keep=list(choice.keep) or None,
         taught=None if choice.taught is None else sorted(choice.taught) or ["none"],
         accept=list(accepted) or None,
+        notes=notes or None,
     )
     refuse_unaccepted(arm, accepted)
     with refusals_of("tools"):
@@ -209,15 +217,23 @@ def compensate(
             *known_of(arm),
             *foreign,
             *controller_notices(arm, read),
+            *_payloads_unlikely(arm, result),
             *check_correction(arm, result, splits),
         ),
         command=invocation,
         inputs=files_of(robot, tools, frames, *_kinematics_file(controller_kinematics)),
+        notes=notes,
     )
     if folder is not None:
         with refusals_of("out"):
             made.save(folder, progress)
     return made
+
+
+def _payloads_unlikely(arm: Robot, result: CorrectedPrograms) -> list[Notice]:
+    """Say which loads no arm of this size carries."""
+    loads = [load for load in dict.fromkeys(result.loads.values()) if load is not None]
+    return [notice for load in [arm.payload, *loads] for notice in check_payload(arm.with_payload(load))][:1]
 
 
 def _with_controller(arm: Robot, said: str | Path | None) -> Robot:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -14,9 +15,13 @@ from truearm.identification.judging.beyond_proof import check_proof
 from truearm.identification.judging.payload import check_payload
 from truearm.identification.judging.same_frames import check_frames
 from truearm.identification.judging.target_names import check_names
+from truearm.identification.refit import MOVED
+from truearm.identification.refit import refit as find_moved
 from truearm.jobs.arguments import (
+    choice_argument,
     data_argument,
     gravity_argument,
+    notes_argument,
     payload_argument,
     readings_argument,
     refuse_swapped,
@@ -38,6 +43,8 @@ def validate(
     *,
     payload: Payload | str | None = None,
     gravity: Sequence[float] | None = None,
+    refit: str | None = None,
+    notes: Mapping[str, str] | None = None,
 ) -> Validation:
     """Judge a calibrated robot on new data taken in the same frames.
 
@@ -50,13 +57,21 @@ def validate(
     payload, gravity
         What the robot carried (an object, or a text such as ``2.7kg,50mm,25mm,100mm``) and free fall in its base frame
         [m/s^2] this time, if they differ from the calibration.
+    refit
+        What was moved since and is found anew from these readings, while everything else stays: ``base`` (the
+        instrument, or the robot's base), ``targets`` (each by itself), or ``tool`` (all targets as one rigid body). The
+        errors of each configuration are then those of what was found without it.
+    notes
+        What to write beside the figures, by its name: ``date``, ``serial``, ``operator``, ``instrument``, or any other.
 
     Raises
     ------
     InputError
-        If the robot has no targets, or the data name others.
+        If the robot has no targets, the data name others, or there are too few of them for `refit`.
     """
     refuse_swapped(robot, data, "validate")
+    moved = None if refit is None else choice_argument(refit, "refit", {kind: kind for kind in MOVED})
+    notes = notes_argument(notes)
     digest = None
     if isinstance(data, str | Path):
         with refusals_of("data"):
@@ -65,34 +80,63 @@ def validate(
     as_calibrated = robot_argument(robot)
     robot, data = as_measured(robot, data, payload, gravity)
     identified = {p.group for p in robot.parameters.values() if p.deviation is not None}
-    if data.anchored and robot.fixtures and identified and "base" not in identified:
+    if moved != "base" and data.anchored and robot.fixtures and identified and "base" not in identified:
         raise InputError(
             "the robot was calibrated without the frame of an instrument, so the place of this instrument is unknown",
             parameter="data",
             where=data.source,
-            cure="Place it first: calibrate the calibrated robot with `model=frames`, or compare distances with "
-            "'truearm distances'.",
+            cure="Find its place with `refit=base`, calibrate the calibrated robot with `model=frames`, or compare "
+            "distances with 'truearm distances'.",
         )
-    errors = errors_of(robot, data)
+    errors, found = errors_of(robot, data), None
+    judged, mistaken = robot, list[Notice]()
+    if moved is not None:
+        # Names that were exchanged would pass for targets that moved.
+        mistaken = [] if moved == "base" else check_names(robot, data, errors)
+        with refusals_of("refit"):
+            found = find_moved(robot, data, moved)
+        judged, errors = found.robot, found.errors
+    # Configurations that decide much alone err more without themselves: that is no sign of anything else.
+    agreed = errors if found is None else errors_of(judged, data)
     mistaken = (
-        check_names(robot, data, errors)
-        or check_frames(robot, data, errors)
-        or check_proof(as_calibrated, data, errors)
+        mistaken
+        or check_names(judged, data, agreed)
+        or check_frames(judged, data, agreed, moved)
+        or check_proof(as_calibrated, data, agreed)
     )
-    return Validation(
-        data.source, errors, (*changed, *mistaken, *check_payload(robot), *_seen_in_training(robot, data, digest))
-    )
+    warnings = (*changed, *mistaken, *check_payload(robot), *_seen_in_training(robot, data, digest))
+    return Validation(data.source, errors, warnings, found, notes)
 
 
 #: How a calibration says in the robot's history which configurations of which data it was trained on: by the hash of
-#: the file, of the readings, or of both.
+#: the file, of the readings, or of both; and how many it left out.
 _TRAINED: Final = re.compile(
     r"(\d+) of (\d+) configurations of .*?\((?:sha256 ([0-9a-f]+))?(?:, )?(?:readings ([0-9a-f]+))?\), seed (\d+)"
+    r"(?:.*? without (\d+) configuration)?"
 )
 
 
-def trained_on(robot: Robot, data: Dataset, digest: str | None) -> tuple[int, int, int] | None:
-    """Return how many configurations of data a robot was trained on, of how many, and the seed; None if on none.
+@dataclass(frozen=True)
+class Training:
+    """What the history of a robot says of a calibration.
+
+    Attributes
+    ----------
+    split
+        How many configurations it was trained on, of how many, and the seed.
+    left_out
+        How many were left out before.
+    line
+        The line of the history.
+    """
+
+    split: tuple[int, int, int]
+    left_out: int
+    line: str
+
+
+def training_of(robot: Robot, data: Dataset, digest: str | None) -> Training | None:
+    """Return how a robot was trained on data; None if it was not.
 
     Parameters
     ----------
@@ -108,17 +152,21 @@ def trained_on(robot: Robot, data: Dataset, digest: str | None) -> tuple[int, in
             continue
         same_file = found[3] is not None and digest is not None and found[3] == digest[: len(found[3])]
         if same_file or (found[4] is not None and found[4] == readings[: len(found[4])]):
-            return int(found[1]), int(found[2]), int(found[5])
+            return Training((int(found[1]), int(found[2]), int(found[5])), int(found[6] or 0), line)
     return None
 
 
 def _seen_in_training(robot: Robot, data: Dataset, digest: str | None) -> list[Notice]:
     """Say if the readings are those that the robot was calibrated with, and how many it was trained on."""
-    trained = trained_on(robot, data, digest)
-    if trained is None:
+    found = training_of(robot, data, digest)
+    if found is None:
         return []
-    count, of, _ = trained
-    held_out = "; the rest was held out, and its errors are in the result of the calibration" if of > count else ""
+    (count, used, _), left_out = found.split, found.left_out
+    of = used + left_out
+    rest = f"; {left_out} were left out" if left_out else ""
+    held_out = (
+        f"{rest}; the rest was held out, and its errors are in the result of the calibration" if used > count else rest
+    )
     return [
         Notice(
             "training-data",

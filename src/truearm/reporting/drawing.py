@@ -9,6 +9,29 @@ Figure = dict[str, Any]
 
 BEFORE: Final = "#b8ab97"
 AFTER: Final = "#1d5f8a"
+#: What colours of pictures become on a dark screen, as the style of the pages has them there.
+DARK: Final = {
+    BEFORE: "#c3b49b",
+    AFTER: "#5fb0e2",
+    "#b3261e": "#f2867d",
+    "#3b7d3b": "#7cc47c",
+    "#2456a6": "#7aa7f0",
+    "#2b2f33": "#e3e6e9",
+    "#e4e6e8": "#30373d",
+    "#d5d8db": "#3a4147",
+    "#9aa0a6": "#6a737b",
+    "#c8ccd0": "#6a737b",
+    "#ffffff": "#16191c",
+    "#000000": "#e3e6e9",
+    "#c3d5e3": "#1f3d52",
+    "#2c6f9c": "#4d93c4",
+    "#4b3a63": "#b78ed6",
+    "#8a6d1d": "#d3b75f",
+    "#5b3a8c": "#b08fe6",
+    "#1d7f86": "#5cc3ca",
+    "#646b72": "#a0a8af",
+    "#6b6f73": "#a0a8af",
+}
 #: Colours of x, y and z, or of the first things that are drawn together.
 COLOURS: Final = ("#b3261e", "#3b7d3b", "#2456a6")
 CAMERA: Final = {"eye": {"x": 1.55, "y": 1.55, "z": 0.8}, "center": {"x": 0, "y": 0, "z": -0.15}}

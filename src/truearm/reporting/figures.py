@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.identification.judging.same_motion import own_parameters
 from truearm.identification.solving.fit import Fit
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
@@ -305,15 +306,16 @@ def residuals(
 
 
 def correlation_map(fit: Fit) -> Figure:
-    """Show the correlations of the free parameters."""
-    names = [html.escape(name) for name in fit.free.names]
+    """Show the correlations of the arm's own free parameters; of all where the arm was not free."""
+    own = own_parameters(fit)
+    names = [html.escape(fit.free.names[i]) for i in own]
     size = min(18.0, 860.0 / max(len(names), 1))
     ticks = {"tickfont": {"size": max(5, min(11, round(0.68 * size)))}, "ticks": "", "dtick": 1, "showgrid": False}
     trace = {
         "type": "heatmap",
         "x": names,
         "y": names,
-        "z": rounded_to(fit.correlations, 2),
+        "z": rounded_to(fit.correlations[np.ix_(own, own)], 2),
         "zmin": -1,
         "zmax": 1,
         "xgap": 0.5,

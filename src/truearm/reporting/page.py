@@ -16,7 +16,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from truearm.printable import LONGEST_WORD, TURNING, printable, shortened, with_short_words
-from truearm.reporting.drawing import AFTER, BEFORE, Figure
+from truearm.reporting.drawing import AFTER, BEFORE, DARK, Figure
 from truearm.version import __version__
 
 #: Characters that could end a script element or a line of JavaScript, as JSON escapes them.
@@ -53,6 +53,7 @@ def page(template: str, figures: Mapping[str, Figure], **content: Any) -> str:
                 "SciPy": installed_version("scipy"),
             },
             colours={"before": BEFORE, "after": AFTER},
+            dark_colours=Markup(json_for_script(DARK)),
         )
     )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -25,6 +26,11 @@ from truearm.units import from_si
 _DRAWN: Final = 5000
 #: Rows in a table of targets that were skipped.
 _LISTED: Final = 500
+#: Thickness of a program whose targets lie in a plane [mm].
+_FLAT: Final = 2.0
+#: Cosine from the vertical of the normal of a plane that is looked at from above, and of directions that are an axis.
+_LEVEL: Final = 0.9
+_ALONG: Final = 0.9999
 #: From far enough to see the axes of a tall picture.
 _CAMERA: Final = CAMERA | {"eye": {"x": 1.9, "y": 1.9, "z": 1.0}}
 #: How long the longest correction is drawn, as a share of the program's size.
@@ -56,6 +62,7 @@ def program_html(correction: ProgramCorrection) -> str:
         figures,
         correction=correction,
         notices=worst_first(correction.warnings),
+        in_plane="path" in figures and "scene" not in figures["path"]["layout"],
         joints=_joint_rows(correction.robot.joints, corrections),
         not_better=not_better[:_LISTED],
         not_better_unlisted=max(len(not_better) - _LISTED, 0),
@@ -69,12 +76,18 @@ def program_html(correction: ProgramCorrection) -> str:
 
 
 def path_figure(corrections: Sequence[Correction]) -> Figure:
-    """Show targets in space in the order of the program, and by how much and whereto each was moved."""
+    """Show targets in the order of the program, and by how much and whereto each was moved.
+
+    They are drawn in space, or in their plane where all lie in one.
+    """
     traces: list[Figure] = []
     points = np.concatenate([c.tips[c.corrected][:, :3, 3] for c in corrections]) * 1e3
+    view = _flat_view(points) or _IN_SPACE
     longest = max(max(float(c.moved.max(initial=0.0)) for c in corrections) * 1e3, 1e-9)
     size = max(float(np.ptp(points, axis=0).max()), 1.0)
-    stretch = 10.0 ** math.floor(math.log10(max(_ARROW * size / longest, 1.0)))
+    wanted = max(_ARROW * size / longest, 1.0)
+    decade = 10.0 ** math.floor(math.log10(wanted))
+    stretch = decade * max(step for step in (1, 2, 5) if step * decade <= wanted)
     for number, correction in enumerate(corrections):
         rows = _evenly(np.flatnonzero(correction.corrected))
         tips = correction.tips[rows]
@@ -83,9 +96,9 @@ def path_figure(corrections: Sequence[Correction]) -> Figure:
         start = tips[:, :3, 3] * 1e3
         way = _way(correction)
         name = html.escape(correction.program.sources[0].path.stem)
-        traces.append(_line(way * 1e3, f"path of {name}", "#9aa0a6", 2))
+        traces.append(_line(view, way * 1e3, f"path of {name}", "#9aa0a6", 2))
         arrows = np.stack([start, start + stretch * 1e3 * step, np.full_like(start, np.nan)], axis=1).reshape(-1, 3)
-        traces.append(_line(arrows, f"correction, {stretch:g} times as long", COLOURS[number % 3], 3))
+        traces.append(_line(view, arrows, f"correction, {stretch:g} times as long", COLOURS[number % 3], 3))
         texts = [
             [html.escape(correction.program.targets[row].name or "inline"), correction.program.targets[row].line]
             for row in rows.tolist()
@@ -93,14 +106,18 @@ def path_figure(corrections: Sequence[Correction]) -> Figure:
         moved = rounded(correction.moved[rows] * 1e3, 3)
         traces.append(
             {
-                "type": "scatter3d",
+                "type": view.kind,
                 "mode": "markers",
                 "name": "targets",
-                **{letter: rounded_to(column, 1) for letter, column in zip("xyz", start.T, strict=True)},
-                "customdata": [[*text, value] for text, value in zip(texts, moved, strict=True)],
+                **{letter: rounded_to(column, 1) for letter, column in zip("xyz", view.seen(start).T, strict=False)},
+                "customdata": [
+                    [*text, value, *place]
+                    for text, value, place in zip(texts, moved, rounded_to(start, 0), strict=True)
+                ],
                 "marker": {
-                    "size": 4,
+                    "size": 4 if view is _IN_SPACE else 7,
                     "color": moved,
+                    "line": {"color": "#9aa0a6", "width": 1},
                     "colorscale": "Viridis",
                     "reversescale": True,
                     "cmin": 0,
@@ -109,12 +126,64 @@ def path_figure(corrections: Sequence[Correction]) -> Figure:
                     "showscale": number == 0,
                 },
                 "hovertemplate": "%{customdata[0]}, line %{customdata[1]}: moved by %{customdata[2]} mm<br>"
-                "x %{x:.0f}, y %{y:.0f}, z %{z:.0f} mm<extra></extra>",
+                "x %{customdata[3]}, y %{customdata[4]}, z %{customdata[5]} mm<extra></extra>",
                 "showlegend": False,
             }
         )
-    axes = {f"{letter}axis": scene_axis(f"{letter} [mm]") for letter in "xyz"}
+    if view is not _IN_SPACE:
+        return figure(
+            traces,
+            520,
+            xaxis=axis(view.titles[0]) | {"constrain": "domain"},
+            yaxis=axis(view.titles[1]) | {"scaleanchor": "x"},
+        )
+    axes = {f"{letter}axis": scene_axis(title) for letter, title in zip("xyz", view.titles, strict=True)}
     return figure(traces, 620, scene={**axes, "aspectmode": "data", "camera": _CAMERA})
+
+
+@dataclass(frozen=True, eq=False)
+class _View:
+    """How points are looked at: directions of the picture's axes ``(2 or 3, 3)``, and their titles."""
+
+    axes: Array
+    titles: tuple[str, ...]
+
+    @property
+    def kind(self) -> str:
+        """Plotly's name of such traces."""
+        return "scatter3d" if len(self.axes) == 3 else "scatter"
+
+    def seen(self, points: Array) -> Array:
+        """Return points ``(n, 3)`` along the picture's axes."""
+        return np.asarray(points @ self.axes.T)
+
+
+_IN_SPACE: Final = _View(np.eye(3), tuple(f"{letter} [mm]" for letter in "xyz"))
+
+
+def _flat_view(points: Array) -> _View | None:
+    """Return the view onto the plane in which all points ``(n, 3)`` [mm] lie, None if there is none."""
+    if len(points) < 3:
+        return None
+    away = points - points.mean(axis=0)
+    _, spread, directions = np.linalg.svd(away, full_matrices=True)
+    normal = directions[2]
+    if len(spread) > 1 and spread[1] < 1e-6 * spread[0]:  # on a line: the plane that is level across it
+        normal = np.array([0.0, 0.0, 1.0]) - directions[0][2] * directions[0]
+        normal = normal / np.linalg.norm(normal) if np.linalg.norm(normal) > 1e-6 else np.array([0.0, -1.0, 0.0])
+    if float(np.ptp(away @ normal)) > _FLAT:
+        return None
+    normal = normal if normal[2] >= 0.0 else -normal
+    level = normal[2] > _LEVEL
+    right = np.array([1.0, 0.0, 0.0]) - normal[0] * normal if level else np.cross([0.0, 0.0, 1.0], normal)
+    right = right / np.linalg.norm(right)
+    up = np.cross(normal, right)
+    names = []
+    for direction, other in ((right, "across its slope"), (up, "up its slope")):
+        axis_of = int(np.argmax(np.abs(direction)))
+        along = direction[axis_of] > _ALONG
+        names.append(f"{'xyz'[axis_of]} [mm]" if along else f"in the targets' plane, {other} [mm]")
+    return _View(np.array([right, up]), tuple(names))
 
 
 def along_figure(corrections: Sequence[Correction]) -> Figure:
@@ -235,13 +304,13 @@ def _way(correction: Correction) -> Array:
     return np.array(parts).reshape(-1, 3)
 
 
-def _line(points: Array, name: str, colour: str, width: float) -> Figure:
-    values = [[None if math.isnan(v) else round(v, 2) for v in column] for column in points.T.tolist()]
+def _line(view: _View, points: Array, name: str, colour: str, width: float) -> Figure:
+    values = [[None if math.isnan(v) else round(v, 2) for v in column] for column in view.seen(points).T.tolist()]
     return {
-        "type": "scatter3d",
+        "type": view.kind,
         "mode": "lines",
         "name": name,
-        **dict(zip("xyz", values, strict=True)),
+        **dict(zip("xyz", values, strict=False)),
         "line": {"color": colour, "width": width},
         "hoverinfo": "skip",
     }

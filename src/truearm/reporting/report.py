@@ -22,6 +22,7 @@ from truearm.reporting.page import page
 from truearm.reporting.tables import (
     SpreadRow,
     expected_rows,
+    noise_alone,
     noise_rows,
     noise_sentence,
     parameter_rows,
@@ -66,17 +67,22 @@ class Report:
     @property
     def position(self) -> tuple[SpreadRow, ...]:
         """Position errors [mm]: before and after, then those of the training part."""
-        return spread_rows(self.calibration.nominal, self.calibration.train, self.calibration.validation, "position")
+        return self._spread("position")
 
     @property
     def orientation(self) -> tuple[SpreadRow, ...]:
         """Orientation errors [mrad], likewise; empty where none was read."""
-        return spread_rows(self.calibration.nominal, self.calibration.train, self.calibration.validation, "orientation")
+        return self._spread("orientation")
 
     @property
     def length(self) -> tuple[SpreadRow, ...]:
         """Errors of distances and heights [mm], likewise; empty where none was read."""
-        return spread_rows(self.calibration.nominal, self.calibration.train, self.calibration.validation, "length")
+        return self._spread("length")
+
+    def _spread(self, kind: str) -> tuple[SpreadRow, ...]:
+        run = self.calibration
+        parts = run.data.of_configurations(run.training).configuration, self.judged_part.configuration
+        return spread_rows(run.nominal, run.train, run.validation, kind, parts)
 
     def figures(self) -> dict[str, Figure]:
         """Return the pictures by the name of their place on the page."""
@@ -148,6 +154,7 @@ def report_html(calibration: Calibration) -> str:
         parameter_sentence=parameter_sentence(rows),
         pairs=strongest_pairs(fit),
         noise_rows=noise_rows(fit),
+        noise_alone={kind: noise_alone(fit, kind) for kind in ("position", "orientation", "length")},
         noise_sentence=noise_sentence(fit),
         down_weighted=int(report._down_weighted().sum()),
         default_gravity=GRAVITY,

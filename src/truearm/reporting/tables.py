@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import islice
 from typing import Final
 
 import numpy as np
 
 from truearm.identification.judging.expected_error import ExpectedError
+from truearm.identification.judging.same_motion import own_parameters, same_motion
 from truearm.identification.solving.fit import Fit, ParameterStatus
+from truearm.measurement.dataset import IntArray
 from truearm.measurement.statistics import Errors, Spread
-from truearm.reporting.numbers import significant
+from truearm.modeling.chain import Array
+from truearm.reporting.numbers import decimals_of, deserved, significant, student_975
 from truearm.results.summaries import joint_error_text
 from truearm.units import SHOWN_AS, from_si
 
@@ -20,6 +25,8 @@ _DECIMALS: Final = {
     **{"mm": 3, "deg": 4, "1": 6, "um/N": 3, "um/(m K)": 2},
     **{"mrad/(N m)": 4, "mrad/(N m)^2": 5, "mrad/(N m)^3": 7},
 }
+#: Width of an interval of 90 % in standard deviations.
+_WIDTH_90: Final = 3.29
 #: Correlated pairs that are listed.
 _PAIRS: Final = 10
 _SIGMA_SHOWN: Final = {
@@ -43,6 +50,8 @@ class SpreadRow:
         How many there are.
     figures
         Mean, root mean square, 95th percentile and maximum.
+    deviation
+        Standard error of the mean, by the scatter of the configurations; None of fewer than two.
     """
 
     part: str
@@ -50,31 +59,64 @@ class SpreadRow:
     configurations: int
     readings: int
     figures: tuple[float, float, float, float]
+    deviation: float | None = None
 
     @property
     def texts(self) -> tuple[str, ...]:
-        """The figures as they are printed."""
-        return tuple(significant(figure) for figure in self.figures)
+        """The figures as they are printed, with the digits that the mean deserves."""
+        return tuple(deserved(figure, self.deviation) for figure in self.figures)
+
+    @property
+    def interval(self) -> tuple[str, str] | None:
+        """Where the mean over configurations that are drawn alike lies with 95 %, as printed; None if not known."""
+        if self.deviation is None or self.configurations < 2:
+            return None
+        wide = student_975(self.configurations - 1) * self.deviation
+        return deserved(max(self.figures[0] - wide, 0.0), self.deviation), deserved(
+            self.figures[0] + wide, self.deviation
+        )
 
 
-def spread_rows(nominal: Errors, train: Errors, validation: Errors | None, kind: str) -> tuple[SpreadRow, ...]:
-    """Return the errors of one kind, ``position`` and ``length`` in mm, ``orientation`` in mrad; none without any."""
+def spread_rows(
+    nominal: Errors, train: Errors, validation: Errors | None, kind: str, configuration: tuple[IntArray, IntArray]
+) -> tuple[SpreadRow, ...]:
+    """Return the errors of one kind, ``position`` and ``length`` in mm, ``orientation`` in mrad; none without any.
+
+    Parameters
+    ----------
+    configuration
+        Of each reading of the training part, and of the part that is judged.
+    """
     part = "training" if validation is None else "held out"
-    cases = [(part, "before", nominal), (part, "after", train if validation is None else validation)]
+    cases = [(part, "before", nominal, configuration[1])]
+    cases.append((part, "after", train if validation is None else validation, configuration[1]))
     if validation is not None:
-        cases.append(("training", "after", train))
+        cases.append(("training", "after", train, configuration[0]))
     rows = []
-    for part, robot, errors in cases:
+    for part, robot, errors, of in cases:
         spread: Spread | None
-        spread, norms = {
-            "position": (errors.position, errors.position_norms),
-            "orientation": (errors.orientation, errors.orientation_norms),
-            "length": (errors.length, errors.length_norms),
+        spread, values = {
+            "position": (errors.position, errors.position_errors),
+            "orientation": (errors.orientation, errors.orientation_errors),
+            "length": (errors.length, errors.length_errors),
         }[kind]
-        if spread is not None:
+        if spread is not None and values is not None:
+            norms = np.linalg.norm(values.reshape(len(values), -1), axis=1)
             figures = (spread.mean * 1e3, spread.rms * 1e3, spread.p95 * 1e3, spread.max * 1e3)
-            rows.append(SpreadRow(part, robot, errors.configurations, len(norms), figures))
+            read = np.isfinite(norms)
+            error = standard_error(norms[read] * 1e3, of[read])
+            rows.append(SpreadRow(part, robot, errors.configurations, int(read.sum()), figures, error))
     return tuple(rows)
+
+
+def standard_error(values: Array, configuration: IntArray) -> float | None:
+    """Return the standard error of a mean whose values hang together within configurations; None of fewer than two."""
+    _, at = np.unique(configuration, return_inverse=True)
+    count = int(at.max(initial=-1)) + 1
+    if count < 2:
+        return None
+    sums = np.bincount(at.reshape(-1), values - values.mean())
+    return float(np.sqrt(count / (count - 1) * np.sum(sums**2)) / len(values))
 
 
 @dataclass(frozen=True)
@@ -92,7 +134,13 @@ def expected_rows(expected: ExpectedError) -> tuple[ExpectedRow, ...]:
     """Return a row for all targets together, then one for each where there are several."""
     parts = {"all": expected.overall, **(expected.targets if len(expected.targets) > 1 else {})}
     return tuple(
-        ExpectedRow(name, *(significant(1e3 * figure) for figure in (of.mean, *of.interval_90, of.p95)))
+        ExpectedRow(
+            name,
+            *(
+                deserved(1e3 * figure, 1e3 * (of.interval_90[1] - of.interval_90[0]) / _WIDTH_90)
+                for figure in (of.mean, *of.interval_90, of.p95)
+            ),
+        )
         for name, of in parts.items()
     )
 
@@ -121,8 +169,18 @@ class ParameterRow:
         return self.estimate - self.start
 
     def fixed(self, value: float) -> str:
-        """Write a value of this parameter."""
-        text = f"{value:.{_DECIMALS[self.unit]}f}"
+        """Write a nominal value of this parameter, or one that was not free."""
+        return self._with(value, _DECIMALS[self.unit])
+
+    def known(self, value: float) -> str:
+        """Write an estimate of this parameter, with the digits that its deviation deserves."""
+        most = _DECIMALS[self.unit] + 1
+        known = self.deviation is not None and self.deviation > 0.0
+        return self._with(value, decimals_of(self.deviation or 0.0, most) if known else _DECIMALS[self.unit])
+
+    @staticmethod
+    def _with(value: float, decimals: int) -> str:
+        text = f"{value:.{decimals}f}"
         return text.removeprefix("-") if float(text) == 0 else text
 
     @property
@@ -130,7 +188,7 @@ class ParameterRow:
         """The change with its sign, nothing where the parameter was not free."""
         if self.deviation is None:
             return ""
-        text = self.fixed(self.change)
+        text = self.known(self.change)
         return text if text.startswith("-") or float(text) == 0 else f"+{text}"
 
     @property
@@ -170,11 +228,19 @@ class Pair:
 
 
 def strongest_pairs(fit: Fit) -> tuple[Pair, ...]:
-    """Return the most strongly correlated pairs of free parameters, strongest first."""
+    """Return the most strongly correlated pairs of the arm's own parameters, strongest first.
+
+    Where base, targets and fixtures are goes with the arm's first and last links in every calibration. So do lengths
+    along parallel axes, of which only the sum moves anything. Such pairs say nothing about these data.
+    """
     names, r = fit.free.names, fit.correlations
-    rows, columns = np.triu_indices(len(names), 1)
-    order = np.argsort(-abs(r[rows, columns]), kind="stable")[:_PAIRS]
-    return tuple(Pair(names[i], names[j], float(r[i, j])) for i, j in zip(rows[order], columns[order], strict=True))
+    own = own_parameters(fit)
+    rows, columns = (np.array(own, dtype=np.intp)[part] for part in np.triu_indices(len(own), 1))
+    order = np.argsort(-abs(r[rows, columns]), kind="stable")
+    pairs = ((int(rows[k]), int(columns[k])) for k in order.tolist())
+    of_convention = same_motion(fit)
+    told = islice((pair for pair in pairs if pair not in of_convention), _PAIRS)
+    return tuple(Pair(names[i], names[j], float(r[i, j])) for i, j in told)
 
 
 @dataclass(frozen=True)
@@ -198,6 +264,18 @@ def noise_rows(fit: Fit) -> Sequence[NoiseRow]:
         NoiseRow(kind, _PER[kind], _SIGMA_SHOWN[kind][0], sigma * _SIGMA_SHOWN[kind][1])
         for kind, sigma in fit.sigma.items()
     ]
+
+
+def noise_alone(fit: Fit, kind: str) -> str | None:
+    """Return the mean error that the noise of a reading alone would make, as printed; None where it is not known.
+
+    It is that of the norm of three normal coordinates, or of a single one: ``sqrt(8 / pi)`` or ``sqrt(2 / pi)``
+    standard deviations.
+    """
+    names = ("distance", "height") if kind == "length" else (kind,)
+    known = [fit.sigma[name] for name in names if name in fit.sigma]
+    share = math.sqrt(2.0 / math.pi) if kind == "length" else math.sqrt(8.0 / math.pi)
+    return significant(1e3 * share * max(known), 2) if known else None
 
 
 def noise_sentence(fit: Fit) -> str:

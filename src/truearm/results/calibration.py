@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from truearm.errors import InputError, did_you_mean
 from truearm.identification.choosing.selection import Selection
 from truearm.identification.judging.expected_error import ExpectedError
+from truearm.identification.judging.next_step import NextStep
 from truearm.identification.judging.repeatability import Repeatability, repeatability
 from truearm.identification.solving.fit import Fit, Status
 from truearm.measurement.dataset import Dataset
@@ -35,7 +36,7 @@ from truearm.results.summaries import (
     noise_summary,
     selection_summary,
 )
-from truearm.shown import counted
+from truearm.shown import counted, listed
 from truearm.units import SHOWN_AS, from_si
 from truearm.writing import output_folder, write_files
 
@@ -78,6 +79,12 @@ class Calibration(Record):
         The files that were read: none of them is overwritten.
     known_before
         What was known of the robot from an earlier calibration; None if nothing was.
+    without
+        Labels of the configurations that were left out; `data` does not have them.
+    notes
+        What the user noted, by its name.
+    next
+        What to do next, three steps at most, the most useful first.
     """
 
     fit: Fit
@@ -95,6 +102,9 @@ class Calibration(Record):
     selection: Selection | None = None
     inputs: tuple[Path, ...] = ()
     known_before: Proof | None = None
+    without: tuple[str, ...] = ()
+    notes: dict[str, str] = field(default_factory=dict)
+    next: tuple[NextStep, ...] = ()
 
     @cached_property
     def robot(self) -> Robot:
@@ -122,22 +132,23 @@ class Calibration(Record):
 
     @property
     def advice(self) -> str:
-        """What to do next, in words."""
-        if self.status is not Status.CONVERGED:
-            return self.status.advice
-        if has_error(self.warnings):
+        """What to do about the status and errors, in words; what to do next is in `next`."""
+        if self.status is Status.CONVERGED and has_error(self.warnings):
             return "See the errors before you use the result."
-        return self.status.advice if self.validation else "Hold configurations out to judge the fit."
+        return self.status.advice
 
     def summary(self) -> dict[str, Any]:
         """Return the figures as ``result.json`` begins with them: errors in mm and mrad."""
         return {
             "status": self.status.value,
             "warnings": notice_summaries(self.warnings),
+            "next": [step.summary() for step in self.next],
             "nominal": errors_summary(self.nominal),
             "train": errors_summary(self.train),
             "validation": None if self.validation is None else errors_summary(self.validation),
             "expected_mm": expected_summary(self.expected),
+            **({"without": list(self.without)} if self.without else {}),
+            **({"notes": self.notes} if self.notes else {}),
         }
 
     def result(self) -> dict[str, Any]:
@@ -165,13 +176,16 @@ class Calibration(Record):
             text.append(f"Nothing was held out; on the {counted(self.train.configurations, 'training configuration')}:")
             text.append(f"  nominal     {error_line(self.nominal)}")
         text.append(f"  calibrated  {error_line(self.train)}")
+        if self.without:
+            text.append(f"Left out: {counted(len(self.without), 'configuration')} ({listed(self.without)})")
         text += expected_lines(self.expected)
         text += noise_lines(self.fit, self.repeatability)
         if self.selection is not None:
             text.append(f"Chosen model: {self.fit.model.summary}")
         if self.fit.model.name == "frames":
             text += self._target_lines()
-        text.append(f"Status: {self.status.value}. {self.advice}")
+        text.append(f"Status: {self.status.value}. {self.advice}".rstrip())
+        text += [step.line for step in self.next]
         return text + notice_lines(self.warnings)
 
     def residuals(self) -> Residuals:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from truearm.identification.judging.next_step import NextStep
 from truearm.measurement.dataset import Dataset
 from truearm.notices import Notice
 from truearm.results.record import Record, notice_lines, notice_summaries
@@ -21,10 +22,13 @@ class DataCheck(Record):
         The measurements.
     warnings
         One notice for each kind of fault; none for believable data.
+    next
+        What to do next, three steps at most, the most useful first.
     """
 
     data: Dataset
     warnings: tuple[Notice, ...]
+    next: tuple[NextStep, ...] = ()
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it."""
@@ -32,10 +36,12 @@ class DataCheck(Record):
             "configurations": self.data.configurations,
             "targets": list(self.data.targets),
             "warnings": notice_summaries(self.warnings),
+            "next": [step.summary() for step in self.next],
         }
 
     def lines(self) -> list[str]:
         """Return what the command prints."""
         data = self.data
         text = [f"{data.source}: {data.configurations} configurations, targets {listed(data.targets)}"]
-        return text + (notice_lines(self.warnings) or ["Nothing looks wrong."])
+        text += notice_lines(self.warnings) or ["Nothing looks wrong."]
+        return text + [step.line for step in self.next]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
@@ -264,6 +264,8 @@ class ProgramCorrection(Record):
         What a simulated robot does with the programs, where there is one.
     inputs
         The files that were read besides the programs: none of them is overwritten.
+    notes
+        What the user noted, by its name.
     """
 
     robot: Robot
@@ -274,12 +276,15 @@ class ProgramCorrection(Record):
     command: str
     simulated: SimulatedRun | None = None
     inputs: tuple[Path, ...] = ()
+    notes: dict[str, str] = field(default_factory=dict)
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it, lengths in mm."""
         return {
             "programs": [file.summary() for file in self.files],
             "expected_is_lower_bound": self.lower_bound,
+            "expected_is_relative": bool(self.relative),
+            **({"notes": self.notes} if self.notes else {}),
             "warnings": notice_summaries(self.warnings),
         }
 
@@ -288,7 +293,10 @@ class ProgramCorrection(Record):
         parts = [file.lines() for file in self.files]
         text = [line for first, second, *_ in parts for line in (first, second)]
         skipped = [line for _, _, *lines in parts for line in lines]
-        if self.lower_bound and any(file.expected is not None for file in self.files):
+        known = any(file.expected is not None for file in self.files)
+        if known and self.relative:
+            text.append(f"  {self.relative}")
+        if self.lower_bound and known:
             text.append("  These errors are lower bounds: the calibration cannot know all errors of the robot.")
         text += skipped[:_EXPLAINED]
         if len(skipped) > _EXPLAINED:
@@ -306,6 +314,17 @@ class ProgramCorrection(Record):
         return self.robot.proof is not None and self.robot.proof.lower_bound
 
     @property
+    def relative(self) -> str:
+        """What the errors to expect are relative to, in words; empty where frames were measured."""
+        frames, choice = self.result.frames, self.result.choice
+        if frames.frames == "identified" or choice.was_taught("points"):
+            return ""
+        each = "in each frame" if choice.was_taught("frames") else "of all programs together"
+        return (
+            f"These errors are of the targets relative to each other, {each}: where a frame is as a whole is not known."
+        )
+
+    @property
     def frame_words(self) -> list[str]:
         """What was taken for the real base and flange, in words."""
         return frame_words(self.result)
@@ -315,6 +334,7 @@ class ProgramCorrection(Record):
         frames, choice = self.result.frames, self.result.choice
         made: dict[str, Any] = {
             "robot": self.robot.name,
+            **({"notes": self.notes} if self.notes else {}),
             "history": list(self.robot.history),
             "proof": None if self.robot.proof is None else self.robot.proof.summary(),
             "payload_kg": self._masses(),

@@ -8,11 +8,12 @@ from typing import Any
 from truearm.identification.choosing.selection import Selection
 from truearm.identification.judging.expected_error import Expectation, ExpectedError
 from truearm.identification.judging.repeatability import Repeatability
+from truearm.identification.refit import Refit
 from truearm.identification.solving.fit import Fit
 from truearm.measurement.observations import OBSERVATIONS
 from truearm.measurement.statistics import Errors, Spread
 from truearm.modeling.parts import Payload
-from truearm.shown import counted, listed
+from truearm.shown import counted, degrees, listed, millimetres
 from truearm.units import from_si
 
 
@@ -45,6 +46,34 @@ def errors_summary(errors: Errors) -> dict[str, Any]:
         if spread is not None:
             made[key] = _scaled(spread, scale)
     return made
+
+
+def refit_summary(found: Refit) -> dict[str, Any]:
+    """Return what was found anew, as JSON holds it, in mm and deg."""
+    return {
+        "moved": found.moved,
+        "readings": found.readings,
+        "parameters": found.parameters,
+        "shift_mm": found.shift * 1e3,
+        "turn_deg": None if found.turn is None else math.degrees(found.turn),
+        "shifts_mm": {name: shift * 1e3 for name, shift in found.shifts.items()},
+    }
+
+
+def refit_lines(found: Refit) -> list[str]:
+    """Return what was found anew, by how much it moved, and what that means for the errors."""
+    from_these = f"found anew from {counted(found.readings, 'reading')} ({counted(found.parameters, 'number')})"
+    turned = "" if found.turn is None else f" and turned by {degrees(found.turn)} deg"
+    moved = f"moved by {millimetres(found.shift)} mm"
+    each = listed([f"{name} {millimetres(shift)}" for name, shift in found.shifts.items()])
+    words = {
+        "base": f"The base was {from_these}: the readings {moved} at their middle{turned}.",
+        "tool": f"The tool was {from_these}: it {moved} at the middle of its targets{turned}.",
+        "targets": f"The targets were {from_these}; they moved on the flange by (mm): {each}.",
+    }
+    if found.moved == "base" and found.shifts:
+        words["base"] = f"The fixtures were {from_these}; they moved before the base by (mm): {each}."
+    return [words[found.moved], "The errors of each configuration are those of what is found without it."]
 
 
 def joint_error_text(fit: Fit) -> str:

@@ -234,6 +234,8 @@ class Program:
     loads
         By the name of a tool, what the program says that the robot carries with it; the centre of gravity in the
         controller's flange frame.
+    load_changes
+        Whether instructions change what the robot carries.
     """
 
     language: str
@@ -245,6 +247,7 @@ class Program:
     skipped: tuple[Skipped, ...] = ()
     unknown: Mapping[str, int] = field(default_factory=dict)
     loads: Mapping[str, Payload] = field(default_factory=dict)
+    load_changes: bool = False
 
 
 class Edit(NamedTuple):

@@ -151,7 +151,7 @@ def select(
     attempts: list[Attempt] = []
     for number in range(1, len(candidates) + 1):
         tried: list[tuple[Attempt, Array]] = []
-        for name in _open(robot, effects, data, candidates):
+        for name in open_effects(robot, effects, data, candidates):
             progress(f"choosing a model: {', '.join(effects)} and {name}?")
             try:
                 errors = judged((*effects, name))
@@ -178,7 +178,9 @@ def _fold(training: Dataset, held_out: Dataset) -> tuple[Dataset, Dataset]:
     return training, replace(held_out.of_readings(placed), quaternion=None)
 
 
-def _open(robot: Robot, effects: tuple[str, ...], data: Dataset, candidates: Sequence[str]) -> list[str]:
+def open_effects(
+    robot: Robot, effects: Sequence[str], data: Dataset, candidates: Sequence[str] = SELECTABLE
+) -> list[str]:
     """Return the effects that are not there yet and that the robot and the data say something about."""
     ordered = data.approach is not None and data.number is not None
     warmed = data.temperature is not None

@@ -240,8 +240,11 @@ def _judged(
 def check_changes(left: LeftOver) -> list[Notice]:
     """Return a notice if something moved during the campaign."""
     change = find_change(left)
-    if change is None:
-        return []
+    return [] if change is None else notices_of_change(left, change)
+
+
+def notices_of_change(left: LeftOver, change: Change) -> list[Notice]:
+    """Return a notice of what moved during the campaign."""
     data = left.problem.data
     label = data.labels[change.first]
     spoils = change.share > _SPOILING_SHARE and change.kind != "drift"  # a drift is slow: its mean is in the result

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -56,6 +57,21 @@ class LeftOver:
         U, s, Vt = np.linalg.svd(R, full_matrices=False)
         kept = s > 1e-8 * s[0]
         return cls(fit, problem, r, J, Q @ U[:, kept], s[kept], Vt[kept])
+
+    def without(self, configurations: Sequence[int]) -> LeftOver:
+        """Return what is left without some configurations; the parameters stay, and take what they can of the rest."""
+        if not configurations:
+            return self
+        rows = ~np.isin(self.configuration, np.array(configurations, dtype=np.intp))
+        data = self.problem.data
+        kept = np.setdiff1d(np.arange(data.configurations), np.array(configurations, dtype=np.intp))
+        return replace(
+            self,
+            problem=replace(self.problem, data=data.of_configurations(kept)),
+            residual=self.residual[rows],
+            jacobian=self.jacobian[rows],
+            basis=np.linalg.qr(self.basis[rows])[0],
+        )
 
     @property
     def freedom(self) -> int:

@@ -60,7 +60,7 @@ def check_narrow_data_without_geometry(
     loss
         Of the fit.
     """
-    if not _joints_that_moved_little(fit, measured):
+    if not joints_that_moved_little(fit, measured):
         return []
     model = named_model("geometric").also([e for e in fit.model.effects if e not in named_model("geometric").effects])
     nominal = fit.robot.with_values({name: p.nominal for name, p in fit.start.parameters.items()})
@@ -109,7 +109,7 @@ def check_narrow_data(
         known = max(known if judged.position else _OF_ONE * known, _expected_where_measured(fit, measured))
     if mean <= max(_WARNING * known, _NEGLIGIBLE) or high <= _ERROR * known:
         return []
-    few = _joints_that_moved_little(fit, measured)
+    few = joints_that_moved_little(fit, measured)
     if fit.gauge_freedoms and not few:
         return []
     part = "held-out" if held_out else "training"
@@ -121,7 +121,7 @@ def check_narrow_data(
     if few:
         words += f"Measure configurations in which these joints move further: {'; '.join(few)}."
     else:
-        words += f"Measure more configurations, also {_least_known(fit)}."
+        words += f"Measure more configurations, also {least_known(fit)}."
     return [Notice("narrow-data", words, "error" if mean > _ERROR * known else "warning")]
 
 
@@ -131,7 +131,7 @@ def _expected_where_measured(fit: Fit, measured: Dataset) -> float:
     return float(PositionErrors(fit, _DRAWS).at(measured.joints[some]).mean())
 
 
-def _joints_that_moved_little(fit: Fit, measured: Dataset) -> list[str]:
+def joints_that_moved_little(fit: Fit, measured: Dataset) -> list[str]:
     """Return the joints that moved over less than half of what their limits allow, in words, the worst first."""
     found = []
     for number, joint in enumerate(fit.robot.joints):
@@ -147,7 +147,7 @@ def _joints_that_moved_little(fit: Fit, measured: Dataset) -> list[str]:
     return [text for _, text in sorted(found)]
 
 
-def _least_known(fit: Fit) -> str:
+def least_known(fit: Fit) -> str:
     """Say where the largest errors are to be expected."""
     places, error = expected_map(fit, _PLACES)
     worst = places[error >= np.percentile(error, _WORST)]

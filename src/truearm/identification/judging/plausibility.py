@@ -56,8 +56,10 @@ _FIXTURE_OUTLIER: Final = 8.0
 _LIMIT_ROUNDING: Final = math.radians(0.05)
 
 
-def check_against(robot: Robot, data: Dataset) -> tuple[list[Notice], list[Suspect]]:
-    """Return what is wrong with a dataset if it was measured on this robot, and the readings that are far off.
+def check_against(robot: Robot, data: Dataset) -> tuple[list[Notice], list[Suspect], Fit | None]:
+    """Return what is wrong with a dataset if it was measured on this robot, the readings far off, and a robust fit.
+
+    The fit is None where none was made, or where it is of no use.
 
     Parameters
     ----------
@@ -69,37 +71,41 @@ def check_against(robot: Robot, data: Dataset) -> tuple[list[Notice], list[Suspe
         try:
             start_from_readings(robot, data)
         except InputError as error:
-            return [Notice("fixtures-unlikely", str(error), "error"), *found], []
+            return [Notice("fixtures-unlikely", str(error), "error"), *found], [], None
         slips = slips_in_lengths(robot, data)
         if slips:
-            return [*slips, *found], []
+            return [*slips, *found], [], None
         fit = identify(robot, data, named_model("geometric"), loss="cauchy")
         unlike, suspects = _far_from_fixtures(fit, data)
-        return [*check_robot(fit, data), *unlike, *found], suspects
+        return [*check_robot(fit, data), *unlike, *found], suspects, fit
     if not data.has_position.any():
-        return found, []
+        return found, [], None
     slips = slips_in_positions(robot, data)
     if slips:
-        return [*(other_robot(robot, data) or slips), *found], []
+        return [*(other_robot(robot, data) or slips), *found], [], None
     fit = identify(robot, data, named_model("geometric"), loss="cauchy")
     off = off_by(errors_of(fit.robot, data))
     if np.nanmedian(off) > _FITTED_WITHIN:
         slips = slips_by_fit(robot, data)
         if slips:
-            return [*(other_robot(robot, data) or slips), *found], []
+            return [*(other_robot(robot, data) or slips), *found], [], None
     wrong = check_robot(fit, data)
     unlike_robot = check_plausible(fit, data, wrong)
     if unlike_robot:
-        return [*unlike_robot, *wrong, *found], []
+        return [*unlike_robot, *wrong, *found], [], None
     mistaken, suspects = _far_off(fit, data, off)
-    return [
-        *wrong,
-        *found,
-        *mistaken,
-        *_often_off(data, off),
-        *_one_point(fit, data),
-        *check_rounding(fit, data),
-    ], suspects
+    return (
+        [
+            *wrong,
+            *found,
+            *mistaken,
+            *_often_off(data, off),
+            *_one_point(fit, data),
+            *check_rounding(fit, data),
+        ],
+        suspects,
+        fit,
+    )
 
 
 def _beyond_limits(robot: Robot, data: Dataset) -> list[Notice]:

@@ -53,9 +53,9 @@ class Status(Enum):
 
     @property
     def advice(self) -> str:
-        """What to do about it."""
+        """What to do about it; nothing where all went well."""
         return {
-            Status.CONVERGED: "Judge the fit by its held-out and expected errors.",
+            Status.CONVERGED: "",
             Status.AT_BOUND: "A parameter is at a bound. Widen the bound if it was a guess.",
             Status.RANK_LOSS: "The data are too few or too alike to determine everything that predictions "
             "depend on. Measure more configurations that move every joint, or free fewer parameters.",

@@ -17,6 +17,8 @@ from truearm.compensation.programs.rapid.moves import DISPLACING, MOTIONS, Motio
 _NAME: Final = re.compile(r"(?<![\\.\w])[^\W\d]\w*+(?!\s*+[.(])")
 #: With these a move cannot be done in several.
 _WHOLE_MOVES: Final = frozenset(("t", "id", "conc", "inpos"))
+#: What puts a load on the tool or changes it: an instruction, an argument of a move, a component that is assigned.
+_LOADING: Final = re.compile(r"\bGripLoad\b|\\TLoad\s*:=|\.\s*tload\s*(?:\.\s*\w+\s*)?:=|\bLoadId\b", re.I)
 
 
 class _Pending(NamedTuple):
@@ -77,6 +79,7 @@ class Finder:
             tuple(sorted(self.skipped, key=lambda one: (one.source, one.line))),
             dict(self.unknown),
             self.frames.loads(),
+            any(_LOADING.search(code) for code in self.listing.codes),
         )
 
     def _skip(self, source: int, place: int, reason: str) -> None:

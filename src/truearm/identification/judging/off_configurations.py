@@ -1,0 +1,271 @@
+"""Single configurations that are off, and by what: a joint that was read or moved wrong, or one target.
+
+A configuration that is left out moves the fit. What its readings are off then by, near the solution, follows from the
+residuals and the share that the free parameters take of them, without another fit (mean-shift outliers: Cook and
+Weisberg 1982, "Residuals and Influence in Regression", section 2.2.2). The worst configuration is left out first, then
+the worst of the rest, because several of them hide each other. What the readings are off by is held against an error of
+one joint, which moves all targets of the configuration together.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.identification.judging.left_over import LeftOver
+from truearm.modeling.chain import Array
+
+#: Mean squares of a configuration, over those of the rest, from which it is off: six times as far as the others are.
+_LEAST_RATIO: Final = 36.0
+#: An error of one joint explains the readings of a configuration if it leaves less than so many times what other
+#: configurations leave, or less than this share of them and what a straight line leaves of a turn.
+_AS_WELL: Final = 9.0
+_EXPLAINED: Final = 0.01
+#: Configurations measured one after the other that are a part of the campaign and no single ones.
+_LEAST_PART: Final = 3
+#: Share of the squares that one target holds where it alone is off.
+_ONE_TARGET: Final = 0.99
+#: Largest share of the configurations that can be off one by one; where more are, something else is wrong.
+_LARGEST_SHARE: Final = 0.1
+#: Configurations looked at in each round, those with the largest residuals.
+_LOOKED_AT: Final = 8
+#: Equations beyond the parameters without which nothing is said, and as a share of the parameters.
+_LEAST_FREEDOM: Final = 10
+_LEAST_SHARE_OF_PARAMETERS: Final = 0.5
+
+
+@dataclass(frozen=True)
+class OffConfiguration:
+    """A configuration whose readings are far from those of a fit without it.
+
+    Attributes
+    ----------
+    index
+        In the dataset.
+    joints
+        Numbers of the joints, from 1, an error of each of which alone explains the readings; none if no joint does.
+    error
+        What the first of them was read too large by [rad or m]; zero if no joint explains the readings.
+    target
+        Name of the target that alone is off; empty if several are.
+    distance
+        How far the positions of its targets are off [m], root mean square, or that of the one target; of distances and
+        heights likewise.
+    """
+
+    index: int
+    joints: tuple[int, ...]
+    error: float
+    target: str
+    distance: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Rows:
+    """What a fit leaves, row by row, in the order of the configurations.
+
+    Attributes
+    ----------
+    residual, basis, by_joints
+        Without what the free parameters can take ``(rows,)``; directions that they can take ``(rows, rank)``; and the
+        derivative by errors of the joints ``(rows, joints)``.
+    sigma
+        Standard deviation of each row [m], zero for angles, ``(rows,)``.
+    target
+        Index of the block that each row is of, ``(rows,)``.
+    of
+        Rows of each configuration.
+    """
+
+    residual: Array
+    basis: Array
+    by_joints: Array
+    sigma: Array
+    target: NDArray[np.intp]
+    of: tuple[slice, ...]
+
+
+@dataclass(frozen=True)
+class Off:
+    """The configurations that are off one by one.
+
+    Attributes
+    ----------
+    configurations
+        The worst first.
+    left
+        What the fit leaves without them, over what it leaves with them: mean of the configurations' root mean squares.
+    in_a_row
+        Whether they were measured one after the other, so that something moved meanwhile.
+    """
+
+    configurations: tuple[OffConfiguration, ...] = ()
+    left: float = 1.0
+    in_a_row: bool = False
+
+    @property
+    def indices(self) -> tuple[int, ...]:
+        """Which they are, in the dataset."""
+        return tuple(off.index for off in self.configurations)
+
+
+def off_configurations(left: LeftOver) -> Off:
+    """Return the configurations that are off one by one; none where too many look like that."""
+    n = left.problem.data.configurations
+    if left.freedom < max(_LEAST_FREEDOM, _LEAST_SHARE_OF_PARAMETERS * left.basis.shape[1]):
+        return Off()
+    rows = _in_order(left)
+    out: list[int] = []
+    most = max(1, math.floor(_LARGEST_SHARE * n))
+    shift, scale = np.zeros(0), 0.0
+    while True:
+        taken = _rows_of(rows, out)
+        now = rows.residual.copy()
+        if len(taken):
+            shift = _shift(rows, taken)
+            now += rows.basis @ (rows.basis[taken].T @ shift)
+            now[taken] = 0.0
+        worst, scale = _worst(rows, now, out, taken)
+        if worst is None:
+            break
+        if len(out) == most:
+            return Off()
+        out.append(worst)
+    if not out:
+        return Off()
+    first, found = 0, []
+    for index in out:
+        mine = rows.of[index]
+        size = mine.stop - mine.start
+        found.append(_described(left, rows, index, shift[first : first + size], scale))
+        first += size
+    before = _mean(rows, rows.residual, [])
+    worst_first = sorted(found, key=lambda off: -off.distance)
+    return Off(tuple(worst_first), _mean(rows, now, out) / before if before else 1.0, _in_a_row(left, out))
+
+
+def _in_a_row(left: LeftOver, out: list[int]) -> bool:
+    """Return whether configurations were measured one after the other."""
+    number = left.problem.data.number
+    if number is None or len(out) < _LEAST_PART:
+        return False
+    place = np.argsort(np.argsort(number, kind="stable"))[out]
+    return int(np.ptp(place)) == len(out) - 1
+
+
+def _mean(rows: _Rows, residual: Array, without: list[int]) -> float:
+    """Return the mean root mean square of the configurations."""
+    parts = [residual[part] for c, part in enumerate(rows.of) if c not in without and part.stop > part.start]
+    return float(np.mean([math.sqrt(float(part @ part) / len(part)) for part in parts])) if parts else 0.0
+
+
+def _in_order(left: LeftOver) -> _Rows:
+    """Sort the equations by configuration."""
+    configuration = left.configuration
+    order = np.argsort(configuration, kind="stable")
+    blocks = left.problem.blocks
+    sigma = np.concatenate(
+        [np.repeat(b.sigma if b.observation.unit == "m" else 0.0 * b.sigma, b.observation.components) for b in blocks]
+    )
+    names = list(dict.fromkeys(b.target for b in blocks))
+    target = np.concatenate([np.full(b.rows, names.index(b.target)) for b in blocks])
+    edges = np.searchsorted(configuration[order], np.arange(left.problem.data.configurations + 1))
+    vector = np.array([left.fit.robot.values[name] for name in left.fit.free.names])
+    return _Rows(
+        left.without_parameters(left.residual)[order],
+        left.basis[order],
+        left.problem.at(vector).by_joints[order],
+        sigma[order],
+        target[order],
+        tuple(slice(a, b) for a, b in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True)),
+    )
+
+
+def _rows_of(rows: _Rows, configurations: list[int]) -> NDArray[np.intp]:
+    """Return the rows of some configurations, in the order of these."""
+    parts = [np.arange(rows.of[c].start, rows.of[c].stop) for c in configurations]
+    return np.concatenate(parts) if parts else np.zeros(0, np.intp)
+
+
+def _shift(rows: _Rows, taken: NDArray[np.intp]) -> Array:
+    """Return what rows are off by from a fit without them, ``(taken,)``."""
+    Q = rows.basis[taken]
+    return np.asarray(np.linalg.lstsq(np.eye(len(taken)) - Q @ Q.T, rows.residual[taken], rcond=1e-8)[0])
+
+
+def _worst(rows: _Rows, now: Array, out: list[int], taken: NDArray[np.intp]) -> tuple[int | None, float]:
+    """Return the configuration that is off most, None if none is, and the mean square of what the others leave.
+
+    Parameters
+    ----------
+    now
+        What the fit without `taken` leaves, ``(rows,)``.
+    """
+    edges = np.array([part.start for part in rows.of])
+    count = np.array([part.stop - part.start for part in rows.of])
+    read = np.flatnonzero(count)
+    squares = np.zeros(len(rows.of))
+    squares[read] = np.add.reduceat(now**2, edges[read])
+    squares[out] = 0.0
+    freedom = len(now) - len(taken) - rows.basis.shape[1]
+    others = np.setdiff1d(read, out)
+    if freedom < _LEAST_FREEDOM or len(others) < 2:
+        return None, 0.0
+    total = float(squares.sum())
+    spread = (len(now) - len(taken)) / freedom
+    usual = float(np.median(squares[others] / count[others])) * spread
+    kept = np.delete(rows.basis, taken, axis=0) if len(taken) else rows.basis
+    inside = np.linalg.inv(kept.T @ kept) if len(taken) and len(kept) > kept.shape[1] else None
+    best, ratio, left = None, 0.0, total / freedom
+    for c in others[np.argsort(-squares[others] / count[others])][:_LOOKED_AT].tolist():
+        mine = rows.of[c]
+        Q = rows.basis[mine]
+        hat = Q @ Q.T if inside is None else Q @ inside @ Q.T
+        size = int(count[c])
+        explained = float(now[mine] @ np.linalg.lstsq(np.eye(size) - hat, now[mine], rcond=1e-8)[0])
+        rest = min(max(total - explained, 0.0) / max(freedom - size, 1), usual)
+        if explained / size > ratio * max(rest, 1e-300):
+            best, ratio = c, explained / size / max(rest, 1e-300)
+    return (best if ratio > _LEAST_RATIO else None), left
+
+
+def _described(left: LeftOver, rows: _Rows, index: int, shift: Array, scale: float) -> OffConfiguration:
+    """Say what a configuration is off by.
+
+    Parameters
+    ----------
+    shift
+        What its rows are off by from a fit without it, ``(rows of it,)``.
+    scale
+        Mean square of what the other configurations leave.
+    """
+    mine = rows.of[index]
+    A, sigma, total = rows.by_joints[mine], rows.sigma[mine], float(shift @ shift)
+    size = np.maximum(np.sum(A**2, axis=0), 1e-300)
+    error = A.T @ shift / size
+    rest = np.maximum(total - error**2 * size, 0.0)
+    order = np.argsort(rest)
+    # Predictions of a fit without the configuration err too, so that a perfect explanation is not asked for.
+    noise = _AS_WELL * max(scale, 1e-300) * len(shift)
+    turns = np.array([joint.kind == "revolute" for joint in left.fit.robot.joints])
+    straight = (_EXPLAINED + np.where(turns, np.abs(error), 0.0)) ** 2 * total
+    joints = [int(i) for i in order if rest[i] < np.maximum(noise, straight[i])]
+    joints = [i for i in joints if i == joints[0] or rest[i] < rest[joints[0]] + noise]
+    by_target = np.bincount(rows.target[mine], shift**2)
+    several = np.count_nonzero(by_target) > 1
+    alone = int(np.argmax(by_target)) if several and by_target.max() > _ONE_TARGET * total else None
+    names = list(dict.fromkeys(block.target for block in left.problem.blocks))
+    counted = sigma > 0.0 if alone is None else (sigma > 0.0) & (rows.target[mine] == alone)
+    lengths = (shift * sigma)[counted]
+    seen = max(len(np.unique(rows.target[mine][counted])), 1)
+    return OffConfiguration(
+        index,
+        () if alone is not None else tuple(i + 1 for i in joints),
+        float(error[joints[0]]) if joints and alone is None else 0.0,
+        "" if alone is None else names[alone],
+        math.sqrt(float(lengths @ lengths) / seen),
+    )

@@ -1,0 +1,388 @@
+"""What would explain what a fit leaves: joint effects, free geometry, or a payload, by a linear estimate.
+
+Near the solution of a fit, what an effect does to the readings is its derivative where it does nothing. What the free
+parameters can take is taken out of the residuals and of these columns (Frisch and Waugh 1933, "Partial time regressions
+as compared with individual trends"). The effect is then found from nine tenths of the configurations and judged on the
+last tenth, ten times over, so that what is gained is gained on readings that the estimate has not seen. Chance may
+still show a gain: of many effects the one that chance likes best is tried. So the share that an effect explains is also
+held against that of as many columns of noise, with three equations a configuration at most.
+
+A payload is found together with the compliances that it bends: their products with it are not linear, but of so few
+unknowns that a few steps on sums of products cost nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.identification.choosing.selection import open_effects
+from truearm.identification.judging.left_over import LeftOver, chi_squared_tail
+from truearm.identification.solving.problem import Problem
+from truearm.measurement.observations import OBSERVATIONS
+from truearm.modeling.chain import Array
+from truearm.modeling.loads import has_weight, joint_loads
+from truearm.modeling.parameters import FreeParameters, Parameter
+from truearm.modeling.parts import Payload
+from truearm.modeling.robot import Robot
+
+#: What frees the geometry and the joint zeros, and what is found of a payload.
+GEOMETRY: Final = "geometry"
+PAYLOAD: Final = "payload"
+LOADS: Final = "loads"
+#: Configurations looked at, evenly spaced; more would take longer and tell nothing new.
+_MOST: Final = 150
+_FOLDS: Final = 10
+#: Share of what a fit leaves, as a root mean square, that must go for an effect to be named.
+_LEAST_GAIN: Final = 0.05
+#: Gain over its standard error, over the folds.
+_LEAST_DEVIATIONS: Final = 2.0
+#: An effect is believed if chance would explain as much with any of those tried less often than this.
+_LARGEST_CHANCE: Final = 1e-3
+#: Equations beyond the parameters, of three a configuration at most, without which nothing is said; and as a share of
+#: the parameters: a fit of almost as many parameters as equations leaves nothing that could be explained.
+_LEAST_FREEDOM: Final = 12
+_LEAST_SHARE: Final = 0.5
+#: A cause that is more likely beforehand is preferred if it gains so large a share of what the best one does. Every arm
+#: gives way, and what else it does is seen better after that.
+_AS_GOOD: Final = {GEOMETRY: 0.5, "compliance": 0.5, LOADS: 0.85, PAYLOAD: 0.85}
+#: No arm carries more than this share of its own mass; where more comes out, its mass is not told.
+_LARGEST_PAYLOAD: Final = 0.7
+_STEPS: Final = 30
+_FINAL_STEP: Final = 1e-6
+#: What a payload may be [kg], and its moment [kg m], before anything is known.
+_MASS_PRIOR: Final = 10.0
+_MOMENT_PRIOR: Final = 2.0
+#: The centre of gravity of a payload lies within this of the flange [m].
+_FARTHEST_COG: Final = 1.0
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """What would explain what a fit leaves.
+
+    Attributes
+    ----------
+    cause
+        Name of a joint effect; ``geometry`` for the geometry and the joint zeros; ``payload``; or ``loads`` where the
+        joints give way under loads that the robot file does not know.
+    left
+        Root mean square that is left with it, over that without it, on configurations that the estimate has not seen.
+    chance
+        Probability that noise alone shows as much with any of the causes tried.
+    mass
+        Of the payload [kg]; zero for other causes, and where it cannot be told.
+    """
+
+    cause: str
+    left: float
+    chance: float
+    mass: float = 0.0
+
+
+def with_causes(left: LeftOver, *causes: str) -> LeftOver:
+    """Return what a fit leaves whose free parameters could also take what causes explain, as far as they are open."""
+    problem = replace(left.problem, free=FreeParameters(()))
+    robot, groups = _candidates(left, problem, causes)
+    free = FreeParameters(tuple(p for cause in dict.fromkeys(causes) for p in groups.get(cause, ())))
+    if not free.parameters:
+        return left
+    J = replace(problem, robot=robot, free=free).at(free.start).jacobian * free.prior
+    columns = left.without_parameters(J)
+    U, s, _ = np.linalg.svd(columns, full_matrices=False)
+    return replace(left, basis=np.concatenate([left.basis, U[:, s > 1.0]], axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class _Remainder:
+    """What a fit leaves of some configurations.
+
+    Attributes
+    ----------
+    problem
+        The readings, without any parameter.
+    residual
+        ``(rows,)``, without what the free parameters can take.
+    basis
+        Orthonormal directions that they can take, ``(rows, rank)``.
+    fold
+        Fold of each row, ``(rows,)``.
+    configuration
+        Of each row, ``(rows,)``.
+    """
+
+    problem: Problem
+    residual: Array
+    basis: Array
+    fold: NDArray[np.intp]
+    configuration: NDArray[np.intp]
+
+    def without_parameters(self, columns: Array) -> Array:
+        """Return columns without what the free parameters can take."""
+        return np.asarray(columns - self.basis @ (self.basis.T @ columns))
+
+
+def explanation(left: LeftOver, without: Sequence[int] = ()) -> Explanation | None:
+    """Return what best explains what a fit leaves, None if nothing does by more than chance.
+
+    Parameters
+    ----------
+    without
+        Configurations of the dataset that are left out of account.
+    """
+    some = _some(left, without)
+    freedom = _freedom(left, some)
+    if not _is_enough(left, freedom):
+        return None
+    rest = _remainder(left, some)
+    total = float(rest.residual @ rest.residual)
+    if total <= 0.0:
+        return None
+    robot, groups = _candidates(left, rest.problem)
+    found = []
+    if groups:
+        free = FreeParameters(tuple(p for group in groups.values() for p in group))
+        problem = replace(rest.problem, robot=robot, free=free)
+        if rest.problem.postures.loads is not None:  # effects that do nothing yet leave the loads as they are
+            problem.__dict__["postures"] = rest.problem.postures
+        J = problem.at(free.start).jacobian * free.prior
+        columns = rest.without_parameters(J)
+        places = {p.name: i for i, p in enumerate(free.parameters)}
+        for cause, parameters in groups.items():
+            found.append((cause, columns[:, [places[p.name] for p in parameters]], 0.0))
+    found += _payload(left, rest)
+    judged = [e for e in (_judged(rest, *tried, freedom, len(found)) for tried in found) if e is not None]
+    if not judged:
+        return None
+    best = min(judged, key=lambda e: e.left)
+    likely = [(e, share) for cause, share in _AS_GOOD.items() for e in judged if e.cause == cause]
+    return next((e for e, share in likely if 1.0 - e.left >= share * (1.0 - best.left)), best)
+
+
+def can_explain(left: LeftOver) -> bool:
+    """Return whether there are enough readings to tell what would explain what a fit leaves."""
+    return _is_enough(left, _freedom(left, _some(left, ())))
+
+
+def _freedom(left: LeftOver, some: NDArray[np.intp]) -> int:
+    """Return the number of equations beyond the parameters, of three a configuration at most."""
+    return int(np.minimum(np.bincount(left.configuration)[some], 3).sum()) - int(left.basis.shape[1])
+
+
+def _is_enough(left: LeftOver, freedom: int) -> bool:
+    return bool(freedom >= max(_LEAST_FREEDOM, _LEAST_SHARE * left.basis.shape[1]))
+
+
+def _some(left: LeftOver, without: Sequence[int]) -> NDArray[np.intp]:
+    """Return the configurations looked at."""
+    kept = np.setdiff1d(np.unique(left.configuration), np.array(without, dtype=np.intp))
+    return kept if len(kept) <= _MOST else kept[np.linspace(0, len(kept) - 1, _MOST).round().astype(np.intp)]
+
+
+def _remainder(left: LeftOver, some: NDArray[np.intp]) -> _Remainder:
+    """Return what a fit leaves of some configurations."""
+    data = left.problem.data
+    rows = np.isin(left.configuration, some)
+    part = data if len(some) == data.configurations else data.of_configurations(some)
+    noise = {observation.name: left.fit.sigma.get(observation.name, 1.0) for observation in OBSERVATIONS}
+    problem = Problem(left.fit.robot, replace(part, setup=None), FreeParameters(()), noise)
+    Q, r = left.basis, left.residual
+    if not rows.all():
+        Q, r = np.linalg.qr(Q[rows])[0], r[rows]
+    place = np.searchsorted(some, left.configuration[rows])
+    order = np.random.default_rng(0).permutation(len(some))
+    return _Remainder(problem, r - Q @ (Q.T @ r), Q, (order % _FOLDS)[place], place)
+
+
+def _candidates(
+    left: LeftOver, problem: Problem, asked: Sequence[str] | None = None
+) -> tuple[Robot, dict[str, tuple[Parameter, ...]]]:
+    """Return the causes that are tried, each with its parameters, and a robot that has them all.
+
+    Parameters
+    ----------
+    asked
+        The causes that are wanted; all of them if None.
+    """
+    fit = left.fit
+    robot = fit.robot
+    freed = set(fit.free.names) | {r.dropped for r in fit.redundancies}
+    own = [effect.name for effect in robot.effects if any(p.name in freed for p in effect.parameters)]
+    closed = (*own, *fit.model.tried)
+    unloaded = not has_weight(robot) and problem.data.wrench is None
+    names = open_effects(robot, closed, problem.data)
+    if unloaded and "compliance" not in closed:
+        robot, names = replace(robot, payload=Payload(1.0)), [*names, "compliance"]
+    if asked is not None:
+        names = [name for name in names if name in asked or (name == "compliance" and LOADS in asked)]
+    robot = robot.with_effects(names)
+    groups: dict[str, tuple[Parameter, ...]] = {}
+    if not {"joint zero", "geometry"} <= set(fit.model.groups):
+        groups[GEOMETRY] = tuple(
+            p for p in robot.parameters.values() if p.group in ("joint zero", "geometry") and p.name not in freed
+        )
+    for name in names:
+        cause = LOADS if unloaded and name == "compliance" else name
+        groups[cause] = tuple(p for p in robot.parameters.values() if p.group == name)
+    return robot, {cause: parameters for cause, parameters in groups.items() if parameters}
+
+
+def _judged(rest: _Remainder, cause: str, columns: Array, mass: float, freedom: int, tried: int) -> Explanation | None:
+    """Return what columns explain of the residuals, None if it is too little or chance.
+
+    Parameters
+    ----------
+    columns
+        Per prior and without what the free parameters can take, ``(rows, k)``.
+    mass
+        Of a payload [kg].
+    """
+    r, k = rest.residual, columns.shape[1]
+    order = np.argsort(rest.fold, kind="stable")
+    edges = np.searchsorted(rest.fold[order], np.arange(_FOLDS + 1))
+    parts = [order[a:b] for a, b in pairwise(edges.tolist())]
+    pull = np.array([columns[part].T @ r[part] for part in parts])
+    inner = np.array([columns[part].T @ columns[part] for part in parts])
+    everything = inner.sum(axis=0)
+    ridge = np.eye(k) + 1e-9 * np.trace(everything) * np.eye(k)
+    values = np.linalg.solve(everything - inner + ridge, (pull.sum(axis=0) - pull)[:, :, None])[:, :, 0]
+    gains = np.array(
+        [2.0 * v @ g - v @ G @ v for v, g, G in zip(values, pull, inner, strict=True)]
+    )  # of squares, on each fold
+    total = float(r @ r)
+    gain = float(gains.sum())
+    error = math.sqrt(_FOLDS) * float(gains.std(ddof=1))
+    remaining = math.sqrt(max(1.0 - gain / total, 0.0))
+    if remaining > 1.0 - _LEAST_GAIN or gain < _LEAST_DEVIATIONS * error:
+        return None
+    value = np.linalg.solve(everything + ridge, pull.sum(axis=0))
+    share = min(float(2.0 * value @ pull.sum(axis=0) - value @ everything @ value) / total, 1.0 - 1e-12)
+    rank = int(np.linalg.matrix_rank(everything + 1e-12 * np.eye(k), tol=1.0))
+    if freedom <= rank + _LEAST_FREEDOM // 2:
+        return None
+    # F of two mean squares, times its numerator's freedom, as chi squared: the denominator has many degrees.
+    f = share / (1.0 - share) * (freedom - rank)
+    chance = min(1.0, tried * chi_squared_tail(max(f, 0.0), max(rank, 1)))
+    return Explanation(cause, remaining, chance, mass) if chance < _LARGEST_CHANCE else None
+
+
+def _payload(left: LeftOver, rest: _Remainder) -> Iterator[tuple[str, Array, float]]:
+    """Try another payload, where compliances are free and links weigh something, as these tell them apart."""
+    fit = left.fit
+    robot, free = fit.robot, fit.free
+    springs = [f"compliance_{i + 1}" for i in range(len(robot.joints))]
+    if not all(name in robot.parameters for name in springs) or not any(link.mass for link in robot.masses):
+        return
+    mine = [i for i, name in enumerate(springs) if name in free.names]
+    if not mine:
+        return
+    fixed = [k for k, name in enumerate(free.names) if name not in springs]
+    rows = np.isin(left.configuration, _places(left, rest))
+    Q = np.linalg.qr((left.jacobian[:, fixed] * free.prior[fixed])[rows])[0]
+    here = rest.problem.at(np.zeros(0))
+    variables = robot.variables(rest.problem.postures, robot.values)
+    bodies = [Payload(1.0), *(Payload(1.0, _unit(k)) for k in range(3))]
+    unit = np.array([_turning(robot, replace(robot, masses=(), payload=body), variables) for body in bodies])
+    unit[1:] -= unit[0]  # of the moment alone
+    of_rows, by = rest.configuration, here.by_joints
+    now = rest.problem.postures.joint_loads
+    lever = np.array([now[i, 5 if robot.joints[i].kind == "revolute" else 2] for i in range(len(robot.joints))])
+    own = by * lever[:, of_rows].T  # (rows, joints)
+    added = by[:, :, None] * np.moveaxis(unit[:, :, of_rows], (0, 1, 2), (2, 1, 0))  # (rows, joints, 4)
+    count = len(robot.joints)
+    columns = np.concatenate([own[:, mine], added.reshape(len(by), 4 * count)], axis=1)
+    r = left.residual[rows]
+    columns -= Q @ (Q.T @ columns)
+    r = r - Q @ (Q.T @ r)
+    start = np.array([robot.values[name] for name in springs])
+    prior = np.array([robot.parameters[name].prior for name in springs])
+    found = _bilinear(columns.T @ columns, columns.T @ r, mine, start, prior)
+    if found is None:
+        return
+    compliance, load = found
+    mass = robot.payload.mass + float(load[0])
+    # The moment is that of what is added to the payload.
+    moment = robot.payload.mass * np.array(robot.payload.cog) + load[1:]
+    if mass <= 0.0 or float(np.linalg.norm(moment)) > _FARTHEST_COG * mass:
+        return
+    if mass > _LARGEST_PAYLOAD * sum(link.mass for link in robot.masses):
+        mass = 0.0
+    scale = np.array([_MASS_PRIOR, *[_MOMENT_PRIOR] * 3])
+    together = np.einsum("rja,j->ra", added, compliance) * scale
+    yield PAYLOAD, rest.without_parameters(together), mass
+
+
+def _places(left: LeftOver, rest: _Remainder) -> NDArray[np.intp]:
+    """Return the configurations of the dataset that a remainder is of."""
+    labels = rest.problem.data.labels
+    known = {label: i for i, label in enumerate(left.problem.data.labels)}
+    return np.array([known[label] for label in labels], dtype=np.intp)
+
+
+def _unit(axis: int) -> tuple[float, float, float]:
+    return (float(axis == 0), float(axis == 1), float(axis == 2))
+
+
+def _turning(robot: Robot, loaded: Robot, variables: Array) -> Array:
+    """Return what the load of another robot turns each joint by [N m], or pushes it [N], ``(joints, n)``."""
+    loads = joint_loads(loaded, variables)
+    return np.array([loads[i, 5 if joint.kind == "revolute" else 2] for i, joint in enumerate(robot.joints)])
+
+
+def _bilinear(G: Array, g: Array, mine: list[int], start: Array, prior: Array) -> tuple[Array, Array] | None:
+    """Return compliances ``(joints,)`` and what to add to a payload: mass and moment ``(4,)``; None if nothing fits.
+
+    The residual is ``r + sum_i own_i (c_i - start_i) + sum_i c_i added_i p``, and its sums of products are given.
+
+    Parameters
+    ----------
+    G, g
+        Columns times columns, and times the residual; own columns of the free joints first, then four of each joint.
+    mine
+        The joints whose compliance is free.
+    """
+    count, k = len(start), len(mine)
+    c, p = start.copy(), np.zeros(4)
+    scale = np.array([_MASS_PRIOR, *[_MOMENT_PRIOR] * 3])
+
+    def weights(c: Array, p: Array) -> Array:
+        return np.concatenate([(c - start)[mine], np.outer(c, p).reshape(-1)])
+
+    def cost(c: Array, p: Array) -> float:
+        w = weights(c, p)
+        springs = ((c / prior)[mine] ** 2).sum()
+        return float(w @ G @ w + 2.0 * w @ g + springs + ((p / scale) ** 2).sum())
+
+    now = cost(c, p)
+    for _ in range(_STEPS):
+        D = np.zeros((k + 4 * count, k + 4))
+        D[:k, :k] = np.eye(k)
+        for place, i in enumerate(mine):
+            D[k + 4 * i : k + 4 * i + 4, place] = p
+        for i in range(count):
+            D[k + 4 * i : k + 4 * i + 4, k:] = c[i] * np.eye(4)
+        w = weights(c, p)
+        weight = np.concatenate([1.0 / prior[mine] ** 2, 1.0 / scale**2])
+        slope = D.T @ (G @ w + g) + weight * np.concatenate([c[mine], p])
+        size = np.concatenate([prior[mine], scale])
+        H = (D.T @ G @ D + np.diag(weight)) * np.outer(size, size)
+        step = -size * np.linalg.solve(H, slope * size)
+        for shorter in (1.0, 0.5, 0.25, 0.1, 0.01):
+            c_next, p_next = c.copy(), p + shorter * step[k:]
+            c_next[mine] += shorter * step[:k]
+            there = cost(c_next, p_next)
+            if there < now:
+                break
+        else:
+            break
+        smaller = now - there
+        c, p, now = c_next, p_next, there
+        if smaller < _FINAL_STEP * max(now, 1.0):
+            break
+    return (c, p) if np.isfinite(p).all() and p.any() else None

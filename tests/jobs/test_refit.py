@@ -1,0 +1,193 @@
+"""What was moved since the calibration is found anew and told; honest readings are left alone."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.simulated import campaign, more_of
+from typer.testing import CliRunner
+
+from truearm.cli import app
+from truearm.errors import InputError
+from truearm.identification.refit import refit
+from truearm.jobs.calibrate import calibrate
+from truearm.jobs.validate import validate
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.readers.canonical import csv_text
+from truearm.measurement.statistics import errors_of
+from truearm.modeling.chain import Array
+from truearm.modeling.robot import Robot
+from truearm.modeling.transform import rotation_from_vector
+from truearm.simulation.twin import Twin, measure
+
+NOISE = 0.05e-3
+TURN = rotation_from_vector(np.array([0.1, -0.2, 0.7]))
+SHIFT = np.array([1.2, -3.4, 0.2])
+
+
+@cache
+def cell(seed: int = 5, robot: str = "irb120") -> tuple[Twin, Robot, Dataset]:
+    """Return a twin, its calibrated robot, and new readings of it."""
+    twin, data = campaign(robot, 40, NOISE, seed)
+    return twin, calibrate(robot, data).robot, more_of(twin, 15, NOISE, 100 + seed)
+
+
+def points_of(twin: Twin) -> dict[str, Array]:
+    values = twin.robot.values
+    return {t.name: np.array([values[t.parameter(axis)] for axis in "xyz"]) for t in twin.robot.targets}
+
+
+def with_points(twin: Twin, points: dict[str, Array], joints: Array, seed: int = 3) -> Dataset:
+    """Return readings of the twin with other targets."""
+    places = {name: tuple(point.tolist()) for name, point in points.items()}
+    moved = replace(twin, robot=twin.robot.with_frames(twin.robot.base, places))
+    return measure(moved, joints, NOISE, np.random.default_rng(seed))
+
+
+def remounted(joints: Array, turn: Array, shift: Array) -> Dataset:
+    twin = cell()[0]
+    return with_points(twin, {name: turn @ point + shift for name, point in points_of(twin).items()}, joints)
+
+
+def test_an_instrument_that_was_carried_elsewhere_is_told_and_found() -> None:
+    _, robot, new = cell()
+    honest = validate(robot, new)
+    there = replace(new, position=new.position @ TURN.T + SHIFT)
+    (notice,) = validate(robot, there).warnings
+    assert (notice.code, notice.level) == ("base-moved", "error")
+    assert "`refit=base`" in notice.message
+    found = validate(robot, there, refit="base")
+    assert found.warnings == ()
+    assert found.position is not None
+    assert honest.position is not None
+    assert honest.position.mean < found.position.mean < 1.4 * honest.position.mean
+    assert found.refit is not None
+    assert (found.refit.parameters, found.refit.readings) == (6, 45)
+    middle = new.position.mean(axis=0)
+    assert found.refit.shift == pytest.approx(np.linalg.norm(TURN @ middle + SHIFT - middle), abs=1e-3)
+    assert found.refit.turn == pytest.approx(np.linalg.norm([0.1, -0.2, 0.7]), abs=1e-3)
+    assert "The base was found anew from 45 readings (6 numbers)" in "\n".join(found.lines())
+    assert found.summary()["refit"]["turn_deg"] == pytest.approx(math.degrees(math.sqrt(0.54)), abs=0.1)
+
+
+@pytest.mark.parametrize("angle", [2e-3, 2.0])
+def test_a_tool_that_was_mounted_anew_is_told_and_found_alone(angle: float) -> None:
+    _, robot, new = cell()
+    moved = remounted(new.joints, rotation_from_vector(np.array([0.6, 0.0, 0.8]) * angle), np.array([1e-3, 5e-4, 0.0]))
+    (notice,) = validate(robot, moved).warnings
+    assert notice.code == "tool-moved"
+    assert "`refit=tool`" in notice.message
+    found = validate(robot, moved, refit="tool")
+    assert found.warnings == ()
+    assert found.position is not None
+    assert found.position.mean < 0.15e-3
+    assert found.refit is not None
+    assert found.refit.turn == pytest.approx(angle, abs=3e-4)
+    for name in ("base_x", "base_y", "base_z"):
+        assert found.refit.robot.values[name] == pytest.approx(robot.values[name], abs=1e-12)
+
+
+def test_a_target_that_was_put_on_anew_is_named() -> None:
+    twin, robot, new = cell()
+    points = points_of(twin)
+    name = next(iter(points))
+    moved = with_points(twin, {**points, name: points[name] + np.array([0.0, 2e-3, 0.0])}, new.joints)
+    (notice,) = validate(robot, moved).warnings
+    assert notice.code == "tool-moved"
+    assert f"target {name} by " in notice.message
+    assert "`refit=targets`" in notice.message
+    found = validate(robot, moved, refit="targets")
+    assert found.refit is not None
+    assert found.refit.turn is None
+    assert found.refit.shifts[name] == pytest.approx(2e-3, abs=2e-4)
+    assert max(shift for other, shift in found.refit.shifts.items() if other != name) < 3e-4
+
+
+def test_base_and_tool_that_were_both_moved_are_told() -> None:
+    _, robot, new = cell()
+    moved = remounted(new.joints, rotation_from_vector(np.array([0.0, 0.3, 0.0])), np.array([0.0, 0.05, 0.0]))
+    moved = replace(moved, position=moved.position @ TURN.T + SHIFT)
+    (notice,) = validate(robot, moved).warnings
+    assert (notice.code, notice.level) == ("frames-differ", "error")
+    assert "`model=frames`" in notice.message
+
+
+def test_configurations_that_cannot_tell_base_from_tool_are_called_so() -> None:
+    twin, robot, _ = cell()
+    rng = np.random.default_rng(0)
+    q = np.radians([20.0, 10.0, -10.0, 5.0, 40.0, 0.0]) + np.radians(0.5) * rng.uniform(-1, 1, (12, 6))
+    near = measure(twin, q, NOISE, rng)
+    (notice,) = validate(robot, replace(near, position=near.position + np.array([1e-3, 0.0, 0.0]))).warnings
+    assert "These configurations do not tell that from a moved" in notice.message
+
+
+def test_the_errors_of_a_refit_are_those_of_configurations_it_has_not_seen() -> None:
+    """Against fitting again without each configuration."""
+    _, robot, new = cell()
+    few = new.of_configurations(np.arange(6))
+    found = refit(robot, few, "tool")
+    for c in range(6):
+        others = refit(robot, few.of_configurations([i for i in range(6) if i != c]), "tool")
+        alone = errors_of(others.robot, few.of_configurations([c])).position_errors
+        mine = few.configuration == c
+        assert found.errors.position_errors[mine] == pytest.approx(alone, abs=2e-7)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_honest_readings_are_left_alone(seed: int) -> None:
+    """30 campaigns: five of each of six robots."""
+    robot = ("irb120", "ur10", "puma560")[seed % 3]
+    twin, data = campaign(robot, 25, NOISE, seed)
+    calibrated = calibrate(robot, data, model=("offsets", "geometric")[seed % 2], train="all").robot
+    for again in range(5):
+        assert validate(calibrated, more_of(twin, 12, NOISE, 500 + 10 * seed + again)).warnings == ()
+
+
+def test_a_single_target_is_shifted_and_not_turned() -> None:
+    _, robot, new = cell()
+    one = new.of_readings(new.target == 0)
+    found = refit(robot, one, "tool")
+    assert (found.parameters, found.turn) == (3, None)
+
+
+def test_exchanged_names_do_not_pass_for_moved_targets() -> None:
+    _, robot, new = cell()
+    (notice,) = validate(robot, replace(new, targets=("2", "3", "1")), refit="targets").warnings
+    assert notice.code == "targets-renamed"
+
+
+def test_too_few_readings_are_refused() -> None:
+    _, robot, new = cell()
+    with pytest.raises(InputError, match="too few") as told:
+        validate(robot, new.of_configurations([0]), refit="base")
+    assert told.value.parameter == "refit"
+
+
+def test_an_unknown_part_is_refused() -> None:
+    _, robot, new = cell()
+    with pytest.raises(InputError, match="base, targets, tool") as told:
+        validate(robot, new, refit="flange")
+    assert told.value.parameter == "refit"
+
+
+def test_the_command_finds_what_moved(tmp_path: Path) -> None:
+    _, robot, new = cell()
+    from truearm.modeling.formats.robot_file import robot_text
+
+    (tmp_path / "robot.yaml").write_text(robot_text(robot))
+    (tmp_path / "moved.csv").write_text(csv_text(replace(new, position=new.position + SHIFT)))
+    words = ["validate", str(tmp_path / "robot.yaml"), str(tmp_path / "moved.csv")]
+    told = CliRunner().invoke(app, words)
+    assert told.exit_code == 3
+    assert "--refit base" in told.output
+    done = CliRunner().invoke(app, [*words, "--refit", "base", "--note", "operator=A B", "--json"])
+    assert done.exit_code == 0, done.output
+    found = json.loads(done.stdout)
+    assert found["refit"]["shift_mm"] == pytest.approx(1e3 * float(np.linalg.norm(SHIFT)), abs=0.2)
+    assert found["notes"] == {"operator": "A B"}

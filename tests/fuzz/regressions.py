@@ -57,6 +57,7 @@ CONTENTS: Final[dict[tuple[str, str], Callable[[], bytes]]] = {
     ("krl", "brackets"): lambda: b"DEF m()\nPTP {" + b"{" * 50_000,
     ("urscript", "brackets"): lambda: b"movel(" + b"(" * 50_000,
     ("jbi", "a pulse of very many digits"): lambda: _sample("jbi/weld.jbi", b"C00000=", b"C00000=" + b"9" * 5000),
+    ("ur-conf", "blank lines"): lambda: b"\n" * 300_000 + b"x: 1\n",
     ("urdf", "entities of entities"): lambda: (
         b'<!DOCTYPE r [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;">]><robot name=\'&b;\'/>'
     ),

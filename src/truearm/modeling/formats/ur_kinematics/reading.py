@@ -165,7 +165,7 @@ class _RosFile(BaseModel):
 
 def _ros(path: Path) -> FactoryKinematics:
     chain = read_yaml(path, _RosFile).kinematics
-    if not chain.hash:  # it is written last, and the driver does not start without it
+    if not chain.hash:  # it is written last, and the driver compares it with that of the controller
         raise InputError(
             "the hash is missing, so the file is not whole",
             where=f"{path}, kinematics",

@@ -243,7 +243,7 @@ def test_the_python_file_computes_it_or_says_that_it_does_not(effect: type[Effec
 NAMED_ELSEWHERE = {
     "identification/solving/models.py": "a model is a choice of effects",
     "identification/inclinometers/fit.py": "so is the first stage of the method with inclinometers",
-    "identification/judging/next_steps.py": "advice asks for what a user can give: a payload, the order of measurement",
+    "identification/judging/next_steps.py": "a list of notices, one of which is called like an effect",
     "identification/judging/unmodelled.py": "compliance is what a payload that nobody gave is seen by",
     "studies/": "a study chooses models as its document does",
 }

@@ -16,12 +16,10 @@ from truearm.compensation.gauge import disagreement
 from truearm.compensation.programs import LANGUAGES
 from truearm.compensation.programs.program import MakersCalibration, Program
 from truearm.errors import InputError
-from truearm.modeling.controller import ControllerKinematics
+from truearm.modeling.controller import OTHER_ARM, ControllerKinematics
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 
-#: Accepts kinematics that are another arm's.
-OTHER_ARM: Final = "other-kinematics"
 _ANSWER: Final = (
     "`controller_kinematics=nominal` says that it computes with the table of the robot file, "
     "`controller_kinematics=proprietary` that it has a calibration which nobody else can read"

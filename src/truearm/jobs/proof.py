@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from truearm.compensation.controller_model import OTHER_ARM
-from truearm.compensation.programs.program import Language
 from truearm.errors import InputError
 from truearm.files import exists
 from truearm.jobs.arguments import choices_argument
 from truearm.manifest import written_differently
+from truearm.modeling.controller import OTHER_ARM
 from truearm.modeling.formats.robot_file import arm_is_known, is_intact
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
+
+if TYPE_CHECKING:  # the readers of all languages take long to import
+    from truearm.compensation.programs.program import Language
 
 #: Ends of a fit of which no program is corrected.
 _UNSOUND: Final = ("rank-loss", "not-converged", "implausible")

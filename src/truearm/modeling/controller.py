@@ -19,6 +19,8 @@ from truearm.modeling.transform import IDENTITY, Transform
 
 #: Whose joint positions numbers are: the ``controller``'s, as its pendant shows them, or the ``model``'s.
 JointsOf = Literal["controller", "model"]
+#: Accepts kinematics of a controller that are another arm's.
+OTHER_ARM: Final = "other-kinematics"
 #: With what a controller computes poses: nobody said; the table of the robot file; rows of its own, which are known;
 #: a model that nobody outside can read.
 KinematicsKind = Literal["unknown", "nominal", "own", "proprietary"]

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.identification.test_axes import runs
+from tests.jobs.examples import EXAMPLES
 
 import truearm
 from truearm import Dataset, InputError
@@ -167,3 +168,11 @@ def test_nothing_that_is_read_is_overwritten(found: AxisCalibration, tmp_path: P
     with pytest.raises(InputError, match="this file is read"):
         truearm.axes(tmp_path / "calibrated.yaml", "missing.csv", out=tmp_path)
     assert (tmp_path / "joint-errors.yaml").read_bytes() == before
+
+
+def test_readings_whose_heights_are_a_row_off_are_refused(tmp_path: Path) -> None:
+    given = EXAMPLES["axes"](tmp_path)
+    data = truearm.load_data(given["data"])
+    shifted = replace(data, position=np.column_stack([data.position[:, :2], np.roll(data.position[:, 2], -1)]))
+    with pytest.raises(InputError, match="the measured axes determine nothing of the robot"):
+        truearm.axes(**{**given, "data": shifted})

@@ -125,6 +125,12 @@ def fit_axes(
             redundancies = find_redundancies(problem, problem.free.start, held)
         settled = [r.dropped for r in redundancies] == held
         held = [r.dropped for r in redundancies]
+        if not problem.free.without(held).names:
+            raise InputError(
+                "the measured axes determine nothing of the robot",
+                where=robot.name,
+                cure="Check units, joint order and signs with 'truearm check ROBOT DATA.csv'.",
+            )
         solution = solve(replace(problem, free=problem.free.without(held)))
         found = dict(zip(problem.free.without(held).names, solution.vector.tolist(), strict=True))
         there = tuple(replace(p, value=found.get(p.name, p.nominal)) for p in free.parameters)

@@ -83,7 +83,8 @@ def _bent(rng: Random, value: Any, folder: Path) -> Any:
         elif way == 2 and bent.ndim:
             bent = bent[..., :-1]
         else:
-            bent = bent * one_of(rng, (-1.0, 0.0, 1e3, 1e-3, 1e200))
+            with np.errstate(over="ignore"):  # of what was bent already
+                bent = bent * one_of(rng, (-1.0, 0.0, 1e3, 1e-3, 1e200))
         return bent
     if isinstance(value, list | tuple) and value:
         entries = list(value)

@@ -58,7 +58,7 @@ EVERY_POSE: Final = Choice()
 def kept_by_choice(programs: Sequence[Program], choice: Choice) -> list[dict[int, Kept]]:
     """Return for each program which of its targets stay as they are, and why.
 
-    Offsets from taught points are corrected: they are where the point is and not where it was taught.
+    Offsets from taught points are corrected: they have to be so far from where the real robot is at the point.
 
     Raises
     ------

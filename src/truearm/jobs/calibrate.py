@@ -3,37 +3,20 @@
 from __future__ import annotations
 
 import hashlib
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from numbers import Integral
 from pathlib import Path
 from typing import Final, Literal, get_args
 
 import numpy as np
 
-from truearm.errors import InputError, did_you_mean, nearest_names, refusals_of, wrong_kind
+from truearm.errors import InputError, refusals_of
 from truearm.files import path_argument, read_bytes
 from truearm.identification.base_changes import with_one_base
 from truearm.identification.choosing.selection import AUTO, select
-from truearm.identification.judging.advice import check_fit
-from truearm.identification.judging.arrival_lag import check_arrival_lag
-from truearm.identification.judging.changes import notices_of_change
-from truearm.identification.judging.expected_error import as_residuals_allow, expected_error
-from truearm.identification.judging.implausible import check_plausible
-from truearm.identification.judging.large_remainder import check_remainder
-from truearm.identification.judging.left_over import LeftOver
-from truearm.identification.judging.narrow_data import check_narrow_data, check_narrow_data_without_geometry
-from truearm.identification.judging.next_steps import Judged, steps_after_fit, what_moved
-from truearm.identification.judging.off_configurations import off_configurations
-from truearm.identification.judging.one_sided import check_one_sided
-from truearm.identification.judging.payload import check_payload
-from truearm.identification.judging.separate_visits import check_separate_visits
-from truearm.identification.judging.sigma import check_sigma, check_sigma_beside_joints
-from truearm.identification.judging.transmission import check_transmission
-from truearm.identification.judging.wrong_robot import WRONG_ROBOT, check_robot, judges_lengths
+from truearm.identification.judging.judgement import judge
 from truearm.identification.solving.bounds import Bounds, read_bounds
-from truearm.identification.solving.fit import Status, identify, place
+from truearm.identification.solving.fit import identify, place
 from truearm.identification.solving.losses import LOSSES, Loss
 from truearm.identification.solving.models import FRAMES, MODELS, Model, named_model
 from truearm.identification.solving.rounds import Redundant
@@ -55,29 +38,34 @@ from truearm.jobs.arguments import (
     whole_argument,
 )
 from truearm.jobs.check import notices_of
-from truearm.jobs.validate import training_of
+from truearm.jobs.split import (
+    check_copies,
+    check_proof,
+    check_split,
+    check_trained_before,
+    left_out,
+    train_count,
+    without_words,
+)
 from truearm.library import urdf_source
-from truearm.measurement.dataset import Dataset, IntArray
-from truearm.measurement.repeats import copies, readings_digest, revisits
-from truearm.measurement.statistics import Errors, errors_of
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.repeats import readings_digest
+from truearm.measurement.statistics import errors_of
 from truearm.measurement.table_motion import without_table_motion
 from truearm.modeling.effects import EFFECTS
 from truearm.modeling.formats.robot_file import is_intact
 from truearm.modeling.parts import Payload
 from truearm.modeling.proof import Proof
 from truearm.modeling.robot import Robot
-from truearm.notices import Notice, has_error
+from truearm.notices import Notice
 from truearm.results.calibration import RESULT_FILES, Calibration
-from truearm.shown import counted, listed
+from truearm.shown import listed
 from truearm.version import __version__
 
 Train = int | Literal["all"] | None
 
 #: Every model that can be asked for by name; None chooses.
 _MODELS: Final[dict[str, Model | None]] = {m.name: m for m in (FRAMES, *MODELS)} | {AUTO: None}
-
-#: The hash by which the history tells which configurations were left out.
-_LEFT_OUT: Final = re.compile(r"; ([0-9a-f]{8})\),")
 
 
 def calibrate(
@@ -200,14 +188,14 @@ def calibrate(
     sha256 = None
     if isinstance(data, str | Path):
         sha256 = hashlib.sha256(read_bytes(path_argument(data, "data"))).hexdigest()
-    readings = _left_out(readings, without)
+    readings = left_out(readings, without)
     bounds_file = str(bounds) if isinstance(bounds, str | Path) else "bounds"
     if bounds is not None and not isinstance(bounds, Bounds):
         with refusals_of("bounds"):
             bounds = read_bounds(path_argument(bounds, "bounds"))
     with refusals_of("data"):
         n = readings.configurations
-        count = _train_count(train, n, readings.source)
+        count = train_count(train, n, readings.source)
         order = np.random.default_rng(seed).permutation(n)
         training, held_out = order[:count], order[count:]
         if not readings.has_reading.any():
@@ -218,7 +206,7 @@ def calibrate(
             raise InputError(
                 "there is no position reading", parameter="data", where=readings.source, cure="Fill in x, y and z."
             )
-        _check_split(readings.of_configurations(training), readings.of_configurations(held_out))
+        check_split(readings.of_configurations(training), readings.of_configurations(held_out))
 
         progress("checking the data")
         steady = without_table_motion(readings)
@@ -251,83 +239,34 @@ def calibrate(
             nominal_robot, first, chosen, loss=loss, redundancy=redundancy, bounds=bounds, bounds_file=bounds_file
         )
     progress("judging it")
-    judged = first if second is None else second
+    judges = first if second is None else second
     validation = None if second is None else errors_of(fit.robot, second)
-    before = errors_of(placed, judged)
+    before = errors_of(placed, judges)
     train_errors = errors_of(fit.robot, first)
-    # What the robust fit of the check could not explain, the fit itself may.
-    noticed = tuple(notice for notice in noticed if notice.code != Status.IMPLAUSIBLE.value)
-    left_over = LeftOver.of(fit, readings)
-    off = off_configurations(left_over)
-    moved_then = what_moved(left_over, off)
-    changes = [] if moved_then is None else notices_of_change(*moved_then)
-    told = [notice for notice in noticed if notice.code == WRONG_ROBOT]
-    noticed = tuple(notice for notice in noticed if notice.code != WRONG_ROBOT)
-    wrong_robot = check_robot(fit, first) if judges_lengths(fit) else told
-    if has_error([*noticed, *changes]):  # what is wrong with the data bends the robot too
-        wrong_robot = []
-    unlike = check_plausible(fit, first, (*noticed, *wrong_robot, *told))
-    if unlike:
-        wrong_robot = wrong_robot or told
-    expected = expected_error(as_residuals_allow(fit, first), plausible=not unlike)
-    wrong_sigma = check_sigma(left_over)
-    hidden = [] if unlike or has_error(wrong_sigma) else check_sigma_beside_joints(left_over)
-    explained = [*changes, *check_arrival_lag(left_over)]
-    doubted = has_error([*unlike, *wrong_robot, *noticed])
-    if not explained and not doubted and not any(notice.code == "joints-rounded" for notice in noticed):
-        explained = check_remainder(left_over)
-    narrow: list[Notice] = []
-    if not unlike and (hidden or not wrong_sigma):  # more configurations do not mend these
-        by, seen = validation or train_errors, validation is not None
-        if chosen.groups and "geometry" not in chosen.groups:
-            narrow = check_narrow_data_without_geometry(fit, first, by, loss, held_out=seen)
-        narrow = narrow or check_narrow_data(fit, expected, first, by, held_out=seen)
+    of_split = (
+        *check_proof(before, validation),
+        *check_copies(readings, training, held_out),
+        *check_trained_before(nominal_robot, as_read, sha256, (count, n, seed), without_words(without)),
+        *moved,
+    )
+    judged = judge(
+        fit, readings, first, validation or train_errors, noticed, of_split, loss, held_out=second is not None
+    )
     digest = f" ({'' if sha256 is None else f'sha256 {sha256[:12]}, '}readings {readings_digest(as_read)[:12]})"
     history = (
         f"calibrated by truearm {__version__}: model {' + '.join([chosen.name, *effects])},"
         f" {count} of {n} configurations of {Path(readings.source).name}{digest}, seed {seed}, loss {loss},"
-        f"{_without_words(without)}"
+        f"{without_words(without)}"
         f" redundancy {redundancy}{f', another base from {listed(base_changes)} on' if base_changes else ''}"
-    )
-    warnings = (
-        *(notice for notice in noticed if notice.level == "error"),
-        *unlike,
-        *wrong_robot,
-        *_check_proof(before, validation),
-        *_check_copies(readings, training, held_out),
-        *_check_trained_before(nominal_robot, as_read, sha256, (count, n, seed), _without_words(without)),
-        *moved,
-        *check_payload(nominal_robot),
-        *check_fit(fit, expected, doubted=doubted),
-        *narrow,
-        *(notice for notice in noticed if notice.level != "error"),
-        *check_one_sided(fit, first),
-        *(hidden or wrong_sigma),
-        *([] if doubted else check_separate_visits(left_over)),
-        *explained,
-        *check_transmission(fit, first),
-    )
-    steps = steps_after_fit(
-        Judged(
-            left_over,
-            Status.IMPLAUSIBLE if unlike else fit.status,
-            warnings,
-            off,
-            moved_then,
-            validation or train_errors,
-            validation is not None,
-            expected,
-            first,
-        )
     )
     calibration = Calibration(
         fit=fit,
         nominal=before,
         train=train_errors,
         validation=validation,
-        expected=expected,
-        warnings=warnings,
-        next=steps,
+        expected=judged.expected,
+        warnings=judged.warnings,
+        next=judged.next,
         data=readings,
         training=training,
         held_out=held_out,
@@ -345,185 +284,8 @@ def calibrate(
     return calibration
 
 
-def _left_out(data: Dataset, labels: Sequence[str]) -> Dataset:
-    """Return the data without some configurations.
-
-    Raises
-    ------
-    InputError
-        For a configuration that the data do not have, or if none would be left.
-    """
-    if not labels:
-        return data
-    known = set(data.labels)
-    for label in labels:
-        if label not in known:
-            raise InputError(
-                "there is no configuration of this name",
-                parameter="without",
-                where=data.source,
-                came=label,
-                cure=did_you_mean(label, data.labels) or "Name configurations of the data.",
-            )
-    kept = [i for i, label in enumerate(data.labels) if label not in set(labels)]
-    if not kept:
-        raise InputError(
-            "no configuration would be left", parameter="without", where=data.source, cure="Leave out fewer."
-        )
-    return data.of_configurations(kept)
-
-
-def _without_words(labels: Sequence[str]) -> str:
-    """Return how the history says which configurations were left out: the first few by name, all of them by a hash."""
-    if not labels:
-        return ""
-    digest = hashlib.sha256("\n".join(sorted(labels)).encode()).hexdigest()[:8]
-    return f" without {counted(len(labels), 'configuration')} ({listed(labels)}; {digest}),"
-
-
 def _known_before(robot: Robot) -> Proof | None:
     """Return what is known of a robot already; of one whose values were changed since, only what speaks against it."""
     if robot.proof is None or is_intact(robot):
         return robot.proof
     return replace(robot.proof, names=(), deviations=(), factor=())
-
-
-def _check_split(training: Dataset, held_out: Dataset) -> None:
-    """Refuse a held-out part that holds nothing, or readings of targets that the training part does not place."""
-    if held_out.configurations and not held_out.has_reading.any():
-        raise InputError(
-            "the held-out part has no reading",
-            where=held_out.source,
-            cure="Lower `train`, change `seed`, or measure again where readings are missing.",
-        )
-    places = training.has_position if training.fixture is None else training.has_reading
-    placed = set(training.target[places].tolist())
-    fixtures = set(training.against[training.has_reading].tolist())
-    for part, name in ((training, "training"), (held_out, "held-out")):
-        for index in dict.fromkeys(part.against[part.has_reading].tolist()):
-            if index not in fixtures:
-                alone = training.fixtures[index] if index >= 0 else ""
-                near = nearest_names(alone, [n for n in training.fixtures if n != alone], 1) if alone else []
-                raise InputError(
-                    f"a fixture of the {name} part was not measured in the training part",
-                    where=training.source,
-                    came=alone or "the instrument's own frame",
-                    cure=f"Did you mean {near[0]}?" if near else "Raise `train`, change `seed`, or leave it out.",
-                )
-        for index in dict.fromkeys(part.target[part.has_reading].tolist()):
-            if index not in placed:
-                raise InputError(
-                    f"a target of the {name} part has no position in the training part",
-                    where=training.source,
-                    came=training.targets[index],
-                    cure="Raise `train`, change `seed`, or leave the target out.",
-                )
-
-
-def _train_count(train: object, n: int, where: str) -> int:
-    if isinstance(train, str) and train == "all":
-        return n
-    if n < 2:
-        raise InputError(
-            "one configuration cannot be split into training and held-out parts",
-            parameter="data",
-            where=where,
-            cure="Measure more, or use `train=all`.",
-        )
-    if train is None:
-        return round(0.7 * n)
-    if isinstance(train, bool) or not isinstance(train, Integral):
-        raise wrong_kind("a number of configurations belongs here", train, "train", "a whole number, or all")
-    if not 1 <= int(train) < n:
-        raise InputError(
-            "the number of training configurations must leave some held out",
-            parameter="train",
-            came=int(train),
-            allowed=f"1 to {n - 1}, or all ({where} has {n} configurations)",
-        )
-    return int(train)
-
-
-def _check_copies(data: Dataset, training: IntArray, held_out: IntArray) -> list[Notice]:
-    """Say if the fit has seen what was held out: copies, or other readings at the same joint positions."""
-    seen = copies(data, held_out, training)
-    known = set(seen)
-    again = [label for label in revisits(data, held_out, training) if label not in known]
-    if not seen and not again:
-        return []
-    told = []
-    if seen:
-        told.append(f"{len(seen)} {'is a copy' if len(seen) == 1 else 'are copies'} of training ones ({listed(seen)})")
-    if again:
-        told.append(
-            f"{len(again)} {'has' if len(again) == 1 else 'have'} the same joint positions as training ones "
-            f"({listed(again)})"
-        )
-    cures = ["Leave copies out; for a bootstrap, draw from the training configurations alone and use `train=all`."]
-    return [
-        Notice(
-            "held-out-seen",
-            f"Of {counted(len(held_out), 'held-out configuration')} {' and '.join(told)}: the fit has seen them, and "
-            f"the errors flatter it. "
-            + " ".join(
-                [
-                    *(cures if seen else []),
-                    *(["Judge it at other joint positions with 'truearm validate'."] if again else []),
-                ]
-            ),
-        )
-    ]
-
-
-def _check_trained_before(
-    robot: Robot, data: Dataset, sha256: str | None, split: tuple[int, int, int], without: str
-) -> list[Notice]:
-    """Say if the robot to begin with has been trained on what is held out now.
-
-    Parameters
-    ----------
-    data
-        As they were read.
-    sha256
-        Of their file; None if they are in none.
-    split
-        How many configurations are trained on, of how many, and the seed.
-    without
-        What the history says of those left out.
-    """
-    before = training_of(robot, data, sha256)
-    if before is None or split[0] == split[1]:
-        return []
-    if before.split == split and _LEFT_OUT.findall(before.line) == _LEFT_OUT.findall(without):
-        return []
-    count, of, seed = before.split
-    return [
-        Notice(
-            "training-data",
-            f"The robot to begin with was calibrated with these readings already, on {count} of its {of} "
-            f"configurations (seed {seed}): what is held out now was partly seen then, and the held-out errors "
-            "flatter it. Begin with the nominal robot, or with the same `train` and `seed`.",
-        )
-    ]
-
-
-def _check_proof(before: Errors, after: Errors | None) -> list[Notice]:
-    """Say if there is no proof, or if it speaks against the calibration."""
-    if after is None:
-        return [
-            Notice(
-                "nothing-held-out",
-                "Nothing was held out: the errors are those of the training readings and flatter the model. "
-                "Leave `train` out to see the error on configurations the fit has not seen.",
-            )
-        ]
-    old, new = before.position or before.length, after.position or after.length
-    if old is None or new is None or new.mean <= old.mean:
-        return []
-    return [
-        Notice(
-            "not-better",
-            "On configurations the fit has not seen, the calibrated robot is no better than the nominal one: "
-            "there are too few readings for this model, or something is wrong with them.",
-        )
-    ]

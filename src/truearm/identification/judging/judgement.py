@@ -1,0 +1,131 @@
+"""Everything a fit is judged by: what may be wrong with it, how accurate it leaves the robot, what to do next."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from truearm.identification.judging.advice import check_fit
+from truearm.identification.judging.arrival_lag import check_arrival_lag
+from truearm.identification.judging.changes import notices_of_change
+from truearm.identification.judging.expected_error import ExpectedError, as_residuals_allow, expected_error
+from truearm.identification.judging.implausible import check_plausible
+from truearm.identification.judging.large_remainder import check_remainder
+from truearm.identification.judging.left_over import LeftOver
+from truearm.identification.judging.narrow_data import check_narrow_data, check_narrow_data_without_geometry
+from truearm.identification.judging.next_step import NextStep
+from truearm.identification.judging.next_steps import Judged, steps_after_fit, what_moved
+from truearm.identification.judging.off_configurations import off_configurations
+from truearm.identification.judging.one_sided import check_one_sided
+from truearm.identification.judging.payload import check_payload
+from truearm.identification.judging.separate_visits import check_separate_visits
+from truearm.identification.judging.sigma import check_sigma, check_sigma_beside_joints
+from truearm.identification.judging.transmission import check_transmission
+from truearm.identification.judging.wrong_robot import WRONG_ROBOT, check_robot, judges_lengths
+from truearm.identification.solving.fit import Fit, Status
+from truearm.identification.solving.losses import Loss
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.statistics import Errors
+from truearm.notices import Notice, has_error
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What is said of a fit.
+
+    Attributes
+    ----------
+    expected
+        How accurate the robot is where it was not measured.
+    warnings
+        What speaks against it, worst first.
+    next
+        What to do next.
+    """
+
+    expected: ExpectedError
+    warnings: tuple[Notice, ...]
+    next: tuple[NextStep, ...]
+
+
+def judge(
+    fit: Fit,
+    data: Dataset,
+    training: Dataset,
+    errors: Errors,
+    noticed: Sequence[Notice],
+    of_split: Sequence[Notice],
+    loss: Loss,
+    *,
+    held_out: bool,
+) -> Judgement:
+    """Judge a fit.
+
+    Parameters
+    ----------
+    data
+        All readings, training and held out.
+    errors
+        By which it is judged: of what was held out, if `held_out`, of the training readings otherwise.
+    noticed
+        What was said of the data before they were fitted.
+    of_split
+        What speaks against the split.
+    loss
+        Of the fit.
+    """
+    # What the robust fit of the check could not explain, the fit itself may.
+    noticed = tuple(notice for notice in noticed if notice.code != Status.IMPLAUSIBLE.value)
+    left_over = LeftOver.of(fit, data)
+    off = off_configurations(left_over)
+    moved_then = what_moved(left_over, off)
+    changes = [] if moved_then is None else notices_of_change(*moved_then)
+    told = [notice for notice in noticed if notice.code == WRONG_ROBOT]
+    noticed = tuple(notice for notice in noticed if notice.code != WRONG_ROBOT)
+    wrong_robot = check_robot(fit, training) if judges_lengths(fit) else told
+    if has_error([*noticed, *changes]):  # what is wrong with the data bends the robot too
+        wrong_robot = []
+    unlike = check_plausible(fit, training, (*noticed, *wrong_robot, *told))
+    if unlike:
+        wrong_robot = wrong_robot or told
+    expected = expected_error(as_residuals_allow(fit, training), plausible=not unlike)
+    wrong_sigma = check_sigma(left_over)
+    hidden = [] if unlike or has_error(wrong_sigma) else check_sigma_beside_joints(left_over)
+    explained = [*changes, *check_arrival_lag(left_over)]
+    doubted = has_error([*unlike, *wrong_robot, *noticed])
+    if not explained and not doubted and not any(notice.code == "joints-rounded" for notice in noticed):
+        explained = check_remainder(left_over)
+    narrow: list[Notice] = []
+    if not unlike and (hidden or not wrong_sigma):  # more configurations do not mend these
+        if fit.model.groups and "geometry" not in fit.model.groups:
+            narrow = check_narrow_data_without_geometry(fit, training, errors, loss, held_out=held_out)
+        narrow = narrow or check_narrow_data(fit, expected, training, errors, held_out=held_out)
+    warnings = (
+        *(notice for notice in noticed if notice.level == "error"),
+        *unlike,
+        *wrong_robot,
+        *of_split,
+        *check_payload(fit.start),
+        *check_fit(fit, expected, doubted=doubted),
+        *narrow,
+        *(notice for notice in noticed if notice.level != "error"),
+        *check_one_sided(fit, training),
+        *(hidden or wrong_sigma),
+        *([] if doubted else check_separate_visits(left_over)),
+        *explained,
+        *check_transmission(fit, training),
+    )
+    steps = steps_after_fit(
+        Judged(
+            left_over,
+            Status.IMPLAUSIBLE if unlike else fit.status,
+            warnings,
+            off,
+            moved_then,
+            errors,
+            held_out,
+            expected,
+            training,
+        )
+    )
+    return Judgement(expected, warnings, steps)

@@ -49,6 +49,7 @@ PLACES: dict[str, Arguments] = {
     "import_table": {"out": "data.csv"},
     "import_matrices": {"out": "data.csv"},
     "import_circle": {"out": "data.csv"},
+    "import_sockets": {"out": "data.csv"},
     "import_ur_kinematics": {"out": "robot.yaml"},
     "calibrate": {"out": "."},
     "plan": {"out": "plan.csv"},

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from truearm.jobs.hexapod_world_frame import hexapod_world_frame
     from truearm.jobs.import_circle import import_circle
     from truearm.jobs.import_matrices import import_matrices
+    from truearm.jobs.import_sockets import import_sockets
     from truearm.jobs.import_table import import_table
     from truearm.jobs.import_ur_kinematics import import_ur_kinematics
     from truearm.jobs.inverse import inverse
@@ -82,6 +83,7 @@ __all__ = [
     "hexapod_world_frame",
     "import_circle",
     "import_matrices",
+    "import_sockets",
     "import_table",
     "import_ur_kinematics",
     "inverse",

@@ -111,6 +111,36 @@ def sized_si(
     )
 
 
+def quantity_si(text: str, units: tuple[str, ...], parameter: str, number: str, whole: str) -> float:
+    """Return a number that a text gives with its unit, such as ``50mm``, in SI units.
+
+    Parameters
+    ----------
+    units
+        Those that it may have.
+    parameter
+        What the refusal names.
+    number, whole
+        A number as an example, and an example of everything that the parameter takes.
+
+    Raises
+    ------
+    InputError
+        If it is no number, or has no unit that fits.
+    """
+    match = re.fullmatch(r"\s*(?P<number>[^a-zA-Z]*(?:[eE][-+0-9]+)?)\s*(?P<unit>[a-zA-Z]*)\s*", text)
+    found = None if match is None else as_number(match["number"].strip())
+    if match is None or found is None or match["unit"] not in units:
+        raise InputError(
+            "a number with its unit belongs here" if found is None else "no unit that fits is given",
+            parameter=parameter,
+            came=text,
+            allowed=" or ".join(f"{number}{unit}" for unit in units),
+            cure=f"Units are never guessed: write {whole}.",
+        )
+    return sized_si(found, match["unit"], parameter=parameter, came=text)
+
+
 def written(value: float, unit: str) -> float:
     """Return the shortest number in `unit` that reads back as exactly this SI value.
 

@@ -55,6 +55,7 @@ def folder() -> Path:
         "import_table",
         "import_matrices",
         "import_circle",
+        "import_sockets",
         "tolerance",
         "compensate",
         "revert",

@@ -82,6 +82,11 @@ def _circle(folder: Path) -> Arguments:
     return {"scans": {"a": drawn(folder / "page.png")}, "points": {"a": points}, "dpi": 300.0, "sigma": 2e-5}
 
 
+def _sockets(folder: Path) -> Arguments:
+    rows = "configuration,joint_1 [deg],joint_2 [deg],socket\n1,10,20,left\n2,12,22,right\n3,15,25,left\n"
+    return {"file": _written(folder / "touches.csv", rows), "apart": "200mm,0.02mm", "ball": "25mm", "sigma": 2e-5}
+
+
 def _axis_runs(folder: Path) -> Path:
     """Runs in which one joint of a KR5 with joint errors moves at a time, in its own frame."""
     path = folder / "axes.csv"
@@ -165,6 +170,7 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
     "import_table": _table,
     "import_matrices": _matrices,
     "import_circle": _circle,
+    "import_sockets": _sockets,
     "import_ur_kinematics": lambda folder: {
         "file": _written(folder / "calibration.conf", UR10_CONF),
         "robot": "ur10",

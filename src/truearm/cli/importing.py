@@ -104,6 +104,35 @@ def circle(
     print_record(imported)
 
 
+@app.command()
+def sockets(
+    file: Annotated[Path, typer.Argument(metavar="TOUCHES.csv", help="Joint positions, and the socket, row by row.")],
+    apart: Annotated[
+        str, typer.Option(metavar="DISTANCE,SIGMA", help="How far apart the sockets are, with units: 200mm,0.02mm.")
+    ],
+    ball: Annotated[str, typer.Option(metavar="DIAMETER", help="Of the ball, with its unit: 25mm.")],
+    out: Annotated[Path, typer.Option("--out", metavar="DATA.csv", help="File to write.")],
+    sigma: Annotated[
+        float | None,
+        typer.Option(
+            metavar="MM", help="How well the ball comes to rest in a socket, a deviation.", show_default="not declared"
+        ),
+    ] = None,
+) -> None:
+    """A ball on the flange that was put into two sockets: joint positions, and no instrument."""
+    from truearm.jobs.import_sockets import import_sockets
+    from truearm.units import sized_si
+
+    imported = import_sockets(
+        file,
+        apart=apart,
+        ball=ball,
+        sigma=None if sigma is None else sized_si(sigma, "mm", parameter="sigma", deviation=True),
+        out=out,
+    )
+    print_record(imported)
+
+
 @app.command("ur-kinematics")
 def ur_kinematics(
     file: Annotated[

@@ -17,6 +17,7 @@ JOBS: Final = (
     "import_table",
     "import_matrices",
     "import_circle",
+    "import_sockets",
     "import_ur_kinematics",
     "check",
     "calibrate",

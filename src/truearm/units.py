@@ -111,7 +111,7 @@ def sized_si(
     )
 
 
-def quantity_si(text: str, units: tuple[str, ...], parameter: str, number: str, whole: str) -> float:
+def quantity_si(text: str, units: tuple[str, ...], parameter: str, number: str, whole: str, *, deviation: bool = False) -> float:
     """Return a number that a text gives with its unit, such as ``50mm``, in SI units.
 
     Parameters
@@ -122,6 +122,8 @@ def quantity_si(text: str, units: tuple[str, ...], parameter: str, number: str, 
         What the refusal names.
     number, whole
         A number as an example, and an example of everything that the parameter takes.
+    deviation
+        Whether it is a standard deviation, which can be too small as well.
 
     Raises
     ------
@@ -138,7 +140,7 @@ def quantity_si(text: str, units: tuple[str, ...], parameter: str, number: str, 
             allowed=" or ".join(f"{number}{unit}" for unit in units),
             cure=f"Units are never guessed: write {whole}.",
         )
-    return sized_si(found, match["unit"], parameter=parameter, came=text)
+    return sized_si(found, match["unit"], parameter=parameter, came=text, deviation=deviation)
 
 
 def written(value: float, unit: str) -> float:

@@ -48,11 +48,10 @@ class Apart:
             raise InputError(
                 "a distance and its standard deviation belong here", parameter=parameter, came=text, allowed=_WHOLE
             )
-        distance, sigma = (
-            quantity_si(part, _LENGTHS, parameter, number, _WHOLE)
-            for part, number in zip(parts, ("200", "0.02"), strict=True)
+        return cls(
+            quantity_si(parts[0], _LENGTHS, parameter, "200", _WHOLE),
+            quantity_si(parts[1], _LENGTHS, parameter, "0.02", _WHOLE, deviation=True),
         )
-        return cls(distance, sigma)
 
 
 def read_sockets(path: Path, apart: Apart, ball: float, sigma: float | None) -> Dataset:
@@ -90,7 +89,7 @@ def read_sockets(path: Path, apart: Apart, ball: float, sigma: float | None) -> 
     if len(names) != 2:
         raise InputError(
             "two sockets are needed: their distance is the only length that is known",
-            where=f"{path}, column {place + 1}, socket",
+            where=f"{path}, column socket",
             came=f"{len(names)}: {', '.join(names[:5])}",
             allowed="two names",
             cure="Put the ball into both sockets." if len(names) < 2 else "Correct the names, or keep two of them.",

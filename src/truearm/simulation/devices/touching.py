@@ -172,9 +172,7 @@ class TwoSockets(Device):
         of = np.arange(SPARE * count) % len(centres)
         name = nominal.targets[0].name
         down = np.tile(-turned[:, 2], (len(of), 1))
-        kept, joints = postures_at(
-            nominal, name, centres[of], count, rng, self.name, facing=down, within=self.within
-        )
+        kept, joints = postures_at(nominal, name, centres[of], count, rng, self.name, facing=down, within=self.within)
         of = of[kept]
         wanted = centres[of] + sigma * rng.standard_normal((count, 3))
         joints = jogged(nominal, arm, name, joints, lambda place: wanted - place)

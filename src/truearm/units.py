@@ -111,7 +111,9 @@ def sized_si(
     )
 
 
-def quantity_si(text: str, units: tuple[str, ...], parameter: str, number: str, whole: str, *, deviation: bool = False) -> float:
+def quantity_si(
+    text: str, units: tuple[str, ...], parameter: str, number: str, whole: str, *, deviation: bool = False
+) -> float:
     """Return a number that a text gives with its unit, such as ``50mm``, in SI units.
 
     Parameters

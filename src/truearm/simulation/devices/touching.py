@@ -149,7 +149,7 @@ class HeldAtPoint(Device):
 
 @dataclass(frozen=True)
 class TwoSockets(Device):
-    """A ball that is put into two sockets by hand, again and again in other postures; joint positions are all that is read.
+    """A ball that is put into two sockets by hand, in ever other postures; joint positions are all that is read.
 
     Attributes
     ----------

@@ -50,6 +50,7 @@ PLACES: dict[str, Arguments] = {
     "import_matrices": {"out": "data.csv"},
     "import_circle": {"out": "data.csv"},
     "import_sockets": {"out": "data.csv"},
+    "import_hand_eye": {"out": "data.csv"},
     "import_ur_kinematics": {"out": "robot.yaml"},
     "calibrate": {"out": "."},
     "plan": {"out": "plan.csv"},

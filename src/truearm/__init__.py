@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from truearm.jobs.hexapod_uncertainty import hexapod_uncertainty
     from truearm.jobs.hexapod_world_frame import hexapod_world_frame
     from truearm.jobs.import_circle import import_circle
+    from truearm.jobs.import_hand_eye import import_hand_eye
     from truearm.jobs.import_matrices import import_matrices
     from truearm.jobs.import_sockets import import_sockets
     from truearm.jobs.import_table import import_table
@@ -82,6 +83,7 @@ __all__ = [
     "hexapod_uncertainty",
     "hexapod_world_frame",
     "import_circle",
+    "import_hand_eye",
     "import_matrices",
     "import_sockets",
     "import_table",

@@ -56,6 +56,7 @@ def folder() -> Path:
         "import_matrices",
         "import_circle",
         "import_sockets",
+        "import_hand_eye",
         "tolerance",
         "compensate",
         "revert",

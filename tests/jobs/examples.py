@@ -87,6 +87,12 @@ def _sockets(folder: Path) -> Arguments:
     return {"file": _written(folder / "touches.csv", rows), "apart": "200mm,0.02mm", "ball": "25mm", "sigma": 2e-5}
 
 
+def _views(folder: Path) -> Arguments:
+    header = "configuration,joint_1 [deg],joint_2 [deg],x [mm],y [mm],z [mm],qw,qx,qy,qz,sigma [mm],sigma_rot [mrad]"
+    rows = "1,10,20,5,-3,400,1,0,0,0,0.05,0.2\n2,12,22,4,8,450,0.6,0.8,0,0,0.05,0.2\n"
+    return {"file": _written(folder / "views.csv", f"{header}\n{rows}"), "on_flange": "camera"}
+
+
 def _axis_runs(folder: Path) -> Path:
     """Runs in which one joint of a KR5 with joint errors moves at a time, in its own frame."""
     path = folder / "axes.csv"
@@ -171,6 +177,7 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
     "import_matrices": _matrices,
     "import_circle": _circle,
     "import_sockets": _sockets,
+    "import_hand_eye": _views,
     "import_ur_kinematics": lambda folder: {
         "file": _written(folder / "calibration.conf", UR10_CONF),
         "robot": "ur10",

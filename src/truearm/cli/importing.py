@@ -119,7 +119,7 @@ def sockets(
         ),
     ] = None,
 ) -> None:
-    """A ball on the flange that was put into two sockets: joint positions, and no instrument."""
+    """Joint positions of a ball on the flange that was put into two sockets, without any instrument."""
     from truearm.jobs.import_sockets import import_sockets
     from truearm.units import sized_si
 
@@ -131,6 +131,35 @@ def sockets(
         out=out,
     )
     print_record(imported)
+
+
+@app.command("hand-eye")
+def hand_eye(
+    file: Annotated[
+        Path, typer.Argument(metavar="VIEWS.csv", help="Joint positions, and poses or pictures of the board.")
+    ],
+    on_flange: Annotated[
+        str, typer.Option(metavar="camera|board", help="What moves with the robot; the other one stands beside it.")
+    ],
+    out: Annotated[Path, typer.Option("--out", metavar="DATA.csv", help="File to write.")],
+    board: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SQUARES,SIDE,MARKER,DICTIONARY",
+            help="The ChArUco board in the pictures: 14x10,25mm,18mm,5X5_250.",
+            show_default="the table holds poses",
+        ),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Poses of a board in a camera, one of them on the flange, or pictures that show it."""
+    from truearm.jobs.import_hand_eye import import_hand_eye
+
+    imported = import_hand_eye(file, on_flange=on_flange, board=board, out=out)  # type: ignore[arg-type]
+    if json:
+        print_json(imported.summary())
+    else:
+        print_record(imported)
 
 
 @app.command("ur-kinematics")

@@ -18,6 +18,7 @@ JOBS: Final = (
     "import_matrices",
     "import_circle",
     "import_sockets",
+    "import_hand_eye",
     "import_ur_kinematics",
     "check",
     "calibrate",

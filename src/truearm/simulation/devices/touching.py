@@ -1,4 +1,4 @@
-"""Closed loops: a probe that touches a plane or a sphere, a tip held at a point (Nubiola, section 1.2), a ball in sockets."""
+"""Closed loops: a probe on a plane or a sphere, a tip held at a point (Nubiola, section 1.2), a ball in sockets."""
 
 from __future__ import annotations
 

@@ -150,12 +150,25 @@ def hand_eye(
             show_default="the table holds poses",
         ),
     ] = None,
+    scale_sigma: Annotated[
+        float | None,
+        typer.Option(
+            metavar="PPM", help="How well the size of the board is known, a deviation.", show_default="taken as exact"
+        ),
+    ] = None,
     json: Json = False,
 ) -> None:
     """Poses of a board in a camera, one of them on the flange, or pictures that show it."""
     from truearm.jobs.import_hand_eye import import_hand_eye
+    from truearm.units import to_si
 
-    imported = import_hand_eye(file, on_flange=on_flange, board=board, out=out)  # type: ignore[arg-type]
+    imported = import_hand_eye(
+        file,
+        on_flange=on_flange,  # type: ignore[arg-type]
+        board=board,
+        scale_sigma=None if scale_sigma is None else to_si(scale_sigma, "ppm"),
+        out=out,
+    )
     if json:
         print_json(imported.summary())
     else:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
+from truearm.arrays import finite_number
 from truearm.errors import refusals_of, wrong_kind
 from truearm.files import path_argument
 from truearm.jobs.arguments import choice_argument, file_for
@@ -21,7 +23,12 @@ from truearm.writing import write_text
 
 
 def import_hand_eye(
-    file: str | Path, *, on_flange: OnFlange, board: str | None = None, out: str | Path | None = None
+    file: str | Path,
+    *,
+    on_flange: OnFlange,
+    board: str | None = None,
+    scale_sigma: float | None = None,
+    out: str | Path | None = None,
 ) -> ImportedHandEye:
     """Read where a camera saw a board, from poses or from pictures, as poses of what is on the flange.
 
@@ -36,6 +43,9 @@ def import_hand_eye(
     board
         The ChArUco board that the pictures show: ``14x10,25mm,18mm,5X5_250``, its squares, the sides of a square and of
         a marker, and the dictionary. None for poses.
+    scale_sigma
+        Standard deviation of how much longer than named the lengths on the board are, or of the poses' own scale: 2e-4
+        for 200 ppm. None takes them as exact.
     out
         Canonical CSV file to write; None writes nothing.
 
@@ -52,9 +62,11 @@ def import_hand_eye(
     with refusals_of("file"):
         pictures = pictures_named(table)
     refuse_wrong_place(pictures, board)
+    scale = None if scale_sigma is None else finite_number(scale_sigma, "scale_sigma", lowest=0.0)
     target = None if out is None else file_for(out, table, *pictures)
     with refusals_of("file"):
         read = read_hand_eye(table, on_flange, named)
+    data = replace(read.data, scale_sigma=scale)
     if target is not None:
-        write_text(target, csv_text(read.data))
-    return ImportedHandEye(read.data, on_flange, read.ahead, read.views.lens, target)
+        write_text(target, csv_text(data))
+    return ImportedHandEye(data, on_flange, read.ahead, read.views.lens, target)

@@ -18,7 +18,7 @@ from truearm.modeling.equilibrium import joints_in_equilibrium, postures_in_equi
 from truearm.modeling.fixtures import FixtureKind
 from truearm.modeling.frames import Frame, forward, jacobian
 from truearm.modeling.loads import joint_loads
-from truearm.modeling.parameters import Parameter
+from truearm.modeling.parameters import SCALE, SCALE_GROUP, Parameter
 from truearm.modeling.parts import Payload, checked_gravity
 from truearm.modeling.placing import fixtures_placed, placed
 from truearm.modeling.postures import Postures
@@ -144,6 +144,21 @@ class Robot(RobotData):
             What each fixture is and where it stands in the world, see :meth:`Fixture.values_at`.
         """
         return fixtures_placed(self, places)
+
+    def with_scale(self, deviation: float | None) -> Robot:
+        """Return the robot with the scale of an instrument beside it, or without any if that is exact.
+
+        Parameters
+        ----------
+        deviation
+            Standard deviation of how much longer than it reads the instrument's unit of length is; None for exact.
+        """
+        kept = {name: p for name, p in self.known.items() if name != SCALE}
+        if deviation is not None:
+            kept[SCALE] = Parameter.plain(SCALE, "1", SCALE_GROUP, 0.0, deviation)
+        other = replace(self, known=kept)
+        self.share(other, STRUCTURE)
+        return other
 
     # -- kinematics ----------------------------------------------------------------------------------------
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from truearm.errors import InputError
 from truearm.modeling.chain import Array, Element, ForwardKinematics
 from truearm.modeling.fixtures import Fixture
-from truearm.modeling.parameters import Group, Parameter, Unit, parameter
+from truearm.modeling.parameters import SCALE, Group, Parameter, Unit, parameter
 from truearm.modeling.parts import Target
 from truearm.modeling.postures import Postures
 
@@ -54,6 +54,8 @@ def all_parameters(robot: RobotData) -> Mapping[str, Parameter]:
         for element in (element for part in parts for element in part.chain.elements):
             if element.parameter is not None:
                 add(element.parameter, _unit(element), group_of, element.value)
+    if SCALE in robot.known:
+        found[SCALE] = robot.known[SCALE]
     return found
 
 

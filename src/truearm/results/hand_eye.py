@@ -56,6 +56,7 @@ class ImportedHandEye(Record):
         made: dict[str, Any] = {
             "configurations": self.data.configurations,
             "on_flange": self.on_flange,
+            "scale_sigma_ppm": None if self.data.scale_sigma is None else 1e6 * self.data.scale_sigma,
             "ahead_mm": 1e3 * self.ahead,
             "sigma_mm": None if self.sigma is None else 1e3 * self.sigma,
             "sigma_rot_mrad": None if self.sigma_rot is None else 1e3 * self.sigma_rot,
@@ -77,6 +78,10 @@ class ImportedHandEye(Record):
             text.append(f"  the target is a point on the camera's axis, {1e3 * self.ahead:.1f} mm before it")
         if self.sigma is not None and self.sigma_rot is not None:
             text.append(f"  deviations {1e3 * self.sigma:.3f} mm a coordinate, {1e3 * self.sigma_rot:.3f} mrad an axis")
+        if self.data.scale_sigma is None:
+            text.append("  the board's size is taken as exact")
+        else:
+            text.append(f"  the board's size is known to {1e6 * self.data.scale_sigma:.3g} ppm")
         if self.lens is not None:
             text.append(f"  corners are off by {self.lens.noise:.2f} px, {min(self.lens.corners)} or more a picture")
             for names, unit in _SHOWN:

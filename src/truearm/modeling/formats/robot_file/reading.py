@@ -14,7 +14,7 @@ from truearm.modeling.effects import EFFECTS, NON_NEGATIVE
 from truearm.modeling.fixtures import Fixture
 from truearm.modeling.formats.controller_entry import STATED
 from truearm.modeling.formats.robot_file.schema import JointEntry, ProofEntry, RobotFile
-from truearm.modeling.parameters import Parameter
+from truearm.modeling.parameters import SCALE, SCALE_GROUP, Parameter
 from truearm.modeling.parts import NO_PAYLOAD, Inertia, Joint, LinkMass, Payload, Target, Tool, Truth
 from truearm.modeling.proof import Proof
 from truearm.modeling.robot import Robot
@@ -143,6 +143,8 @@ def _with_values(robot: Robot, content: RobotFile, where: str) -> Robot:
     def known(name: str, entry: str) -> Parameter:
         if name in robot.parameters:
             return robot.parameters[name]
+        if name == SCALE:
+            return Parameter.plain(SCALE, "1", SCALE_GROUP, 0.0, 1.0)
         cure = did_you_mean(name, robot.parameters)
         for effect in EFFECTS:
             if name in [p.name for p in effect(robot.layout).parameters]:

@@ -57,7 +57,7 @@ def campaign(seed: int, sigma: float, newton: float = 5.0, count: int = 120) -> 
         joints={number: JointTruth(compliance=value) for number, value in SOFT.items()},
     )
     pressed: Arm = Pressed(twin, newton / np.sqrt(3) * rng.standard_normal((count, 3)))
-    placed = NOMINAL.with_frames(twin.robot.base, {"ball": np.array([0.02, 0.01, 0.15])})
+    placed = NOMINAL.with_frames(twin.robot.base, {"ball": (0.02, 0.01, 0.15)})
     return twin, DEVICE.campaign(placed, pressed, count, sigma, rng)
 
 

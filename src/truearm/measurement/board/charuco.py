@@ -12,12 +12,16 @@ from truearm.errors import InputError, did_you_mean
 from truearm.modeling.chain import Array
 from truearm.units import quantity_si
 
-#: Dictionaries of markers, as OpenCV names them behind ``DICT_``.
-DICTIONARIES: Final = (
-    *(f"{bits}X{bits}_{count}" for bits in (4, 5, 6, 7) for count in (50, 100, 250, 1000)),
-    "ARUCO_ORIGINAL",
-    *(f"APRILTAG_{name}" for name in ("16h5", "25h9", "36h10", "36h11")),
-)
+#: Dictionaries of markers, as OpenCV names them behind ``DICT_``, and how many markers each has.
+DICTIONARIES: Final[dict[str, int]] = {
+    f"{bits}X{bits}_{count}": count for bits in (4, 5, 6, 7) for count in (50, 100, 250, 1000)
+} | {
+    "ARUCO_ORIGINAL": 1024,
+    "APRILTAG_16h5": 30,
+    "APRILTAG_25h9": 35,
+    "APRILTAG_36h10": 2320,
+    "APRILTAG_36h11": 587,
+}
 _WHOLE: Final = "14x10,25mm,18mm,5X5_250"
 _MOST: Final = 100
 
@@ -81,6 +85,14 @@ class Charuco:
                 came=parts[3],
                 allowed=", ".join(DICTIONARIES),
                 cure=did_you_mean(dictionary, DICTIONARIES),
+            )
+        if columns * rows // 2 > DICTIONARIES[dictionary]:
+            raise InputError(
+                "the dictionary has fewer markers than the board",
+                parameter=parameter,
+                came=f"{columns * rows // 2} markers of {dictionary}",
+                allowed=f"{DICTIONARIES[dictionary]} or fewer",
+                cure="Correct the squares, or the dictionary.",
             )
         return cls(columns, rows, square, marker, dictionary)
 

@@ -88,22 +88,10 @@ def _image(cv2: Any, path: Path) -> Any:
     return image
 
 
-def _board(cv2: Any, board: Charuco, dictionary: str) -> Any:
-    markers = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, f"DICT_{dictionary}"))
-    return cv2.aruco.CharucoBoard((board.columns, board.rows), board.square, board.marker, markers)
-
-
 def _corners(cv2: Any, image: Any, board: Charuco, path: Path) -> Seen:
     """Return the corners that a picture shows [px], ``(k, 2)``, and where they are on the board [m], ``(k, 3)``."""
-    try:
-        made = _board(cv2, board, board.dictionary)
-    except cv2.error as error:
-        raise InputError(
-            "the dictionary has fewer markers than the board",
-            parameter="board",
-            came=f"{board.columns * board.rows // 2} markers, {board.dictionary}",
-            cure="Correct the squares, or the dictionary.",
-        ) from error
+    names = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, f"DICT_{board.dictionary}"))
+    made = cv2.aruco.CharucoBoard((board.columns, board.rows), board.square, board.marker, names)
     corners, numbers, _, markers = cv2.aruco.CharucoDetector(made).detectBoard(image)
     count = 0 if numbers is None else len(numbers)
     if count >= LEAST_CORNERS:

@@ -91,7 +91,7 @@ def configurations(cell: Cell, count: int, rng: np.random.Generator) -> Array:
         R = np.stack([x, np.cross(-out, x), -out], axis=2) @ rotation_from_vector(roll[:, None] * np.array([0, 0, 1.0]))
         board_from_camera = np.zeros((n, 4, 4))
         board_from_camera[:, :3, :3], board_from_camera[:, :3, 3], board_from_camera[:, 3, 3] = R, eye, 1.0
-        views = np.linalg.inv(board_from_camera)
+        views: Array = np.asarray(np.linalg.inv(board_from_camera), float)
         views = views[_inside(views, 60.0)][: 2 * count]
         goal = cell.beside @ (np.linalg.inv(views) if cell.on_flange == "camera" else views)
         flange = goal @ np.linalg.inv(_matrix(MOUNT))

@@ -101,7 +101,9 @@ def test_robot_mount_and_the_other_one_are_found_together(on_flange: str, seed: 
     assert fit.status is Status.CONVERGED
     assert fit.excess == 1.0  # the deviations are what the corners leave
     unseen, base = q[VIEWS:], product(fit.robot.base_elements, fit.robot)
-    other = without_gauge(np.linalg.inv(base), there.beside)  # in the base: what theta_1 and d_1 leave
+    other = without_gauge(
+        np.asarray(np.linalg.inv(base), float), there.beside
+    )  # in the base: what theta_1 and d_1 leave
     in_base = other @ frames(fit.robot, unseen, on_flange, read.ahead)
     assert errors(in_base, there.twin.frames(unseen)[on_flange])[0] < 0.2e-3
     assert errors(other[None], there.beside[None])[0] < 0.2e-3

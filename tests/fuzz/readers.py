@@ -21,8 +21,10 @@ from truearm.measurement.hexapod.sheet import read_sheet
 from truearm.measurement.hexapod.touches import read_touches
 from truearm.measurement.readers.canonical import csv_text, read_csv
 from truearm.measurement.readers.drawn_circles import Page, read_drawn_circles
+from truearm.measurement.readers.hand_eye import read_hand_eye
 from truearm.measurement.readers.matrices import read_matrices
 from truearm.measurement.readers.poses import read_poses
+from truearm.measurement.readers.sockets import Apart, read_sockets
 from truearm.measurement.readers.table import read_table
 from truearm.modeling.formats.dh_csv import complete_dh_csv, read_dh_csv
 from truearm.modeling.formats.robot_file import robot_text
@@ -133,6 +135,14 @@ READERS: Final[Mapping[str, Reader]] = {
         lambda folder: _dataset(
             read_drawn_circles({"a": Page(folder / "page.png", folder / "page.csv")}, 300.0, 2e-5), folder
         ),
+    ),
+    "sockets": Reader(
+        {"sockets.csv": "sockets.csv"},
+        lambda folder: _dataset(read_sockets(folder / "sockets.csv", Apart(0.2, 2e-5), 0.025, None), folder),
+    ),
+    "hand-eye": Reader(
+        {"views.csv": "views.csv"},
+        lambda folder: _dataset(read_hand_eye(folder / "views.csv", "camera", None).data, folder),
     ),
     "hexapod-sheet": Reader(
         {"sheet.csv": "sheet.csv"}, lambda folder: _dataset(read_sheet(folder / "sheet.csv").dataset(), folder)

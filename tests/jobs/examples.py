@@ -84,7 +84,7 @@ def _circle(folder: Path) -> Arguments:
 
 def _sockets(folder: Path) -> Arguments:
     rows = "configuration,joint_1 [deg],joint_2 [deg],socket\n1,10,20,left\n2,12,22,right\n3,15,25,left\n"
-    return {"file": _written(folder / "touches.csv", rows), "apart": "200mm,0.02mm", "ball": "25mm", "sigma": 2e-5}
+    return {"file": _written(folder / "sockets.csv", rows), "apart": "200mm,0.02mm", "ball": "25mm", "sigma": 2e-5}
 
 
 def _views(folder: Path) -> Arguments:

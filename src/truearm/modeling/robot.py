@@ -153,6 +153,8 @@ class Robot(RobotData):
         deviation
             Standard deviation of how much longer than it reads the instrument's unit of length is; None for exact.
         """
+        if deviation is None and SCALE not in self.known:
+            return self
         kept = {name: p for name, p in self.known.items() if name != SCALE}
         if deviation is not None:
             kept[SCALE] = Parameter.plain(SCALE, "1", SCALE_GROUP, 0.0, deviation)

@@ -22,6 +22,7 @@ from truearm.modeling.robot import Robot
 from truearm.simulation.twin_body import (
     Link,
     forces_of,
+    forces_on_tool,
     moved,
     product,
     second_moments,
@@ -81,12 +82,15 @@ class Posture:
     deflection
         What each joint leans about x and y and turns about, or slides along, z beyond its joint position ``(joints,
         3)``.
+    wrench
+        External force [N] and moment about the flange's origin [N m] on the flange, in base axes, ``(6,)``.
     """
 
     links: Array
     targets: Mapping[str, Array]
     loads: Array
     deflection: Array
+    wrench: Array
 
 
 @dataclass(frozen=True)
@@ -211,7 +215,10 @@ class Twin:
             frames.append(T[0])
             weights.append(weight(link.body, T, gravity))
         flange = T @ self._flange
-        carried = weight(self._payload, flange, gravity) + forces_of(wrench, flange[0, :3, 3])
+        pushed = forces_of(wrench, flange[0, :3, 3])
+        if self.robot.wrench is not None:
+            pushed = pushed + forces_on_tool(self.robot.wrench, flange[0], self._wrench_axes)
+        carried = weight(self._payload, flange, gravity) + pushed
         loads = []
         for axis, of_link in zip(reversed(axes), reversed(weights), strict=True):
             carried = carried + of_link
@@ -222,6 +229,7 @@ class Twin:
             targets={name: world @ place for name, place in self._targets.items()},
             loads=np.stack(loads[::-1]),
             deflection=deflection,
+            wrench=wrench_at(pushed, np.block([[np.eye(3), flange[0, :3, 3:]], [np.zeros((1, 3)), np.eye(1)]])),
         )
 
     def _links(self, warmer: float, cold: float) -> tuple[Link, ...]:
@@ -249,6 +257,14 @@ class Twin:
     @cached_property
     def _flange(self) -> Array:
         return product(self.robot.flange_elements, self.robot.values)
+
+    @cached_property
+    def _wrench_axes(self) -> Array:
+        """Axes in the base that a wrench is given in that does not turn with the tool, ``(3, 3)``."""
+        if self.robot.wrench is not None and self.robot.wrench.frame == "world":
+            return np.linalg.inv(self._base)[:3, :3]
+        controller = self.robot.wrench is not None and self.robot.wrench.frame == "controller"
+        return self.robot.controller.base.matrix[:3, :3] if controller else np.eye(3)
 
     @cached_property
     def _payload(self) -> Array:

@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from truearm.errors import InputError
 from truearm.modeling.controller import AS_THE_MODEL
 from truearm.modeling.formats.controller_entry import controller_entry
 from truearm.modeling.formats.entries import NAME, place_entry
@@ -20,7 +21,21 @@ from truearm.units import SHOWN_AS, written
 
 
 def robot_text(robot: Robot) -> str:
-    """Return the robot as the text of a robot file, in mm and degrees."""
+    """Return the robot as the text of a robot file, in mm and degrees.
+
+    Raises
+    ------
+    InputError
+        If something acts on its tool, which a robot file does not hold.
+    """
+    if robot.wrench is not None:
+        raise InputError(
+            "a robot file holds no external force",
+            parameter="robot",
+            where=robot.name,
+            came=robot.wrench.text,
+            cure="Take it away first: robot.with_wrench(None).",
+        )
     from ruamel.yaml import YAML
 
     yaml = YAML()
@@ -98,6 +113,8 @@ def file_content(robot: Robot) -> dict[str, Any]:
         ]
     if robot.payload != NO_PAYLOAD:
         content["payload"] = flow({"mass": robot.payload.mass, "cog": mm(robot.payload.cog)})
+    if robot.rated_load is not None:
+        content["rated_load"] = robot.rated_load
     if robot.gravity != GRAVITY:
         content["gravity"] = listed(list(robot.gravity))
     if robot.tools:
@@ -179,6 +196,8 @@ def _proof(
         units = ["deg" if joint.kind == "revolute" else "mm" for joint in robot.joints]
         made["region"] = [listed([written(v, u) for v in one]) for one, u in zip(proof.region, units, strict=True)]
         made["joint_error"] = listed([written(v, u) for v, u in zip(proof.joint_error, units, strict=True)])
+        if proof.loads:
+            made["loads"] = [listed([*one]) for one in proof.loads]
         made["deviations"] = flow(
             {
                 text(name): written(deviation, SHOWN_AS[robot.parameters[name].unit])

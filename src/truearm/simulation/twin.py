@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Final, TypedDict, Unpack
 
@@ -262,7 +262,7 @@ class Twin:
     def _wrench_axes(self) -> Array:
         """Axes in the base that a wrench is given in that does not turn with the tool, ``(3, 3)``."""
         if self.robot.wrench is not None and self.robot.wrench.frame == "world":
-            return np.linalg.inv(self._base)[:3, :3]
+            return np.asarray(self._base[:3, :3].T)
         controller = self.robot.wrench is not None and self.robot.wrench.frame == "controller"
         return self.robot.controller.base.matrix[:3, :3] if controller else np.eye(3)
 
@@ -326,6 +326,13 @@ def measure(
         temperature=conditions.get("temperature"),
         wrench=conditions.get("wrench"),
     )
+
+
+def with_wrench_read(twin: Twin, data: Dataset) -> Dataset:
+    """Return readings of a twin with what acted on its flange at each configuration, as a force sensor there says."""
+    given = {"approach": data.approach, "number": data.number, "temperature": data.temperature}
+    conditions: Conditions = {name: values for name, values in given.items() if values is not None}  # type: ignore[assignment]
+    return replace(data, wrench=np.array([at.wrench for at in twin.postures(data.joints, **conditions)]))
 
 
 def _shaped(what: str, values: Array, shape: tuple[int, ...]) -> Array:

@@ -96,7 +96,7 @@ def check_force(cases: Sequence[tuple[Robot, Array]]) -> list[Notice]:
 
 
 def _some(q: Array) -> Array:
-    return q[np.unique(np.linspace(0, len(q) - 1, min(len(q), _MOST)).astype(int))]
+    return np.asarray(q[np.unique(np.linspace(0, len(q) - 1, min(len(q), _MOST)).astype(int))])
 
 
 def _bending(robot: Robot, q: Array) -> _Bending:

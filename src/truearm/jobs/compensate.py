@@ -171,6 +171,13 @@ def compensate(
         )
     )
     arm = _with_controller(robot_argument(robot).with_payload(payload), controller_kinematics)
+    if arm.wrench is not None:
+        raise InputError(
+            "something acts on the tool of this robot already",
+            parameter="robot",
+            came=arm.wrench.text,
+            cure="Give it as `wrench`, and the robot without it.",
+        )
     accepted = accept_argument(accept, arm)
     invocation = command_argument(command) or python_call(
         "compensate",

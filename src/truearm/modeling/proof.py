@@ -17,7 +17,7 @@ from truearm.units import SHOWN_AS, from_si, to_si
 #: own deviation.
 _DIGITS: Final = 9
 _DECIMALS: Final = 7
-_LOAD_DIGITS: Final = 6
+_LOAD_DECIMALS: Final = 6
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ class Proof:
             ),
             lower_bound,
             tuple(warnings),
-            loads=tuple((float(f"{low:.{_LOAD_DIGITS}g}"), float(f"{high:.{_LOAD_DIGITS}g}")) for low, high in loads),
+            loads=tuple((round(low, _LOAD_DECIMALS) + 0.0, round(high, _LOAD_DECIMALS) + 0.0) for low, high in loads),
         )
 
     def summary(self) -> dict[str, Any]:

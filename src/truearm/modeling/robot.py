@@ -132,10 +132,10 @@ class Robot(RobotData):
             If there is no such target, the wrench is larger than the robot is rated for, or is given in axes of the
             controller that are not known.
         """
+        if not isinstance(wrench, Wrench | None):
+            raise wrong_kind("a wrench belongs here", wrench, "wrench", "a Wrench, or None")
         if wrench is None or not wrench.acts:
             return replace(self, wrench=None)
-        if not isinstance(wrench, Wrench):
-            raise wrong_kind("a wrench belongs here", wrench, "wrench", "a Wrench")
         if tool is not None:
             wrench = wrench.at(self.tool_place(tool) if isinstance(tool, str) else tool)
         if wrench.frame != "tool":

@@ -213,3 +213,21 @@ def refuse_above_rating(robot: Robot, wrench: Wrench, parameter: str = "wrench")
                 allowed=f"up to {most:.4g} {unit}, of a rated load of {robot.rated_load:g} kg",
                 cure=cure,
             )
+
+
+def refuse_pushed(robot: Robot) -> None:
+    """Refuse to write a robot on whose tool something acts: no file would hold that.
+
+    Raises
+    ------
+    InputError
+        If there is anything.
+    """
+    if robot.wrench is not None:
+        raise InputError(
+            "no file of a robot holds an external force",
+            parameter="robot",
+            where=robot.name,
+            came=robot.wrench.text,
+            cure="Take it away first: robot.with_wrench(None).",
+        )

@@ -7,7 +7,6 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from truearm.errors import InputError
 from truearm.modeling.controller import AS_THE_MODEL
 from truearm.modeling.formats.controller_entry import controller_entry
 from truearm.modeling.formats.entries import NAME, place_entry
@@ -17,6 +16,7 @@ from truearm.modeling.parts import GRAVITY, NO_PAYLOAD, Joint
 from truearm.modeling.proof import Proof
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
+from truearm.modeling.wrench import refuse_pushed
 from truearm.units import SHOWN_AS, written
 
 
@@ -28,14 +28,7 @@ def robot_text(robot: Robot) -> str:
     InputError
         If something acts on its tool, which a robot file does not hold.
     """
-    if robot.wrench is not None:
-        raise InputError(
-            "a robot file holds no external force",
-            parameter="robot",
-            where=robot.name,
-            came=robot.wrench.text,
-            cure="Take it away first: robot.with_wrench(None).",
-        )
+    refuse_pushed(robot)
     from ruamel.yaml import YAML
 
     yaml = YAML()

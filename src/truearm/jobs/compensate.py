@@ -30,7 +30,7 @@ from truearm.compensation.program_correction import CorrectedPrograms, corrected
 from truearm.compensation.program_files import edited, language_called, program_files, read_programs
 from truearm.compensation.programs.program import Edit
 from truearm.compensation.split import ProgramSplit, check_tolerance, split_program
-from truearm.errors import InputError, refusals_of
+from truearm.errors import InputError, refusals_at, refusals_of
 from truearm.files import path_argument
 from truearm.identification.judging.external_force import check_force
 from truearm.identification.judging.payload import check_payload
@@ -205,7 +205,7 @@ def compensate(
     with refusals_of("frames"):
         frames_given = read_frames(arm, frame_file)
     cell = Cell(tools_given, frames_given)
-    acting = _wrenches(pushed, wrench_file)
+    acting = _wrenches(arm, pushed, wrench_file)
     for path, parameter in ((tool_file, "tools"), (frame_file, "frames")):
         if path != wrench_file:
             refuse_wrenches_left_out(path, parameter)
@@ -276,12 +276,16 @@ def _wrench_file(wrench: object) -> Path | None:
     return path_argument(wrench, "wrench") if named or isinstance(wrench, Path) else None
 
 
-def _wrenches(pushed: Wrench | None, file: Path | None) -> tuple[TargetWrench, ...]:
+def _wrenches(arm: Robot, pushed: Wrench | None, file: Path | None) -> tuple[TargetWrench, ...]:
     """Return what acts on the tool, and where: at every target, or as a file says."""
     if file is None:
         return () if pushed is None else (TargetWrench((), (), pushed),)
     with refusals_of("wrench"):
-        return read_wrenches(file)
+        acting = read_wrenches(file)
+        for one in acting:
+            with refusals_at(one.where):
+                arm.with_wrench(one.wrench)
+    return acting
 
 
 def _payloads_unlikely(arm: Robot, result: CorrectedPrograms) -> list[Notice]:

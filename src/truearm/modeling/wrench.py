@@ -206,9 +206,8 @@ def refuse_above_rating(robot: Robot, wrench: Wrench, parameter: str = "wrench")
     ):
         if came > most * (1.0 + 1e-9):
             raise InputError(
-                f"the {what} is larger than the robot is rated for",
+                f"the {what} is larger than {robot.name} is rated for",
                 parameter=parameter,
-                where=robot.name,
                 came=f"{came:.4g} {unit}",
                 allowed=f"up to {most:.4g} {unit}, of a rated load of {robot.rated_load:g} kg",
                 cure=cure,

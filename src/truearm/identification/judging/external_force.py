@@ -181,10 +181,10 @@ def _unseen(robot: Robot, bent: Sequence[_Bending]) -> list[Notice]:
     return [
         Notice(
             "compliance-unseen",
-            f"The force leans on what the calibration's data did not determine: {words}{more}, each with how uncertain "
-            f"the tip is by it (standard deviation).{on_joints} Gravity does not load a joint whose axis is upright. "
-            "Measure with a force across it as well (columns force_x to moment_z), or with the robot mounted another "
-            "way, and calibrate again.",
+            f"The force leans on what the calibration's data did not determine: {words}{more}; so uncertain is the tip "
+            f"by it (standard deviation).{on_joints} Gravity does not load a joint whose axis is upright. Measure with "
+            "a force across it as well (columns force_x to moment_z), or with the robot mounted another way, and "
+            "calibrate again.",
         )
     ]
 

@@ -201,11 +201,11 @@ def pushed_at_argument(robot: Robot, wrench: Wrench | None, at: object) -> Robot
             allowed=", ".join([*names, FLANGE]),
             cure="Name the target that is the tool's point, or the flange.",
         )
-    place = None
-    if at is not None and at != FLANGE:
-        place = choice_argument(at, "wrench_at", {name: name for name in [*names, FLANGE]}, "target")
-    elif at is None and names:
-        place = names[0]
+    if at is None:
+        place = names[0] if names else None
+    else:
+        known: dict[str, str | None] = {**{name: name for name in names}, FLANGE: None}
+        place = choice_argument(at, "wrench_at", known, "target")
     return robot.with_wrench(wrench, robot.tool_place(place))
 
 

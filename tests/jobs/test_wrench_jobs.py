@@ -129,6 +129,7 @@ def test_what_is_simulated_under_a_force_says_so(campaign: tuple[Twin, Robot], d
     assert free.wrench is None
     np.testing.assert_allclose(np.linalg.norm(data.wrench[:, :3], axis=1), 8.0)
     told = truearm.validate(robot, data)
+    assert "force-taken" in codes(told)
     assert told.position is not None
     assert told.position.max < 1e-9
     bare = replace(data, wrench=None)
@@ -185,7 +186,7 @@ def test_data_that_say_the_force_are_told_no_other(campaign: tuple[Twin, Robot])
 def test_one_target_is_where_the_force_acts(campaign: tuple[Twin, Robot]) -> None:
     _, robot = campaign
     one = robot.with_frames(robot.base, {"tip": (0.0, 0.0, 0.12)})
-    given = {"truth": one, "poses": 3, "noise": 0.0, "wrench": TEXT}
+    given: dict[str, Any] = {"truth": one, "poses": 3, "noise": 0.0, "wrench": TEXT}
     plain, named = (truearm.simulate(one, **given, wrench_at=at).data for at in (None, "tip"))
     np.testing.assert_array_equal(plain.position, named.position)
 
@@ -219,7 +220,7 @@ def test_a_file_says_what_acts_where(cell: Path) -> None:
     words = ["compensate", str(cell / "calibrated.yaml"), str(cell / "plate.mod"), "--out", str(cell / "out")]
     run = CliRunner().invoke(app, [*words, "--tool", str(file), "--wrench", str(file), "--json"])
     assert "force-taken" in {notice["code"] for notice in json.loads(run.output)["warnings"]}
-    said = (
+    said: tuple[tuple[list[str], str], ...] = (
         ([], str(file) + ": the file has wrenches, and nothing takes them. Give the file as --wrench"),
         (["--wrench", str(file), "--wrench-frame", "tool"], "--wrench-frame: the file says the frame of each force"),
         (["--wrench", str(cell / "no.yaml")], "there is no such file"),

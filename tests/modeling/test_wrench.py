@@ -60,7 +60,9 @@ def test_a_text_is_in_newtons_or_in_the_units_it_says(
     text: str, force: tuple[float, ...], moment: tuple[float, ...]
 ) -> None:
     read = Wrench.of(text, "tool")
-    assert (read.force, read.moment, read.frame) == (pytest.approx(force), pytest.approx(moment), "tool")
+    assert read.force == pytest.approx(force)
+    assert read.moment == pytest.approx(moment)
+    assert read.frame == "tool"
     assert Wrench.of(read.text, "tool") == read
     assert Wrench.of([*force, *moment]) == replace(read, frame="base")
 

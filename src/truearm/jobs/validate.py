@@ -123,7 +123,7 @@ def validate(
         *changed,
         *mistaken,
         *check_payload(robot),
-        *check_force([(robot, data.joints)]),
+        *check_force([(robot, data.postures)]),
         *_seen_in_training(robot, data, digest),
     )
     return Validation(data.source, errors, warnings, found, notes)

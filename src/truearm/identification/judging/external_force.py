@@ -9,7 +9,7 @@ deviations that the calibration found, the difference says how well the bending 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -17,7 +17,9 @@ import numpy as np
 from truearm.modeling.chain import Array
 from truearm.modeling.equilibrium import joint_efforts
 from truearm.modeling.parameters import Parameter
+from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
+from truearm.modeling.transform import IDENTITY
 from truearm.modeling.wrench import STANDARD_GRAVITY
 from truearm.notices import Notice
 
@@ -58,21 +60,20 @@ class _Bending:
     rigid: bool
 
 
-def check_force(cases: Sequence[tuple[Robot, Array]]) -> list[Notice]:
-    """Return what is to be said of forces at the tool.
+def check_force(cases: Sequence[tuple[Robot, Array | Postures]]) -> list[Notice]:
+    """Return what is to be said of forces at the tool, or at the flange.
 
     Parameters
     ----------
     cases
-        Robots, with what acts on their tools, and the joint positions ``(n, joints)`` at which it does; those where
-        nothing acts are left out. They are one robot with several forces.
+        Robots, with what acts on their tools, and the joint positions ``(n, joints)``, or postures with what acts on
+        the flange, at which it does; those where nothing acts are left out. They are one robot with several forces.
     """
-    acting = [(robot, q[np.isfinite(q).all(axis=1)]) for robot, q in cases if robot.wrench is not None]
-    acting = [(robot, q) for robot, q in acting if len(q)]
+    acting = [(robot, at) for robot, q in cases if len(at := _some(Postures.of(q))) and _pushed(robot, at)]
     if not acting:
         return []
     robot = acting[0][0]
-    bent = [_bending(arm, _some(q)) for arm, q in acting]
+    bent = [_bending(arm, at) for arm, at in acting]
     made = [*_rated([arm for arm, _ in acting])]
     if all(one.rigid for one in bent):
         return [
@@ -95,15 +96,22 @@ def check_force(cases: Sequence[tuple[Robot, Array]]) -> list[Notice]:
     return [*_unseen(robot, bent), *_beyond(robot, bent), *made]
 
 
-def _some(q: Array) -> Array:
-    return np.asarray(q[np.unique(np.linspace(0, len(q) - 1, min(len(q), _MOST)).astype(int))])
+def _pushed(robot: Robot, at: Postures) -> bool:
+    return robot.wrench is not None or (at.wrench is not None and bool(at.wrench.any()))
 
 
-def _bending(robot: Robot, q: Array) -> _Bending:
-    free = robot.with_wrench(None)
-    with_force, without = joint_efforts(robot, q), joint_efforts(free, q)
-    tip = np.array([] if robot.wrench is None else robot.wrench.tool.translation)
-    (places, by_parameter), (before, before_by) = (_tips(one, q, tip) for one in (robot, free))
+def _some(at: Postures) -> Postures:
+    known = np.flatnonzero(np.isfinite(at.joints).all(axis=1))
+    evenly = np.linspace(0, len(known) - 1, min(len(known), _MOST)).astype(int)
+    return at.at(known[np.unique(evenly)])
+
+
+def _bending(robot: Robot, at: Postures) -> _Bending:
+    at = robot.loaded(at)
+    free, at_rest = robot.with_wrench(None), replace(at, wrench=None, loads=None)
+    with_force, without = joint_efforts(robot, at), joint_efforts(free, at_rest)
+    tip = np.array(IDENTITY.translation if robot.wrench is None else robot.wrench.tool.translation)
+    (places, by_parameter), (before, before_by) = (_tips(*one, tip) for one in ((robot, at), (free, at_rest)))
     moved = float(np.linalg.norm(places - before, axis=1).max())
     change = by_parameter - before_by
     names = [p.name for p in _elastic(robot)]
@@ -129,7 +137,7 @@ def _bending(robot: Robot, q: Array) -> _Bending:
         uncertain,
         dict(sorted(unseen.items(), key=lambda item: -item[1])),
         loaded,
-        _loaded_beyond(robot, q, tip, with_force),
+        _loaded_beyond(robot, at, tip, with_force),
         rigid=not names and bool(loaded.any()),
     )
 
@@ -139,7 +147,7 @@ def _elastic(robot: Robot) -> list[Parameter]:
     return [parameter for effect in robot.effects if effect.loaded for parameter in effect.parameters]
 
 
-def _tips(robot: Robot, q: Array, tip: Array) -> tuple[Array, Array]:
+def _tips(robot: Robot, q: Postures, tip: Array) -> tuple[Array, Array]:
     """Return tips ``(n, 3)``, and how they follow the elastic parameters ``(parameters, 3, n)``, in the world."""
     at = robot.loaded(q)
     kinematics = robot.forward_kinematics(at)
@@ -148,7 +156,7 @@ def _tips(robot: Robot, q: Array, tip: Array) -> tuple[Array, Array]:
     return kinematics.position.T + arm, linear + np.cross(angular, arm.T[None], axis=1)
 
 
-def _loaded_beyond(robot: Robot, q: Array, tip: Array, efforts: Array) -> dict[int, float]:
+def _loaded_beyond(robot: Robot, q: Postures, tip: Array, efforts: Array) -> dict[int, float]:
     """Return the loads beyond those of the calibration by so much that the tip follows [N m or N], by joint."""
     if robot.proof is None or not robot.proof.loads:
         return {}
@@ -218,7 +226,10 @@ def _load(robot: Robot, joint: int, load: float) -> str:
 
 
 def _rated(arms: Sequence[Robot]) -> list[Notice]:
-    """Say if what is carried and pushed is more than the arm is rated for, or if nobody knows."""
+    """Say if what is carried and pushed is more than the arm is rated for, or if nobody knows; measured it was."""
+    arms = [arm for arm in arms if arm.wrench is not None]
+    if not arms:
+        return []
     robot = arms[0]
     if robot.rated_load is None:
         return [

@@ -169,3 +169,14 @@ def test_names_that_fit_nothing_or_twice_are_refused(tmp_path: Path, entries: st
         wrenches_of_targets([plate(original())], read(tmp_path, entries))
     assert said in str(refusal.value)
     assert "cell.yaml, wrenches[" in str(refusal.value)
+
+
+def test_too_many_different_forces_are_refused(
+    campaign: tuple[Twin, Calibration], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Every one is another robot, and takes a tenth of a second."""
+    monkeypatch.setenv("TRUEARM_LIMITS", "wrenches=1")
+    one, other = (TargetWrench((name,), (), Wrench((0.0, y, 0.0))) for name, y in (("pHole1", 5.0), ("pHole2", 6.0)))
+    assert with_forces(campaign, (one,)).pushed
+    with pytest.raises(InputError, match="there are too many different forces for one run; got '2 forces'"):
+        with_forces(campaign, (one, other))

@@ -26,6 +26,7 @@ from truearm.compensation.resolved_program import Between, ResolvedProgram
 from truearm.compensation.target_wrenches import wrenches_of_targets
 from truearm.compensation.tool_loads import arms_of_tools, loads_of_tools
 from truearm.errors import InputError
+from truearm.limits import refuse_beyond
 from truearm.modeling.chain import Array
 from truearm.modeling.formats.robot_file import arm_is_known
 from truearm.modeling.parts import Payload
@@ -157,6 +158,7 @@ def corrected_programs(
         ResolvedProgram(robot, nominal, program, cell, arms, staying, at_targets, flange)
         for program, staying, at_targets in zip(programs, kept, acting, strict=True)
     ]
+    refuse_beyond("wrenches", sum(one.forces for one in resolved), parameter="wrench")
     names = tuple(dict.fromkeys(name for one in resolved for name in one.frames))
     if frames == "identified":
         # What is given by joints stays where it is to the first frame that was measured.

@@ -97,13 +97,12 @@ class ResolvedProgram:
         self._base = Places(program, cell.frames, "frame", controller.base.matrix)
         self._tool = Places(program, cell.tools, "tool", controller.flange.matrix)
         carried = [by_tool.get(target.tool, robot) for target in targets]
+        pushed = carried
         if wrenches is not None:
-            carried = self._pushed(carried, wrenches, np.eye(4) if flange is None else flange)
-        self._arms = tuple({id(arm): arm for arm in carried}.values())
+            pushed = self._pushed(carried, wrenches, np.eye(4) if flange is None else flange)
+        self._arms, self._arm = _each_once(pushed)
         #: The same without what acts on the tool: bases are found by what the arm does at rest.
-        self._free_arms = tuple(arm if arm.wrench is None else arm.with_wrench(None) for arm in self._arms)
-        number = {id(arm): index for index, arm in enumerate(self._arms)}
-        self._arm: NDArray[np.intp] = np.array([number[id(arm)] for arm in carried], dtype=np.intp)
+        self._free_arms, self._free_arm = _each_once(carried)
         known = joints_of(nominal, program)
         self._joints_given: NDArray[np.bool_] = np.asarray(~np.isnan(known).any(axis=1))
         poses = poses_of(program)
@@ -146,6 +145,11 @@ class ResolvedProgram:
             made.append(known[key])
         return made
 
+    @property
+    def forces(self) -> int:
+        """How many robots with something that acts on their tools there are."""
+        return sum(arm.wrench is not None for arm in self._arms)
+
     def pushed(self, correction: Correction) -> list[tuple[Robot, Array]]:
         """Return the robots on whose tool something acts, and the joint positions ``(n, joints)`` at which it does."""
         some = [(arm, correction.corrected & (self._arm == number)) for number, arm in enumerate(self._arms)]
@@ -181,7 +185,7 @@ class ResolvedProgram:
         """Return tips of targets in the controller's base frame, before and after correction, where found."""
         if not len(rows):
             return np.zeros((0, 4, 4)), np.zeros((0, 4, 4))
-        found = self._found(rows, base, flange, self._free_arms)
+        found = self._found(rows, base, flange, pushed=False)
         good = found.solutions.usable
         tips = self._base.nominal[rows] @ self._poses[rows]
         return tips[good], (found.flange @ self._tool.nominal[rows])[good]
@@ -197,7 +201,7 @@ class ResolvedProgram:
             if row not in self._kept:
                 reasons[row] = self._why_not(row)
         if len(rows):
-            found = self._found(rows, base, flange, self._arms)
+            found = self._found(rows, base, flange)
             joints[rows] = found.joints
             for at, row in enumerate(rows.tolist()):
                 if not found.solutions.status[at].usable:
@@ -286,10 +290,11 @@ class ResolvedProgram:
         fakes = np.linalg.inv(self._base.nominal[rows]) @ found.flange @ self._tool.nominal[rows]
         return fakes, found.solutions.usable
 
-    def _found(self, rows: NDArray[np.intp], base: Shift, flange: Array, arms: tuple[Robot, ...]) -> FakeTargets:
+    def _found(self, rows: NDArray[np.intp], base: Shift, flange: Array, *, pushed: bool = True) -> FakeTargets:
         poses = self._meant(base, flange)
         wanted = self._base.real(rows, base) @ poses[rows] @ np.linalg.inv(self._tool.real(rows, flange))
-        return fake_targets_of(arms, self._arm[rows], wanted, self._resolved.joints[rows])
+        arms, arm = (self._arms, self._arm) if pushed else (self._free_arms, self._free_arm)
+        return fake_targets_of(arms, arm[rows], wanted, self._resolved.joints[rows])
 
     def _first(self, row: int) -> int:
         """Return the target that the offsets up to this one begin at."""
@@ -364,6 +369,13 @@ class ResolvedProgram:
                 groups.setdefault(configuration, []).append(row)
         for configuration, members in groups.items():
             yield configuration, np.array(members)
+
+
+def _each_once(arms: Sequence[Robot]) -> tuple[tuple[Robot, ...], NDArray[np.intp]]:
+    """Return robots each once, and which of them each is."""
+    once = tuple({id(arm): arm for arm in arms}.values())
+    number = {id(arm): index for index, arm in enumerate(once)}
+    return once, np.array([number[id(arm)] for arm in arms], dtype=np.intp)
 
 
 def _reason(found: FakeTargets, at: int) -> str:

@@ -11,6 +11,7 @@ from truearm.identification.judging.external_force import check_force
 from truearm.jobs.calibrate import calibrate
 from truearm.library import load_robot
 from truearm.modeling.robot import Robot
+from truearm.modeling.transform import Transform
 from truearm.modeling.wrench import Wrench
 from truearm.notices import Notice
 from truearm.simulation.truths import truth_twin
@@ -101,6 +102,16 @@ def test_the_rated_load_counts_payload_and_force(by_force: Robot) -> None:
     assert "make up to 33.6 N, and irb120 is rated for 29.4 N (3 kg)" in told["rated-load-exceeded"].message
     unknown = said(replace(by_force, rated_load=None))
     assert unknown["rating-unknown"].level == "note"
+
+
+def test_another_base_of_the_controller_is_told(by_force: Robot) -> None:
+    base = Transform((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+    turned = replace(by_force, controller=replace(by_force.controller, base=base))
+    told = said(turned)["force-in-model-base"]
+    assert told.level == "warning"
+    assert "`wrench_frame=controller`" in told.message
+    assert "force-in-model-base" not in said(turned, Wrench((0.0, -14.0, 0.0), frame="controller"))
+    assert "force-in-model-base" not in said(by_force)
 
 
 def test_nothing_is_said_where_nothing_acts(by_force: Robot) -> None:

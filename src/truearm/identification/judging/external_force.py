@@ -74,7 +74,7 @@ def check_force(cases: Sequence[tuple[Robot, Array | Postures]]) -> list[Notice]
         return []
     robot = acting[0][0]
     bent = [_bending(arm, at) for arm, at in acting]
-    made = [*_rated([arm for arm, _ in acting])]
+    made = [*_turned([arm for arm, _ in acting]), *_rated([arm for arm, _ in acting])]
     if all(one.rigid for one in bent):
         return [
             Notice(
@@ -223,6 +223,21 @@ def _beyond(robot: Robot, bent: Sequence[_Bending]) -> list[Notice]:
 def _load(robot: Robot, joint: int, load: float) -> str:
     unit = "N m" if robot.joints[joint].kind == "revolute" else "N"
     return f"{robot.joints[joint].name} with {load:.3g} {unit}"
+
+
+def _turned(arms: Sequence[Robot]) -> list[Notice]:
+    """Say if a force was taken in the model's base frame, and the controller's has other axes."""
+    own = arms[0].controller.base.quaternion == IDENTITY.quaternion
+    if own or not any(arm.wrench is not None and arm.wrench.frame == "base" for arm in arms):
+        return []
+    return [
+        Notice(
+            "force-in-model-base",
+            "The force was taken in the axes of the model's base frame, and the base of the controller is turned "
+            "against it ('truearm show' says how): for a force in the axes of the pendant use "
+            "`wrench_frame=controller`.",
+        )
+    ]
 
 
 def _rated(arms: Sequence[Robot]) -> list[Notice]:

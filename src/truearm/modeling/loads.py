@@ -52,11 +52,11 @@ def joint_loads(
     acceleration: Array | None = None,
     wrench: Array | None = None,
 ) -> Array:
-    """Return force [N] and moment [N m] of the load at every joint, about its origin and in its own axes.
+    """Return force [N] and moment [N m] of the load at every joint, about its bearing and in its own axes.
 
-    A joint's own axes are those of :func:`truearm.modeling.chain.across` and its axis as z, and its origin is that of
-    the frame right behind it: behind the turn, or the slide of a prismatic joint. The place of the base in the world
-    does not matter, because gravity is given in the base frame.
+    A joint's own axes are those of :func:`truearm.modeling.chain.across` and its axis as z. Its bearing lies on the
+    axis, see :mod:`truearm.modeling.bearings`; of a prismatic joint it is the origin of the frame behind the slide. The
+    place of the base in the world does not matter, because gravity is given in the base frame.
 
     Parameters
     ----------
@@ -93,7 +93,10 @@ def joint_loads(
     elements = robot.arm.elements
     moves = robot.arm.forward_kinematics(variables, robot.values).moves
     ends = [0, *accumulate(len(link) for link in robot.moved_links)]
-    bodies = [(ends[link.joint], link.mass, link.cog, link.inertia) for link in robot.masses]
+    stayed = robot.axial_slides.stayed
+    bodies = [
+        (ends[link.joint], link.mass, stayed(link.joint, link.cog, robot.values), link.inertia) for link in robot.masses
+    ]
     bodies.append((len(elements), robot.payload.mass, robot.payload.cog, POINT_MASS))
     bodies = [(end, mass, cog, inertia) for end, mass, cog, inertia in bodies if mass or any(inertia)]
     moving = velocity is not None or acceleration is not None
@@ -133,6 +136,7 @@ def joint_loads(
                 applied.setdefault(place, []).append((pull, turn))
 
     loads = np.empty((count, 6, size))
+    bearings = robot.bearings
     for place in range(len(elements), 0, -1):
         element, move = elements[place - 1], moves[place - 1]
         for pull, turn in applied.get(place, ()):
@@ -141,6 +145,11 @@ def joint_loads(
             for k, axis in enumerate((*across(element), axis_of(element))):
                 loads[element.variable, k] = _along(axis, force)
                 loads[element.variable, 3 + k] = _along(axis, moment)
+            away = bearings[element.variable]
+            if away:
+                x, y = loads[element.variable, :2]
+                loads[element.variable, 3] += away * y
+                loads[element.variable, 4] -= away * x
         if move and element.turns:
             force, moment = in_frame_before(force, element, move), in_frame_before(moment, element, move)
         elif move:

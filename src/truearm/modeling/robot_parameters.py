@@ -86,6 +86,9 @@ def by_parameters(
         From :func:`effect_rates`.
     """
     derivative = by_elements([kinematics.places.get(name) for name in names])
+    for i, name in enumerate(names):
+        for place, factor in robot.offset_elements.get(name, ()):
+            derivative[i] += factor * by_elements([place])[0]
     if rates:
         needed = sorted({variable for rate in rates.values() for variable in rate})
         by_variable = dict(zip(needed, by_elements([robot.moving[v] for v in needed]), strict=True))

@@ -48,7 +48,9 @@ class RobotDescription(Record):
             }
             unit = "deg" if joint.kind == "revolute" else "mm"
             limits = [from_si(v, unit) for v in joint.limits] if joint.limits else None
-            joints.append({"name": joint.name, "type": joint.kind, "values": values, "limits": limits})
+            bearing = None if joint.bearing is None else written(joint.bearing, "mm")
+            made = {"name": joint.name, "type": joint.kind, "values": values, "limits": limits, "bearing": bearing}
+            joints.append(made)
         return {
             "name": robot.name,
             "title": robot.title,
@@ -84,7 +86,8 @@ class RobotDescription(Record):
         for joint in content["joints"]:
             row = "  ".join(f"{name} {value:g}" for name, value in joint["values"].items())
             limits = "  limits {:g} to {:g}".format(*joint["limits"]) if joint["limits"] else ""
-            text.append(f"  {joint['name']} ({joint['type']})  {row}{limits}")
+            bearing = "" if joint["bearing"] is None else f"  bearing at {joint['bearing']:g}"
+            text.append(f"  {joint['name']} ({joint['type']})  {row}{limits}{bearing}")
         x, y, z = content["flange_at_zero_mm"]
         text.append(f"Flange at zero joint positions, from the base: x {x:.3f}  y {y:.3f}  z {z:.3f} mm")
         if content["masses_kg"]:

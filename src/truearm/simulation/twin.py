@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Final, TypedDict, Unpack
 
@@ -30,6 +30,7 @@ from truearm.simulation.twin_body import (
     wrench_at,
 )
 from truearm.simulation.twin_joint import PERFECT, Contact, JointTruth
+from truearm.simulation.twin_slides import carried, directions_at
 
 #: Where every length is what its parameter says [degC].
 REFERENCE_TEMPERATURE: Final = 20.0
@@ -76,7 +77,7 @@ class Posture:
     loads
         Force [N] and moment [N m] ``(joints, 6)`` that everything beyond a joint puts on it: weight, inertia and the
         wrench on the flange. Its sign is the load's: a compliant joint gives way in its direction. It is taken about
-        the joint's origin in the joint's axes: z along the joint, x and y of the frame right behind its own element
+        the joint's bearing in the joint's axes: z along the joint, x and y of the frame right behind its own element
         (of Rz(theta) for DH), before the tilt; joints that are not about their frame's z have some x and y across it.
     deflection
         What each joint leans about x and y and turns about, or slides along, z beyond its joint position ``(joints,
@@ -207,7 +208,9 @@ class Twin:
         ):
             T = moved(T, link, q + gamma, qd, qdd)
             axes.append(T[0] @ link.axes)
-            T = T @ tilt(alpha, beta) @ link.after if alpha or beta else T @ link.after
+            if alpha or beta:
+                T = T @ link.axes @ tilt(alpha, beta) @ np.linalg.inv(link.axes)
+            T = T @ link.after
             frames.append(T[0])
             weights.append(weight(link.body, T, gravity))
         flange = T @ self._flange
@@ -235,8 +238,28 @@ class Twin:
         )
 
     def _link(self, number: int, growth: float) -> Link:
-        masses = [mass for mass in self.robot.masses if mass.joint == number]
-        return Link.made_of(self.robot.link_elements[number - 1], self.robot.values, growth, masses)
+        links, values = self.robot.link_elements, self.robot.values
+        every = [element for link in links for element in link]
+        before = sum(len(link) for link in links[: number - 1])
+        turning = before + next(i for i, element in enumerate(links[number - 1]) if element.variable is not None)
+        joint, bearing = every[turning], 0.0
+        if joint.turns:
+            along = np.array(joint.axis) if joint.axis else np.eye(3)["xyz".index(joint.motion[1])]
+            bearing = (self.robot.joints[number - 1].bearing or 0.0) - carried(every, turning, along, values)
+        masses = [
+            replace(mass, cog=self._stayed(number, mass.cog)) for mass in self.robot.masses if mass.joint == number
+        ]
+        return Link.made_of(links[number - 1], values, growth, masses, bearing)
+
+    def _stayed(self, number: int, point: tuple[float, float, float]) -> tuple[float, float, float]:
+        """Return a point of a link given with nominal slides, in the link's frame."""
+        links = self.robot.link_elements
+        every, end = [element for link in links for element in link], sum(len(link) for link in links[:number])
+        place = np.array(point)
+        for along in directions_at(every, end):
+            place = place - carried(every, end, along, self.robot.values) * along
+        x, y, z = (float(v) for v in place)
+        return x, y, z
 
     @cached_property
     def _plain(self) -> tuple[Link, ...]:

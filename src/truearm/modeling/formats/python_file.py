@@ -106,22 +106,25 @@ def _constants(robot: Robot) -> dict[str, str]:
 
 
 def _bodies(robot: Robot) -> tuple[list[tuple[Row, Row]], list[tuple[int, float, Row]]]:
-    """Return the places of joints and flange, every joint along z, and the masses of the links in these frames."""
+    """Return the places of joints and flange, every joint along z from its bearing, and the masses in these frames."""
     origins, behind = collapsed(robot)
-    turned = []  # from the axis and its own x and y to those of the convention
-    for link in robot.link_elements:
+    turned = []  # from the axis and its own x and y, at the bearing, to those of the convention
+    for link, bearing in zip(robot.link_elements, robot.bearings, strict=True):
         moving = next(element for element in link if element.variable is not None)
         axes = np.eye(4)
         axes[:3, :3] = np.transpose([*across(moving), axis_of(moving)])
+        axes[:3, 3] = bearing * np.array(axis_of(moving))
         turned.append(axes)
-    before = [np.eye(4), *(axes.T for axes in turned)]
+    inverses = [np.linalg.inv(axes) for axes in turned]
+    before = [np.eye(4), *inverses]
     places = [
         _place(start @ origin @ end) for start, origin, end in zip(before, origins, [*turned, np.eye(4)], strict=True)
     ]
     masses = []
     for mass in robot.masses:
         if mass.mass:
-            cog = turned[mass.joint - 1].T @ behind[mass.joint - 1] @ [*mass.cog, 1.0]
+            centre = robot.axial_slides.stayed(mass.joint, mass.cog, robot.values)
+            cog = inverses[mass.joint - 1] @ behind[mass.joint - 1] @ [*centre, 1.0]
             masses.append((mass.joint - 1, mass.mass, _tidy(cog[:3])))
     return places, masses
 

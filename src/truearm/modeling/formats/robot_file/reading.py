@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Final
 
 from truearm.errors import InputError, did_you_mean, name_place
 from truearm.files import read_yaml
@@ -255,6 +256,10 @@ def _row(text: str, count: int, where: str, cure: str) -> tuple[float, ...]:
     return known
 
 
+#: Entries of a joint in every convention.
+_OF_ANY_JOINT: Final = ("name", "type", "limits", "transmission_periods", "bearing")
+
+
 def _joint(content: RobotFile, number: int, entry: JointEntry, where: str) -> Joint:
     table = convention(content.convention)
     units = table.row_units(entry.type)
@@ -272,8 +277,8 @@ def _joint(content: RobotFile, number: int, entry: JointEntry, where: str) -> Jo
                 f"a joint of convention {content.convention} has no such entry",
                 where=where,
                 came=column,
-                allowed=", ".join(["name", "type", "limits", "transmission_periods", *allowed]),
-                cure=did_you_mean(column, ["name", "type", "limits", "transmission_periods", *allowed]),
+                allowed=", ".join([*_OF_ANY_JOINT, *allowed]),
+                cure=did_you_mean(column, [*_OF_ANY_JOINT, *allowed]),
             )
         row[column] = sized_si(_number(value, f"{where}.{column}"), shown[units[column]], f"{where}.{column}")
     fault = table.fault(row, entry.type)
@@ -293,7 +298,17 @@ def _joint(content: RobotFile, number: int, entry: JointEntry, where: str) -> Jo
             allowed=f"limits: [LOWEST, HIGHEST] in {unit}",
             cure="Give what the controller allows.",
         )
-    return Joint(entry.name or f"joint_{number}", entry.type, row, limits, entry.transmission_periods)
+    bearing = None
+    if entry.bearing is not None:
+        if entry.type == "prismatic":
+            raise InputError(
+                "a joint that slides has no bearing on its axis",
+                where=f"{where}.bearing",
+                came=entry.bearing,
+                cure="Take the entry out: moments across a slide are taken where it stands.",
+            )
+        bearing = sized_si(entry.bearing, content.units.length, f"{where}.bearing")
+    return Joint(entry.name or f"joint_{number}", entry.type, row, limits, entry.transmission_periods, bearing)
 
 
 def _vector(name: str, value: object, unit: str, where: str, *, direction: bool) -> dict[str, float]:

@@ -78,6 +78,7 @@ class JointEntry(BaseModel):
     type: Literal["revolute", "prismatic"] = "revolute"
     limits: tuple[Number, Number] | None = None
     transmission_periods: Annotated[int, Field(strict=True, ge=1, le=10_000)] | None = None
+    bearing: Number | None = None
 
 
 class MassEntry(_Entry):

@@ -72,6 +72,8 @@ def file_content(robot: Robot) -> dict[str, Any]:
             row["limits"] = listed([written(v, "deg" if j.kind == "revolute" else "mm") for v in j.limits])
         if j.transmission_periods:
             row["transmission_periods"] = j.transmission_periods
+        if j.bearing is not None:
+            row["bearing"] = written(j.bearing, "mm")
         return flow(row)
 
     content: dict[str, Any] = {

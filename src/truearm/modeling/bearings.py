@@ -19,7 +19,7 @@ from typing import Final
 
 import numpy as np
 
-from truearm.modeling.chain import Array, Chain, Coordinates, Direction, Element, Motion, Offset
+from truearm.modeling.chain import Array, Chain, Direction, Element, Motion, Offset
 
 #: Sine of the angle below which two directions are parallel.
 _PARALLEL: Final = 1e-9
@@ -59,9 +59,9 @@ class AxialSlides:
             frames.append(tuple(((float(x), float(y), float(z)), offsets) for (x, y, z), offsets in found if offsets))
         return cls(tuple(joints), tuple(frames))
 
-    def stayed(self, link: int, point: Coordinates, values: Mapping[str, float]) -> Direction:
+    def stayed(self, link: int, point: Direction, values: Mapping[str, float]) -> Direction:
         """Return a point of a link (from 1; 0 is the base) given with nominal slides, in the link's frame [m]."""
-        x, y, z = (float(v) for v in point)  # type: ignore[arg-type]
+        x, y, z = point
         for (a, b, c), offsets in self.links[link - 1] if link else ():
             carried = carried_by(offsets, values)
             x, y, z = x - a * carried, y - b * carried, z - c * carried

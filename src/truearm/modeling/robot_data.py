@@ -11,6 +11,7 @@ from typing import Final, Self, TypeVar
 import numpy as np
 
 from truearm.errors import InputError, did_you_mean
+from truearm.modeling.balancers import Balancer
 from truearm.modeling.bearings import AxialSlides, bearing_elements, carried_by
 from truearm.modeling.chain import Chain, Element, Offset, across, turn_about
 from truearm.modeling.controller import AS_THE_MODEL, Controller
@@ -64,6 +65,8 @@ class RobotData:
         From the last link's frame to the flange.
     masses
         Link masses, where published.
+    balancers
+        Springs and gas cylinders that relieve joints.
     payload
         What hangs on the flange.
     gravity
@@ -113,6 +116,7 @@ class RobotData:
     maker: str = ""
     history: tuple[str, ...] = ()
     proof: Proof | None = None
+    balancers: tuple[Balancer, ...] = ()
 
     def __repr__(self) -> str:
         changed = sum(p.value != p.nominal for p in self.parameters.values())
@@ -233,6 +237,7 @@ class RobotData:
             tuple(joint.kind for joint in self.joints),
             tuple(lengths),
             tuple(joint.transmission_periods for joint in self.joints),
+            len(self.balancers),
         )
 
     @cached_property

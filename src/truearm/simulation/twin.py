@@ -8,7 +8,7 @@ of the models, so a mistake there cannot hide by appearing on both sides.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Final, TypedDict, Unpack
@@ -213,6 +213,9 @@ class Twin:
             T = T @ link.after
             frames.append(T[0])
             weights.append(weight(link.body, T, gravity))
+        for (lower, upper), pulls in self._balanced(frames):
+            weights[lower - 1] = weights[lower - 1] + pulls[0] if lower else weights[lower - 1]
+            weights[upper - 1] = weights[upper - 1] + pulls[1]
         flange = T @ self._flange
         carried = weight(self._payload, flange, gravity) + forces_of(wrench, flange[0, :3, 3])
         loads = []
@@ -226,6 +229,18 @@ class Twin:
             loads=np.stack(loads[::-1]),
             deflection=deflection,
         )
+
+    def _balanced(self, frames: Sequence[Array]) -> Iterator[tuple[tuple[int, int], tuple[Array, Array]]]:
+        """Give the links of each balancer, and what it does to both as sums of ``p f^T``."""
+        every = [np.eye(4), *frames]
+        for number, balancer in enumerate(self.robot.balancers, 1):
+            ends = (balancer.fixed, balancer.moving)
+            one, other = ((every[end.link] @ [*self._stayed(end.link, end.point), 1.0])[:3] for end in ends)
+            length = math.dist(one, other)
+            pull = balancer.force + balancer.stiffness * (length - balancer.length)
+            pull *= self.robot.values.get(f"balancer_{number}", 1.0)
+            towards = np.concatenate([pull / length * (one - other), np.zeros(3)])
+            yield (ends[0].link, ends[1].link), (forces_of(-towards, one), forces_of(towards, other))
 
     def _links(self, warmer: float, cold: float) -> tuple[Link, ...]:
         """Return the links of an arm some kelvin warmer than the reference, a share of whose warming up is to come."""

@@ -197,8 +197,8 @@ def _check_effects(fit: Fit) -> list[Notice]:
         found.append(
             Notice(
                 "bearing-assumed",
-                f"The robot file does not say where on their axes the bearings of {listed(assumed)} lie. They are taken "
-                "at the joints' origins, and the moments that tilt these joints with them. If drawings tell, enter "
+                f"The robot file does not say where on their axes the bearings of {listed(assumed)} lie. They are "
+                "taken at the joints' origins, and so are the moments that tilt them. If drawings tell, enter "
                 "`bearing` in the robot file.",
                 "note",
             )

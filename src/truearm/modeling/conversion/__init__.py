@@ -15,6 +15,7 @@ from typing import Final
 import numpy as np
 
 from truearm.errors import InputError, did_you_mean
+from truearm.modeling.balancers import Anchor, Balancer
 from truearm.modeling.chain import Array
 from truearm.modeling.controller import ControllerKinematics
 from truearm.modeling.conventions import convention
@@ -122,6 +123,7 @@ def converted(robot: Robot, convention_name: str) -> Robot:
         made,
         joints=_with_bearings(robot, made),
         masses=_moved_masses(robot, made) if upright else (),
+        balancers=tuple(_moved_balancer(balancer, robot, made) for balancer in robot.balancers),
         history=(*robot.history, "; ".join(said)),
     )
 
@@ -169,15 +171,29 @@ def _with_bearings(before: Robot, after: Robot) -> tuple[Joint, ...]:
 def _moved_masses(before: Robot, after: Robot) -> tuple[LinkMass, ...]:
     masses = []
     for mass in before.masses:
-        old, new = (
-            at_zero(r, [*r.base_elements, *(e for link in r.link_elements[: mass.joint] for e in link)])
-            for r in (before, after)
-        )
-        place = np.linalg.inv(new) @ old
+        place = _link_frames(before, after, mass.joint)
         centre = before.axial_slides.stayed(mass.joint, mass.cog, before.values)
         x, y, z, _ = (round(float(v), _DECIMALS) + 0.0 for v in place @ [*centre, 1.0])
         masses.append(replace(mass, cog=(x, y, z), inertia=_turned(mass.inertia, place[:3, :3])))
     return tuple(masses)
+
+
+def _moved_balancer(balancer: Balancer, before: Robot, after: Robot) -> Balancer:
+    def moved(anchor: Anchor) -> Anchor:
+        point = before.axial_slides.stayed(anchor.link, anchor.point, before.values)
+        there = _link_frames(before, after, anchor.link) @ [*point, 1.0]
+        x, y, z, _ = (round(float(v), _DECIMALS) + 0.0 for v in there)
+        return replace(anchor, point=(x, y, z))
+
+    return replace(balancer, fixed=moved(balancer.fixed), moving=moved(balancer.moving))
+
+
+def _link_frames(before: Robot, after: Robot, link: int) -> Array:
+    """Return the frame of a link (0 is the base) of one robot seen from that of the other, joints at zero."""
+    old, new = (
+        at_zero(r, [*r.base_elements, *(e for each in r.link_elements[:link] for e in each)]) for r in (before, after)
+    )
+    return np.asarray(np.linalg.inv(new) @ old)
 
 
 def _turned(inertia: Inertia, R: Array) -> Inertia:

@@ -13,6 +13,7 @@ from truearm.files import read_yaml
 from truearm.modeling.conventions import convention
 from truearm.modeling.effects import EFFECTS, NON_NEGATIVE
 from truearm.modeling.fixtures import Fixture
+from truearm.modeling.formats.balancer_entry import check_anchors
 from truearm.modeling.formats.controller_entry import STATED
 from truearm.modeling.formats.robot_file.schema import JointEntry, ProofEntry, RobotFile
 from truearm.modeling.parameters import Parameter
@@ -88,6 +89,9 @@ def _robot(content: RobotFile, where: str) -> Robot:
             )
             for i, m in enumerate(content.masses, 1)
         ),
+        balancers=tuple(
+            b.balancer(i, len(joints), length, f"{where}, balancers[{i}]") for i, b in enumerate(content.balancers, 1)
+        ),
         payload=NO_PAYLOAD
         if content.payload is None
         else Payload(si(content.payload.mass, "1", "payload.mass"), metres(content.payload.cog, "payload.cog")),
@@ -114,6 +118,7 @@ def _robot(content: RobotFile, where: str) -> Robot:
         },
         history=tuple(content.history),
     )
+    check_anchors(robot, where)
     return _with_values(_with_controller(robot, content, where), content, where)
 
 

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from truearm.modeling.controller import AS_THE_MODEL
+from truearm.modeling.formats.balancer_entry import balancer_entry
 from truearm.modeling.formats.controller_entry import controller_entry
 from truearm.modeling.formats.entries import NAME, place_entry
 from truearm.modeling.formats.robot_file.schema import SCHEMA
@@ -98,6 +99,8 @@ def file_content(robot: Robot) -> dict[str, Any]:
             )
             for m in robot.masses
         ]
+    if robot.balancers:
+        content["balancers"] = [flow(_flowing(balancer_entry(b), flow, listed)) for b in robot.balancers]
     if robot.payload != NO_PAYLOAD:
         content["payload"] = flow({"mass": robot.payload.mass, "cog": mm(robot.payload.cog)})
     if robot.gravity != GRAVITY:
@@ -145,6 +148,20 @@ def file_content(robot: Robot) -> dict[str, Any]:
     if robot.history:
         content["history"] = list(robot.history)
     return content
+
+
+def _flowing(
+    entry: Mapping[str, Any], flow: Callable[[Mapping[str, Any]], Any], listed: Callable[[list[Any]], Any]
+) -> dict[str, Any]:
+    """Return an entry whose tables and lists are written on its own line."""
+    return {
+        name: flow(_flowing(part, flow, listed))
+        if isinstance(part, dict)
+        else listed(part)
+        if isinstance(part, list)
+        else part
+        for name, part in entry.items()
+    }
 
 
 def _parameter(p: Parameter, shown: Mapping[str, str]) -> dict[str, Any]:

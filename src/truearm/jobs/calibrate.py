@@ -257,8 +257,9 @@ def calibrate(
         fit, readings, first, validation or train_errors, noticed, of_split, loss, held_out=second is not None
     )
     digest = f" ({'' if sha256 is None else f'sha256 {sha256[:12]}, '}readings {readings_digest(as_read)[:12]})"
+    freed = " + ".join([chosen.name, *(name for name in effects if name in chosen.effects)])
     history = (
-        f"calibrated by truearm {__version__}: model {' + '.join([chosen.name, *(name for name in effects if name in chosen.effects)])},"
+        f"calibrated by truearm {__version__}: model {freed},"
         f" {count} of {n} configurations of {Path(readings.source).name}{digest}, seed {seed}, loss {loss},"
         f"{without_words(without)}"
         f" redundancy {redundancy}{f', another base from {listed(base_changes)} on' if base_changes else ''}"

@@ -36,11 +36,10 @@ def refuse_balancers_that_are_not_there(robot: Robot, effects: Sequence[str]) ->
     """
     if Balancing.name in effects and not robot.balancers:
         raise InputError(
-            "the robot has no balancer whose strength could be identified",
+            f"{robot.name} has no balancer whose strength could be identified",
             parameter="effects",
-            where=robot.name,
             came=Balancing.name,
-            cure="Enter `balancers` in the robot file: anchors, length, force and stiffness as the maker states them.",
+            cure="Enter balancers in the robot file: anchors, length, force and stiffness as the maker states them.",
         )
 
 
@@ -58,7 +57,7 @@ def without_unseen_balancers(model: Model, data: Dataset) -> tuple[Model, list[N
     words = (
         "All training configurations carry one load. A balancer then looks like a periodic error of the joint that it "
         "relieves, so its strength is held at what the robot file states. Measure some configurations with another "
-        "weight or a force at the flange, and enter it in the columns fx to fz [N]."
+        "weight or a pull at the flange, and enter that in the columns force_x [N] to force_z [N]."
     )
     return kept, [Notice("balancer-held", words, "note")]
 

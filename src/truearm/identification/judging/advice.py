@@ -199,7 +199,7 @@ def _check_effects(fit: Fit) -> list[Notice]:
                 "bearing-assumed",
                 f"The robot file does not say where on their axes the bearings of {listed(assumed)} lie. They are "
                 "taken at the joints' origins, and so are the moments that tilt them. If drawings tell, enter "
-                "`bearing` in the robot file.",
+                "the entry bearing of these joints in the robot file.",
                 "note",
             )
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Annotated, Any, Final
 
@@ -168,13 +169,18 @@ def _shortest(robot: Robot, balancer: Balancer) -> float:
     """Return the shortest distance [m] of two anchors while each joint between them goes through its range alone."""
     links = robot.link_elements[balancer.fixed.link : balancer.moving.link]
     way = Chain((*(e for link in links for e in link), *_slides(balancer.moving.point)))
-    distances = []
+    shortest = math.inf
     for joint in range(balancer.fixed.link, balancer.moving.link):
-        variables = np.zeros((len(robot.joints), _STEPS))
-        variables[joint] = np.linspace(*robot.joints[joint].range, _STEPS)
-        seen = way.forward_kinematics(variables, robot.values).position
-        distances.append(np.linalg.norm(seen - np.array(balancer.fixed.point)[:, None], axis=0).min())
-    return float(min(distances))
+        low, high = robot.joints[joint].range
+        for _ in range(2):  # the whole range, then the neighbourhood of the shortest
+            variables = np.zeros((len(robot.joints), _STEPS))
+            variables[joint] = np.linspace(low, high, _STEPS)
+            seen = np.broadcast_to(way.forward_kinematics(variables, robot.values).position, (3, _STEPS))
+            distances = np.linalg.norm(seen - np.array(balancer.fixed.point)[:, None], axis=0)
+            best, step = variables[joint, int(distances.argmin())], (high - low) / _STEPS
+            low, high = max(low, best - step), min(high, best + step)
+        shortest = min(shortest, float(distances.min()))
+    return shortest
 
 
 def _slides(point: Sequence[float]) -> tuple[Element, ...]:

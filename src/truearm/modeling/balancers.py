@@ -1,5 +1,7 @@
 """Balancers: springs and gas cylinders between two links that relieve the joints between them (Patel, 2.3.2).
 
+Source: Klimchik et al. 2013, "Modelling of the gravity compensators in robotic manufacturing cells", which Patel cites.
+
 Large arms carry a spring or a cylinder beside joint 2, anchored on the link that stands and on the link that moves. It
 pulls the two anchors together with a force along the line between them that grows with its length L::
 

@@ -1,8 +1,9 @@
 """Whether readings can tell how strong a balancer is.
 
-At one load a balancer moves its joint by something that depends on that joint's position alone. A periodic error of the
-joint does so too, and a calibration cannot tell which of them it sees. Under another load the joint's compliance shows,
-and with it what moment the joint really carries.
+A balancer moves its joint by compliance times a moment that depends on that joint's position alone, as a periodic
+error of the joint does. Under one load its strength is then one guess among several. Another load shows the compliance
+by itself, and with it the moment. Beside a free curve of the same joint no load tells the two apart; the informed share
+of the strength says so.
 """
 
 from __future__ import annotations

@@ -216,6 +216,8 @@ def test_exports_carry_balancers(tmp_path: Path) -> None:
     assert_allclose(position, robot.world_poses(q)[0], rtol=0, atol=1e-10)
     assert_allclose(rotation, robot.world_poses(q)[1], rtol=0, atol=1e-10)
     assert "(1, (" in path.read_text()
+    assert any("cannot hold balancers; left out: spring" in said for said in exported(robot, "urdf").left_out)
+    assert not any("balancers" in said for said in exported(robot, "python").left_out)
     (held,) = json.loads(exported(robot, "json").text)["balancers"]
     assert (held["name"], held["fixed"]["link"], held["stiffness"]) == ("spring", 1, 40e3)
 

@@ -253,3 +253,16 @@ def test_balancer_that_cannot_be_is_refused(tmp_path: Path, old: str, new: str, 
         arm(tmp_path, ARM.replace("PULL", PULL).replace(old, new, 1))
     for part in ("balancers[1]", *parts):
         assert part in str(caught.value)
+
+
+def test_trial_values_of_a_strength_are_each_what_they_are_alone(tmp_path: Path) -> None:
+    robot = arm(tmp_path).with_effects(["compliance", "balancer"]).with_values({"compliance_2": 1e-6})
+    at = robot.loaded(robot.random_configurations(6, np.random.default_rng(6)))
+    trials = np.array([[0.8], [1.0], [1.3]])
+    together = robot.forward_kinematics(at, values={**robot.values, "balancer_1": trials}).position
+    for k, factor in enumerate(trials[:, 0]):
+        alone = robot.forward_kinematics(at, values={**robot.values, "balancer_1": float(factor)}).position
+        assert_allclose(together[:, k], alone, rtol=0, atol=1e-15)
+    stronger = robot.with_values({"balancer_1": 1.3}).world_poses(at.at(np.arange(6)))[0]
+    assert_allclose(together[:, 2].T, stronger, rtol=0, atol=1e-5)  # the arm stands a little elsewhere then
+    assert np.abs(together[:, 1].T - stronger).max() > 1e-4

@@ -29,7 +29,7 @@ from truearm.simulation.twin import Twin
 from truearm.simulation.twin_joint import JointTruth
 
 #: All together; of clearance in one form.
-SPRING = Balancer("spring", Anchor(1, (-0.15, 0.05, 0.1)), Anchor(2, (0.2, 0.08, 0.03)), 90.0, 0.2, 1500.0)
+SPRING = Balancer("spring", Anchor(1, (-0.15, 0.05, 0.1)), Anchor(2, (0.2, 0.08, 0.03)), 400.0, 0.2, 1000.0)
 NAMES = tuple(effect.name for effect in EFFECTS if effect.name != "clearance-linear-contact")
 
 

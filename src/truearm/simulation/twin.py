@@ -22,6 +22,7 @@ from truearm.modeling.robot import Robot
 from truearm.simulation.twin_body import (
     Link,
     forces_of,
+    forces_on_tool,
     moved,
     product,
     second_moments,
@@ -82,12 +83,15 @@ class Posture:
     deflection
         What each joint leans about x and y and turns about, or slides along, z beyond its joint position ``(joints,
         3)``.
+    wrench
+        External force [N] and moment about the flange's origin [N m] on the flange, in base axes, ``(6,)``.
     """
 
     links: Array
     targets: Mapping[str, Array]
     loads: Array
     deflection: Array
+    wrench: Array
 
 
 @dataclass(frozen=True)
@@ -217,7 +221,10 @@ class Twin:
             weights[lower - 1] = weights[lower - 1] + pulls[0] if lower else weights[lower - 1]
             weights[upper - 1] = weights[upper - 1] + pulls[1]
         flange = T @ self._flange
-        carried = weight(self._payload, flange, gravity) + forces_of(wrench, flange[0, :3, 3])
+        pushed = forces_of(wrench, flange[0, :3, 3])
+        if self.robot.wrench is not None:
+            pushed = pushed + forces_on_tool(self.robot.wrench, flange[0], self._wrench_axes)
+        carried = weight(self._payload, flange, gravity) + pushed
         loads = []
         for axis, of_link in zip(reversed(axes), reversed(weights), strict=True):
             carried = carried + of_link
@@ -228,6 +235,7 @@ class Twin:
             targets={name: world @ place for name, place in self._targets.items()},
             loads=np.stack(loads[::-1]),
             deflection=deflection,
+            wrench=wrench_at(pushed, np.block([[np.eye(3), flange[0, :3, 3:]], [np.zeros((1, 3)), np.eye(1)]])),
         )
 
     def _balanced(self, frames: Sequence[Array]) -> Iterator[tuple[tuple[int, int], tuple[Array, Array]]]:
@@ -289,6 +297,14 @@ class Twin:
         return product(self.robot.flange_elements, self.robot.values)
 
     @cached_property
+    def _wrench_axes(self) -> Array:
+        """Axes in the base that a wrench is given in that does not turn with the tool, ``(3, 3)``."""
+        if self.robot.wrench is not None and self.robot.wrench.frame == "world":
+            return np.asarray(self._base[:3, :3].T)
+        controller = self.robot.wrench is not None and self.robot.wrench.frame == "controller"
+        return self.robot.controller.base.matrix[:3, :3] if controller else np.eye(3)
+
+    @cached_property
     def _payload(self) -> Array:
         return second_moments(self.robot.payload.mass, self.robot.payload.cog)
 
@@ -348,6 +364,13 @@ def measure(
         temperature=conditions.get("temperature"),
         wrench=conditions.get("wrench"),
     )
+
+
+def with_wrench_read(twin: Twin, data: Dataset) -> Dataset:
+    """Return readings of a twin with what acted on its flange at each configuration, as a force sensor there says."""
+    given = {"approach": data.approach, "number": data.number, "temperature": data.temperature}
+    conditions: Conditions = {name: values for name, values in given.items() if values is not None}  # type: ignore[assignment]
+    return replace(data, wrench=np.array([at.wrench for at in twin.postures(data.joints, **conditions)]))
 
 
 def _shaped(what: str, values: Array, shape: tuple[int, ...]) -> Array:

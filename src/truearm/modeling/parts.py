@@ -40,6 +40,10 @@ class Joint:
     transmission_periods
         How often the joint's gear errs in a turn of the joint, where known: for a strain wave gear twice the turns of
         its wave generator.
+    bearing
+        How far along the joint's axis its bearing lies [m], from the joint's origin at nominal values (the origin of
+        the frame right behind the joint's turn); None if that is not known, and zero is assumed. Joints that slide
+        have none.
     """
 
     name: str
@@ -47,6 +51,7 @@ class Joint:
     row: Mapping[str, float]
     limits: tuple[float, float] | None = None
     transmission_periods: int | None = None
+    bearing: float | None = None
 
     @property
     def range(self) -> tuple[float, float]:

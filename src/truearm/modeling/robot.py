@@ -225,7 +225,7 @@ class Robot(RobotData):
 
         Those of the joints come first; the rest of :attr:`layout` is there if some effect tilts or stretches.
         """
-        at = self.loaded(q)
+        at = self.loaded(q).relieved(values)
         joints = np.ascontiguousarray(at.joints.T)
         moved: dict[int, Array] = {}
         for effect in self.effects:

@@ -110,6 +110,7 @@ def joint_truths(robot: Robot) -> dict[int, JointTruth]:
     known = {
         "warm_up_rate",
         *(f"gain_{number}" for number in range(1, len(robot.joints) + 1)),
+        *(f"balancer_{number}" for number in range(1, len(robot.balancers) + 1)),
     }  # read by the twin itself
 
     def of(name: str, number: int) -> float:

@@ -118,8 +118,7 @@ def change_derivatives(robot: Robot, pairs: Pairs, names: Sequence[str], seats: 
 
 def link_ends(robot: Robot) -> list[int]:
     """Return the index of the element of the trunk right behind each link's frame."""
-    tilts = 2 if any(effect.tilts for effect in robot.effects) else 0
-    ends = accumulate((len(link) + tilts for link in robot.link_elements), initial=len(robot.base_elements))
+    ends = accumulate((len(link) for link in robot.moved_links), initial=len(robot.base_elements))
     return list(ends)[1:]
 
 

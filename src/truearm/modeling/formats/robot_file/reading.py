@@ -6,12 +6,14 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Final
 
 from truearm.errors import InputError, did_you_mean, name_place
 from truearm.files import read_yaml
 from truearm.modeling.conventions import convention
 from truearm.modeling.effects import EFFECTS, NON_NEGATIVE
 from truearm.modeling.fixtures import Fixture
+from truearm.modeling.formats.balancer_entry import check_anchors
 from truearm.modeling.formats.controller_entry import STATED
 from truearm.modeling.formats.robot_file.schema import JointEntry, ProofEntry, RobotFile
 from truearm.modeling.parameters import SCALE, SCALE_GROUP, Parameter
@@ -87,6 +89,9 @@ def _robot(content: RobotFile, where: str) -> Robot:
             )
             for i, m in enumerate(content.masses, 1)
         ),
+        balancers=tuple(
+            b.balancer(i, len(joints), length, f"{where}, balancers[{i}]") for i, b in enumerate(content.balancers, 1)
+        ),
         payload=NO_PAYLOAD
         if content.payload is None
         else Payload(si(content.payload.mass, "1", "payload.mass"), metres(content.payload.cog, "payload.cog")),
@@ -114,6 +119,7 @@ def _robot(content: RobotFile, where: str) -> Robot:
         },
         history=tuple(content.history),
     )
+    check_anchors(robot, where)
     return _with_values(_with_controller(robot, content, where), content, where)
 
 
@@ -260,6 +266,10 @@ def _row(text: str, count: int, where: str, cure: str) -> tuple[float, ...]:
     return known
 
 
+#: Entries of a joint in every convention.
+_OF_ANY_JOINT: Final = ("name", "type", "limits", "transmission_periods", "bearing")
+
+
 def _joint(content: RobotFile, number: int, entry: JointEntry, where: str) -> Joint:
     table = convention(content.convention)
     units = table.row_units(entry.type)
@@ -277,8 +287,8 @@ def _joint(content: RobotFile, number: int, entry: JointEntry, where: str) -> Jo
                 f"a joint of convention {content.convention} has no such entry",
                 where=where,
                 came=column,
-                allowed=", ".join(["name", "type", "limits", "transmission_periods", *allowed]),
-                cure=did_you_mean(column, ["name", "type", "limits", "transmission_periods", *allowed]),
+                allowed=", ".join([*_OF_ANY_JOINT, *allowed]),
+                cure=did_you_mean(column, [*_OF_ANY_JOINT, *allowed]),
             )
         row[column] = sized_si(_number(value, f"{where}.{column}"), shown[units[column]], f"{where}.{column}")
     fault = table.fault(row, entry.type)
@@ -298,7 +308,17 @@ def _joint(content: RobotFile, number: int, entry: JointEntry, where: str) -> Jo
             allowed=f"limits: [LOWEST, HIGHEST] in {unit}",
             cure="Give what the controller allows.",
         )
-    return Joint(entry.name or f"joint_{number}", entry.type, row, limits, entry.transmission_periods)
+    bearing = None
+    if entry.bearing is not None:
+        if entry.type == "prismatic":
+            raise InputError(
+                "a joint that slides has no bearing on its axis",
+                where=f"{where}.bearing",
+                came=entry.bearing,
+                cure="Take the entry out: moments across a slide are taken where it stands.",
+            )
+        bearing = sized_si(entry.bearing, content.units.length, f"{where}.bearing")
+    return Joint(entry.name or f"joint_{number}", entry.type, row, limits, entry.transmission_periods, bearing)
 
 
 def _vector(name: str, value: object, unit: str, where: str, *, direction: bool) -> dict[str, float]:

@@ -64,6 +64,10 @@ class TiltingFit:
         contains it.
     converged
         Whether the last step was too small to matter.
+    left
+        What is left of each change of inclination [rad], ``(n, instruments, 3)``; NaN where one was not used.
+    seats
+        Small turns from where each instrument is mounted to how it sits [rad], ``(instruments, 3)``.
     """
 
     robot: Robot
@@ -71,6 +75,8 @@ class TiltingFit:
     covariance: Array
     excess: float
     converged: bool
+    left: Array
+    seats: Array
 
     @property
     def with_priors(self) -> Robot:
@@ -124,6 +130,8 @@ def calibrate_tilting(robot: Robot, readings: InclinometerReadings, poses: Datas
         covariance=covariance,
         excess=excess,
         converged=solution.converged,
+        left=np.where(problem.used, problem.at(solution.vector).left, np.nan),
+        seats=solution.vector[-3 * len(readings.mounted) :].reshape(-1, 3),
     )
 
 
@@ -144,19 +152,20 @@ class _Problem:
         """Effects, then joint zeros and twists, then three turns for the seat of each instrument."""
         effects, angles = tilting_parameters(self.robot)
         seats = [
-            Parameter.plain(f"seat_{link}_{axis}", "rad", "target", 0.0, SEAT)
-            for link in range(1, len(self.robot.joints) + 1)
+            Parameter.plain(f"seat_{number}_{axis}", "rad", "target", 0.0, SEAT)
+            for number in range(1, len(self.readings.mounted) + 1)
             for axis in "xyz"
         ]
         return FreeParameters((*effects, *angles, *seats))
 
     @cached_property
     def used(self) -> NDArray[np.bool_]:
-        used = np.isfinite(self.readings.change) & readable(self.robot, self.readings.pairs)
+        used = np.isfinite(self.readings.change) & readable(self.robot, self.readings.pairs, self.readings.mounted)
         if not used.any():
             raise InputError(
                 "no change of inclination can be used",
                 where="inclinometer readings",
+                came=f"{np.isfinite(self.readings.change).sum()} changes",
                 allowed=f"axes within {math.degrees(STEEPEST):g} deg of the horizontal, and {DECIDING_MOMENTS}",
             )
         return used
@@ -199,21 +208,30 @@ class _Evaluation:
     @cached_property
     def residual(self) -> Array:
         p = self.problem
-        first, second = (inclinations_of(self._robot, q, self._seats) for q in (self._pairs.first, self._pairs.second))
-        change = np.where(p.used, second - first - p.readings.change, 0.0) / p.readings.sigma
+        change = np.where(p.used, self.left, 0.0) / p.readings.deviations
         return np.concatenate([change.reshape(-1), *(r for r, _ in self._displacements)])
+
+    @cached_property
+    def left(self) -> Array:
+        """What is left of the changes of inclination [rad], ``(n, instruments, 3)``."""
+        mounted = self.problem.readings.mounted
+        first, second = (
+            inclinations_of(self._robot, q, self._seats, mounted) for q in (self._pairs.first, self._pairs.second)
+        )
+        return np.asarray(second - first - self.problem.readings.change)
 
     @cached_property
     def jacobian(self) -> Array:
         p = self.problem
-        change = change_derivatives(self._robot, self._pairs, self._names, self._seats) / p.readings.sigma
+        change = change_derivatives(self._robot, self._pairs, self._names, self._seats, p.readings.mounted)
+        change = change / p.readings.deviations[..., None]
         change[~p.used] = 0.0
         points = [np.pad(J, ((0, 0), (0, self._seats.size))) for _, J in self._displacements]
         return np.concatenate([change.reshape(-1, len(self.vector)), *points])
 
     @cached_property
     def _names(self) -> tuple[str, ...]:
-        return self.problem.free.names[: -3 * len(self.problem.robot.joints)]
+        return self.problem.free.names[: -3 * len(self.problem.readings.mounted)]
 
     @cached_property
     def _robot(self) -> Robot:

@@ -71,10 +71,11 @@ def inclination_derivatives(
     n, count = len(at), len(mounted)
     found = np.zeros((n, count, 3, len(names) + 3 * count))
     for column, moved in enumerate(_moved_elements(robot, at, names)):
+        by_parameter = found[..., column]
         for element, rate in moved.items():
             beyond = np.flatnonzero(links >= bisect_right(ends, element))  # on links that the element turns
             turning = kinematics.axis(element).T * np.broadcast_to(rate, n)[:, None]
-            found[:, beyond, :, column] += np.einsum("nlkx,nx->nlk", levers[:, beyond], turning)
+            by_parameter[:, beyond] += np.einsum("nlkx,nx->nlk", levers[:, beyond], turning)
     for number, (link, mount) in enumerate(zip(mounted.links, mounted.mounts, strict=True)):
         first = len(names) + 3 * number
         found[:, number, :, first : first + 3] = levers[:, number] @ kinematics.matrix(ends[link]) @ mount

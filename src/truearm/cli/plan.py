@@ -35,7 +35,7 @@ def plan(
         str | None,
         typer.Option(
             metavar="NAME",
-            help="An instrument of 'truearm devices'; not with --from.",
+            help="An instrument of 'truearm devices', or inclinometers; not with --from.",
             show_default="one that reads every target everywhere",
         ),
     ] = None,
@@ -49,6 +49,15 @@ def plan(
     payload: PayloadText = None,
     gravity: GravityText = None,
     joints: JointsText = None,
+    pull: Annotated[
+        float | None,
+        typer.Option(
+            metavar="N",
+            min=0.0,
+            help="Of a string or weight on the flange under which inclinometers are read; 0: gravity alone.",
+            show_default="20",
+        ),
+    ] = None,
     json: Json = False,
 ) -> None:
     """Choose the configurations that tell most, in a measuring order, and say how accurate the result will be.
@@ -74,6 +83,7 @@ def plan(
             payload=payload,
             gravity=read_gravity(gravity),
             joints=joints,  # type: ignore[arg-type]
+            pull=pull,
             command=command_line(),
             progress=say,
         )
@@ -81,7 +91,8 @@ def plan(
         print_json(planned.summary())
     else:
         print_record(planned)
-        print_line(f"Written: {out}, {out.with_suffix('.html')}")
+        pages = "" if device == "inclinometers" else f", {out.with_suffix('.html')}"
+        print_line(f"Written: {out}{pages}")
 
 
 def _poses(text: str) -> Any:

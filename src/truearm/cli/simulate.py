@@ -30,13 +30,22 @@ def simulate(
         str | None,
         typer.Option(
             metavar="NAME",
-            help="An instrument of 'truearm devices'.",
+            help="An instrument of 'truearm devices', or inclinometers.",
             show_default="one that sees every target everywhere",
         ),
     ] = None,
     seed: Annotated[int, typer.Option(metavar="S", min=0, help="Of configurations, noise and a random truth.")] = 0,
     payload: PayloadText = None,
     gravity: GravityText = None,
+    pull: Annotated[
+        float | None,
+        typer.Option(
+            metavar="N",
+            min=0.0,
+            help="Of a string or weight on the flange under which inclinometers are read; 0: gravity alone.",
+            show_default="20",
+        ),
+    ] = None,
     joints: Annotated[
         str,
         typer.Option(
@@ -60,6 +69,7 @@ def simulate(
             device=device,
             seed=seed,
             payload=payload,
+            pull=pull,
             gravity=read_gravity(gravity),
             joints=joints,  # type: ignore[arg-type]
             progress=say,

@@ -16,7 +16,6 @@ from truearm.jobs.arguments import (
     command_argument,
     count_argument,
     deviation_argument,
-    device_argument,
     file_for,
     files_of,
     gravity_argument,
@@ -28,6 +27,7 @@ from truearm.jobs.arguments import (
     robot_argument,
     whole_argument,
 )
+from truearm.jobs.inclinometer_device import INCLINOMETERS, instrument_argument, planned_pairs, pull_argument
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.controller import JointsOf
 from truearm.modeling.parts import Payload
@@ -40,6 +40,7 @@ from truearm.planning.choosing.measurement_plan import (
 )
 from truearm.planning.choosing.observability import INDICES
 from truearm.planning.constraints.constraints import Constraints, read_constraints
+from truearm.results.inclinometer_plan import InclinometerPlan
 from truearm.results.plan import PAGE, Plan
 
 
@@ -59,9 +60,10 @@ def plan(
     payload: Payload | str | None = None,
     gravity: Sequence[float] | None = None,
     joints: JointsOf | None = None,
+    pull: float | None = None,
     command: str | None = None,
     progress: Callable[[str], None] = lambda _: None,
-) -> Plan:
+) -> Plan | InclinometerPlan:
     """Choose the configurations that tell most, in measuring order, and say how accurate the result will be.
 
     Parameters
@@ -82,7 +84,8 @@ def plan(
         How many configurations to draw, where none are given.
     device
         Name of the instrument, of ``truearm.devices()``, which finds configurations itself; None for one that reads
-        every target everywhere.
+        every target everywhere. For ``inclinometers`` on all links pairs of configurations are chosen, with the loads
+        that they are read under, and poses for what they cannot see.
     constraints
         What a configuration must keep besides the robot's limits, or a constraints file.
     noise
@@ -95,6 +98,8 @@ def plan(
     joints
         Whose joint positions the file holds: the ``model``'s, or as the ``controller`` shows them; None for the
         controller's where the robot file says that they differ.
+    pull
+        Force of a string or a weight on the flange under which inclinometers are read [N]; 0 for gravity alone.
     command
         How to run it again, for the page; None writes the call in Python.
     progress
@@ -106,6 +111,7 @@ def plan(
         For anything that cannot be used, with a message that says what to do.
     """
     progress_argument(progress)
+    force = pull_argument(pull, device)
     table = None if out is None else _files(out, robot, candidates_from, constraints)
     count = _count(poses)
     choice_argument(objective, "objective", {name: name for name in INDICES})
@@ -120,7 +126,7 @@ def plan(
             came=f"{device} and {_named(candidates_from)}",
             cure="Leave one of them out; `constraints` narrows the choice.",
         )
-    instrument = None if device is None else device_argument(device)
+    instrument = instrument_argument(device)
     rules = _rules(constraints)
     carried, fall = payload_argument(payload), gravity_argument(gravity)
     call = command_argument(command) or python_call(
@@ -138,10 +144,19 @@ def plan(
         payload=carried,
         gravity=fall,
         joints=joints,
+        pull=pull,
     )
     progress("reading the robot")
     carrying = robot_argument(robot).with_payload(carried, fall)
     joints_are = joints_argument(joints, carrying)
+    if instrument == INCLINOMETERS:
+        _refuse_beside_inclinometers(count, objective, wanted.name, constraints)
+        progress("choosing pairs of configurations")
+        pairs = planned_pairs(carrying, count or 0, rng, force, number, deviation)
+        chosen = InclinometerPlan(carrying, pairs, force, call, files_of(robot), joints_are)
+        if table is not None:
+            chosen.save(table)
+        return chosen
     labels, readings, own = None, None, bool(carrying.targets)
     if instrument is not None:
         seen, readings, choice = device_candidates(carrying, instrument, number, rng)
@@ -173,6 +188,31 @@ def plan(
         progress("writing the files")
         planned.save(table)
     return planned
+
+
+def _refuse_beside_inclinometers(count: int | None, objective: str, model: str, constraints: object) -> None:
+    """Refuse what says nothing for inclinometers: their pairs tell most about tilt, backlash and stiffness."""
+    if count is None:
+        raise InputError(
+            "for inclinometers a number of configurations belongs here",
+            parameter="poses",
+            came="auto",
+            allowed="an even number",
+        )
+    beside: dict[str, object] = {}
+    if objective != "O1":
+        beside["objective"] = objective
+    if model not in ("geometric", "tilting"):
+        beside["model"] = model
+    if constraints is not None:
+        beside["constraints"] = _named(constraints)
+    for name, came in beside.items():
+        raise InputError(
+            "configurations for inclinometers are chosen by the determinant of tilt, backlash and stiffness alone",
+            parameter=name,
+            came=came,
+            cure=f"Leave `{name}` out.",
+        )
 
 
 def _files(out: object, *read: object) -> Path:

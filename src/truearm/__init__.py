@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from truearm.jobs.show import show
     from truearm.jobs.simulate import simulate
     from truearm.jobs.study import study
+    from truearm.jobs.tilting import tilting
     from truearm.jobs.tolerance import tolerance
     from truearm.jobs.validate import validate
     from truearm.measurement.dataset import Dataset
@@ -95,6 +96,7 @@ __all__ = [
     "show",
     "simulate",
     "study",
+    "tilting",
     "tolerance",
     "validate",
 ]

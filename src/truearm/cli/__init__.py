@@ -28,6 +28,7 @@ from truearm.cli.plan import plan
 from truearm.cli.simulate import simulate
 from truearm.cli.starting import demo, example, new_robot
 from truearm.cli.study import HELP, study
+from truearm.cli.tilting import tilting
 from truearm.cli.tolerance import tolerance
 from truearm.cli.validate import validate
 from truearm.errors import InputError
@@ -65,6 +66,7 @@ def _root(
 
 app.command()(check)
 app.command()(calibrate)
+app.command()(tilting)
 app.command()(validate)
 app.command()(distances)
 app.command()(compensate)

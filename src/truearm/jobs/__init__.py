@@ -20,6 +20,7 @@ JOBS: Final = (
     "import_ur_kinematics",
     "check",
     "calibrate",
+    "tilting",
     "validate",
     "distances",
     "plan",

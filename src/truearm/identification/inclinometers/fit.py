@@ -108,6 +108,8 @@ def calibrate_tilting(robot: Robot, readings: InclinometerReadings, poses: Datas
     start = start.with_parameters(p.restarted() for p in start.parameters.values() if p.group in TILTING)
     if poses is not None:
         _check_pairs(poses)
+        if not poses.has_position.any():
+            raise InputError("there is no position reading", where=poses.source, cure="Fill in x, y and z.")
         start = initial_frames(start, poses)
     problem = _Problem(start, readings, poses)
     solution = solve(problem)

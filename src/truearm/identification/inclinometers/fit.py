@@ -41,6 +41,9 @@ from truearm.modeling.robot import Robot
 
 #: What the first stage identifies.
 TILTING: Final = ("compliance", "backlash", "clearance")
+#: What the model leaves out of a change of inclination where all is well: what tilts do to the loads, one standard
+#: deviation [rad].
+_MODEL: Final = math.radians(1.5e-4)
 #: How well an instrument is aligned with its link, one standard deviation [rad].
 SEAT: Final = math.radians(0.5)
 
@@ -173,6 +176,11 @@ class _Problem:
         return used
 
     @cached_property
+    def deviations(self) -> Array:
+        """Standard deviation of each change, with what the model leaves out [rad]."""
+        return np.hypot(self.readings.deviations, _MODEL)
+
+    @cached_property
     def pairs(self) -> dict[str, IntArray]:
         """For each target of the poses, the readings that are compared, ``(pairs, 2)``."""
         if self.poses is None:
@@ -210,7 +218,7 @@ class _Evaluation:
     @cached_property
     def residual(self) -> Array:
         p = self.problem
-        change = np.where(p.used, self.left, 0.0) / p.readings.deviations
+        change = np.where(p.used, self.left, 0.0) / p.deviations
         return np.concatenate([change.reshape(-1), *(r for r, _ in self._displacements)])
 
     @cached_property
@@ -226,7 +234,7 @@ class _Evaluation:
     def jacobian(self) -> Array:
         p = self.problem
         change = change_derivatives(self._robot, self._pairs, self._names, self._seats, p.readings.mounted)
-        change = change / p.readings.deviations[..., None]
+        change = change / p.deviations[..., None]
         change[~p.used] = 0.0
         points = [np.pad(J, ((0, 0), (0, self._seats.size))) for _, J in self._displacements]
         return np.concatenate([change.reshape(-1, len(self.vector)), *points])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -11,6 +11,7 @@ import numpy as np
 from truearm.errors import InputError, kind_of, refusals_of
 from truearm.files import path_argument
 from truearm.identification.solving.models import MODELS
+from truearm.jobs.accuracy_goal import accuracy_goal
 from truearm.jobs.arguments import (
     choice_argument,
     command_argument,
@@ -29,10 +30,12 @@ from truearm.jobs.arguments import (
 )
 from truearm.jobs.inclinometer_device import INCLINOMETERS, instrument_argument, planned_pairs, pull_argument
 from truearm.measurement.dataset import Dataset
+from truearm.modeling.chain import Array
 from truearm.modeling.controller import JointsOf
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
 from truearm.planning.choosing.measurement_plan import (
+    ERROR,
     device_candidates,
     plan_measurements,
     random_candidates,
@@ -50,7 +53,11 @@ def plan(
     poses: int | Literal["auto"],
     out: str | Path | None = None,
     candidates_from: Dataset | str | Path | None = None,
-    objective: str = "O1",
+    objective: str | None = None,
+    accurate_at: Array | str | Path | None = None,
+    region: Sequence[Sequence[float]] | None = None,
+    tools: str | Path | None = None,
+    frames: str | Path | None = None,
     model: str = "geometric",
     candidates: int = 5000,
     device: str | None = None,
@@ -77,7 +84,15 @@ def plan(
     candidates_from
         Readings, or a canonical CSV file, among whose configurations to choose; None draws them within the limits.
     objective
-        ``O1`` to ``O5``.
+        ``O1`` to ``O5``, or ``error``: the mean square error where the robot shall be accurate. None is ``error`` if
+        that was said, otherwise ``O1``.
+    accurate_at
+        Where the robot shall be accurate: a program, a CSV file of poses of the flange in the base frame as
+        :func:`truearm.inverse` takes it, or joint positions of the model ``(n, joints)`` [rad or m].
+    region
+        The same as a box for the flange: lowest and highest x, y and z in the base frame [m].
+    tools, frames
+        Files that say where tools and frames of the program are, as for :func:`truearm.compensate`.
     model
         What will be identified, one of :data:`truearm.identification.solving.models.MODELS` by name.
     candidates
@@ -112,9 +127,11 @@ def plan(
     """
     progress_argument(progress)
     force = pull_argument(pull, device)
-    table = None if out is None else _files(out, robot, candidates_from, constraints)
+    read = (robot, candidates_from, constraints, accurate_at, tools, frames)
+    table = None if out is None else _files(out, *read)
     count = _count(poses)
-    choice_argument(objective, "objective", {name: name for name in INDICES})
+    if objective is not None:
+        choice_argument(objective, "objective", dict.fromkeys((*INDICES, ERROR)))
     wanted = choice_argument(model, "model", {m.name: m for m in MODELS})
     deviation = deviation_argument(noise, "noise")
     number = count_argument(candidates, "candidates")
@@ -135,6 +152,10 @@ def plan(
         poses=poses,
         candidates_from=candidates_from,
         objective=objective,
+        accurate_at=accurate_at,
+        region=region,
+        tools=tools,
+        frames=frames,
         model=model,
         candidates=candidates,
         device=device,
@@ -150,7 +171,16 @@ def plan(
     carrying = robot_argument(robot).with_payload(carried, fall)
     joints_are = joints_argument(joints, carrying)
     if instrument == INCLINOMETERS:
-        _refuse_beside_inclinometers(count, objective, wanted.name, constraints)
+        beside = {
+            "objective": objective,
+            "accurate_at": accurate_at,
+            "region": region,
+            "tools": tools,
+            "frames": frames,
+            "model": None if wanted.name in ("geometric", "tilting") else wanted.name,
+            "constraints": constraints,
+        }
+        _refuse_beside_inclinometers(count, beside)
         progress("choosing pairs of configurations")
         pairs = planned_pairs(carrying, count or 0, rng, force, number, deviation)
         chosen = InclinometerPlan(carrying, pairs, force, call, files_of(robot), joints_are)
@@ -168,6 +198,8 @@ def plan(
         data = readings_argument(carrying, candidates_from, "candidates_from")
         seen, choice, labels = with_targets(carrying, data), data.postures, data.labels
         own = own or bool(data.has_position.any())
+    progress("looking where the robot shall be accurate")
+    goal = accuracy_goal(seen, accurate_at, region, tools, frames, np.random.default_rng(seed))
     progress(f"choosing among {len(choice)} configurations")
     made = plan_measurements(
         seen,
@@ -175,7 +207,8 @@ def plan(
         wanted,
         poses=count,
         rng=rng,
-        objective=objective,
+        objective=objective or ("O1" if goal is None else ERROR),
+        accurate_at=None if goal is None else goal.postures,
         noise=deviation,
         labels=labels,
         constraints=rules,
@@ -183,14 +216,14 @@ def plan(
         seen_from_the_origin=own,
         readings=readings,
     )
-    planned = Plan(made, call, files_of(robot, candidates_from, constraints), deviation, joints_are)
+    planned = Plan(made, call, files_of(*read), deviation, joints_are, "" if goal is None else goal.words)
     if table is not None:
         progress("writing the files")
         planned.save(table)
     return planned
 
 
-def _refuse_beside_inclinometers(count: int | None, objective: str, model: str, constraints: object) -> None:
+def _refuse_beside_inclinometers(count: int | None, beside: Mapping[str, object]) -> None:
     """Refuse what says nothing for inclinometers: their pairs tell most about tilt, backlash and stiffness."""
     if count is None:
         raise InputError(
@@ -199,20 +232,14 @@ def _refuse_beside_inclinometers(count: int | None, objective: str, model: str, 
             came="auto",
             allowed="an even number",
         )
-    beside: dict[str, object] = {}
-    if objective != "O1":
-        beside["objective"] = objective
-    if model not in ("geometric", "tilting"):
-        beside["model"] = model
-    if constraints is not None:
-        beside["constraints"] = _named(constraints)
     for name, came in beside.items():
-        raise InputError(
-            "configurations for inclinometers are chosen by the determinant of tilt, backlash and stiffness alone",
-            parameter=name,
-            came=came,
-            cure=f"Leave `{name}` out.",
-        )
+        if came is not None:
+            raise InputError(
+                "configurations for inclinometers are chosen by what they tell of tilt, backlash and stiffness alone",
+                parameter=name,
+                came=_named(came),
+                cure=f"Leave `{name}` out.",
+            )
 
 
 def _files(out: object, *read: object) -> Path:

@@ -134,11 +134,7 @@ def changes_figure(found: Tilting) -> Figure:
     """Show the changes of inclination in the order of measurement, and what is left of them."""
     used = np.isfinite(found.fit.left)
     order = np.broadcast_to(np.arange(1, len(used) + 1)[:, None, None], used.shape)[used]
-    names = [
-        f"{html.escape(name)}, {letter}"
-        for name in found.read.instruments.names
-        for letter in "xyz"
-    ]
+    names = [f"{html.escape(name)}, {letter}" for name in found.read.instruments.names for letter in "xyz"]
     labels = np.broadcast_to(np.array(names).reshape(1, -1, 3), used.shape)[used].tolist()
     sizes = [np.abs(np.degrees(values[used])) for values in (found.changes.change, found.fit.left)]
     low = 1e-5
@@ -153,7 +149,9 @@ def changes_figure(found: Tilting) -> Figure:
             "marker": {"color": colour, "size": 5},
             "hovertemplate": f"pair %{{x}}, %{{customdata}}: {name} %{{y:.3g}} deg<extra></extra>",
         }
-        for name, values, colour in zip(("change that was read", "what is left of it"), sizes, (BEFORE, AFTER), strict=True)
+        for name, values, colour in zip(
+            ("change that was read", "what is left of it"), sizes, (BEFORE, AFTER), strict=True
+        )
     ]
     high = max(float(sizes[0].max()), 10 * low) if len(order) else 1.0
     return figure(
@@ -192,5 +190,3 @@ def errors_figure(found: Tilting) -> Figure:
         barmode="overlay",
         bargap=0,
     )
-
-

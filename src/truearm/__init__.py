@@ -44,10 +44,12 @@ if TYPE_CHECKING:
     from truearm.jobs.load_robot import load_robot
     from truearm.jobs.new_robot import new_robot
     from truearm.jobs.plan import plan
+    from truearm.jobs.plan_inclinometers import plan_inclinometers
     from truearm.jobs.revert import revert
     from truearm.jobs.robots import robots
     from truearm.jobs.show import show
     from truearm.jobs.simulate import simulate
+    from truearm.jobs.simulate_inclinometers import simulate_inclinometers
     from truearm.jobs.study import study
     from truearm.jobs.tilting import tilting
     from truearm.jobs.tolerance import tolerance
@@ -91,10 +93,12 @@ __all__ = [
     "load_robot",
     "new_robot",
     "plan",
+    "plan_inclinometers",
     "revert",
     "robots",
     "show",
     "simulate",
+    "simulate_inclinometers",
     "study",
     "tilting",
     "tolerance",

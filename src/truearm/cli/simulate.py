@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from truearm.cli.inclinometers import INCLINOMETERS, Pull, refuse_beside, refuse_pull
 from truearm.cli.loading import GravityText, PayloadText, read_gravity
 
 
@@ -37,15 +38,7 @@ def simulate(
     seed: Annotated[int, typer.Option(metavar="S", min=0, help="Of configurations, noise and a random truth.")] = 0,
     payload: PayloadText = None,
     gravity: GravityText = None,
-    pull: Annotated[
-        float | None,
-        typer.Option(
-            metavar="N",
-            min=0.0,
-            help="Of a string or weight on the flange under which inclinometers are read; 0: gravity alone.",
-            show_default="20",
-        ),
-    ] = None,
+    pull: Pull = None,
     joints: Annotated[
         str,
         typer.Option(
@@ -56,9 +49,30 @@ def simulate(
 ) -> None:
     """Measure a digital twin whose truth is known, with a simulated instrument."""
     from truearm.cli.output import print_record, progress
-    from truearm.jobs.simulate import simulate as run
     from truearm.units import sized_si
 
+    if device == INCLINOMETERS:
+        from truearm.jobs.simulate_inclinometers import simulate_inclinometers
+
+        refuse_beside({"noise": noise})
+        with progress() as say:
+            read = simulate_inclinometers(
+                robot,
+                truth=truth,
+                poses=poses,
+                out=out,
+                pull=20.0 if pull is None else pull,
+                seed=seed,
+                payload=payload,
+                gravity=read_gravity(gravity),
+                joints=joints,  # type: ignore[arg-type]
+                progress=say,
+            )
+        print_record(read)
+        return
+    from truearm.jobs.simulate import simulate as run
+
+    refuse_pull(pull)
     with progress() as say:
         simulated = run(
             robot,
@@ -69,7 +83,6 @@ def simulate(
             device=device,
             seed=seed,
             payload=payload,
-            pull=pull,
             gravity=read_gravity(gravity),
             joints=joints,  # type: ignore[arg-type]
             progress=say,

@@ -333,14 +333,11 @@ def notes_argument(notes: object, parameter: str = "notes") -> dict[str, str]:
     return found
 
 
-def device_argument(device: object, parameter: str = "device", beside: Sequence[str] = ()) -> Device:
-    """Return the instrument of a name; refusals offer the names `beside` too."""
+def device_argument(device: object, parameter: str = "device") -> Device:
+    """Return the instrument of a name."""
     from truearm.simulation.devices import DEVICES  # with its inverse kinematics, only where it is asked for
 
-    known = {each.name: each for each in DEVICES}
-    if isinstance(device, str) and device not in known:
-        choice_argument(device, parameter, dict.fromkeys((*known, *beside)))
-    return choice_argument(device, parameter, known)
+    return choice_argument(device, parameter, {known.name: known for known in DEVICES})
 
 
 def paths_argument(paths: object, parameter: str, what: str) -> list[Path]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -17,6 +17,7 @@ from truearm.jobs.arguments import (
     command_argument,
     count_argument,
     deviation_argument,
+    device_argument,
     file_for,
     files_of,
     gravity_argument,
@@ -28,7 +29,6 @@ from truearm.jobs.arguments import (
     robot_argument,
     whole_argument,
 )
-from truearm.jobs.inclinometer_device import INCLINOMETERS, instrument_argument, planned_pairs, pull_argument
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
 from truearm.modeling.controller import JointsOf
@@ -43,7 +43,6 @@ from truearm.planning.choosing.measurement_plan import (
 )
 from truearm.planning.choosing.observability import INDICES
 from truearm.planning.constraints.constraints import Constraints, read_constraints
-from truearm.results.inclinometer_plan import InclinometerPlan
 from truearm.results.plan import PAGE, Plan
 
 
@@ -67,10 +66,9 @@ def plan(
     payload: Payload | str | None = None,
     gravity: Sequence[float] | None = None,
     joints: JointsOf | None = None,
-    pull: float | None = None,
     command: str | None = None,
     progress: Callable[[str], None] = lambda _: None,
-) -> Plan | InclinometerPlan:
+) -> Plan:
     """Choose the configurations that tell most, in measuring order, and say how accurate the result will be.
 
     Parameters
@@ -99,8 +97,7 @@ def plan(
         How many configurations to draw, where none are given.
     device
         Name of the instrument, of ``truearm.devices()``, which finds configurations itself; None for one that reads
-        every target everywhere. For ``inclinometers`` on all links pairs of configurations are chosen, with the loads
-        that they are read under, and poses for what they cannot see.
+        every target everywhere. For inclinometers there is :func:`truearm.plan_inclinometers`.
     constraints
         What a configuration must keep besides the robot's limits, or a constraints file.
     noise
@@ -113,8 +110,6 @@ def plan(
     joints
         Whose joint positions the file holds: the ``model``'s, or as the ``controller`` shows them; None for the
         controller's where the robot file says that they differ.
-    pull
-        Force of a string or a weight on the flange under which inclinometers are read [N]; 0 for gravity alone.
     command
         How to run it again, for the page; None writes the call in Python.
     progress
@@ -126,7 +121,6 @@ def plan(
         For anything that cannot be used, with a message that says what to do.
     """
     progress_argument(progress)
-    force = pull_argument(pull, device)
     read = (robot, candidates_from, constraints, accurate_at, tools, frames)
     table = None if out is None else _files(out, *read)
     count = _count(poses)
@@ -143,7 +137,7 @@ def plan(
             came=f"{device} and {_named(candidates_from)}",
             cure="Leave one of them out; `constraints` narrows the choice.",
         )
-    instrument = instrument_argument(device)
+    instrument = None if device is None else device_argument(device)
     rules = _rules(constraints)
     carried, fall = payload_argument(payload), gravity_argument(gravity)
     call = command_argument(command) or python_call(
@@ -165,28 +159,10 @@ def plan(
         payload=carried,
         gravity=fall,
         joints=joints,
-        pull=pull,
     )
     progress("reading the robot")
     carrying = robot_argument(robot).with_payload(carried, fall)
     joints_are = joints_argument(joints, carrying)
-    if instrument == INCLINOMETERS:
-        beside = {
-            "objective": objective,
-            "accurate_at": accurate_at,
-            "region": region,
-            "tools": tools,
-            "frames": frames,
-            "model": None if wanted.name in ("geometric", "tilting") else wanted.name,
-            "constraints": constraints,
-        }
-        _refuse_beside_inclinometers(count, beside)
-        progress("choosing pairs of configurations")
-        pairs = planned_pairs(carrying, count or 0, rng, force, number, deviation)
-        chosen = InclinometerPlan(carrying, pairs, force, call, files_of(robot), joints_are)
-        if table is not None:
-            chosen.save(table)
-        return chosen
     labels, readings, own = None, None, bool(carrying.targets)
     if instrument is not None:
         seen, readings, choice = device_candidates(carrying, instrument, number, rng)
@@ -221,25 +197,6 @@ def plan(
         progress("writing the files")
         planned.save(table)
     return planned
-
-
-def _refuse_beside_inclinometers(count: int | None, beside: Mapping[str, object]) -> None:
-    """Refuse what says nothing for inclinometers: their pairs tell most about tilt, backlash and stiffness."""
-    if count is None:
-        raise InputError(
-            "for inclinometers a number of configurations belongs here",
-            parameter="poses",
-            came="auto",
-            allowed="an even number",
-        )
-    for name, came in beside.items():
-        if came is not None:
-            raise InputError(
-                "configurations for inclinometers are chosen by what they tell of tilt, backlash and stiffness alone",
-                parameter=name,
-                came=_named(came),
-                cure=f"Leave `{name}` out.",
-            )
 
 
 def _files(out: object, *read: object) -> Path:

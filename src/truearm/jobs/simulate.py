@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from truearm.jobs.arguments import (
     choice_argument,
     count_argument,
     deviation_argument,
+    device_argument,
     file_for,
     gravity_argument,
     joints_argument,
@@ -25,31 +25,17 @@ from truearm.jobs.arguments import (
     robot_argument,
     whole_argument,
 )
-from truearm.jobs.inclinometer_device import (
-    AXES,
-    INCLINOMETERS,
-    RESOLUTION,
-    instrument_argument,
-    planned_pairs,
-    pull_argument,
-)
 from truearm.limits import refuse_beyond
 from truearm.measurement.controller_joints import in_controller_joints
 from truearm.measurement.readers.canonical import csv_text
 from truearm.modeling.controller import JointsOf
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
-from truearm.planning.choosing.inclinometer import CANDIDATES
-from truearm.results.inclinometer_plan import InclinometerSimulation, pushed_file
 from truearm.results.simulation import Simulation
 from truearm.simulation.devices import in_view_of, measured_with
-from truearm.simulation.inclinometer import measure_pairs, read_pairs
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import measure
-from truearm.writing import write_files, write_text
-
-#: Standard deviation of a coordinate of the poses under loads [m]: the document's cameras (Patel, section 4.4.2).
-_POSE_DEVIATION: Final = 1e-5
+from truearm.writing import write_text
 
 
 def simulate(
@@ -64,9 +50,8 @@ def simulate(
     payload: Payload | str | None = None,
     gravity: Sequence[float] | None = None,
     joints: JointsOf = "model",
-    pull: float | None = None,
     progress: Callable[[str], None] = lambda _: None,
-) -> Simulation | InclinometerSimulation:
+) -> Simulation:
     """Measure a digital twin whose truth is known, with a simulated instrument.
 
     Configurations are measured in their order: what depends on the way the arm came, or on how long it has been moving,
@@ -82,12 +67,12 @@ def simulate(
     poses
         How many configurations, drawn evenly within the limits.
     out
-        Canonical CSV file to write, or one of inclinations; None writes nothing.
+        Canonical CSV file to write; None writes nothing.
     noise
         Standard deviation of a reading [m], 0 for none; None for the deviation of the device.
     device
-        Name of the instrument, of ``truearm.devices()``; None for one that sees every target everywhere.
-        ``inclinometers`` on all links are read in pairs of configurations that the planner chooses.
+        Name of the instrument, of ``truearm.devices()``; None for one that sees every target everywhere. For
+        inclinometers there is :func:`truearm.simulate_inclinometers`.
     seed
         Of configurations, noise and a random truth.
     payload, gravity
@@ -95,8 +80,6 @@ def simulate(
         frame [m/s^2]; None for what its file says.
     joints
         Whose joint positions the data hold: the ``model``'s, or as the ``controller`` shows them.
-    pull
-        Force of a string or a weight on the flange under which inclinometers are read [N]; 0 for gravity alone.
     progress
         Called with a few words at each step.
 
@@ -108,16 +91,8 @@ def simulate(
     progress_argument(progress)
     if noise is None and device is None:
         raise InputError("no noise is given", parameter="noise", cure="Give `noise`, or a `device`.")
-    instrument = instrument_argument(device)
-    force = pull_argument(pull, device)
-    if instrument == INCLINOMETERS and noise is not None:
-        raise InputError(
-            "inclinometers read angles, in steps of 0.001 deg",
-            parameter="noise",
-            came=noise,
-            cure="Leave `noise` out.",
-        )
-    sigma = 0.0 if instrument is None or instrument == INCLINOMETERS else instrument.sigma
+    instrument = None if device is None else device_argument(device)
+    sigma = 0.0 if instrument is None else instrument.sigma
     if noise is not None:
         sigma = deviation_argument(noise, "noise") if finite_number(noise, "noise", lowest=0.0) else 0.0
     count = count_argument(poses, "poses")
@@ -126,31 +101,12 @@ def simulate(
             raise wrong_kind("a truth belongs here", truth, "truth", "nominal, random, a truth's name, or a robot")
         path_argument(truth, "truth")
     file = None if out is None else file_for(out, robot, truth)
-    if file is not None and instrument == INCLINOMETERS:
-        file_for(pushed_file(file), robot, truth)
     rng = np.random.default_rng(whole_argument(seed, "seed"))
     nominal = robot_argument(robot)
     joints_are = joints_argument(choice_argument(joints, "joints", JOINTS_OF), nominal)
     with refusals_of("truth"):
         twin = truth_twin(nominal, truth, rng)
     twin = replace(twin, robot=twin.robot.with_payload(payload_argument(payload), gravity_argument(gravity)))
-    if instrument == INCLINOMETERS:
-        progress("choosing configurations")
-        pairs = planned_pairs(
-            nominal.with_payload(payload_argument(payload), gravity_argument(gravity)),
-            *(count, rng, force, CANDIDATES, _POSE_DEVIATION),
-        )
-        progress(f"measuring {count} configurations")
-        read = read_pairs(twin, pairs.inclined, RESOLUTION, rng, AXES)
-        pushed = measure_pairs(twin, pairs.posed, _POSE_DEVIATION, rng) if len(pairs.posed) else None
-        if joints_are == "controller":
-            read = replace(read, joints=nominal.controller.from_model(read.joints), joints_are="controller")
-            pushed = None if pushed is None else in_controller_joints(nominal, pushed)
-        named = truth.name if isinstance(truth, Robot) else str(truth)
-        made = InclinometerSimulation(nominal.name, named, read, pushed, file)
-        if file is not None:
-            write_files(file.parent, made.texts())
-        return made
     seen = twin.robot if instrument is None else in_view_of(instrument, twin.robot)
     refuse_beyond("readings", count * len(seen.targets), parameter="poses")
     progress(f"measuring {count} configurations")

@@ -15,7 +15,7 @@ import numpy as np
 from truearm.identification.inclinometers.fit import TiltingFit
 from truearm.identification.inclinometers.judging import seen
 from truearm.identification.inclinometers.mounting import Mounting
-from truearm.measurement.inclinometer import InclinometerReadings, Inclinations
+from truearm.measurement.inclinometer import Inclinations, InclinometerReadings
 from truearm.modeling.formats.robot_file import robot_text
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice, has_error

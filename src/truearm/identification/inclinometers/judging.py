@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Final
 
 import numpy as np
@@ -16,10 +16,11 @@ from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.shown import counted, listed
 
-#: Share of the prior variance that readings remove of a constant that they see.
-SEEN: Final = 0.5
-#: Larger than declared by so much, changes hold something that the model does not know.
+#: Share of the prior variance that readings remove of a constant that they see: a quarter of the deviation is left.
+SEEN: Final = 1.0 - 0.25**2
+#: Larger than declared by so much, changes hold something that the model does not know; or nothing that it knows.
 _SCATTER: Final = 2.0
+_WRONG: Final = 10.0
 #: So many deviations below zero a spring, a play or a gap cannot be.
 _BELOW: Final = 3.0
 #: Sine of the angle between gravity and an axis that stands upright whatever the posture.
@@ -75,8 +76,10 @@ def _below_zero(fit: TiltingFit) -> list[Notice]:
 def _scatter(fit: TiltingFit, read: Inclinations) -> list[Notice]:
     if fit.excess <= _SCATTER:
         return []
-    left = np.sqrt(np.nanmean(fit.left**2, axis=(0, 2))) if np.isfinite(fit.left).any() else np.zeros(0)
-    worst = int(np.nanargmax(left)) if np.isfinite(left).any() else 0
+    used = np.isfinite(fit.left)
+    squares = np.where(used, fit.left, 0.0) ** 2
+    left = np.sqrt(squares.sum(axis=(0, 2)) / np.maximum(used.sum(axis=(0, 2)), 1))
+    worst = int(np.argmax(left))
     return [
         Notice(
             "inclinations-scatter",
@@ -84,6 +87,7 @@ def _scatter(fit: TiltingFit, read: Inclinations) -> list[Notice]:
             f"deviations, most on {read.instruments.names[worst]} ({math.degrees(float(left[worst])):.2g} deg): an "
             "instrument moved, a force or payload is not as stated, or bearings and links give way too. Deviations are "
             "widened by that.",
+            "error" if fit.excess > _WRONG else "warning",
         )
     ]
 
@@ -104,7 +108,7 @@ def _unseen(start: Robot, fit: TiltingFit, *, pushed: bool) -> list[Notice]:
         told.append(
             Notice(
                 "upright-unseen",
-                f"{listed(by_poses)} stay as they were believed: gravity does not turn a joint whose axis stands "
+                f"{_stay(by_poses)}: gravity does not turn a joint whose axis stands "
                 f"upright, and inclinometers do not see its turn. {cure}",
             )
         )
@@ -112,12 +116,16 @@ def _unseen(start: Robot, fit: TiltingFit, *, pushed: bool) -> list[Notice]:
         told.append(
             Notice(
                 "tilting-unseen",
-                f"{listed(others)} stay as they were believed: no change of load that was read tells them. Read "
+                f"{_stay(others)}: no change of load that was read tells them. Read "
                 "inclinometers behind these joints where the moment about or across their axes turns round; "
                 "'truearm plan' with the device inclinometers chooses such postures.",
             )
         )
     return told
+
+
+def _stay(names: Sequence[str]) -> str:
+    return f"{listed(names)} {'stays as it was' if len(names) == 1 else 'stay as they were'} believed"
 
 
 def _number(name: str) -> int:
@@ -146,7 +154,3 @@ def _unpaired(read: Inclinations) -> list[Notice]:
             "note",
         )
     ]
-
-
-#: Names of the effects that are found, as people say them, with the unit they are shown in.
-WORDS: Final = {"clearance": "tilt", "backlash": "backlash", "compliance": "compliance"}

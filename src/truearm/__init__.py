@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from truearm.jobs.import_matrices import import_matrices
     from truearm.jobs.import_table import import_table
     from truearm.jobs.import_ur_kinematics import import_ur_kinematics
+    from truearm.jobs.influence import influence
     from truearm.jobs.inverse import inverse
     from truearm.jobs.lines import lines
     from truearm.jobs.load_data import load_data
@@ -87,6 +88,7 @@ __all__ = [
     "import_matrices",
     "import_table",
     "import_ur_kinematics",
+    "influence",
     "inverse",
     "lines",
     "load_data",

@@ -21,6 +21,7 @@ from truearm.cli.export import export
 from truearm.cli.hexapod import app as hexapod
 from truearm.cli.ik import ik
 from truearm.cli.importing import app as importing
+from truearm.cli.influence import influence
 from truearm.cli.library import robots, show
 from truearm.cli.lines import lines
 from truearm.cli.options import CommandError, Commands
@@ -75,6 +76,7 @@ app.command()(plan)
 app.command()(axes)
 app.command()(tolerance)
 app.command()(lines)
+app.command()(influence)
 app.command()(simulate)
 app.command()(devices)
 app.add_typer(importing, name="import")

@@ -33,6 +33,7 @@ JOBS: Final = (
     "axes",
     "tolerance",
     "lines",
+    "influence",
     "hexapod_enumerate",
     "hexapod_uncertainty",
     "hexapod_plan",

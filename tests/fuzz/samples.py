@@ -56,6 +56,7 @@ def folder() -> Path:
         "import_matrices",
         "import_circle",
         "tolerance",
+        "tilting",
         "compensate",
         "revert",
     ):

@@ -282,7 +282,9 @@ def test_refusals(options: dict[str, Any], parameter: str, says: str) -> None:
         "unpaired": pushed.of_configurations(range(1, 16)),
         "no sigma": replace(pushed, sigma=None),
     }
-    given = {"robot": KATANA, "inclinations": inclinations()} | {n: known.get(v, v) for n, v in options.items()}
+    given: dict[str, Any] = {"robot": KATANA, "inclinations": inclinations()} | {
+        n: known.get(v, v) for n, v in options.items()
+    }
     with pytest.raises(InputError, match=says) as refusal:
         truearm.tilting(**given)
     assert refusal.value.parameter == parameter

@@ -180,7 +180,14 @@ def influence(
     made = influence_of(placed, at, names, tip, changes)
     notices += _still(made)
     found = InfluenceResult(
-        placed, made, labels, tip or "the flange", identified, tuple(notices), call, files_of(robot, data)
+        placed,
+        made,
+        labels,
+        "the flange" if tip is None else f"target {tip}",
+        identified,
+        tuple(notices),
+        call,
+        files_of(robot, data),
     )
     if folder is not None:
         progress("writing the files")

@@ -54,7 +54,7 @@ def influence_html(found: InfluenceResult) -> str:
 
 def _texts(row: dict[str, Any]) -> dict[str, Any]:
     return row | {
-        "texts": {way: f"{row[way]:.4f}" for way in WAYS},
+        "texts": {way: f"{round(row[way], 4) + 0.0:.4f}" for way in WAYS},
         "known": significant(row["deviation"] or 0.0, 2, 6),
     }
 

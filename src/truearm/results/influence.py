@@ -138,7 +138,9 @@ class InfluenceResult(Record):
         rows = []
         for name in self.made.names:
             unit = SHOWN_AS[self.robot.parameters[name].unit]
-            values = {way: from_si(robot.values[name], unit) for way, robot in self.identified.robots.items()}
+            values: dict[str, float] = {
+                way: from_si(robot.values[name], unit) for way, robot in self.identified.robots.items()
+            }
             deviation = self.identified.robots["calibrate"].parameters[name].deviation
             known = None if deviation is None else from_si(deviation, unit)
             rows.append({"name": name, "unit": unit, **values, "deviation": known})
@@ -157,7 +159,7 @@ class InfluenceResult(Record):
                 "held_out": self.identified.held_out,
                 "training": self.identified.training,
                 "frames": self.identified.frames,
-                "errors": {way: errors_summary(errors) for way, errors in self.identified.errors.items()},
+                "errors": {str(way): errors_summary(errors) for way, errors in self.identified.errors.items()},
             }
         return told
 

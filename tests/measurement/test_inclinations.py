@@ -40,7 +40,7 @@ def test_columns_become_angles_instruments_and_pairs(tmp_path: Path) -> None:
     assert math.isnan(found.angle[0, 0, 2])
     assert np.isnan(found.angle[1, 1:]).all()
     assert_allclose(found.sigma[0], np.radians([0.001, 0.001, 0.002]))
-    assert_allclose(found.payload, [[0, 0, 0, 0], [1.5, 0, 0, 0], [0, 0, 0, 0]])
+    assert found.payload.tolist() == [[0, 0, 0, 0], [1.5, 0, 0, 0], [0, 0, 0, 0]]
     assert found.pairs.tolist() == [[0, 1]]
     assert found.unpaired == ("c",)
 

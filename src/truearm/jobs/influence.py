@@ -164,18 +164,18 @@ def influence(
     identified, notices = None, list[Notice]()
     if measured is None:
         n = count or 118
+        refuse_beyond("derivatives", 9 * len(names) * n, parameter="poses")
         placed, labels = nominal, tuple(str(number) for number in range(1, n + 1))
         at = Postures(nominal.random_configurations(n, np.random.default_rng(seed)))
     else:
         labels, at = measured.labels, measured.postures
-        refuse_beyond("places", len(names) * len(labels), parameter="data")
+        refuse_beyond("derivatives", 9 * len(names) * len(labels), parameter="data")
         with refusals_of("data"):
             progress("placing the nominal robot")
             placed, parts = _parts(nominal, measured, str(tip), frames, train, seed)
             progress("identifying the parameters in every way")
             identified = _identified(nominal, placed, *parts, wanted, names, str(tip), changes, combination, frames)
         notices += _compared(identified)
-    refuse_beyond("places", len(names) * len(labels), parameter="poses")
     progress("changing one parameter after the other")
     made = influence_of(placed, at, names, tip, changes)
     notices += _still(made)
@@ -236,12 +236,6 @@ def _parts(
     nominal: Robot, data: Dataset, tip: str, frames: str, train: Train, seed: int
 ) -> tuple[Robot, tuple[Dataset, Dataset | None]]:
     """Return the nominal robot in the frames of the readings, and the readings to train on and to judge by."""
-    if data.fixture is not None:
-        raise InputError(
-            "readings against fixtures are not positions in one frame",
-            where=data.source,
-            cure="Calibrate with 'truearm calibrate'.",
-        )
     if not (data.has_position & (data.target == data.targets.index(tip))).any():
         raise InputError("there is no position reading of this target", where=data.source, came=tip)
     count = train_count(train, data.configurations, data.source)

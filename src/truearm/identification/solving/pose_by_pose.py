@@ -233,7 +233,7 @@ def _poses(
 
 
 def positions_of(data: Dataset, target: str) -> Dataset:
-    """Return the position readings of one target alone."""
+    """Return the position readings of one target alone, those in the instrument's own frame."""
     kept = (data.target == data.targets.index(target)) & data.has_position
     return replace(
         data,
@@ -242,6 +242,11 @@ def positions_of(data: Dataset, target: str) -> Dataset:
         target=np.zeros(int(kept.sum()), dtype=np.intp),
         position=data.position[kept],
         quaternion=None,
+        distance=None,
+        height=None,
+        fixtures=(),
+        fixture=None,
+        setup=None,
         sigma=None if data.sigma is None else data.sigma[kept],
         sigma_rot=None,
         visit=None,

@@ -26,7 +26,7 @@ REFUSED = r"would be overwritten|not overwritten|of this name itself|no robot la
 #: Parameters that name what a job writes.
 OUTPUTS = ("out", "steps", "file", "folder")
 #: Of these names those that a job reads.
-FILES = (("import_table", "file"), ("import_ur_kinematics", "file"))
+FILES = (("import_table", "file"), ("import_robodk", "file"), ("import_ur_kinematics", "file"))
 Arguments = dict[str, Any]
 
 

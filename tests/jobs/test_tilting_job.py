@@ -232,6 +232,14 @@ def test_an_instrument_that_slips_is_told() -> None:
     assert "link 3" in next(n.message for n in result.notices if n.code == "inclinations-scatter")
 
 
+def test_joints_that_hardly_tilt_are_better_left_alone() -> None:
+    read = truearm.simulate_inclinometers(KATANA, truth="standard", poses=8, pull=0.0).inclinations
+    data = truearm.simulate(KATANA, truth="standard", poses=30, noise=1e-5).data
+    result = truearm.tilting(KATANA, read, data)
+    assert codes(result)["tilting-not-better"] == "warning"
+    assert "tilting-not-better" not in codes(found())
+
+
 def test_configurations_without_a_partner_are_told() -> None:
     result = truearm.tilting(KATANA, replace(inclinations(), order=inclinations().order + 1))
     assert codes(result)["unpaired"] == "note"

@@ -167,6 +167,7 @@ def tilting(
             geometry = _with_constants(calibrate(found, measured, **options), fit)  # type: ignore[arg-type]
             progress("identifying the geometry alone, for comparison")
             alone = calibrate(start, measured, **options)  # type: ignore[arg-type]
+        told = (*told, *_compared(geometry, alone))
     made = Tilting(
         fit=fit,
         robot=found if geometry is None else geometry.robot,
@@ -231,6 +232,22 @@ def _proven(robot: Robot, fit: TiltingFit, read: Inclinations, joints: Array, to
     )
     made = replace(fit.robot, history=(*fit.robot.history, history), tools={}, truths={}, proof=None)
     return sealed(made, proof)
+
+
+def _compared(geometry: Calibration, alone: Calibration) -> list[Notice]:
+    """Say if the constants do not help the poses."""
+    errors = [one.validation or one.train for one in (geometry, alone)]
+    after, before = (error.position or error.length for error in errors)
+    if after is None or before is None or after.mean < before.mean:
+        return []
+    return [
+        Notice(
+            "tilting-not-better",
+            f"With tilt, backlash and compliance of the joints the poses are missed by {after.mean * 1e3:.3f} mm, by "
+            f"the geometry alone by {before.mean * 1e3:.3f} mm: the joints of this robot tilt less than is known of "
+            "them, or something else is wrong with it or with the inclinations. Calibrate without them.",
+        )
+    ]
 
 
 def _with_constants(geometry: Calibration, fit: TiltingFit) -> Calibration:

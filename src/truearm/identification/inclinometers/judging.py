@@ -116,7 +116,7 @@ def _unseen(start: Robot, fit: TiltingFit, *, pushed: bool) -> list[Notice]:
         told.append(
             Notice(
                 "tilting-unseen",
-                f"{_stay(others)}: no change of load that was read tells them. Read "
+                f"{_stay(others)}: no change of load that was read tells them well. Read "
                 "inclinometers behind these joints where the moment about or across their axes turns round; "
                 "'truearm plan' with the device inclinometers chooses such postures.",
             )
@@ -125,7 +125,7 @@ def _unseen(start: Robot, fit: TiltingFit, *, pushed: bool) -> list[Notice]:
 
 
 def _stay(names: Sequence[str]) -> str:
-    return f"{listed(names)} {'stays as it was' if len(names) == 1 else 'stay as they were'} believed"
+    return f"{listed(names)} {'stays about as it was' if len(names) == 1 else 'stay about as they were'} believed"
 
 
 def _number(name: str) -> int:

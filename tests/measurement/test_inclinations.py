@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -112,3 +114,22 @@ def test_refusals(tmp_path: Path, text: str, says: str) -> None:
     with pytest.raises(InputError, match=f"(?s){says}") as refusal:
         read(tmp_path, text)
     assert "inclinations.csv" in str(refusal.value)
+
+
+def test_objects_that_do_not_fit_together_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "data.csv").write_text(f"{HEADER}\n{ROWS}")
+    found = read_inclinations(tmp_path / "data.csv")
+    other = replace(found.instruments, links=(0, 1, 2))
+    bent: dict[str, tuple[dict[str, Any], str]] = {
+        "shape": ({"sigma": found.sigma[:, :2]}, "wrong number of values: sigma"),
+        "joints": ({"joints": found.joints * math.nan}, "joint position"),
+        "wrench": ({"wrench": found.wrench + math.inf}, "force or a moment"),
+        "payload": ({"payload": found.payload - 1.0}, "payload"),
+        "angle": ({"angle": found.angle + 2.0}, "beyond the vertical"),
+        "sigma": ({"sigma": 0.0 * found.sigma}, "deviation"),
+        "order": ({"order": 0 * found.order}, "same place"),
+        "links": ({"instruments": other}, "no such link"),
+    }
+    for change, says in bent.values():
+        with pytest.raises(InputError, match=says):
+            replace(found, **change)

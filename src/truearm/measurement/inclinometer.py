@@ -121,6 +121,36 @@ class Inclinations:
     payload: Array
     joints_are: str = "model"
 
+    def __post_init__(self) -> None:
+        """Refuse fields that do not fit together, and angles that are none."""
+        n, count, joints = len(self.labels), len(self.instruments), len(self.joint_kinds)
+        shapes = {
+            "joints": (n, joints),
+            "angle": (n, count, 3),
+            "sigma": (n, count),
+            "order": (n,),
+            "wrench": (n, 6),
+            "payload": (n, 4),
+        }
+        for name, shape in shapes.items():
+            came = np.shape(getattr(self, name))
+            if came != shape:
+                raise InputError(
+                    f"wrong number of values: {name}", where=self.source, came=str(came), allowed=str(shape)
+                )
+        wrong = {
+            "a joint position is no number": not np.isfinite(self.joints).all(),
+            "a force or a moment is no number": not np.isfinite(self.wrench).all(),
+            "a payload is no mass": not (np.isfinite(self.payload).all() and (self.payload[:, 0] >= 0.0).all()),
+            "an angle is beyond the vertical": bool((np.abs(self.angle) > math.pi / 2).any()),
+            "a reading has no deviation above zero": not (self.sigma[np.isfinite(self.angle).any(axis=2)] > 0.0).all(),
+            "two configurations have the same place in the order": len(np.unique(self.order)) < n,
+            "there is no such link": not all(0 <= link < joints for link in self.instruments.links),
+        }
+        for what, is_so in wrong.items():
+            if is_so:
+                raise InputError(what, where=self.source)
+
     @cached_property
     def pairs(self) -> NDArray[np.intp]:
         """Configurations that are compared, ``(pairs, 2)``: those of the orders 1 and 2, 3 and 4 and so on."""

@@ -77,7 +77,7 @@ def test_refusals_name_file_line_and_option(truearm: Truearm, campaign: Path, tm
     for words, says in (
         (("irb120", campaign / "inclinations.csv"), "number of joints differs"),
         (("katana450", tmp_path / "bad.csv"), "bad.csv, line 1, column 12"),
-        (("katana450", campaign / "poses.csv"), "column is not known"),
+        (("katana450", campaign / "poses.csv"), "This looks like readings of targets"),
         (("katana450", campaign / "inclinations.csv", "--train", "5"), "--train"),
         ((campaign / "inclinations.csv", "katana450"), "exchanged"),
     ):

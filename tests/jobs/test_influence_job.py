@@ -105,6 +105,13 @@ def test_identification_by_influence_stands_beside_the_standard_one() -> None:
     assert errors["calibrate"] == pytest.approx(calibrated.validation.position.mean, rel=1e-6)
 
 
+def test_a_robot_that_knows_the_readings_is_told() -> None:
+    calibrated = truearm.calibrate(KATANA, measured(), model="offsets").robot
+    again = truearm.influence(calibrated, measured(), model="offsets", seed=1)
+    assert codes(again)["training-data"] == "warning"
+    assert "training-data" not in codes(truearm.influence(calibrated, measured(), model="offsets"))
+
+
 def test_frames_of_the_file_are_held_where_the_readings_are_in_them() -> None:
     own = KATANA.with_frames(KATANA.base, {"tip": (0.0, 0.0, 0.0)})
     truth = own.with_values(KATANA.truths["standard"].values)

@@ -39,7 +39,7 @@ from truearm.jobs.arguments import (
     whole_argument,
 )
 from truearm.jobs.calibrate import Train
-from truearm.jobs.split import check_split, train_count
+from truearm.jobs.split import check_split, check_trained_before, train_count
 from truearm.limits import refuse_beyond
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of
@@ -152,7 +152,8 @@ def influence(
     refuse_swapped(robot, data, "influence")
     folder = None if out is None else folder_for(INFLUENCE_FILES, out, robot, data, ours=True)
     progress("reading the robot")
-    nominal = wanted.prepared(robot_argument(robot).with_payload(carried, fall))
+    given = robot_argument(robot)
+    nominal = wanted.prepared(given.with_payload(carried, fall))
     names = _names(nominal, wanted)
     measured = None if data is None else readings_argument(nominal, data)
     _refuse_unused(measured, count, train)
@@ -173,6 +174,8 @@ def influence(
         with refusals_of("data"):
             progress("placing the nominal robot")
             placed, parts = _parts(nominal, measured, str(tip), frames, train, seed)
+            split = train_count(train, measured.configurations, measured.source), measured.configurations, seed
+            notices += check_trained_before(given, measured, None, split, "")
             progress("identifying the parameters in every way")
             identified = _identified(nominal, placed, *parts, wanted, names, str(tip), changes, combination, frames)
         notices += _compared(identified)

@@ -34,6 +34,8 @@ _UNITS: Final[dict[str, tuple[str, ...]]] = (
     | dict.fromkeys(_COG, LENGTH_UNITS)
 )
 _PLAIN: Final = ("configuration", "order", "link", "sensor")
+#: Columns of the canonical CSV that this file has not.
+_OF_TARGETS: Final = ("target", "fixture", "distance", "height", "role", "qw")
 #: Every column as one writes it, for messages.
 _SHOWN: Final = (
     {"configuration": "configuration", "order": "order"}
@@ -123,12 +125,15 @@ def _columns(cells: Cells) -> dict[str, tuple[int, str]]:
         units = (*ANGLE_UNITS, *LENGTH_UNITS) if JOINT_COLUMN.fullmatch(name) else _UNITS.get(name)
         if units is None and name not in _PLAIN:
             near = nearest_names(name, _SHOWN, 1)
+            cure = f"Did you mean {_SHOWN[near[0]]}?" if near else "Rename it, or leave it out."
+            if name in _OF_TARGETS:
+                cure = "This looks like readings of targets, which are given as `poses`."
             raise InputError(
                 "the column is not known" if heading else "the column has no name",
                 where=where,
                 came=heading,
                 allowed=_ALLOWED,
-                cure=f"Did you mean {_SHOWN[near[0]]}?" if near else "Rename it, or leave it out.",
+                cure=cure,
             )
         if name in columns:
             raise InputError(f"the column {name} appears twice", where=where, cure="Remove one of them.")

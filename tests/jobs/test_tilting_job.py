@@ -145,7 +145,12 @@ def test_one_joint_only_says_what_it_does_not_tell() -> None:
 
 
 def test_zeros_of_instruments_and_relative_readings_change_nothing() -> None:
-    plain, other = found(), truearm.tilting(KATANA, with_angles(lambda angle: angle - angle[:1] + 0.03))
+    def zeroed(angle: Array) -> Array:
+        relative = angle - np.radians(20.0) * np.array([1.0, -1.0, 0.0])
+        return np.where(np.abs(relative) < math.pi / 2, relative, math.nan)
+
+    plain, other = found(), truearm.tilting(KATANA, with_angles(zeroed))
+    assert other.seats()[1]["zero_deg"]["x"] == pytest.approx(-20.0, abs=1.0)
     for name in ("backlash_3", "clearance_4", "compliance_2"):
         p = plain.fit.robot.parameters[name]
         assert other.fit.robot.values[name] == pytest.approx(p.value, abs=p.deviation)

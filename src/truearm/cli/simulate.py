@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from truearm.cli.inclinometers import INCLINOMETERS, Pull, refuse_beside, refuse_pull
-from truearm.cli.loading import GravityText, PayloadText, read_gravity
+from truearm.cli.loading import GravityText, PayloadText, WrenchAtText, WrenchFrameText, WrenchText, read_gravity
 
 
 def simulate(
@@ -39,6 +39,9 @@ def simulate(
     payload: PayloadText = None,
     gravity: GravityText = None,
     pull: Pull = None,
+    wrench: WrenchText = None,
+    wrench_frame: WrenchFrameText = None,
+    wrench_at: WrenchAtText = None,
     joints: Annotated[
         str,
         typer.Option(
@@ -54,7 +57,7 @@ def simulate(
     if device == INCLINOMETERS:
         from truearm.jobs.simulate_inclinometers import simulate_inclinometers
 
-        refuse_beside({"noise": noise})
+        refuse_beside({"noise": noise, "wrench": wrench, "wrench_frame": wrench_frame, "wrench_at": wrench_at})
         with progress() as say:
             read = simulate_inclinometers(
                 robot,
@@ -84,6 +87,9 @@ def simulate(
             seed=seed,
             payload=payload,
             gravity=read_gravity(gravity),
+            wrench=wrench,
+            wrench_frame=wrench_frame,  # type: ignore[arg-type]
+            wrench_at=wrench_at,
             joints=joints,  # type: ignore[arg-type]
             progress=say,
         )

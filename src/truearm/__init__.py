@@ -42,17 +42,21 @@ if TYPE_CHECKING:
     from truearm.jobs.import_sockets import import_sockets
     from truearm.jobs.import_table import import_table
     from truearm.jobs.import_ur_kinematics import import_ur_kinematics
+    from truearm.jobs.influence import influence
     from truearm.jobs.inverse import inverse
     from truearm.jobs.lines import lines
     from truearm.jobs.load_data import load_data
     from truearm.jobs.load_robot import load_robot
     from truearm.jobs.new_robot import new_robot
     from truearm.jobs.plan import plan
+    from truearm.jobs.plan_inclinometers import plan_inclinometers
     from truearm.jobs.revert import revert
     from truearm.jobs.robots import robots
     from truearm.jobs.show import show
     from truearm.jobs.simulate import simulate
+    from truearm.jobs.simulate_inclinometers import simulate_inclinometers
     from truearm.jobs.study import study
+    from truearm.jobs.tilting import tilting
     from truearm.jobs.tolerance import tolerance
     from truearm.jobs.validate import validate
     from truearm.measurement.dataset import Dataset
@@ -92,17 +96,21 @@ __all__ = [
     "import_sockets",
     "import_table",
     "import_ur_kinematics",
+    "influence",
     "inverse",
     "lines",
     "load_data",
     "load_robot",
     "new_robot",
     "plan",
+    "plan_inclinometers",
     "revert",
     "robots",
     "show",
     "simulate",
+    "simulate_inclinometers",
     "study",
+    "tilting",
     "tolerance",
     "validate",
 ]

@@ -59,6 +59,7 @@ def folder() -> Path:
         "import_sockets",
         "import_hand_eye",
         "tolerance",
+        "tilting",
         "compensate",
         "revert",
     ):

@@ -101,6 +101,16 @@ def _views(folder: Path) -> Arguments:
     return {"file": _written(folder / "views.csv", f"{header}\n{rows}"), "on_flange": "camera"}
 
 
+def _inclinations(folder: Path) -> Path:
+    """What inclinometers on a Katana read in eight pairs of configurations."""
+    import truearm
+
+    path = folder / "inclinations.csv"
+    if not path.exists():
+        truearm.simulate_inclinometers("katana450", truth="tilting", poses=16, out=path)
+    return path
+
+
 def _axis_runs(folder: Path) -> Path:
     """Runs in which one joint of a KR5 with joint errors moves at a time, in its own frame."""
     path = folder / "axes.csv"
@@ -186,6 +196,7 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "payload": "1kg,0mm,0mm,50mm",
         "gravity": (0.0, 0.0, -9.81),
     },
+    "tilting": lambda folder: {"robot": "katana450", "inclinations": _inclinations(folder)},
     "validate": lambda folder: {
         "robot": _calibrated(folder),
         "data": _data(folder),
@@ -220,6 +231,8 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "seed": 1,
         "region": ((0.3, 0.5), (-0.1, 0.1), (0.2, 0.4)),
     },
+    "plan_inclinometers": lambda _: {"robot": "katana450", "poses": 8, "candidates": 100, "seed": 1},
+    "simulate_inclinometers": lambda _: {"robot": "katana450", "truth": "tilting", "poses": 8},
     "simulate": lambda _: {
         "robot": "irb120",
         "truth": "random",
@@ -243,6 +256,15 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "truth": "axis-tests",
         "noise": 1e-5,
         "repeats": 2,
+    },
+    "influence": lambda folder: {
+        "robot": "irb120",
+        "data": _data(folder),
+        "model": "offsets",
+        "train": 14,
+        "target": "2",
+        "frames": "placed",
+        "combination": "mean",
     },
     "hexapod_enumerate": lambda _: {},
     "hexapod_uncertainty": lambda _: {"trials": 100, "seed": 1},

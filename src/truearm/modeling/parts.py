@@ -210,11 +210,15 @@ class Truth:
         Parameter values [m, rad]; what is not named is nominal.
     compliance
         Deflection of a joint per moment about its axis [rad/(N m)], by joint number; only the twin knows it.
+    backlash, clearance
+        Whole play of a joint, and how far its shaft tilts from the middle [rad], likewise.
     """
 
     source: str
     values: Mapping[str, float]
     compliance: Mapping[int, float] = field(default_factory=dict)
+    backlash: Mapping[int, float] = field(default_factory=dict)
+    clearance: Mapping[int, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -58,8 +58,9 @@ def truth_twin(robot: Robot, truth: Robot | str | Path, rng: np.random.Generator
         published = robot.truths[str(truth)]
         true = robot.with_values(published.values)
         joints = joint_truths(true)
-        for number, compliance in published.compliance.items():
-            joints[number] = replace(joints.get(number, PERFECT), compliance=compliance)
+        for kind in ("compliance", "backlash", "clearance"):
+            for number, value in getattr(published, kind).items():
+                joints[number] = replace(joints.get(number, PERFECT), **{kind: value})
         return Twin(at_station(true, tool), joints, _contact(true))
     if truth == "nominal":
         return Twin(at_station(robot, tool), joint_truths(robot), _contact(robot))

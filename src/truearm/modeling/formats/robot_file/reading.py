@@ -65,7 +65,8 @@ def _robot(content: RobotFile, where: str) -> Robot:
             )
     numbered = [("link", "masses", mass.link) for mass in content.masses]
     for name, truth in content.truths.items():
-        numbered += [("joint", f"truths.{name}.compliance", joint) for joint in truth.compliance]
+        for kind in ("compliance", "backlash", "clearance"):
+            numbered += [("joint", f"truths.{name}.{kind}", joint) for joint in getattr(truth, kind)]
     for kind, part, number in numbered:
         if not 1 <= number <= len(joints):
             raise InputError(
@@ -172,6 +173,8 @@ def _with_values(robot: Robot, content: RobotFile, where: str) -> Robot:
                 for n, v in truth.values.items()
             },
             {n: si(v, "1", f"truths.{truth_name}.compliance.{n}") for n, v in truth.compliance.items()},
+            {n: si(v, shown["rad"], f"truths.{truth_name}.backlash.{n}") for n, v in truth.backlash.items()},
+            {n: si(v, shown["rad"], f"truths.{truth_name}.clearance.{n}") for n, v in truth.clearance.items()},
         )
         for truth_name, truth in content.truths.items()
     }

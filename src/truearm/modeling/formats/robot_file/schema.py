@@ -120,6 +120,8 @@ class TruthEntry(_Entry):
     source: str
     values: dict[str, Number]
     compliance: dict[Annotated[int, Field(strict=True)], NotNegative] = {}
+    backlash: dict[Annotated[int, Field(strict=True)], NotNegative] = {}
+    clearance: dict[Annotated[int, Field(strict=True)], NotNegative] = {}
 
 
 class TargetEntry(_Entry):

@@ -126,6 +126,11 @@ def file_content(robot: Robot) -> dict[str, Any]:
                 "source": truth.source,
                 "values": {n: written(v, shown[robot.parameters[n].unit]) for n, v in truth.values.items()},
                 "compliance": dict(truth.compliance),
+                **{
+                    kind: {n: written(v, shown["rad"]) for n, v in angles.items()}
+                    for kind, angles in (("backlash", truth.backlash), ("clearance", truth.clearance))
+                    if angles
+                },
             }
             for name, truth in robot.truths.items()
         }

@@ -16,6 +16,7 @@ from truearm.measurement.statistics import Errors
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import GRAVITY
 from truearm.notices import worst_first
+from truearm.reporting.budget_figure import budget_figure, budget_rows, workspace_budget_figure
 from truearm.reporting.drawing import Figure
 from truearm.reporting.figures import correlation_map, expected_error_map, histogram, residuals, workspace
 from truearm.reporting.page import page
@@ -105,6 +106,10 @@ class Report:
             drawn["workspace"] = workspace(
                 self.judged_part, self._tips(self.judged_part), _millimetres(nominal), _millimetres(judged)
             )
+        if run.budget is not None:
+            drawn["limits-of-accuracy"] = budget_figure(run.budget)
+            if run.budget.workspace is not None:
+                drawn["limits-over-the-workspace"] = workspace_budget_figure(run.budget.workspace)
         drawn["expected-error"] = expected_error_map(
             *expected_map(replace(run.fit, joint_error=run.expected.joint_error), _MAPPED),
             self._tips(run.data.of_configurations(run.training)),
@@ -144,6 +149,8 @@ def report_html(calibration: Calibration) -> str:
         report=report,
         run=calibration,
         expected=calibration.expected,
+        budget=calibration.budget,
+        budget_rows=() if calibration.budget is None else budget_rows(calibration.budget),
         expected_of=expected_of(calibration.expected),
         expected_rows=expected_rows(calibration.expected),
         notices=worst_first(calibration.warnings),

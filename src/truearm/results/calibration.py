@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from truearm.errors import InputError, did_you_mean
 from truearm.identification.choosing.selection import Selection
+from truearm.identification.judging.error_budget import ErrorBudget, error_budget
 from truearm.identification.judging.expected_error import ExpectedError
 from truearm.identification.judging.next_step import NextStep
 from truearm.identification.judging.repeatability import Repeatability, repeatability
@@ -24,6 +25,7 @@ from truearm.modeling.formats.robot_file import robot_text, sealed
 from truearm.modeling.proof import Proof
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice, has_error
+from truearm.results.budgets import budget_lines, budget_summary
 from truearm.results.calibration_proof import proof_of
 from truearm.results.record import Record, notice_lines, notice_summaries
 from truearm.results.residuals import Part, Residuals, residuals_of
@@ -119,6 +121,13 @@ class Calibration(Record):
         """How well the robot comes back to a posture; None if too few were visited again."""
         return repeatability(self.data, self.fit.sigma.get("position", 0.0))
 
+    @cached_property
+    def budget(self) -> ErrorBudget | None:
+        """What limits the accuracy: the mean square of the errors by its sources; None if there is nothing to part."""
+        held_out = self.data.of_configurations(self.held_out) if len(self.held_out) else None
+        training = self.data.of_configurations(self.training)
+        return error_budget(self.fit, self.data, training, held_out, self.expected)
+
     @property
     def status(self) -> Status:
         """How the fit ended, or that what it found cannot be this robot."""
@@ -160,6 +169,7 @@ class Calibration(Record):
             "history": self.history,
             "model": {"name": self.fit.model.name, "effects": list(self.fit.model.effects)},
             "noise": noise_summary(self.fit, self.repeatability),
+            "limits_of_accuracy": None if self.budget is None else budget_summary(self.budget),
             "parameters": list(self._parameters()),
             **({} if self.selection is None else {"selection": selection_summary(self.selection)}),
         }
@@ -180,6 +190,7 @@ class Calibration(Record):
             text.append(f"Left out: {counted(len(self.without), 'configuration')} ({listed(self.without)})")
         text += expected_lines(self.expected)
         text += noise_lines(self.fit, self.repeatability)
+        text += budget_lines(self.budget)
         if self.selection is not None:
             text.append(f"Chosen model: {self.fit.model.summary}")
         if self.fit.model.name == "frames":
@@ -203,8 +214,9 @@ class Calibration(Record):
         Parameters
         ----------
         picture
-            ``residuals`` (configuration by configuration), ``expected-error``, ``workspace``, ``correlations``, and
-            ``position-histogram``, ``orientation-histogram`` or ``length-histogram`` where such readings were held out.
+            ``residuals`` (configuration by configuration), ``limits-of-accuracy``, ``expected-error``, ``workspace``,
+            ``correlations``, and ``position-histogram``, ``orientation-histogram`` or ``length-histogram`` where such
+            readings were held out.
 
         Raises
         ------

@@ -294,7 +294,7 @@ def _scatter_of_all(fit: Fit, seen: _Part, taken: float) -> float:
     The residuals are of as many equations less, and where the variances were estimated from them, so is what was taken.
     """
     known = seen.declared and fit.excess == 1.0 and not fit.joint_error.any() and not fit.scattered
-    return seen.scatter * (1.0 + taken / max(seen.square, 1e-30)) ** (0.5 if known else 1.5)
+    return seen.scatter * math.pow(1.0 + taken / max(seen.square, 1e-30), 0.5 if known else 1.5)
 
 
 def _of_variances(fit: Fit, judged: _Part) -> Iterator[float]:

@@ -59,6 +59,12 @@ def calibrate(
             "--without", metavar="LABEL,...", help="Configurations to leave out; repeatable.", show_default=False
         ),
     ] = None,
+    monte_carlo: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N", help="Simulate N calibrations for intervals beside the linear ones.", show_default=False
+        ),
+    ] = None,
     notes: NoteTexts = None,
     json: Json = False,
 ) -> None:
@@ -84,6 +90,7 @@ def calibrate(
             gravity=read_gravity(gravity),
             base_changes=[name.strip() for name in base_changes.split(",")] if base_changes else (),
             without=[name.strip() for text in without or () for name in text.split(",")],
+            monte_carlo=monte_carlo,
             notes=read_notes(notes),
             command=command_line(),
             progress=say,

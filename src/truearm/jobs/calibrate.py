@@ -38,6 +38,7 @@ from truearm.jobs.arguments import (
     whole_argument,
 )
 from truearm.jobs.check import notices_of
+from truearm.jobs.monte_carlo import simulate_calibrations, trials_argument
 from truearm.jobs.split import (
     check_copies,
     check_proof,
@@ -84,6 +85,7 @@ def calibrate(
     gravity: Sequence[float] | None = None,
     base_changes: Sequence[str] = (),
     without: Sequence[str] = (),
+    monte_carlo: int | None = None,
     notes: Mapping[str, str] | None = None,
     command: str | None = None,
     progress: Callable[[str], None] = lambda _: None,
@@ -125,6 +127,10 @@ def calibrate(
         taken out of the readings; no deviation contains what is not known of it.
     without
         Configurations that are left out, by their labels: neither part of the split knows them.
+    monte_carlo
+        How many calibrations of the robot that is found are simulated (100 or more): their spread gives intervals of
+        the parameters and the predictions that need no linearity, beside the linear ones. With the linear loss and
+        without bounds; seeded by `seed`. None simulates none.
     notes
         What to write on the report and into result.json, by its name: ``date``, ``serial``, ``operator``,
         ``instrument``, or any other.
@@ -154,6 +160,7 @@ def calibrate(
     choice_argument(loss, "loss", {name: name for name in LOSSES})
     choice_argument(redundancy, "redundancy", {name: name for name in get_args(Redundant)})
     seed = whole_argument(seed, "seed")
+    trials = trials_argument(monte_carlo, loss, bounds)
     payload, fall = payload_argument(payload), gravity_argument(gravity)
     call = command_argument(command) or python_call(
         "calibrate",
@@ -168,6 +175,7 @@ def calibrate(
         effects=list(effects) or None,
         base_changes=list(base_changes) or None,
         without=list(without) or None,
+        monte_carlo=trials,
         notes=notes or None,
         payload=payload,
         gravity=fall,
@@ -252,6 +260,11 @@ def calibrate(
     judged = judge(
         fit, readings, first, validation or train_errors, noticed, of_split, loss, held_out=second is not None
     )
+    simulated, told = None, list[Notice]()
+    if trials is not None:
+        simulated, told = simulate_calibrations(
+            fit, first, second, trials, priors=redundancy == "prior", seed=seed, progress=progress
+        )
     digest = f" ({'' if sha256 is None else f'sha256 {sha256[:12]}, '}readings {readings_digest(as_read)[:12]})"
     history = (
         f"calibrated by truearm {__version__}: model {' + '.join([chosen.name, *effects])},"
@@ -265,7 +278,7 @@ def calibrate(
         train=train_errors,
         validation=validation,
         expected=judged.expected,
-        warnings=judged.warnings,
+        warnings=(*judged.warnings, *told),
         next=judged.next,
         data=readings,
         training=training,
@@ -278,6 +291,7 @@ def calibrate(
         known_before=_known_before(nominal_robot),
         without=without,
         notes=notes,
+        monte_carlo=simulated,
     )
     if folder is not None:
         calibration.save(folder, progress)

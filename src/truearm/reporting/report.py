@@ -19,6 +19,7 @@ from truearm.notices import worst_first
 from truearm.reporting.budget_figure import budget_figure, budget_rows, workspace_budget_figure
 from truearm.reporting.drawing import Figure
 from truearm.reporting.figures import correlation_map, expected_error_map, histogram, residuals, workspace
+from truearm.reporting.monte_carlo_figure import coverage_figure, interval_rows
 from truearm.reporting.page import page
 from truearm.reporting.tables import (
     SpreadRow,
@@ -32,6 +33,7 @@ from truearm.reporting.tables import (
     strongest_pairs,
 )
 from truearm.results.calibration import Calibration
+from truearm.results.simulated import simulated_lines
 from truearm.results.summaries import expected_of
 
 _FRAMES: Final = ("base", "target", "fixture")
@@ -118,6 +120,8 @@ class Report:
         if run.validation is not None:
             parts.append(("held out", run.held_out, _millimetres(run.validation)))
         drawn["residuals"] = residuals(run.data, parts, self._down_weighted())
+        if run.monte_carlo is not None and run.monte_carlo.settled:
+            drawn["coverage"] = coverage_figure(run.monte_carlo, run.fit.robot)
         drawn["correlations"] = correlation_map(run.fit)
         return drawn
 
@@ -150,6 +154,9 @@ def report_html(calibration: Calibration) -> str:
         run=calibration,
         expected=calibration.expected,
         budget=calibration.budget,
+        simulated=calibration.monte_carlo,
+        simulated_line="".join(simulated_lines(calibration.monte_carlo, fit.robot)),
+        interval_rows=() if calibration.monte_carlo is None else interval_rows(calibration.monte_carlo, fit.robot),
         budget_rows=() if calibration.budget is None else budget_rows(calibration.budget),
         expected_of=expected_of(calibration.expected),
         expected_rows=expected_rows(calibration.expected),

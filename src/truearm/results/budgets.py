@@ -62,8 +62,9 @@ def budget_lines(budget: ErrorBudget | None) -> list[str]:
         parts[-1] += " (within its uncertainty)" if budget.remainder_is_chance else " (not explained)"
     missing = [SOURCES[share.source] for share in budget.shares if share.rms is None]
     what = "held-out rms" if budget.held_out else "rms to expect at configurations like these"
+    below_zero = any((share.square or 0.0) < 0.0 for share in known)
     unknown = f"; not measured: {', '.join(missing)}" if missing else ""
     return [
         f"What limits the accuracy, in squares that add up to the {what} of {budget.rms * 1e3:.3f} mm: "
-        f"{', '.join(parts)} mm{unknown}"
+        f"{', '.join(parts)} mm{'; minus: a negative square' if below_zero else ''}{unknown}"
     ]

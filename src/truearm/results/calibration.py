@@ -18,6 +18,7 @@ from truearm.identification.judging.error_budget import ErrorBudget, error_budge
 from truearm.identification.judging.expected_error import ExpectedError
 from truearm.identification.judging.next_step import NextStep
 from truearm.identification.judging.repeatability import Repeatability, repeatability
+from truearm.identification.judging.simulated_calibrations import SimulatedCalibrations
 from truearm.identification.solving.fit import Fit, Status
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import Errors
@@ -29,6 +30,7 @@ from truearm.results.budgets import budget_lines, budget_summary
 from truearm.results.calibration_proof import proof_of
 from truearm.results.record import Record, notice_lines, notice_summaries
 from truearm.results.residuals import Part, Residuals, residuals_of
+from truearm.results.simulated import simulated_lines, simulated_summary
 from truearm.results.summaries import (
     error_line,
     errors_summary,
@@ -87,6 +89,8 @@ class Calibration(Record):
         What the user noted, by its name.
     next
         What to do next, three steps at most, the most useful first.
+    monte_carlo
+        Calibrations that were simulated for intervals; None if none were asked for.
     """
 
     fit: Fit
@@ -107,6 +111,7 @@ class Calibration(Record):
     without: tuple[str, ...] = ()
     notes: dict[str, str] = field(default_factory=dict)
     next: tuple[NextStep, ...] = ()
+    monte_carlo: SimulatedCalibrations | None = None
 
     @cached_property
     def robot(self) -> Robot:
@@ -171,6 +176,7 @@ class Calibration(Record):
             "noise": noise_summary(self.fit, self.repeatability),
             "limits_of_accuracy": None if self.budget is None else budget_summary(self.budget),
             "parameters": list(self._parameters()),
+            **({} if self.monte_carlo is None else {"monte_carlo": simulated_summary(self.monte_carlo, self.robot)}),
             **({} if self.selection is None else {"selection": selection_summary(self.selection)}),
         }
 
@@ -191,6 +197,7 @@ class Calibration(Record):
         text += expected_lines(self.expected)
         text += noise_lines(self.fit, self.repeatability)
         text += budget_lines(self.budget)
+        text += simulated_lines(self.monte_carlo, self.robot)
         if self.selection is not None:
             text.append(f"Chosen model: {self.fit.model.summary}")
         if self.fit.model.name == "frames":

@@ -12,6 +12,7 @@ from typing import Final
 from truearm.errors import InputError, refusals_of
 from truearm.files import path_argument, read_bytes
 from truearm.identification.judging.beyond_proof import check_proof
+from truearm.identification.judging.next_step import NextStep
 from truearm.identification.judging.payload import check_payload
 from truearm.identification.judging.same_frames import check_frames
 from truearm.identification.judging.target_names import check_names
@@ -19,10 +20,13 @@ from truearm.identification.refit import MOVED
 from truearm.identification.refit import refit as find_moved
 from truearm.jobs.arguments import (
     choice_argument,
+    command_argument,
     data_argument,
+    files_of,
     gravity_argument,
     notes_argument,
     payload_argument,
+    python_call,
     readings_argument,
     refuse_swapped,
     robot_argument,
@@ -33,8 +37,10 @@ from truearm.measurement.repeats import readings_digest
 from truearm.measurement.statistics import errors_of
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
-from truearm.notices import Notice
+from truearm.notices import Notice, has_error
 from truearm.results.validation import Validation
+from truearm.validation.orientation_errors import orientation_errors
+from truearm.validation.region_distances import RegionDistances, region_distances
 
 
 def validate(
@@ -44,7 +50,9 @@ def validate(
     payload: Payload | str | None = None,
     gravity: Sequence[float] | None = None,
     refit: str | None = None,
+    out: str | Path | None = None,
     notes: Mapping[str, str] | None = None,
+    command: str | None = None,
 ) -> Validation:
     """Judge a calibrated robot on new data taken in the same frames.
 
@@ -61,8 +69,12 @@ def validate(
         What was moved since and is found anew from these readings, while everything else stays: ``base`` (the
         instrument, or the robot's base), ``targets`` (each by itself), or ``tool`` (all targets as one rigid body). The
         errors of each configuration are then those of what was found without it.
+    out
+        Folder for result.json and report.html; None writes nothing.
     notes
         What to write beside the figures, by its name: ``date``, ``serial``, ``operator``, ``instrument``, or any other.
+    command
+        How to run it again, for the report; None writes the call in Python.
 
     Raises
     ------
@@ -72,6 +84,11 @@ def validate(
     refuse_swapped(robot, data, "validate")
     moved = None if refit is None else choice_argument(refit, "refit", {kind: kind for kind in MOVED})
     notes = notes_argument(notes)
+    call = command_argument(command) or python_call(
+        "validate", robot, data, payload=payload, gravity=gravity, refit=refit, notes=notes or None
+    )
+    inputs = files_of(robot, data)
+    folder = None if out is None else Validation.folder(out, inputs, "out")
     digest = None
     if isinstance(data, str | Path):
         with refusals_of("data"):
@@ -105,7 +122,38 @@ def validate(
         or check_proof(as_calibrated, data, agreed)
     )
     warnings = (*changed, *mistaken, *check_payload(robot), *_seen_in_training(robot, data, digest))
-    return Validation(data.source, errors, warnings, found, notes)
+    distances = region_distances(judged, data, errors)
+    validation = Validation(
+        source=data.source,
+        errors=errors,
+        warnings=warnings,
+        refit=found,
+        notes=notes,
+        orientations=orientation_errors(judged, data, errors),
+        distances=distances,
+        next=() if has_error(warnings) else measure_farther(distances),
+        robot=judged,
+        data=data,
+        command=call,
+        inputs=inputs,
+    )
+    if folder is not None:
+        validation.save(folder)
+    return validation
+
+
+def measure_farther(distances: RegionDistances | None) -> tuple[NextStep, ...]:
+    """Return the advice to measure where errors grow with the distance from where the robot was calibrated."""
+    growth = None if distances is None else distances.growth
+    if growth is None or not growth[2]:
+        return ()
+    near, far, _ = growth
+    message = (
+        f"Calibrate with configurations that reach farther: the third of the readings that is farthest from where the "
+        f"robot was calibrated ({far.low * 1e3:.0f} mm or more) is off by {far.mean * 1e3:.2g} mm on average, the "
+        f"nearest third by {near.mean * 1e3:.2g} mm."
+    )
+    return (NextStep("measure-more", message),)
 
 
 #: How a calibration says in the robot's history which configurations of which data it was trained on: by the hash of

@@ -17,6 +17,9 @@ from truearm.units import SHOWN_AS, from_si, to_si
 #: own deviation.
 _DIGITS: Final = 9
 _DECIMALS: Final = 7
+#: Measured joint positions that are kept, and their decimals in deg or mm.
+MOST_MEASURED: Final = 1000
+_POSITION_DECIMALS: Final = 3
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,9 @@ class Proof:
         Whether the error may be larger than covariance and joint error say, for a reason that is known.
     digest
         SHA-256 of the values that it is about; empty if it is about none yet.
+    measured
+        Joint positions at which it was measured [rad or m], to a thousandth of a degree or millimetre; a thousand of
+        them at most, evenly taken. Empty where only the region is known.
     """
 
     status: str
@@ -61,6 +67,7 @@ class Proof:
     lower_bound: bool = False
     warnings: tuple[Notice, ...] = ()
     digest: str = ""
+    measured: tuple[tuple[float, ...], ...] = ()
 
     @classmethod
     def of(
@@ -74,6 +81,8 @@ class Proof:
         *,
         warnings: Sequence[Notice] = (),
         lower_bound: bool = False,
+        measured: Sequence[Sequence[float]] = (),
+        joint_units: Sequence[str] = (),
     ) -> Self:
         """Make the proof of a calibration, rounded to what a file holds of it.
 
@@ -83,6 +92,10 @@ class Proof:
             That were identified.
         covariance
             Of these parameters [SI], ``(parameters, parameters)``.
+        measured
+            Joint positions at which it was measured [rad or m].
+        joint_units
+            Units in which a file holds these, ``deg`` or ``mm``.
         """
         deviation = np.sqrt(np.diag(covariance))
         units = [SHOWN_AS[p.unit] for p in parameters]
@@ -102,6 +115,10 @@ class Proof:
             ),
             lower_bound,
             tuple(warnings),
+            measured=tuple(
+                tuple(to_si(float(position_text(v, u)), u) for v, u in zip(row, joint_units, strict=True))
+                for row in _some(measured)
+            ),
         )
 
     def summary(self) -> dict[str, Any]:
@@ -121,6 +138,20 @@ class Proof:
         """Covariance of the parameters [SI], ``(parameters, parameters)``."""
         root = self.root
         return np.asarray(root @ root.T)
+
+
+def position_text(value: float, unit: str) -> str:
+    """Return a measured joint position [rad or m] as a file holds it, in deg or mm."""
+    text = f"{from_si(value, unit):.{_POSITION_DECIMALS}f}"
+    return text.removeprefix("-") if float(text) == 0.0 else text
+
+
+def _some(measured: Sequence[Sequence[float]]) -> list[Sequence[float]]:
+    """Return different joint positions in their order, as many as a file holds, evenly taken."""
+    rows = [*{tuple(row): row for row in measured}.values()]
+    if len(rows) <= MOST_MEASURED:
+        return rows
+    return [rows[i] for i in np.linspace(0, len(rows) - 1, MOST_MEASURED).round().astype(int).tolist()]
 
 
 def _factor(covariance: Array, deviation: Array) -> Array:

@@ -52,6 +52,7 @@ def proof_of(
     names, root = uncertain_names(fit), covariance_root(fit, fit.covariance)
     parameters, covariance = [fit.robot.parameters[name] for name in names], root @ root.T
     region = list(zip(training.joints.min(axis=0).tolist(), training.joints.max(axis=0).tolist(), strict=True))
+    measured = training.joints.tolist()
     if before is not None:
         arm = {n: p for n, p in fit.robot.parameters.items() if p.group not in PLACES}
         kept = [i for i, name in enumerate(before.names) if name in arm and name not in names]
@@ -61,10 +62,20 @@ def proof_of(
             repeated += [warning for warning in before.warnings if not repeated]
             parameters += [arm[before.names[i]] for i in kept]
             region = [(min(a, c), max(b, d)) for (a, b), (c, d) in zip(region, before.region or region, strict=True)]
+            measured = [*before.measured, *measured] if before.measured else []
             joint_error = np.maximum(joint_error, before.joint_error or 0.0)
             lower_bound = lower_bound or before.lower_bound
             beside = np.zeros((len(covariance), len(kept)))
             covariance = np.block([[covariance, beside], [beside.T, before.covariance[np.ix_(kept, kept)]]])
     return Proof.of(
-        ended, errors, region, joint_error, parameters, covariance, warnings=repeated, lower_bound=lower_bound
+        ended,
+        errors,
+        region,
+        joint_error,
+        parameters,
+        covariance,
+        warnings=repeated,
+        lower_bound=lower_bound,
+        measured=measured,
+        joint_units=["deg" if joint.kind == "revolute" else "mm" for joint in fit.robot.joints],
     )

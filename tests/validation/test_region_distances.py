@@ -105,15 +105,9 @@ def test_a_thousand_configurations_are_kept_at_most() -> None:
 def test_errors_that_grow_with_the_distance_are_told() -> None:
     rng = np.random.default_rng(0)
     tip = rng.uniform(0.0, 0.5, 90)
-    base = {
-        "reading": np.arange(90),
-        "tip": tip,
-        "joints": np.full(90, np.nan),
-        "middle": tip,
-        "configuration": np.repeat(np.arange(30), 3),
-        "training": 10,
-    }
-    grows = RegionDistances(error=1e-4 * (1.0 + 6.0 * tip) * rng.uniform(0.8, 1.2, 90), **base)
+    error = 1e-4 * (1.0 + 6.0 * tip) * rng.uniform(0.8, 1.2, 90)
+    at = np.repeat(np.arange(30), 3)
+    grows = RegionDistances(np.arange(90), error, tip, np.full(90, np.nan), tip, at, 10)
     (step,) = measure_farther(grows)
     assert step.code == "measure-more"
     assert "Calibrate with configurations that reach farther" in step.message
@@ -122,9 +116,9 @@ def test_errors_that_grow_with_the_distance_are_told() -> None:
     spans = grows.spans(grows.tip)
     assert [span.readings for span in spans] == [18] * 5
     assert spans[0].mean < spans[2].mean < spans[4].mean
-    level = RegionDistances(error=1e-4 * rng.uniform(0.8, 1.2, 90), **base)
+    level = replace(grows, error=1e-4 * rng.uniform(0.8, 1.2, 90))
     assert measure_farther(level) == ()
     assert "deg" not in distance_lines(level)[0]
-    few = RegionDistances(**{**base, "error": level.error, "configuration": np.zeros(90, dtype=np.intp)})
+    few = replace(grows, configuration=np.zeros(90, dtype=np.intp))
     assert few.growth is None
     assert measure_farther(few) == ()

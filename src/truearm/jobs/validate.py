@@ -32,6 +32,7 @@ from truearm.jobs.arguments import (
     robot_argument,
 )
 from truearm.jobs.proof import changed_since
+from truearm.jobs.zones import zoned_robot
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.repeats import readings_digest
 from truearm.measurement.statistics import errors_of
@@ -59,7 +60,8 @@ def validate(
     Parameters
     ----------
     robot
-        A calibrated robot, or its file.
+        A calibrated robot, or its file; or the ``zones.yaml`` of a calibration by zones: each configuration is then
+        judged by the robot of its zone.
     data
         Readings, or a canonical CSV file.
     payload, gravity
@@ -82,6 +84,7 @@ def validate(
         If the robot has no targets, the data name others, or there are too few of them for `refit`.
     """
     refuse_swapped(robot, data, "validate")
+    zoned = zoned_robot(robot)
     moved = None if refit is None else choice_argument(refit, "refit", {kind: kind for kind in MOVED})
     notes = notes_argument(notes)
     call = command_argument(command) or python_call(
@@ -93,6 +96,15 @@ def validate(
     if isinstance(data, str | Path):
         with refusals_of("data"):
             digest = hashlib.sha256(read_bytes(path_argument(data, "data"))).hexdigest()
+    if zoned is not None:
+        if moved is not None:
+            raise InputError(
+                "what moved is found with one robot, not with zones",
+                parameter="refit",
+                came=moved,
+                cure=f"Give {zoned.file.name} instead of the zones.",
+            )
+        robot = zoned.file
     changed = changed_since(robot)
     as_calibrated = robot_argument(robot)
     robot, data = as_measured(robot, data, payload, gravity)
@@ -121,6 +133,10 @@ def validate(
         or check_frames(judged, data, agreed, moved)
         or check_proof(as_calibrated, data, agreed)
     )
+    of_zones = None
+    if zoned is not None:
+        errors = zoned.errors(robot, data)
+        of_zones = zoned.means(data, errors)
     warnings = (*changed, *mistaken, *check_payload(robot), *_seen_in_training(robot, data, digest))
     distances = region_distances(judged, data, errors)
     validation = Validation(
@@ -134,6 +150,7 @@ def validate(
         next=() if has_error(warnings) else measure_farther(distances),
         robot=judged,
         data=data,
+        zones=of_zones,
         command=call,
         inputs=inputs,
     )

@@ -32,6 +32,7 @@ from truearm.reporting.tables import (
     spread_rows,
     strongest_pairs,
 )
+from truearm.reporting.zones_figure import zone_rows, zones_figure
 from truearm.results.calibration import Calibration
 from truearm.results.simulated import simulated_lines
 from truearm.results.summaries import expected_of
@@ -122,6 +123,8 @@ class Report:
         drawn["residuals"] = residuals(run.data, parts, self._down_weighted())
         if run.monte_carlo is not None and run.monte_carlo.settled:
             drawn["coverage"] = coverage_figure(run.monte_carlo, run.fit.robot)
+        if run.zones is not None and any(verdict.zone is not None for verdict in run.zones.verdicts):
+            drawn["zone-errors"] = zones_figure(run.zones)
         drawn["correlations"] = correlation_map(run.fit)
         return drawn
 
@@ -154,6 +157,8 @@ def report_html(calibration: Calibration) -> str:
         run=calibration,
         expected=calibration.expected,
         budget=calibration.budget,
+        zone_lines=[] if calibration.zones is None else calibration.zones.lines(),
+        zone_rows=() if calibration.zones is None else zone_rows(calibration.zones),
         simulated=calibration.monte_carlo,
         simulated_line="".join(simulated_lines(calibration.monte_carlo, fit.robot)),
         interval_rows=() if calibration.monte_carlo is None else interval_rows(calibration.monte_carlo, fit.robot),

@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 
 from truearm.errors import InputError, did_you_mean
 from truearm.identification.choosing.selection import Selection
+from truearm.identification.choosing.zone_boxes import flange_places
+from truearm.identification.choosing.zones import ZoneVerdict
 from truearm.identification.judging.error_budget import ErrorBudget, error_budget
-from truearm.identification.judging.expected_error import ExpectedError
+from truearm.identification.judging.expected_error import ExpectedError, expected_error
 from truearm.identification.judging.next_step import NextStep
 from truearm.identification.judging.repeatability import Repeatability, repeatability
 from truearm.identification.judging.simulated_calibrations import SimulatedCalibrations
@@ -40,6 +42,7 @@ from truearm.results.summaries import (
     noise_summary,
     selection_summary,
 )
+from truearm.results.zones import ZONES_FILE, ZoneChoice, robot_file_of, zone_files
 from truearm.shown import counted, listed
 from truearm.units import SHOWN_AS, from_si
 from truearm.writing import output_folder, write_files
@@ -91,6 +94,8 @@ class Calibration(Record):
         What to do next, three steps at most, the most useful first.
     monte_carlo
         Calibrations that were simulated for intervals; None if none were asked for.
+    zones
+        What became of zones of the workspace; None if none were asked for.
     """
 
     fit: Fit
@@ -112,6 +117,7 @@ class Calibration(Record):
     notes: dict[str, str] = field(default_factory=dict)
     next: tuple[NextStep, ...] = ()
     monte_carlo: SimulatedCalibrations | None = None
+    zones: ZoneChoice | None = None
 
     @cached_property
     def robot(self) -> Robot:
@@ -177,6 +183,7 @@ class Calibration(Record):
             "limits_of_accuracy": None if self.budget is None else budget_summary(self.budget),
             "parameters": list(self._parameters()),
             **({} if self.monte_carlo is None else {"monte_carlo": simulated_summary(self.monte_carlo, self.robot)}),
+            **({} if self.zones is None else {"zones": self.zones.summary()}),
             **({} if self.selection is None else {"selection": selection_summary(self.selection)}),
         }
 
@@ -198,6 +205,7 @@ class Calibration(Record):
         text += noise_lines(self.fit, self.repeatability)
         text += budget_lines(self.budget)
         text += simulated_lines(self.monte_carlo, self.robot)
+        text += [] if self.zones is None else self.zones.lines()
         if self.selection is not None:
             text.append(f"Chosen model: {self.fit.model.summary}")
         if self.fit.model.name == "frames":
@@ -272,8 +280,34 @@ class Calibration(Record):
             )
         return rows
 
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Names of the files that are written: those of every calibration, and of the zones that are kept."""
+        kept = [] if self.zones is None else [robot_file_of(verdict.box.name) for verdict in self.zones.kept]
+        return (*RESULT_FILES, *([ZONES_FILE] if kept else []), *kept)
+
+    def zone_robot(self, verdict: ZoneVerdict) -> Robot:
+        """Return the calibrated robot of a zone, with what is known about it.
+
+        Raises
+        ------
+        InputError
+            If it has none.
+        """
+        fit = verdict.fit
+        if fit is None or self.zones is None:
+            raise InputError("this zone has no model of its own", parameter="verdict", came=verdict.box.name)
+        training = self.data.of_configurations(self.training)
+        mine = np.flatnonzero(verdict.box.holds(flange_places(self.fit.start, training.postures), self.zones.overlap))
+        part = training.of_configurations(mine)
+        proof = proof_of(fit, fit.status, self.warnings, expected_error(fit), part, self.known_before)
+        line = f"{self.history}, zone {verdict.box.name}"
+        return sealed(replace(fit.robot, history=(*fit.robot.history, line), tools={}, truths={}), proof)
+
     def save(self, folder: str | Path, progress: Callable[[str], None] = lambda _: None) -> tuple[Path, ...]:
         """Write ``calibrated.yaml``, ``result.json``, ``report.html`` and ``calibrated.urdf`` into a folder.
+
+        Zones that are kept add ``zones.yaml`` and ``zone-NAME.yaml`` of each.
 
         An earlier result stays until the new files are complete on disk; only then are they put in its place.
 
@@ -285,7 +319,7 @@ class Calibration(Record):
         from truearm.modeling.formats.urdf_writing import urdf_text
         from truearm.reporting.report import report_html
 
-        folder = output_folder(folder, RESULT_FILES, self.inputs, ours=True)
+        folder = output_folder(folder, self.files, self.inputs, ours=True)
         progress("drawing the report")
         urdf = calibrated_urdf(self.urdf, self.robot)[0] if self.urdf else urdf_text(self.robot)[0]
         files: dict[str, str | bytes] = {
@@ -293,6 +327,7 @@ class Calibration(Record):
             "result.json": json.dumps(self.result(), indent=2, allow_nan=False) + "\n",
             "report.html": report_html(self),
             "calibrated.urdf": urdf,
+            **zone_files(self.zones, self.robot, self.zone_robot),
         }
         progress("writing the files")
         write_files(folder, files, self.command)

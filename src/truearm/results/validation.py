@@ -53,6 +53,9 @@ class Validation(Record):
         What to do next.
     robot, data
         What was compared.
+    zones
+        For each zone, and for elsewhere by an empty name, how many configurations lie in it and their mean error [m];
+        None of a robot without zones.
     command
         How to run it again.
     inputs
@@ -69,6 +72,7 @@ class Validation(Record):
     next: tuple[NextStep, ...] = ()
     robot: Robot | None = None
     data: Dataset | None = None
+    zones: dict[str, tuple[int, float]] | None = None
     command: str = ""
     inputs: tuple[Path, ...] = ()
 
@@ -93,6 +97,7 @@ class Validation(Record):
             **errors_summary(self.errors),
             **({} if self.orientations is None else {"orientation_parts_deg": orientation_summary(self.orientations)}),
             **({} if self.distances is None else {"distance_from_training": distance_summary(self.distances)}),
+            **({} if self.zones is None else {"zones": self._zones()}),
             **({} if self.refit is None else {"refit": refit_summary(self.refit)}),
             **({"notes": self.notes} if self.notes else {}),
             "next": [step.summary() for step in self.next],
@@ -106,10 +111,21 @@ class Validation(Record):
             f"  {error_line(self.errors)}",
             *orientation_lines(self.orientations),
             *distance_lines(self.distances),
+            *(
+                f"  {'elsewhere' if row['zone'] is None else 'zone ' + row['zone']}: {row['mean_mm']:.3f} mm on "
+                f"{counted(row['configurations'], 'configuration')}"
+                for row in self._zones()
+            ),
             *([] if self.refit is None else refit_lines(self.refit)),
             *(f"{name}: {said}" for name, said in self.notes.items()),
             *(step.line for step in self.next),
             *notice_lines(self.warnings),
+        ]
+
+    def _zones(self) -> list[dict[str, Any]]:
+        return [
+            {"zone": name or None, "configurations": count, "mean_mm": mean * 1e3}
+            for name, (count, mean) in (self.zones or {}).items()
         ]
 
     @staticmethod

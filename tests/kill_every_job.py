@@ -51,6 +51,7 @@ PLACES: dict[str, Arguments] = {
     "import_circle": {"out": "data.csv"},
     "import_ur_kinematics": {"out": "robot.yaml"},
     "calibrate": {"out": "."},
+    "validate": {"out": "."},
     "plan": {"out": "plan.csv"},
     "simulate": {"out": "data.csv"},
     "inverse": {"out": "joints.csv"},

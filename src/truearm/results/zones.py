@@ -73,13 +73,12 @@ class ZoneChoice:
         """Return which zones are kept, and why the others are not."""
         count = counted(len(self.verdicts), "zone")
         if not self.kept:
-            text = [
-                f"Zones: none of {count} is kept; one model for the whole workspace is as good on held-out readings."
-            ]
+            text = [f"Zones: none of {count} is kept; one model is as good on held-out readings."]
         else:
             text = [
-                f"Zones: {len(self.kept)} of {len(self.verdicts)} kept; mean held-out error {self.zoned * 1e3:.3f} mm with them, "
-                f"{self.whole * 1e3:.3f} mm with one model (the held-out part has chosen them: validate with new data)."
+                f"Zones: {len(self.kept)} of {len(self.verdicts)} kept; mean held-out error {self.zoned * 1e3:.3f} mm "
+                f"with them, {self.whole * 1e3:.3f} mm with one model (the held-out part has chosen them: validate with "
+                "new data)."
             ]
         for verdict in self.verdicts:
             text.append(f"  zone {verdict.box.name}: {_words(verdict)}")

@@ -179,6 +179,17 @@ def test_lengths_have_a_budget_too() -> None:
     assert budget.share("table").square is None
 
 
+def test_positions_before_a_fixture_have_a_budget() -> None:
+    rng = np.random.default_rng(5)
+    data = measured_with(named_device("point"), ROBOT, truth_twin(ROBOT, "random", rng), 60, rng)
+    first, rest = data.of_configurations(range(45)), data.of_configurations(range(45, 60))
+    budget = error_budget(identify(ROBOT, first, MODEL["geometric"]), data, first, rest)
+    assert budget is not None
+    assert budget.kind == "position"
+    assert square(budget, "instrument") == pytest.approx(3 * 0.05e-3**2)
+    assert budget.remainder_is_chance
+
+
 def on_a_moving_table(noise: float) -> tuple[Dataset, Array]:
     """Return readings on a table that moves, with four noisy reference points, and where the targets truly are."""
     rng = np.random.default_rng(6)

@@ -153,3 +153,12 @@ def test_what_cannot_be_simulated_is_refused() -> None:
         calibrate(ROBOT, data, monte_carlo=100, bounds=Bounds.model_validate(limits))
     with pytest.raises(InputError, match="a whole number belongs here"):
         calibrate(ROBOT, data, monte_carlo=1e3)  # type: ignore[arg-type]
+
+
+def test_nothing_is_simulated_of_a_fit_that_leaves_things_open() -> None:
+    _, data = read()
+    run = calibrate(ROBOT, data.of_configurations(range(3)), monte_carlo=100)
+    assert run.status.value == "rank-loss"
+    assert run.monte_carlo is None
+    assert ("not-simulated", "note") in {(notice.code, notice.level) for notice in run.warnings}
+    assert "monte_carlo" not in run.result()

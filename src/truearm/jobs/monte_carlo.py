@@ -12,7 +12,7 @@ from truearm.identification.judging.simulated_calibrations import (
     simulated_calibrations,
 )
 from truearm.identification.solving.bounds import Bounds
-from truearm.identification.solving.fit import Fit
+from truearm.identification.solving.fit import Fit, Status
 from truearm.identification.solving.losses import Loss
 from truearm.jobs.arguments import count_argument
 from truearm.measurement.dataset import Dataset
@@ -62,8 +62,20 @@ def simulate_calibrations(
     priors: bool,
     seed: int,
     progress: Callable[[str], None],
-) -> tuple[SimulatedCalibrations, list[Notice]]:
-    """Return simulated calibrations, and what they say against the linear intervals."""
+) -> tuple[SimulatedCalibrations | None, list[Notice]]:
+    """Return simulated calibrations, and what they say against the linear intervals.
+
+    None are made of a fit that leaves open what predictions depend on: where base and targets are is not drawn.
+    """
+    if fit.status not in (Status.CONVERGED, Status.AT_BOUND):
+        return None, [
+            Notice(
+                "not-simulated",
+                f"No calibration was simulated, because this one ended with {fit.status.value}: intervals say nothing "
+                "of what the data do not determine.",
+                "note",
+            )
+        ]
 
     def done(count: int) -> None:
         full = _BAR * count // trials

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any, Final
 
@@ -57,7 +58,8 @@ def budget_lines(budget: ErrorBudget | None) -> list[str]:
     if budget is None:
         return []
     known = [share for share in budget.shares if share.rms is not None]
-    parts = [f"{SOURCES[share.source]} {(share.rms or 0.0) * 1e3:.3f}" for share in known]
+    places = min(max(3, 1 - math.floor(math.log10(max(budget.rms * 1e3, 1e-9)))), 6)
+    parts = [f"{SOURCES[share.source]} {(share.rms or 0.0) * 1e3:.{places}f}" for share in known]
     if budget.held_out:
         parts[-1] += " (within its uncertainty)" if budget.remainder_is_chance else " (not explained)"
     missing = [SOURCES[share.source] for share in budget.shares if share.rms is None]
@@ -65,6 +67,6 @@ def budget_lines(budget: ErrorBudget | None) -> list[str]:
     below_zero = any((share.square or 0.0) < 0.0 for share in known)
     unknown = f"; not measured: {', '.join(missing)}" if missing else ""
     return [
-        f"What limits the accuracy, in squares that add up to the {what} of {budget.rms * 1e3:.3f} mm: "
+        f"What limits the accuracy, in squares that add up to the {what} of {budget.rms * 1e3:.{places}f} mm: "
         f"{', '.join(parts)} mm{'; minus: a negative square' if below_zero else ''}{unknown}"
     ]

@@ -77,8 +77,8 @@ class ZoneChoice:
         else:
             text = [
                 f"Zones: {len(self.kept)} of {len(self.verdicts)} kept; mean held-out error {self.zoned * 1e3:.3f} mm "
-                f"with them, {self.whole * 1e3:.3f} mm with one model (the held-out part has chosen them: validate with "
-                "new data)."
+                f"with them, {self.whole * 1e3:.3f} mm with one model (the held-out part has chosen them: validate "
+                "with new data)."
             ]
         for verdict in self.verdicts:
             text.append(f"  zone {verdict.box.name}: {_words(verdict)}")

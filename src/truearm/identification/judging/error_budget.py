@@ -30,7 +30,7 @@ from truearm.identification.judging.repeatability import repeatability
 from truearm.identification.solving.fit import Fit
 from truearm.identification.solving.problem import Problem
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.observations import OBSERVATIONS
+from truearm.measurement.observations import OBSERVATIONS, Position
 from truearm.measurement.table_motion import TableMotion, table_motion
 from truearm.modeling.chain import Array
 from truearm.modeling.parameters import FreeParameters
@@ -41,7 +41,7 @@ Source = Literal["instrument", "table", "repeatability", "model", "parameters", 
 _CONFIGURATIONS: Final = 100
 _DRAWS: Final = 200
 #: Standard deviations within which a difference is chance.
-_CHANCE: Final = 2.0
+_CHANCE: Final = 3.0
 _LENGTHS: Final = ("distance", "height")
 
 
@@ -116,7 +116,7 @@ class ErrorBudget:
 
     @property
     def remainder_is_chance(self) -> bool:
-        """Whether the remainder lies within two of its standard deviations."""
+        """Whether the remainder lies within three of its standard deviations."""
         rest = self.share("remainder")
         return abs(rest.square or 0.0) <= _CHANCE * rest.deviation
 
@@ -199,7 +199,7 @@ def error_budget(
     expected
         The error to expect over the workspace.
     """
-    kind: Literal["position", "length"] = "position" if training.has_position.any() else "length"
+    kind: Literal["position", "length"] = "position" if Position().present(training).any() else "length"
     seen = _part(fit, training, kind)
     judged = seen if held_out is None else _part(fit, held_out, kind)
     if seen is None or judged is None:

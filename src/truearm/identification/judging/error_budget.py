@@ -306,8 +306,8 @@ def _of_variances(fit: Fit, judged: _Part) -> Iterator[float]:
 def _instrument_words(fit: Fit, judged: _Part) -> str:
     if judged.declared:
         return "as the data declare it"
-    shared = " and is shared by the readings of a configuration" if fit.joint_error.any() else ""
-    return f"estimated from the residuals: what the model cannot express is in it, unless it is larger{shared}"
+    shared = ", except for what the readings of a configuration share" if fit.joint_error.any() else ""
+    return f"estimated from the residuals: what the model cannot express is in it{shared}"
 
 
 def _table_share(table: TableMotion | None, kind: str) -> Share:

@@ -53,13 +53,14 @@ def _mm(value: float | None) -> str:
 def box_words(box: Box) -> str:
     """Return the limits of a box in words."""
     words = []
-    for letter, (low, high) in shown_box(box).items():
+    for letter, ends in shown_box(box).items():
+        low, high = (None if end is None else round(end) for end in ends)
         if low is None:
-            words.append(f"{letter} below {high:.0f}")
+            words.append(f"{letter} below {high}")
         elif high is None:
-            words.append(f"{letter} from {low:.0f}")
+            words.append(f"{letter} from {low}")
         else:
-            words.append(f"{letter} {low:.0f} to {high:.0f}")
+            words.append(f"{letter} {low} to {high}")
     return ", ".join(words)
 
 

@@ -7,7 +7,16 @@ from typing import Annotated
 
 import typer
 
-from truearm.cli.loading import GravityText, NoteTexts, PayloadText, read_gravity, read_notes
+from truearm.cli.loading import (
+    GravityText,
+    NoteTexts,
+    PayloadText,
+    WrenchAtText,
+    WrenchFrameText,
+    WrenchText,
+    read_gravity,
+    read_notes,
+)
 from truearm.cli.options import command_line
 from truearm.cli.output import Json, end_on_error, print_json, print_line, print_record
 
@@ -17,6 +26,9 @@ def validate(
     data: Annotated[str, typer.Argument(metavar="DATA.csv", help="New measurements in the same frames.")],
     payload: PayloadText = None,
     gravity: GravityText = None,
+    wrench: WrenchText = None,
+    wrench_frame: WrenchFrameText = None,
+    wrench_at: WrenchAtText = None,
     refit: Annotated[
         str | None,
         typer.Option(
@@ -40,6 +52,9 @@ def validate(
         data,
         payload=payload,
         gravity=read_gravity(gravity),
+        wrench=wrench,
+        wrench_frame=wrench_frame,  # type: ignore[arg-type]
+        wrench_at=wrench_at,
         refit=refit,
         out=out,
         notes=read_notes(notes),

@@ -136,7 +136,7 @@ class ZonedRobot:
         for mine, (_, robot) in zip(self.configurations(data.postures), self.zones, strict=True):
             if not len(mine):
                 continue
-            carrying = robot.with_payload(whole.payload, whole.gravity)
+            carrying = robot.with_payload(whole.payload, whole.gravity).with_wrench(whole.wrench)
             part = errors_of(carrying, data.of_configurations(mine))
             readings = np.isin(data.configuration, mine)
             position[readings] = part.position_errors

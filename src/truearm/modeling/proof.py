@@ -20,6 +20,7 @@ _DECIMALS: Final = 7
 #: Measured joint positions that are kept, and their decimals in deg or mm.
 MOST_MEASURED: Final = 1000
 _POSITION_DECIMALS: Final = 3
+_LOAD_DECIMALS: Final = 6
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,9 @@ class Proof:
     measured
         Joint positions at which it was measured [rad or m], to a thousandth of a degree or millimetre; a thousand of
         them at most, evenly taken. Empty where only the region is known.
+    loads
+        Lowest and highest moment about each joint's axis, or force along it, while it was measured [N m or N]; empty
+        if that is not known.
     """
 
     status: str
@@ -68,6 +72,7 @@ class Proof:
     warnings: tuple[Notice, ...] = ()
     digest: str = ""
     measured: tuple[tuple[float, ...], ...] = ()
+    loads: tuple[tuple[float, float], ...] = ()
 
     @classmethod
     def of(
@@ -83,6 +88,7 @@ class Proof:
         lower_bound: bool = False,
         measured: Sequence[Sequence[float]] = (),
         joint_units: Sequence[str] = (),
+        loads: Sequence[tuple[float, float]] = (),
     ) -> Self:
         """Make the proof of a calibration, rounded to what a file holds of it.
 
@@ -119,6 +125,7 @@ class Proof:
                 tuple(to_si(float(position_text(v, u)), u) for v, u in zip(row, joint_units, strict=True))
                 for row in _some(measured)
             ),
+            loads=tuple((round(low, _LOAD_DECIMALS) + 0.0, round(high, _LOAD_DECIMALS) + 0.0) for low, high in loads),
         )
 
     def summary(self) -> dict[str, Any]:

@@ -10,8 +10,11 @@ import numpy as np
 from truearm.identification.judging.expected_error import ExpectedError, covariance_root, uncertain_names
 from truearm.identification.solving.fit import Fit, Status
 from truearm.measurement.dataset import Dataset
+from truearm.modeling.equilibrium import joint_efforts
 from truearm.modeling.parameters import PLACES
+from truearm.modeling.postures import Postures
 from truearm.modeling.proof import Proof
+from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 
 #: A note of the calibration that concerns every program: its controller may not have the nominal values of the file.
@@ -53,6 +56,7 @@ def proof_of(
     parameters, covariance = [fit.robot.parameters[name] for name in names], root @ root.T
     region = list(zip(training.joints.min(axis=0).tolist(), training.joints.max(axis=0).tolist(), strict=True))
     measured = training.joints.tolist()
+    loads = loads_of(fit.robot, training.postures)
     if before is not None:
         arm = {n: p for n, p in fit.robot.parameters.items() if p.group not in PLACES}
         kept = [i for i, name in enumerate(before.names) if name in arm and name not in names]
@@ -63,6 +67,9 @@ def proof_of(
             parameters += [arm[before.names[i]] for i in kept]
             region = [(min(a, c), max(b, d)) for (a, b), (c, d) in zip(region, before.region or region, strict=True)]
             measured = [*before.measured, *measured] if before.measured else []
+            # By older versions nothing is known of the loads before.
+            pairs = zip(loads, before.loads, strict=True) if before.loads else ()
+            loads = [(min(a, c), max(b, d)) for (a, b), (c, d) in pairs]
             joint_error = np.maximum(joint_error, before.joint_error or 0.0)
             lower_bound = lower_bound or before.lower_bound
             beside = np.zeros((len(covariance), len(kept)))
@@ -78,4 +85,11 @@ def proof_of(
         lower_bound=lower_bound,
         measured=measured,
         joint_units=["deg" if joint.kind == "revolute" else "mm" for joint in fit.robot.joints],
+        loads=loads,
     )
+
+
+def loads_of(robot: Robot, postures: Postures) -> list[tuple[float, float]]:
+    """Return the lowest and highest load about, or along, each joint's axis in some postures [N m or N]."""
+    efforts = joint_efforts(robot, postures)
+    return list(zip(efforts.min(axis=0).tolist(), efforts.max(axis=0).tolist(), strict=True))

@@ -172,6 +172,7 @@ class ProofEntry(_Entry):
     lower_bound: Annotated[bool, Field(strict=True)] = False
     region: list[tuple[Number, Number]] = []
     joint_error: list[NotNegative] = []
+    loads: list[tuple[Number, Number]] = []
     deviations: dict[str, NotNegative] = {}
     correlations: list[Annotated[str, StringConstraints(strict=True)]] = []
     measured: list[Annotated[str, StringConstraints(strict=True)]] = []
@@ -206,6 +207,7 @@ class RobotFile(_Entry):
     controller: ControllerEntry = ControllerEntry()
     masses: list[MassEntry] = []
     payload: PayloadEntry | None = None
+    rated_load: Positive | None = None
     gravity: Annotated[Triple, AfterValidator(_falls)] = GRAVITY
     tools: dict[Name, ToolEntry] = {}
     truths: dict[Name, TruthEntry] = {}

@@ -55,6 +55,7 @@ PLACES: dict[str, Arguments] = {
     "import_ur_kinematics": {"out": "robot.yaml"},
     "calibrate": {"out": "."},
     "tilting": {"out": "."},
+    "validate": {"out": "."},
     "plan": {"out": "plan.csv"},
     "plan_inclinometers": {"out": "pairs.csv"},
     "simulate": {"out": "data.csv"},

@@ -84,6 +84,7 @@ LIMITS: Final[Mapping[str, Limit]] = {
     "poses": Limit(50_000, "the number is out of range", "poses"),
     "candidates": Limit(50_000, "the number is out of range", "candidates"),
     "trials": Limit(1_000_000, "the number is out of range", "trials"),
+    "monte_carlo": Limit(100_000, "the number is out of range", "trials"),
     "repeats": Limit(100_000, "the number is out of range", "repeats"),
     "seeds": Limit(1000, "the number is out of range", "seeds"),
 }

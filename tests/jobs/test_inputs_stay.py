@@ -20,6 +20,7 @@ from truearm.modeling.formats.robot_file import robot_text
 from truearm.results.axis_calibration import AXIS_FILES
 from truearm.results.calibration import RESULT_FILES
 from truearm.results.program_correction import REPORT
+from truearm.results.validation import VALIDATION_FILES
 
 #: How a job refuses it; a program that is called as a record is no program to begin with.
 REFUSED = r"would be overwritten|not overwritten|of this name itself|no robot language has files of this kind"
@@ -47,6 +48,9 @@ READ: dict[str, Callable[[Path], Arguments]] = {
     "calibrate": lambda folder: {
         "robot": _robot(folder),
         "bounds": _written(folder / "bounds.yaml", f"truearm: truearm-bounds/1\n{_UNITS}within: {{d_1: 5}}\n"),
+        "zones": _written(
+            folder / "zones.yaml", "truearm: truearm-zones/1\nunits: {length: mm}\nzones: {left: {y: [0, null]}}\n"
+        ),
     },
     "plan": lambda folder: {
         "robot": _robot(folder),
@@ -93,6 +97,7 @@ ELSEWHERE = (("compensate", "controller_kinematics"),)
 #: The names of what a job writes into the folder `out`.
 INTO_FOLDERS = {
     "calibrate": RESULT_FILES,
+    "validate": VALIDATION_FILES,
     "axes": AXIS_FILES,
     "compensate": ("plate.mod", "plate.mod.truearm.json", REPORT),
     "revert": ("plate.mod",),

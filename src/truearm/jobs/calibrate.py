@@ -39,6 +39,7 @@ from truearm.jobs.arguments import (
     whole_argument,
 )
 from truearm.jobs.check import notices_of
+from truearm.jobs.monte_carlo import simulate_calibrations, trials_argument
 from truearm.jobs.split import (
     check_copies,
     check_proof,
@@ -48,6 +49,7 @@ from truearm.jobs.split import (
     train_count,
     without_words,
 )
+from truearm.jobs.zones import choose_zones, zone_file_names, zones_argument
 from truearm.library import urdf_source
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.repeats import readings_digest
@@ -85,6 +87,8 @@ def calibrate(
     gravity: Sequence[float] | None = None,
     base_changes: Sequence[str] = (),
     without: Sequence[str] = (),
+    monte_carlo: int | None = None,
+    zones: int | str | Path | None = None,
     notes: Mapping[str, str] | None = None,
     command: str | None = None,
     progress: Callable[[str], None] = lambda _: None,
@@ -126,6 +130,14 @@ def calibrate(
         taken out of the readings; no deviation contains what is not known of it.
     without
         Configurations that are left out, by their labels: neither part of the split knows them.
+    monte_carlo
+        How many calibrations of the robot that is found are simulated (100 or more): their spread gives intervals of
+        the parameters and the predictions that need no linearity, beside the linear ones. With the linear loss and
+        without bounds; seeded by `seed`. None simulates none.
+    zones
+        Into how many zones the workspace is cut, 2 to 64, or a file of zones: each gets a model of its own, which is
+        kept if it is better on the held-out configurations there; it is written as ``zone-NAME.yaml``, and
+        ``zones.yaml`` says where they are.
     notes
         What to write on the report and into result.json, by its name: ``date``, ``serial``, ``operator``,
         ``instrument``, or any other.
@@ -155,6 +167,8 @@ def calibrate(
     choice_argument(loss, "loss", {name: name for name in LOSSES})
     choice_argument(redundancy, "redundancy", {name: name for name in get_args(Redundant)})
     seed = whole_argument(seed, "seed")
+    trials = trials_argument(monte_carlo, loss, bounds)
+    wanted_zones = zones_argument(zones, held_out=train != "all")
     payload, fall = payload_argument(payload), gravity_argument(gravity)
     call = command_argument(command) or python_call(
         "calibrate",
@@ -169,13 +183,19 @@ def calibrate(
         effects=list(effects) or None,
         base_changes=list(base_changes) or None,
         without=list(without) or None,
+        monte_carlo=trials,
+        zones=zones,
         notes=notes or None,
         payload=payload,
         gravity=fall,
     )
     refuse_swapped(robot, data, "calibrate")
-    inputs = files_of(robot, data, bounds)
-    folder = None if out is None else folder_for(RESULT_FILES, out, robot, data, bounds, ours=True)
+    inputs = files_of(robot, data, bounds, zones)
+    folder = (
+        None
+        if out is None
+        else folder_for((*RESULT_FILES, *zone_file_names(wanted_zones)), out, robot, data, bounds, zones, ours=True)
+    )
     progress("reading the robot")
     source = urdf_source(robot) if isinstance(robot, str | Path) else None
     urdf = None if source is None else read_bytes(source[0])
@@ -256,6 +276,17 @@ def calibrate(
     judged = judge(
         fit, readings, first, validation or train_errors, noticed, of_split, loss, held_out=second is not None
     )
+    simulated, told = None, list[Notice]()
+    if trials is not None:
+        simulated, told = simulate_calibrations(
+            fit, first, second, trials, priors=redundancy == "prior", seed=seed, progress=progress
+        )
+    chosen_zones = None
+    if wanted_zones is not None and second is not None:
+        progress("identifying zones")
+        chosen_zones = choose_zones(
+            wanted_zones, nominal_robot, fit, (first, second), loss=loss, redundancy=redundancy, bounds=bounds
+        )
     digest = f" ({'' if sha256 is None else f'sha256 {sha256[:12]}, '}readings {readings_digest(as_read)[:12]})"
     freed = " + ".join([chosen.name, *(name for name in effects if name in chosen.effects)])
     history = (
@@ -270,7 +301,7 @@ def calibrate(
         train=train_errors,
         validation=validation,
         expected=judged.expected,
-        warnings=judged.warnings,
+        warnings=(*judged.warnings, *told),
         next=judged.next,
         data=readings,
         training=training,
@@ -283,6 +314,8 @@ def calibrate(
         known_before=_known_before(nominal_robot),
         without=without,
         notes=notes,
+        monte_carlo=simulated,
+        zones=chosen_zones,
     )
     if folder is not None:
         calibration.save(folder, progress)

@@ -55,6 +55,7 @@ def proof_of(
     names, root = uncertain_names(fit), covariance_root(fit, fit.covariance)
     parameters, covariance = [fit.robot.parameters[name] for name in names], root @ root.T
     region = list(zip(training.joints.min(axis=0).tolist(), training.joints.max(axis=0).tolist(), strict=True))
+    measured = training.joints.tolist()
     loads = loads_of(fit.robot, training.postures)
     if before is not None:
         arm = {n: p for n, p in fit.robot.parameters.items() if p.group not in PLACES}
@@ -65,6 +66,7 @@ def proof_of(
             repeated += [warning for warning in before.warnings if not repeated]
             parameters += [arm[before.names[i]] for i in kept]
             region = [(min(a, c), max(b, d)) for (a, b), (c, d) in zip(region, before.region or region, strict=True)]
+            measured = [*before.measured, *measured] if before.measured else []
             # By older versions nothing is known of the loads before.
             pairs = zip(loads, before.loads, strict=True) if before.loads else ()
             loads = [(min(a, c), max(b, d)) for (a, b), (c, d) in pairs]
@@ -81,6 +83,8 @@ def proof_of(
         covariance,
         warnings=repeated,
         lower_bound=lower_bound,
+        measured=measured,
+        joint_units=["deg" if joint.kind == "revolute" else "mm" for joint in fit.robot.joints],
         loads=loads,
     )
 

@@ -251,8 +251,28 @@ def _proof(robot: Robot, entry: ProofEntry, shown: Mapping[str, str], where: str
         lower_bound=entry.lower_bound,
         warnings=tuple(Notice(warning.code, warning.message, "note") for warning in entry.warnings),
         digest=entry.sha256,
+        measured=tuple(
+            _position(row, robot, f"{where}, proof.measured[{number}]", cure)
+            for number, row in enumerate(entry.measured, 1)
+        ),
         loads=tuple(entry.loads),
     )
+
+
+def _position(text: str, robot: Robot, where: str, cure: str) -> tuple[float, ...]:
+    """Return joint positions of a measured configuration in SI units."""
+    numbers = [as_number(word) for word in text.split()]
+    known = tuple(number for number in numbers if number is not None and math.isfinite(number))
+    if len(known) != len(robot.joints) or len(numbers) != len(known):
+        raise InputError(
+            "one number belongs here for each joint, in deg or mm",
+            where=where,
+            came=text,
+            allowed=counted(len(robot.joints), "number"),
+            cure=cure,
+        )
+    units = ["deg" if joint.kind == "revolute" else "mm" for joint in robot.joints]
+    return tuple(to_si(value, unit) for value, unit in zip(known, units, strict=True))
 
 
 def _row(text: str, count: int, where: str, cure: str) -> tuple[float, ...]:

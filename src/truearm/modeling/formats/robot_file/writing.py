@@ -14,7 +14,7 @@ from truearm.modeling.formats.entries import NAME, place_entry
 from truearm.modeling.formats.robot_file.schema import SCHEMA
 from truearm.modeling.parameters import Parameter
 from truearm.modeling.parts import GRAVITY, NO_PAYLOAD, Joint
-from truearm.modeling.proof import Proof
+from truearm.modeling.proof import Proof, position_text
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 from truearm.modeling.wrench import refuse_pushed
@@ -222,5 +222,9 @@ def _proof(
             }
         )
         made["correlations"] = [text(" ".join(f"{v:.7g}" for v in row)) for row in proof.factor]
+        if proof.measured:
+            made["measured"] = [
+                text(" ".join(position_text(v, u) for v, u in zip(row, units, strict=True))) for row in proof.measured
+            ]
     made["sha256"] = proof.digest
     return made

@@ -1,0 +1,5 @@
+"""``truearm path``."""
+
+
+def path() -> None:
+    """Follow a path."""

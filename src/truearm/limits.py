@@ -79,6 +79,9 @@ LIMITS: Final[Mapping[str, Limit]] = {
         1000, "there are too many parameters", "parameters", "Leave out targets that say nothing more."
     ),
     "poses": Limit(50_000, "the number is out of range", "poses"),
+    "samples": Limit(
+        20_000, "the path has too many samples", "samples", "Take a longer step in the file, or go faster."
+    ),
     "candidates": Limit(50_000, "the number is out of range", "candidates"),
     "trials": Limit(1_000_000, "the number is out of range", "trials"),
     "repeats": Limit(100_000, "the number is out of range", "repeats"),

@@ -64,7 +64,7 @@ def ik(
         poses,
         out=out,
         branch=branch,
-        seed=_seed(robot, seed, joints),
+        seed=read_seed(robot, seed, joints),
         target=target,
         frame=frame,  # type: ignore[arg-type]
         orientation="free" if orientation_free else "axis" if orientation_axis else "full",
@@ -81,7 +81,7 @@ def ik(
         raise typer.Exit(3)
 
 
-def _seed(robot: str, text: str | None, joints: str | None) -> list[float] | None:
+def read_seed(robot: str, text: str | None, joints: str | None) -> list[float] | None:
     """Return the model's joint positions [rad or m] that a text in deg or mm names, of the kind that is written."""
     if text is None:
         return None

@@ -32,9 +32,7 @@ def poses(
     plane: Annotated[str, typer.Option(metavar="CORNERS", help="Diagonal plane, for sets on one.")] = "C1-C2-C7-C8",
     count: Annotated[
         int | None,
-        typer.Option(
-            metavar="N", min=1, help="Poses of diagonal, 118 and sphere.", show_default="25, 118 and 50"
-        ),
+        typer.Option(metavar="N", min=1, help="Poses of diagonal, 118 and sphere.", show_default="25, 118 and 50"),
     ] = None,
     target: Annotated[
         str | None, typer.Option(metavar="NAME", help="What goes to the poses.", show_default="the flange")

@@ -113,9 +113,7 @@ def sphere(
 
             inside = np.isfinite(lengths)
             before = None if nominal is None else judged(nominal)
-            spheres.append(
-                OneSphere(target, fixture, lengths[inside], int((~inside).sum()), before, judged(arm))
-            )
+            spheres.append(OneSphere(target, fixture, lengths[inside], int((~inside).sum()), before, judged(arm)))
     found = SphereTests(
         arm,
         measured.source,

@@ -123,7 +123,7 @@ def correct_path(robot: Robot, planned: PlannedPath, seed: ArrayLike | None = No
             joints[name] = corrected(model, moving, desired, TIP, orientation=planned.orientation, rotation=kept).joints
     tip = Tip(real, TIP)
     found = {name: tip.positions(motion.postures(values)) for name, values in joints.items()}
-    back = np.linalg.inv(place.to_real)
+    back = np.asarray(np.linalg.inv(place.to_real), float)
     best = joints[[name for name in KNOWLEDGE if name in joints][-1]]
     return CorrectedPath(
         planned,
@@ -141,10 +141,11 @@ class _Placed:
 
     def __init__(self, robot: Robot, nominal: Robot, planned: PlannedPath, known: bool) -> None:
         #: From the frame of the path to the base of the nominal robot, and to that of the calibrated one.
-        self.to_nominal = self.to_real = np.eye(4)
-        flange = np.eye(4)
+        self.to_nominal: Array = np.eye(4)
+        self.to_real: Array = self.to_nominal
+        flange: Array = np.eye(4)
         if planned.frame == "world":
-            self.to_nominal = self.to_real = np.linalg.inv(robot.base.matrix)
+            self.to_nominal = self.to_real = np.asarray(np.linalg.inv(robot.base.matrix))
         elif planned.frame == "nominal" and known:
             self.to_real, flange = best_agreement(robot)
         at = _tip(robot, planned)
@@ -153,7 +154,7 @@ class _Placed:
         else:
             on_nominal, on_real = np.linalg.inv(flange) @ np.append(at, 1.0), at
         turned = Transform.from_matrix(flange[:3, :3], on_real[:3])
-        self.nominal = nominal.with_frames(IDENTITY, {TIP: Transform(tuple(map(float, on_nominal[:3])))})
+        self.nominal = nominal.with_frames(IDENTITY, {TIP: on_nominal[:3].tolist()})
         self.real = robot.with_frames(robot.base, {TIP: turned})
         self.nominal_path = _trajectory(self.to_nominal, planned.trajectory)
 

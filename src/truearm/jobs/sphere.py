@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truearm.compensation.fake_targets import nominal_robot
 from truearm.compensation.gauge import best_agreement
@@ -104,16 +105,10 @@ def sphere(
             if not len(rows):
                 continue
             lengths = measured.distance[rows]
-
-            def judged(model: Robot, rows: Array = rows, target: str = target) -> SphereTest:
-                centre = None if at_ball is None else _centre(model, measured, at_ball)
-                postures = measured.postures.at(measured.configuration[rows])
-                with refusals_of("data"):
-                    return sphere_test(model, postures, measured.distance[rows], target, centre)
-
             inside = np.isfinite(lengths)
-            before = None if nominal is None else judged(nominal)
-            spheres.append(OneSphere(target, fixture, lengths[inside], int((~inside).sum()), before, judged(arm)))
+            before = None if nominal is None else _judged(nominal, measured, rows, target, at_ball)
+            after = _judged(arm, measured, rows, target, at_ball)
+            spheres.append(OneSphere(target, fixture, lengths[inside], int((~inside).sum()), before, after))
     found = SphereTests(
         arm,
         measured.source,
@@ -126,6 +121,14 @@ def sphere(
     if page is not None:
         found.save(page)
     return found
+
+
+def _judged(model: Robot, data: Dataset, rows: NDArray[np.intp], target: str, at_ball: int | None) -> SphereTest:
+    """Return the test of some readings by a model."""
+    assert data.distance is not None
+    centre = None if at_ball is None else _centre(model, data, at_ball)
+    with refusals_of("data"):
+        return sphere_test(model, data.postures.at(data.configuration[rows]), data.distance[rows], target, centre)
 
 
 def _nominal(robot: Robot) -> Robot | None:

@@ -1,4 +1,4 @@
-"""The page of sphere tests: the error of every reading, before and after calibration (Nubiola, figures 2.13 to 2.16)."""
+"""The page of sphere tests: the error of every reading, before and after (Nubiola, figures 2.13 to 2.16)."""
 
 from __future__ import annotations
 

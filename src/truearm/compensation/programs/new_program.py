@@ -119,7 +119,8 @@ class NewProgram:
 
     def pose(self, row: int, form: Form) -> list[str]:
         """Return the numbers of the pose of a target as a language writes them."""
-        assert self.poses is not None and form.orientation is not None
+        assert self.poses is not None
+        assert form.orientation is not None
         matrix = self.poses[row]
         orientation = form.orientation
         start = np.zeros((1, orientation.count))

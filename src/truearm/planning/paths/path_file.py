@@ -209,21 +209,14 @@ def read_path(file: FilePath) -> PlannedPath:
                 kind = "hermite"
             else:
                 kind, way = _way(section, at, length, where)
-                law = [
-                    metres(own if own is not None else everywhere, where)
-                    for own, everywhere in (
-                        (section.speed, content.speed),
-                        (section.acceleration, content.acceleration),
-                    )
-                ]
-                _refuse_too_many(way.length / law[0], step)
-                part = timed(way, *law, step)
-        first = 0 if not parts else 1  # where the section before ended
-        parts.append(
-            Trajectory(
-                part.time[first:] + began, *(v[first:] for v in (part.position, part.velocity, part.acceleration))
-            )
-        )
+                speed = metres(section.speed if section.speed is not None else content.speed, where)
+                own = section.acceleration if section.acceleration is not None else content.acceleration
+                acceleration = metres(own, where)
+                _refuse_too_many(way.length / speed, step)
+                part = timed(way, speed, acceleration, step)
+        new = slice(1 if parts else 0, None)  # where the section before ended
+        moved = (part.position[new], part.velocity[new], part.acceleration[new])
+        parts.append(Trajectory(part.time[new] + began, *moved))
         kinds.append(kind)
         numbers.append(np.full(len(parts[-1].time), number))
         began, at = float(parts[-1].time[-1]), parts[-1].position[-1]
@@ -268,7 +261,9 @@ def _way(section: _Section, start: Array, length: str, where: str) -> tuple[str,
 
 def _as_given(section: _Section, start: Array, step: float, length: str, where: str) -> Trajectory:
     """Return a section whose waypoints have times and velocities."""
-    assert section.hermite is not None and section.velocities is not None and section.times is not None
+    assert section.hermite is not None
+    assert section.velocities is not None
+    assert section.times is not None
     points = [np.array([sized_si(v, length, where) for v in one]) for one in section.hermite]
     waypoints = _waypoints(start, points, length)
     velocities = np.array([[sized_si(v, length, where) for v in one] for one in section.velocities])

@@ -11,7 +11,7 @@ _NO_AXES = "[9E9,9E9,9E9,9E9,9E9,9E9]"
 
 
 def new_program(program: NewProgram) -> dict[str, str]:
-    """Return a module with one routine: every move takes its time (``\\T``)."""
+    r"""Return a module with one routine: every move takes its time (``\T``)."""
     lines = [f"MODULE {program.name}", *(f"  ! {line}" for line in program.comments)]
     for row in range(len(program)):
         joints = ",".join([*program.axes(row, JOINTTARGET), *["0"] * (6 - len(program.sliding))])

@@ -15,6 +15,10 @@ _POINT: Final = Form("pointRx", "pose", angle=radians(1.0), orientation=MOVING_X
 _DATA = 'xmlns="http://www.staubli.com/robotics/VAL3/Data/2"'
 _CODE = 'xmlns="http://www.staubli.com/robotics/VAL3/Program/2"'
 _PROJECT = 'xmlns="http://www.staubli.com/robotics/VAL3/Project/3"'
+_NAMES = ("x", "y", "z", "rx", "ry", "rz")
+#: On its way the arm stays in the posture in which it began.
+_SAME = 'shoulder="ssame" elbow="esame" wrist="wsame" fatherId="world[0]"'
+_MOTION = '<Value key="0" accel="100" vel="10" decel="100" blend="joint" leave="1" reach="1" />'
 _HEAD = '<?xml version="1.0" encoding="utf-8"?>'
 
 
@@ -25,16 +29,15 @@ def new_program(program: NewProgram) -> dict[str, str]:
     """
     name, count = program.name, len(program)
     straight = program.poses is not None
-    joints = [
-        _element(k, zip("123456", program.axes(k, _JOINT), strict=False), "j") for k in range(1 if straight else count)
-    ]
-    data = [_variable("jPath", "jointRx", joints)]
+    by_joints = range(1 if straight else count)
+    joints = [_element(k, zip("123456", program.axes(k, _JOINT), strict=False), "j") for k in by_joints]
+    data = [_variable("jPath", "jointRx", joints), _variable("mPath", "mdesc", [_MOTION])]
     steps = [f"  // {line}" for line in program.comments]
     steps += ["  movej(jPath[0],flange,mPath)", "  waitEndMove()"]
     if straight:
-        names = ("x", "y", "z", "rx", "ry", "rz")
-        same = 'shoulder="ssame" elbow="esame" wrist="wsame" fatherId="world[0]"'
-        points = [_element(k - 1, zip(names, program.pose(k, _POINT), strict=True), "", same) for k in range(1, count)]
+        points = [
+            _element(k - 1, zip(_NAMES, program.pose(k, _POINT), strict=True), "", _SAME) for k in range(1, count)
+        ]
         data.append(_variable("pPath", "pointRx", points))
     said = ""
     for row in range(1, count):
@@ -46,26 +49,26 @@ def new_program(program: NewProgram) -> dict[str, str]:
             steps.append(f"  mPath.tvel={speed}")
             said = speed
         steps.append(f"  movel(pPath[{row - 1}],flange,mPath)")
-    data.append(
-        _variable(
-            "mPath", "mdesc", ['<Value key="0" accel="100" vel="10" decel="100" blend="joint" leave="1" reach="1" />']
-        )
-    )
     code = "\n".join(["begin", *steps, "  waitEndMove()", "end"])
-    return {
-        f"{name}/{name}.dtx": "\n".join(
-            [_HEAD, f"<Database {_DATA}>", "<Datas>", *data, "</Datas>", "</Database>", ""]
-        ),
-        f"{name}/start.pgx": "\n".join(
-            [_HEAD, f"<Programs {_CODE}>", '<Program name="start">', f"<Code><![CDATA[\n{code}\n]]></Code>"]
-            + ["</Program>", "</Programs>", ""]
-        ),
-        f"{name}/{name}.pjx": "\n".join(
-            [_HEAD, f"<Project {_PROJECT}>", '<Parameters version="s7.5.3" stackSize="5000" millimeterUnit="true" />']
-            + ['<Programs><Program file="start.pgx" /></Programs>', f'<Database><Data file="{name}.dtx" /></Database>']
-            + ["<Libraries />", "</Project>", ""]
-        ),
+    files = {
+        f"{name}.dtx": [f"<Database {_DATA}>", "<Datas>", *data, "</Datas>", "</Database>"],
+        "start.pgx": [
+            f"<Programs {_CODE}>",
+            '<Program name="start">',
+            f"<Code><![CDATA[\n{code}\n]]></Code>",
+            "</Program>",
+            "</Programs>",
+        ],
+        f"{name}.pjx": [
+            f"<Project {_PROJECT}>",
+            '<Parameters version="s7.5.3" stackSize="5000" millimeterUnit="true" />',
+            '<Programs><Program file="start.pgx" /></Programs>',
+            f'<Database><Data file="{name}.dtx" /></Database>',
+            "<Libraries />",
+            "</Project>",
+        ],
     }
+    return {f"{name}/{file}": "\n".join([_HEAD, *lines, ""]) for file, lines in files.items()}
 
 
 def _element(key: int, numbers: zip[tuple[str, str]], before: str, more: str = "") -> str:

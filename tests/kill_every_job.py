@@ -52,6 +52,9 @@ PLACES: dict[str, Arguments] = {
     "import_ur_kinematics": {"out": "robot.yaml"},
     "calibrate": {"out": "."},
     "plan": {"out": "plan.csv"},
+    "poses": {"out": "set.csv"},
+    "path": {"out": "."},
+    "sphere": {"out": "page.html"},
     "simulate": {"out": "data.csv"},
     "inverse": {"out": "joints.csv"},
     "axes": {"out": "."},
@@ -71,6 +74,8 @@ PLACES: dict[str, Arguments] = {
 EARLIER: dict[str, Arguments] = {
     "calibrate": {"seed": 2},
     "plan": {"seed": 2},
+    "poses": {"count": 6},
+    "path": {"programs": ["rapid"]},
     "simulate": {"seed": 2},
     "axes": {"frame": "instrument"},
     "hexapod_plan": {"fixture": (0.24, 0.0, 0.1, -0.5)},

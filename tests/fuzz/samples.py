@@ -58,6 +58,8 @@ def folder() -> Path:
         "tolerance",
         "compensate",
         "revert",
+        "path",
+        "sphere",
     ):
         EXAMPLES[job](place)
     truearm.import_ur_kinematics(**EXAMPLES["import_ur_kinematics"](place))

@@ -24,6 +24,7 @@ from truearm.jobs.arguments import (
     folder_for,
     gravity_argument,
     joints_argument,
+    name_argument,
     payload_argument,
     python_call,
     robot_argument,
@@ -110,6 +111,7 @@ def path(
         languages = tuple(BY_NAME)
     kinds: dict[str, TargetKind] = {"joints": "joints", "poses": "poses"}
     kind = choice_argument(targets, "targets", kinds)
+    called = name_argument(name, "name")
     time = finite_number(spacing, "spacing", allowed="a time in s")
     if not time > 0.0:
         raise InputError("targets are some time apart", parameter="spacing", came=f"{time:g} s", allowed="above 0 s")
@@ -119,6 +121,12 @@ def path(
     written = (MOTION, CORRECTED, LOADS, REPORT)
     folder = None if out is None else folder_for(written, out, robot, file, *kinematics)
     carried, fall = payload_argument(payload), gravity_argument(gravity)
+    arm = robot_argument(robot).with_payload(carried, fall)
+    if controller_kinematics is not None:
+        with refusals_of("controller_kinematics"):
+            said = str(path_argument(controller_kinematics, "controller_kinematics"))
+            arm = with_controller_kinematics(arm, said, Path())
+    accepted = accept_argument(accept, arm)
     call = command_argument(command) or python_call(
         "path",
         robot,
@@ -129,17 +137,11 @@ def path(
         programs=list(languages) or None,
         targets=kind,
         spacing=time,
-        name=name,
+        name=called,
         controller_kinematics=controller_kinematics,
-        accept=list(accept) or None,
+        accept=list(accepted) or None,
         joints=joints,
     )
-    arm = robot_argument(robot).with_payload(carried, fall)
-    if controller_kinematics is not None:
-        with refusals_of("controller_kinematics"):
-            said = str(path_argument(controller_kinematics, "controller_kinematics"))
-            arm = with_controller_kinematics(arm, said, Path())
-    accepted = accept_argument(accept, arm)
     if languages:
         refuse_unaccepted(arm, accepted)
     joints_are = joints_argument(joints, arm)
@@ -153,7 +155,7 @@ def path(
     texts: dict[str, str] = {}
     if chosen:
         with refusals_of("name" if kind == "joints" else "targets"):
-            content = path_program(followed, arm, name, targets=kind, spacing=time)
+            content = path_program(followed, arm, called, targets=kind, spacing=time)
             texts = _programs(arm, content, chosen, notices)
     made = FollowedPath(
         arm, followed, texts, call, tuple(dict.fromkeys(notices)), files_of(robot, file, *kinematics), joints_are
@@ -169,15 +171,16 @@ def _programs(arm: Robot, content: NewProgram, languages: Sequence[Language], no
     for language in languages:
         assert language.new is not None
         files = language.new(content)
-        if content.corrected:
+        theirs = not arm.maker or language.runs_on(arm.maker)
+        if content.corrected and theirs:
             as_read = [language.read([Source(Path(file), text) for file, text in files.items()])]
             refuse_unknown_controller(arm, as_read)
             notices += controller_notices(arm, as_read)
         texts |= files
     foreign = [one for one in languages if arm.maker and not one.runs_on(arm.maker)]
     if foreign:
-        theirs = ", ".join(f"{one.name} of {one.makers[0]}" for one in foreign)
-        notices.append(Notice("maker", f"{arm.name} is of {arm.maker}, and programs were written in {theirs}."))
+        written = ", ".join(f"{one.name} of {one.makers[0]}" for one in foreign)
+        notices.append(Notice("maker", f"{arm.name} is of {arm.maker}, and programs were written in {written}."))
     untimed = [one.name for one in languages if content.untimed(one.name)]
     if untimed:
         notices.append(

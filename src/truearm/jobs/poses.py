@@ -12,7 +12,6 @@ from truearm.errors import InputError, refusals_of
 from truearm.jobs.arguments import (
     choice_argument,
     command_argument,
-    count_argument,
     files_of,
     joints_argument,
     length_argument,
@@ -22,6 +21,7 @@ from truearm.jobs.arguments import (
     robot_argument,
     whole_argument,
 )
+from truearm.limits import limit
 from truearm.measurement.readers.rows import QUATERNION_TOLERANCE
 from truearm.modeling.chain import Array
 from truearm.modeling.controller import JointsOf
@@ -31,7 +31,7 @@ from truearm.planning.poses.iso9283 import PLANES, Cube
 from truearm.planning.poses.largest_cube import DIRECTIONS, Direction, largest_cube
 from truearm.planning.poses.pose_sets import POSE_SETS, pose_set
 from truearm.planning.poses.seven_lines import DOWN
-from truearm.results.pose_set import Poses, places
+from truearm.results.pose_set import PlannedPoses, places
 
 #: What the tip of a robot is called whose target is given by its place alone.
 TIP = "tip"
@@ -55,7 +55,7 @@ def poses(
     joints: JointsOf | None = None,
     out: str | Path | None = None,
     command: str | None = None,
-) -> Poses:
+) -> PlannedPoses:
     """Return the poses of a set, and the joint positions that reach them.
 
     Parameters
@@ -100,7 +100,7 @@ def poses(
     choice_argument(set, "set", dict.fromkeys(POSE_SETS), "set of poses")
     choice_argument(plane, "plane", dict.fromkeys(PLANES))
     choice_argument(ahead, "ahead", dict.fromkeys(DIRECTIONS))
-    number = None if count is None else count_argument(count, "count")
+    number = None if count is None else whole_argument(count, "count", 1, limit("poses"))
     seed = whole_argument(seed, "seed")
     inputs = files_of(robot)
     table = None if out is None else places(out, inputs, "out")[0]
@@ -139,7 +139,7 @@ def poses(
     cube = _cube(arm, set, centre, side, target, ahead, near, low)
     with refusals_of("count" if number is not None else "set"):
         made = pose_set(arm, set, cube, plane=plane, count=number, target=target, rotation=turned, seed=seed)
-    found = Poses(arm, made, call, inputs, joints_are, own)
+    found = PlannedPoses(arm, made, call, inputs, joints_are, own)
     if table is not None:
         found.save(table)
     return found

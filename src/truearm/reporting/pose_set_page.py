@@ -9,10 +9,10 @@ from truearm.reporting.drawing import AFTER, CAMERA, Figure, base_axes, figure, 
 from truearm.reporting.numbers import rounded_to
 from truearm.reporting.picture_page import Drawing, picture_page
 from truearm.reporting.planning_figures import pose_cube
-from truearm.results.pose_set import Poses
+from truearm.results.pose_set import PlannedPoses
 
 
-def pose_set_page(poses: Poses) -> str:
+def pose_set_page(poses: PlannedPoses) -> str:
     """Return the page of a set."""
     made, cube = poses.made, poses.made.cube
     if cube is None or not made.planes:
@@ -30,7 +30,7 @@ def pose_set_page(poses: Poses) -> str:
     )
 
 
-def _points(poses: Poses) -> Figure:
+def _points(poses: PlannedPoses) -> Figure:
     points = 1e3 * poses.made.position
     trace = {
         "type": "scatter3d",

@@ -31,7 +31,7 @@ POSES: Final = "-poses.csv"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Poses(Record):
+class PlannedPoses(Record):
     """Poses of a named set.
 
     Attributes

@@ -8,7 +8,7 @@ from typing import Final, Literal
 
 import numpy as np
 
-from truearm.compensation.corrected_path import TIP, CorrectedPath
+from truearm.compensation.corrected_path import CorrectedPath
 from truearm.compensation.programs import LANGUAGES
 from truearm.compensation.programs.new_program import NAME, NewProgram
 from truearm.compensation.programs.program import Language
@@ -16,7 +16,6 @@ from truearm.errors import InputError
 from truearm.modeling.inverse.branches import branch_rule
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import homogeneous
-from truearm.planning.poses.tip import Tip
 
 #: What the targets of a program are.
 TargetKind = Literal["joints", "poses"]
@@ -67,8 +66,7 @@ def path_program(path: CorrectedPath, robot: Robot, name: str, *, targets: Targe
     rows = _chosen(path.motion.time, path.planned.section, spacing)
     joints = path.joints[path.best][rows]
     time = path.motion.time[rows]
-    tip = Tip(path.nominal, TIP).positions(joints)
-    apart = np.concatenate([[0.0], np.linalg.norm(np.diff(tip, axis=0), axis=1)])
+    apart = np.diff(path.planned.trajectory.distance[rows], prepend=0.0)
     durations = np.concatenate([[0.0], np.diff(time)])
     poses, branches = None, None
     if targets == "poses":

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from truearm.compensation.corrected_path import Knowledge
-from truearm.reporting.drawing import AFTER, BEFORE, CAMERA, COLOURS, Figure, axis, base_axes, figure, scene_axis
+from truearm.reporting.drawing import AFTER, BEFORE, CAMERA, COLOURS, Figure, axis, figure, scene_axis
 from truearm.reporting.numbers import rounded, rounded_to
 from truearm.reporting.picture_page import Drawing, Figures, picture_page
 from truearm.reporting.planning_figures import joint_trajectories
@@ -59,19 +59,18 @@ def path_page(followed: FollowedPath) -> str:
             Drawing(
                 "loads",
                 "Moments about the joints' axes",
-                "Of the load, in motion: weight and inertia of all that lies beyond each joint; for a joint that "
-                "slides, the force along its axis.",
+                "Of the load, in motion: weight and inertia of all that lies beyond each joint.",
                 _moments(followed),
             )
         )
     return picture_page(
         f"A path of {followed.robot.title}",
         f"{', '.join(path.planned.kinds)}; {path.planned.source}.",
-        followed.lines(),
+        followed.answer,
         followed.command,
         pictures=pictures,
         tables=tables,
-        notices=(),
+        notices=followed.warnings,
     )
 
 
@@ -109,9 +108,8 @@ def _space(followed: FollowedPath) -> Drawing:
         traces.append(_curve(f"without correction, error times {times:g}", wanted + times * beside, "#b3261e", 3))
         words = f"In the frame of the path. What the robot misses it by is drawn {times:g} times as large."
     scene = {f"{letter}axis": scene_axis(f"{letter} [mm]") for letter in "xyz"}
-    length = 0.2 * float(np.abs(wanted).max()) * 1e3 or 100.0
     drawn = figure(
-        [*traces, *base_axes(length)],
+        traces,
         560,
         scene={**scene, "aspectmode": "data", "camera": CAMERA},
         margin={"l": 0, "r": 0, "t": 40, "b": 0},
@@ -149,7 +147,9 @@ def _moments(followed: FollowedPath) -> Figure:
                 "hovertemplate": f"{name}: %{{y:.4g}} {unit} at %{{x:.3f}} s<extra></extra>",
             }
         )
-    return figure(traces, 380, xaxis=axis("time [s]"), yaxis=axis("moment [N m], force [N]"))
+    slides = any(joint.kind == "prismatic" for joint in followed.robot.joints)
+    title = "moment [N m], force [N]" if slides else "moment [N m]"
+    return figure(traces, 380, xaxis=axis("time [s]"), yaxis=axis(title))
 
 
 def _thinned(count: int) -> np.ndarray:

@@ -25,7 +25,7 @@ def sphere_page(tests: SphereTests) -> str:
     return picture_page(
         f"Ballbar on a sphere: {tests.robot.title}",
         f"Measurements of {tests.source}.",
-        tests.lines()[:1],
+        [tests.lines()[0].replace(":", ".")],
         tests.command,
         tables=[Figures("Errors of the distance", heading, tuple(rows))],
         pictures=[

@@ -98,25 +98,34 @@ class FollowedPath(Record):
             "warnings": notice_summaries(self.warnings),
         }
 
-    def lines(self) -> list[str]:
-        """Return how long the path is, and how far the robot is from it before and after correction."""
+    @property
+    def answer(self) -> tuple[str, str]:
+        """What the path is, and what can be said of its correction."""
         path = self.path
         trajectory = path.planned.trajectory
-        text = [
+        first = (
             f"{counted(len(path.planned.kinds), 'section')} ({', '.join(path.planned.kinds)}), "
             f"{trajectory.distance[-1] * 1e3:.1f} mm in {trajectory.time[-1]:.2f} s, "
             f"{counted(len(trajectory.time), 'sample')}."
-        ]
-        if path.calibrated:
+        )
+        if not path.calibrated:
+            return first, "The robot is not calibrated: there is nothing to correct."
+        return first, (
+            "What is left after the last correction is what the model says of itself: the real robot misses the path "
+            "by the model's error."
+        )
+
+    def lines(self) -> list[str]:
+        """Return how long the path is, and how far the robot is from it before and after correction."""
+        first, last = self.answer
+        text = [first]
+        if self.path.calibrated:
             text.append("Off the path, as the calibrated robot predicts it in motion:")
             wide = max(len(STAGES[name]) for name in self.stages)
             for name in self.stages:
-                error = path.errors[name] * 1e3
+                error = self.path.errors[name] * 1e3
                 text.append(f"  {STAGES[name]:<{wide}}  mean {error.mean():.3f}  max {error.max():.3f} mm")
-            text.append("The last line is what the model says of itself: the real robot misses by the model's error.")
-        else:
-            text.append("The robot is not calibrated: there is nothing to correct.")
-        return [*text, *joints_lines(self.joints_are), *notice_lines(self.warnings)]
+        return [*text, last, *joints_lines(self.joints_are), *notice_lines(self.warnings)]
 
     def motion_csv(self) -> str:
         """Return what the controller would command: time, section, joint positions, and where the tip shall be."""

@@ -17,9 +17,10 @@
       - {circle: {centre: [350, 100, 300], normal: [0, 0, 1]}, speed: 50}
       - hermite: [[320, 150, 320], [300, 200, 300]]
 
-Each section begins where the one before ended, at rest, and ends at rest. A circle comes back to where it began. A
-section of Hermite cubics has the velocities of the natural spline, or its own ``velocities`` and ``times`` (Li,
-equation 3): then these say when it is where, and not speed and acceleration.
+What keeps its orientation has an ``axis`` (the tip's z axis points along it) or a ``quaternion``; left out, the
+orientation is free. Each section begins where the one before ended, at rest, and ends at rest. A circle comes back to
+where it began. A section of Hermite cubics has the velocities of the natural spline, or its own ``velocities`` and
+``times`` (Li, equation 3): then these say when it is where, and not speed and acceleration.
 """
 
 from __future__ import annotations
@@ -122,7 +123,7 @@ class PathFile(BaseModel):
     frame: PathFrame = "nominal"
     tip: Triple | None = None
     target: str | None = None
-    orientation: Literal["free"] | _Kept = "free"
+    orientation: _Kept | None = None
     speed: Positive
     acceleration: Positive
     step: Positive
@@ -303,8 +304,8 @@ def _refuse_too_many(duration: float, step: float) -> None:
     refuse_beyond("samples", int(min(duration / step, 1e9)))
 
 
-def _orientation(given: Literal["free"] | _Kept) -> tuple[Orientation, Array]:
-    if isinstance(given, str):
+def _orientation(given: _Kept | None) -> tuple[Orientation, Array]:
+    if given is None:
         return "free", np.eye(3)
     if given.quaternion is not None:
         return "full", np.asarray(rotation_from_quaternion(np.array([given.quaternion]))[0])

@@ -107,6 +107,22 @@ def test_the_controller_takes_the_posture_that_was_meant(
     assert robot.controller.from_model(went) == pytest.approx(program.joints, abs=2e-5)
 
 
+@pytest.mark.parametrize("name", BY_NAME)
+def test_an_arm_of_five_joints_has_programs_of_joint_positions(name: str, tmp_path: Path) -> None:
+    katana = load_robot("katana450")
+    file = tmp_path / "path.yaml"
+    file.write_text(
+        "truearm: truearm-path/1\nunits: {length: mm, angle: deg, time: s}\ntip: [0, 0, 130]\nspeed: 100\n"
+        "acceleration: 500\nstep: 0.1\nstart: [0, -370, 210]\nsections:\n  - line: [50, -370, 210]\n"
+    )
+    program = path_program(correct_path(katana, read_path(file)), katana, "weld", targets="joints", spacing=0.2)
+    found = read_again(name, program)
+    assert len(found.targets) == len(program)
+    for row, target in enumerate(found.targets):
+        assert np.array(target.values)[:5] * target.form.angle == pytest.approx(program.joints[row], abs=1e-6)
+        assert not any(target.values[5:])
+
+
 def test_targets_are_some_time_apart_and_ends_of_sections_are_among_them(paths: dict[str, CorrectedPath]) -> None:
     path = paths["front-up"]
     program = path_program(path, calibrated(), "weld", targets="joints", spacing=0.25)

@@ -110,12 +110,21 @@ class NewProgram:
         shoulder, elbow, wrist = BRANCHES[self.branches[row]].split("-")
         return shoulder, elbow, wrist
 
-    def axes(self, row: int, form: Form) -> list[str]:
-        """Return the joint positions of a target as a language writes them."""
+    def axes(self, row: int, form: Form, least: int = 6) -> list[str]:
+        """Return the joint positions of a target as a language writes them, zeros for those that the arm does not have.
+
+        Parameters
+        ----------
+        form
+            What the language's numbers mean.
+        least
+            How many numbers the language writes at least.
+        """
         units = [form.length if slides else form.angle for slides in self.sliding]
         decimals = [form.decimals[0] if slides else form.decimals[1] for slides in self.sliding]
         values = self.joints[row].tolist()
-        return [written(v / unit, d) for v, unit, d in zip(values, units, decimals, strict=True)]
+        axes = [written(v / unit, d) for v, unit, d in zip(values, units, decimals, strict=True)]
+        return axes + [written(0.0, form.decimals[1])] * (least - len(axes))
 
     def pose(self, row: int, form: Form) -> list[str]:
         """Return the numbers of the pose of a target as a language writes them."""

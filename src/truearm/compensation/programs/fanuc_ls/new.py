@@ -19,7 +19,7 @@ def new_program(program: NewProgram) -> dict[str, str]:
         if program.poses is None or row == 0:
             speed = f"{max(1, round(program.seconds(row) * 1e3))}msec" if row else "5%"
             moves.append(f"J P[{row + 1}] {speed} {end}")
-            axes = program.axes(row, JOINTS)
+            axes = program.axes(row, JOINTS, least=0)
             units = ["mm" if slides else "deg" for slides in program.sliding]
             parts = [f"J{n}= {v} {unit}" for n, (v, unit) in enumerate(zip(axes, units, strict=True), 1)]
             head = "UF : 0, UT : 0,"

@@ -7,6 +7,9 @@ import math
 from truearm.compensation.programs.jbi.forms import ANGLES, POSE
 from truearm.compensation.programs.new_program import NewProgram
 
+#: The controller writes its own when it loads the job.
+_DATE = "2000/01/01 00:00"
+
 
 def new_program(program: NewProgram) -> dict[str, str]:
     """Return a job: straight moves have their speed, joint motions a tenth of the fastest (VJ), as no time can be said.
@@ -20,7 +23,6 @@ def new_program(program: NewProgram) -> dict[str, str]:
     for row in range(count):
         if program.poses is None or row == 0:
             now, numbers = "///POSTYPE ANGLE\n///ANGLE", program.axes(row, ANGLES)
-            numbers += ["0.0000"] * (6 - len(numbers))
             steps.append(f"MOVJ C{row:05d} VJ=10.00{' PL=1' if program.blend(row) else ' PL=0'}")
         else:
             now, numbers = f"///POSTYPE ROBOT\n///RECTAN\n///RCONF {_rconf(program, row)}", program.pose(row, POSE)
@@ -33,7 +35,7 @@ def new_program(program: NewProgram) -> dict[str, str]:
     comments = [f"'{line[:32]}" for line in program.comments]
     lines += [
         "//INST",
-        "///DATE 2000/01/01 00:00",
+        f"///DATE {_DATE}",
         "///ATTR SC,RW",
         "///GROUP1 RB1",
         "NOP",

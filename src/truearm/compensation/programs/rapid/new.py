@@ -14,7 +14,7 @@ def new_program(program: NewProgram) -> dict[str, str]:
     r"""Return a module with one routine: every move takes its time (``\T``)."""
     lines = [f"MODULE {program.name}", *(f"  ! {line}" for line in program.comments)]
     for row in range(len(program)):
-        joints = ",".join([*program.axes(row, JOINTTARGET), *["0"] * (6 - len(program.sliding))])
+        joints = ",".join(program.axes(row, JOINTTARGET))
         if program.poses is None or row == 0:
             lines.append(f"  CONST jointtarget j{row + 1}:=[[{joints}],{_NO_AXES}];")
             continue

@@ -157,6 +157,8 @@ def test_a_path_is_written_with_its_correction_and_programs(truearm: Truearm, ca
     }
     assert codes["maker"] == "warning"
     assert codes["untimed-moves"] == "note"
+    far = package.path(calibrated, tmp_path / "path.yaml", programs=["rapid"], targets="poses", spacing=0.5)
+    assert {notice.code: notice.level for notice in far.warnings}["between-targets"] == "warning"
 
 
 def test_a_nominal_robot_follows_the_path_and_is_not_corrected(tmp_path: Path) -> None:

@@ -38,7 +38,7 @@ def path(
         ),
     ] = None,
     targets: Annotated[str, typer.Option(metavar="joints|poses", help="Of the programs.")] = "joints",
-    spacing: Annotated[float, typer.Option(metavar="S", help="Time from one target of a program to the next.")] = 0.1,
+    spacing: Annotated[float, typer.Option(metavar="S", help="Time from one target of a program to the next.")] = 0.02,
     name: Annotated[str, typer.Option(metavar="NAME", help="Of the programs.")] = "truearm_path",
     controller_kinematics: Annotated[
         str | None,

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from typing import Final, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
-from truearm.compensation.corrected_path import CorrectedPath
+from truearm.compensation.corrected_path import TIP, CorrectedPath
 from truearm.compensation.programs import LANGUAGES
 from truearm.compensation.programs.new_program import NAME, NewProgram
 from truearm.compensation.programs.program import Language
 from truearm.errors import InputError
+from truearm.modeling.chain import Array
 from truearm.modeling.inverse.branches import branch_rule
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import homogeneous
+from truearm.planning.poses.tip import Tip
 
 #: What the targets of a program are.
 TargetKind = Literal["joints", "poses"]
@@ -40,7 +44,7 @@ def path_program(path: CorrectedPath, robot: Robot, name: str, *, targets: Targe
     targets
         ``joints``, or ``poses``: those that the controller's robot has with the corrected joint positions.
     spacing
-        Time from one target to the next [s], or a little more.
+        Time from one target to the next [s], or a little less; that of the samples at the least.
 
     Raises
     ------
@@ -86,18 +90,47 @@ def path_program(path: CorrectedPath, robot: Robot, name: str, *, targets: Targe
         np.divide(apart, durations, out=np.zeros_like(apart), where=durations > 0.0),
         apart,
         path.calibrated,
+        _beside(path, rows, straight=targets == "poses"),
     )
 
 
-def _chosen(time: np.ndarray, section: np.ndarray, spacing: float) -> np.ndarray:
-    """Return the samples that become targets: the first, the ends of sections, and others at least `spacing` apart."""
-    ends = np.append(np.flatnonzero(np.diff(section)), len(time) - 1)
+def _chosen(time: Array, section: NDArray[np.intp], spacing: float) -> NDArray[np.intp]:
+    """Return the samples that become targets: the first, the ends of sections, and others about `spacing` apart."""
+    ends = [*np.flatnonzero(np.diff(section)).tolist(), len(time) - 1]
     kept = [0]
-    for end in ends.tolist():
-        for row in range(kept[-1] + 1, end):
-            far = time[row] - time[kept[-1]] >= spacing - 1e-9
-            if far and time[end] - time[row] >= 0.5 * spacing:
-                kept.append(row)
-        if end > kept[-1]:
-            kept.append(end)
+    for end in ends:
+        first = kept[-1]
+        pieces = min(max(1, math.ceil(float(time[end] - time[first]) / spacing - 1e-6)), end - first)
+        wanted = np.linspace(time[first], time[end], pieces + 1)[1:]
+        rows = first + 1 + np.abs(time[first + 1 : end + 1, None] - wanted).argmin(axis=0)
+        kept += np.unique(rows).tolist()
     return np.array(kept)
+
+
+def _beside(path: CorrectedPath, rows: NDArray[np.intp], *, straight: bool) -> float:
+    """Return how far a program leaves the path between its targets [m], its corners not rounded off.
+
+    Parameters
+    ----------
+    rows
+        The samples that are targets.
+    straight
+        Whether the tip goes straight from one to the next, or all joints evenly.
+    """
+    travelled, position = path.planned.trajectory.distance, path.planned.trajectory.position
+
+    def between(values: Array) -> Array:
+        return np.column_stack([np.interp(travelled, travelled[rows], column) for column in values[rows].T])
+
+    if straight:
+        went = between(position)
+        meant = position
+    else:
+        joints = path.joints[path.best]
+        tip = Tip(path.nominal, TIP)
+        went = tip.positions(between(joints))
+        meant = tip.positions(joints)
+    apart = went - meant
+    along = np.gradient(meant, axis=0)
+    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
+    return float(np.linalg.norm(apart - (apart * along).sum(axis=1, keepdims=True) * along, axis=1).max())

@@ -39,10 +39,12 @@ from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.planning.paths.path_file import read_path
 from truearm.results.followed_path import CORRECTED, LOADS, MOTION, REPORT, FollowedPath
-from truearm.shown import listed
+from truearm.shown import listed, millimetres
 
 #: Every language at once.
 ALL = "all"
+#: A program that leaves the path by no more than this between its targets is said nothing of [m].
+_FAR = 0.02e-3
 
 
 def path(
@@ -54,7 +56,7 @@ def path(
     gravity: Sequence[float] | None = None,
     programs: Sequence[str] = (),
     targets: str = "joints",
-    spacing: float = 0.1,
+    spacing: float = 0.02,
     name: str = "truearm_path",
     controller_kinematics: str | Path | None = None,
     accept: Sequence[str] = (),
@@ -83,7 +85,7 @@ def path(
     targets
         ``joints`` if the targets of the programs are joint positions, ``poses`` for straight moves to poses.
     spacing
-        Time from one target to the next [s], or a little more.
+        Time from one target to the next [s], or a little less; that of the file's samples at the least.
     name
         Of the programs.
     controller_kinematics
@@ -181,6 +183,14 @@ def _programs(arm: Robot, content: NewProgram, languages: Sequence[Language], no
     if foreign:
         written = ", ".join(f"{one.name} of {one.makers[0]}" for one in foreign)
         notices.append(Notice("maker", f"{arm.name} is of {arm.maker}, and programs were written in {written}."))
+    if content.beside > _FAR:
+        notices.append(
+            Notice(
+                "between-targets",
+                f"Between its targets the program leaves the path by up to {millimetres(content.beside)} mm. Take a "
+                "smaller `spacing`.",
+            )
+        )
     untimed = [one.name for one in languages if content.untimed(one.name)]
     if untimed:
         notices.append(

@@ -101,10 +101,20 @@ class PlannedPoses(Record):
         made = self.made
         text = [f"{counted(len(made.labels), 'pose')} of the set {made.name}{self._where()}."]
         if made.name == "118":
-            move = made.smallest_move
-            if np.isfinite(move):
-                text.append(f"Every joint moves by {degrees(move)} deg or more from one pose to the next.")
+            text += self._moves()
         return [*text, *joints_lines(self.joints_are), *notice_lines(self.warnings)]
+
+    def _moves(self) -> list[str]:
+        """Return by how much every joint moves from one pose to the next."""
+        moves = np.abs(np.diff(self.joints, axis=0)).min(axis=0, initial=np.inf)
+        words = {"revolute": degrees, "prismatic": millimetres}
+        units = {"revolute": "deg", "prismatic": "mm"}
+        said = []
+        for kind in words:
+            of_kind = [move for move, joint in zip(moves, self.robot.joints, strict=True) if joint.kind == kind]
+            if of_kind and np.isfinite(min(of_kind)):
+                said.append(f"{words[kind](min(of_kind))} {units[kind]}")
+        return [f"Every joint moves by {' or '.join(said)} or more from one pose to the next."] if said else []
 
     def dataset(self) -> Dataset:
         """Return the configurations as measurements whose readings are still missing, at the model's joints."""

@@ -126,7 +126,7 @@ def test_an_arm_of_five_joints_has_programs_of_joint_positions(name: str, tmp_pa
 def test_targets_are_some_time_apart_and_ends_of_sections_are_among_them(paths: dict[str, CorrectedPath]) -> None:
     path = paths["front-up"]
     program = path_program(path, calibrated(), "weld", targets="joints", spacing=0.25)
-    assert program.durations[1:].min() >= 0.12
+    assert program.durations[1:] == pytest.approx(0.25, abs=0.06)
     assert program.durations.sum() == pytest.approx(path.motion.time[-1])
     ends = [int(np.flatnonzero(path.planned.section == number)[-1]) for number in (1, 2)]
     for end in ends:
@@ -185,3 +185,16 @@ def test_what_cannot_be_a_program_is_refused(paths: dict[str, CorrectedPath]) ->
         with pytest.raises(InputError, match="the postures of this arm have no names"):
             read_again(name, nameless)
     assert len(read_again("rapid", nameless).targets) == len(nameless)
+
+
+def test_how_far_a_program_leaves_a_circle_between_its_targets_is_known(paths: dict[str, CorrectedPath]) -> None:
+    wide = path_program(paths["front-up"], calibrated(), "weld", targets="poses", spacing=0.4)
+    speed, radius = 0.05, 0.05
+    assert wide.beside == pytest.approx((0.4 * speed) ** 2 / (8 * radius), rel=0.3)  # targets are samples
+    narrow = path_program(paths["front-up"], calibrated(), "weld", targets="poses", spacing=0.1)
+    assert narrow.beside < 0.15 * wide.beside
+    every = path_program(paths["front-up"], calibrated(), "weld", targets="poses", spacing=0.05)
+    assert every.beside < 1e-9
+    assert len(every) == len(paths["front-up"].motion.time)
+    turning = path_program(paths["front-up"], calibrated(), "weld", targets="joints", spacing=0.4)
+    assert 0.0 < turning.beside < 2.0 * wide.beside

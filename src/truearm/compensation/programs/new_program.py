@@ -57,6 +57,8 @@ class NewProgram:
         Distance of the tip from the target before [m], ``(n,)``.
     corrected
         Whether the targets are corrected for one robot, which then must not be done again.
+    beside
+        How far the tip leaves the path between the targets [m].
     """
 
     name: str
@@ -69,6 +71,7 @@ class NewProgram:
     speeds: Array
     spacing: Array
     corrected: bool
+    beside: float
 
     def __len__(self) -> int:
         return len(self.joints)

@@ -24,9 +24,10 @@ def pose_set_page(poses: PlannedPoses) -> str:
     return picture_page(
         f"Poses of {poses.robot.title}",
         f"{len(made.labels)} poses of the set {made.name}.",
-        poses.lines(),
+        poses.answer,
         poses.command,
         pictures=[Drawing("poses", "Where the poses are", words, drawn)],
+        notices=poses.warnings,
     )
 
 

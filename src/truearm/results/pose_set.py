@@ -96,13 +96,16 @@ class PlannedPoses(Record):
             "warnings": notice_summaries(self.warnings),
         }
 
+    @property
+    def answer(self) -> list[str]:
+        """What the set is, in words."""
+        made = self.made
+        first = f"{counted(len(made.labels), 'pose')} of the set {made.name}{self._where()}."
+        return [first, *(self._moves() if made.name == "118" else ())]
+
     def lines(self) -> list[str]:
         """Return what the set is, and what cannot be reached."""
-        made = self.made
-        text = [f"{counted(len(made.labels), 'pose')} of the set {made.name}{self._where()}."]
-        if made.name == "118":
-            text += self._moves()
-        return [*text, *joints_lines(self.joints_are), *notice_lines(self.warnings)]
+        return [*self.answer, *joints_lines(self.joints_are), *notice_lines(self.warnings)]
 
     def _moves(self) -> list[str]:
         """Return by how much every joint moves from one pose to the next."""

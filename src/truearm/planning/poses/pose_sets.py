@@ -7,7 +7,7 @@ p1-p5      P1 to P5 of ISO 9283 on one diagonal plane
 iso-cube   the centre of the cube and its corners C1 to C8
 diagonal   points that fill one diagonal plane evenly
 118        points that fill all four diagonal planes, in an order in which every joint moves between two of them
-sphere     points that fill the upper half of a sphere evenly, for a ballbar (Nubiola, section 2.6.3)
+sphere     points that fill the upper half of a sphere evenly, on a short way, for a ballbar (Nubiola, section 2.6.3)
 ========== ==============================================================================================
 
 Where no orientation is asked for, each point is reached in the orientation that comes of a random configuration near
@@ -27,7 +27,7 @@ from truearm.errors import InputError
 from truearm.modeling.chain import Array
 from truearm.modeling.inverse import inverse
 from truearm.modeling.robot import Robot
-from truearm.planning.choosing.ordering import smallest_moves
+from truearm.planning.choosing.ordering import short_order, smallest_moves
 from truearm.planning.poses.iso9283 import Cube
 from truearm.planning.poses.pose_plan import LEAST_MOVE, POSES, joints_at, moving_order
 from truearm.planning.poses.tip import Tip
@@ -143,6 +143,8 @@ def pose_set(
         order = moving_order(robot, held, points[kept], target, least_move, rng, again=rotation is None)
         joints[kept] = held  # poses may have been reached anew
         kept = kept[order]
+    elif name == "sphere":
+        kept = kept[short_order(joints[kept])]
     tip = Tip(robot, target).at(joints[kept])
     missed = tuple(labels[k] for k in np.flatnonzero(~reached))
     return PoseSet(

@@ -192,6 +192,14 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
     "validate": lambda folder: {"robot": _calibrated(folder), "data": _data(folder)},
     "import_table": _table,
     "import_matrices": _matrices,
+    "import_robodk": lambda folder: {
+        "file": _written(
+            folder / "robodk.csv",
+            "J1,J2,J3,J4,J5,J6,X,Y,Z,RX,RY,RZ,TX,TY,TZ,TRX,TRY,TRZ\n10,20,30,0,45,90,500,20,800,0,0,90,0,0,50,0,0,0\n",
+        ),
+        "angle_unit": "deg",
+    },
+    "export_robodk": lambda folder: {"robot": _calibrated(folder), "data": _data(folder), "out": _new(folder, "r.csv")},
     "import_circle": _circle,
     "import_ur_kinematics": lambda folder: {
         "file": _written(folder / "calibration.conf", UR10_CONF),
@@ -199,7 +207,14 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "out": _new(folder, "ur10-controller.yaml"),
     },
     "distances": lambda folder: {"robot": _calibrated(folder), "data": _data(folder), "payload": "1kg,0mm,0mm,50mm"},
-    "plan": lambda _: {"robot": "irb120", "poses": 12, "candidates": 40, "device": "ballbar", "seed": 1},
+    "plan": lambda _: {
+        "robot": "irb120",
+        "poses": 12,
+        "candidates": 40,
+        "device": "ballbar",
+        "seed": 1,
+        "region": ((0.3, 0.5), (-0.1, 0.1), (0.2, 0.4)),
+    },
     "simulate": lambda _: {"robot": "irb120", "truth": "random", "poses": 3, "noise": 1e-4, "device": "tracker"},
     "poses": lambda _: {
         "robot": "irb120",

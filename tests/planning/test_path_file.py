@@ -84,6 +84,7 @@ def test_an_axis_to_keep_is_a_rotation_about_it(tmp_path: Path) -> None:
         ("  - circle: [[300, 50, 300], [300, 100, 300]]\n", "three points on a line define no circle"),
         ("  - circle: {centre: [300, 0, 300], normal: [0, 0, 1]}\n", "radius and normal of a circle must not be zero"),
         ("  - circle: {centre: [300, 50, 300], normal: [0, 1, 0]}\n", "does not lie in its plane"),
+        ("  - circle: {centre: [300, 50, 300], normal: [0, 0, 0]}\n", "a direction cannot be zero"),
         ("  - {line: [300, 50, 300], speed: -10}\n", "speed"),
         ("  - {line: [300, 50, 300], acceleration: 0}\n", "acceleration"),
         ("  - {line: [300, 50, 300], circle: [[1, 2, 3], [4, 5, 6]]}\n", "a section is of one kind"),
@@ -141,3 +142,9 @@ def test_what_a_file_cannot_be_is_refused(tmp_path: Path, old: str, new: str, sa
     message = refused(tmp_path, "  - line: [300, 100, 300]\n", HEAD.replace(old, new, 1))
     assert said in message, message
     assert "path.yaml" in message
+
+
+def test_how_long_a_direction_is_does_not_matter(tmp_path: Path) -> None:
+    one = read(tmp_path, "  - circle: {centre: [300, 50, 300], normal: [0, 0, 1]}\n")
+    other = read(tmp_path, "  - circle: {centre: [300, 50, 300], normal: [0, 0, 1.0e+300]}\n")
+    assert other.trajectory.position == pytest.approx(one.trajectory.position, abs=1e-15)

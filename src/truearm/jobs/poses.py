@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
@@ -176,7 +177,7 @@ def _rotation(orientation: object) -> Array | None:
     if isinstance(orientation, str):
         return choice_argument(orientation, "orientation", {"free": None, "down": DOWN})
     quaternion = np.array(numbers_argument(orientation, "orientation", 4, "free, down, or a quaternion w, x, y, z"))
-    size = float(np.linalg.norm(quaternion))
+    size = math.hypot(*quaternion)
     if abs(size - 1.0) > QUATERNION_TOLERANCE:
         raise InputError(
             "a quaternion (w, x, y, z) has length 1",

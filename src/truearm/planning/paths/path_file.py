@@ -78,8 +78,6 @@ class _Kept(BaseModel):
     def _one_of_them(self) -> _Kept:
         if (self.axis is None) == (self.quaternion is None):
             raise InputError("one orientation belongs here", allowed="axis: [x, y, z], or quaternion: [w, x, y, z]")
-        if self.axis is not None and not any(self.axis):
-            raise InputError("a direction cannot be zero", came=list(self.axis))
         return self
 
 
@@ -223,7 +221,8 @@ def read_path(file: FilePath) -> PlannedPath:
         began, at = float(parts[-1].time[-1]), parts[-1].position[-1]
         refuse_beyond("samples", sum(len(one.time) for one in parts), where=where)
     joined = [np.concatenate([getattr(one, name) for one in parts]) for name in _FIELDS]
-    orientation, rotation = _orientation(content.orientation)
+    with refusals_at(f"{file}, orientation"):
+        orientation, rotation = _orientation(content.orientation)
     tip = None
     if content.tip is not None:
         x, y, z = place(content.tip, f"{file}, tip")
@@ -253,7 +252,7 @@ def _way(section: _Section, start: Array, length: str, where: str) -> tuple[str,
     if section.line is not None:
         return "line", Line(start, place(section.line))
     if isinstance(section.circle, _About):
-        return "circle", Circle(place(section.circle.centre), start, np.array(section.circle.normal))
+        return "circle", Circle(place(section.circle.centre), start, _unit(section.circle.normal))
     if section.circle is not None:
         return "circle", Circle.through(start, *(place(one) for one in section.circle))
     assert section.hermite is not None
@@ -309,8 +308,17 @@ def _orientation(given: _Kept | None) -> tuple[Orientation, Array]:
         return "free", np.eye(3)
     if given.quaternion is not None:
         return "full", np.asarray(rotation_from_quaternion(np.array([given.quaternion]))[0])
-    z = np.array(given.axis, float)
-    z /= np.linalg.norm(z)
+    assert given.axis is not None
+    z = _unit(given.axis)
     x = np.cross(np.eye(3)[int(np.abs(z).argmin())], z)
     x /= np.linalg.norm(x)
     return "axis", np.stack([x, np.cross(z, x), z], axis=1)
+
+
+def _unit(direction: Triple) -> Array:
+    """Return a direction as a unit vector, however long it is."""
+    largest = max(map(abs, direction))
+    if largest == 0.0:
+        raise InputError("a direction cannot be zero", came=list(direction))
+    scaled = np.array(direction) / largest
+    return np.asarray(scaled / np.linalg.norm(scaled))

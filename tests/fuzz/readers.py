@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from truearm.compensation.cell import read_frames, read_tools
+from truearm.compensation.cell import read_frames, read_tools, read_wrenches
 from truearm.compensation.program_files import program_files, read_programs, restored
 from truearm.errors import InputError
 from truearm.identification.solving.bounds import read_bounds
@@ -165,6 +165,7 @@ READERS: Final[Mapping[str, Reader]] = {
     "frames": Reader(
         {"cell.yaml": "cell.yaml"}, lambda folder: read_frames(of_library("irb120"), folder / "cell.yaml")
     ),
+    "wrenches": Reader({"forces.yaml": "forces.yaml"}, lambda folder: read_wrenches(folder / "forces.yaml")),
     "rapid": _programs("rapid", "polish.mod"),
     "rapid-cell": _programs("rapid/cell", "MainModule.mod", "Data.sys"),
     "krl": _programs("krl", "milling.src"),

@@ -47,7 +47,15 @@ def _poses(_: Path) -> Arguments:
     """Return two poses of an IRB 120 that are easily reached."""
     q = np.radians([[10.0, 20.0, -30.0, 40.0, 50.0, 60.0], [-70.0, 30.0, 0.0, -20.0, 40.0, 0.0]])
     at = load_robot("irb120").forward_kinematics(q)
-    return {"robot": "irb120", "poses": at.position.T, "rotations": at.matrix(), "seed": q, "branch": "front-up-noflip"}
+    return {
+        "robot": "irb120",
+        "poses": at.position.T,
+        "rotations": at.matrix(),
+        "seed": q,
+        "branch": "front-up-noflip",
+        "wrench": (0.0, 5.0, 0.0, 0.0, 0.0, 0.1),
+        "wrench_frame": "tool",
+    }
 
 
 def _written(path: Path, text: str) -> Path:
@@ -126,6 +134,12 @@ def _cell(folder: Path) -> Path:
     return path
 
 
+_FORCES = (
+    "truearm: truearm-cell/1\nunits: {length: mm, angle: deg, force: N}\n"
+    "wrenches:\n  - {targets: [pHole1], force: [0, 5, 0]}\n"
+)
+
+
 def _corrected(folder: Path) -> Path:
     import truearm
 
@@ -189,7 +203,13 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "payload": "1kg,0mm,0mm,50mm",
         "gravity": (0.0, 0.0, -9.81),
     },
-    "validate": lambda folder: {"robot": _calibrated(folder), "data": _data(folder)},
+    "validate": lambda folder: {
+        "robot": _calibrated(folder),
+        "data": _data(folder),
+        "wrench": "0N,5N,0N,0Nm,0Nm,0Nm",
+        "wrench_frame": "world",
+        "wrench_at": "1",
+    },
     "import_table": _table,
     "import_matrices": _matrices,
     "import_robodk": lambda folder: {
@@ -215,7 +235,6 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "seed": 1,
         "region": ((0.3, 0.5), (-0.1, 0.1), (0.2, 0.4)),
     },
-    "simulate": lambda _: {"robot": "irb120", "truth": "random", "poses": 3, "noise": 1e-4, "device": "tracker"},
     "poses": lambda _: {
         "robot": "irb120",
         "set": "diagonal",
@@ -239,6 +258,16 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "data": _ballbar(folder),
         "tip": (0.0, 0.0, 0.125),
         "payload": "1kg,0mm,0mm,50mm",
+    },
+    "simulate": lambda _: {
+        "robot": "irb120",
+        "truth": "random",
+        "poses": 3,
+        "noise": 1e-4,
+        "device": "tracker",
+        "wrench": (0.0, 5.0, 0.0, 0.0, 0.0, 0.1),
+        "wrench_frame": "base",
+        "wrench_at": "flange",
     },
     "inverse": _poses,
     "robots": lambda _: {},
@@ -272,6 +301,7 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "tools": _cell(folder),
         "frames": _cell(folder),
         "payload": "1kg,0mm,0mm,50mm",
+        "wrench": _written(folder / "forces.yaml", _FORCES),
         "controller_kinematics": "nominal",
         "strict": True,
         "split": 5e-5,

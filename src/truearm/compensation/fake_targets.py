@@ -56,6 +56,7 @@ def _nominal(robot: Robot) -> Robot:
     return replace(
         robot,
         effect_names=(),
+        wrench=None,
         base_quaternion=(1.0, 0.0, 0.0, 0.0),
         known={},
         targets=(),

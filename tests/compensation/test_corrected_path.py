@@ -14,6 +14,7 @@ from truearm.errors import InputError
 from truearm.library import load_robot
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
+from truearm.modeling.wrench import Wrench
 from truearm.planning.paths.path_file import PlannedPath, read_path
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import Twin, measure
@@ -94,6 +95,17 @@ def test_loads_along_the_path_are_those_of_the_twin(measured: tuple[Twin, Robot]
     went = twin.postures(path.joints["motion"], velocity=motion.velocity, acceleration=motion.acceleration)
     moments = np.array([[load[5] for load in posture.loads] for posture in went]).T
     assert path.loads[:, 5] == pytest.approx(moments, abs=0.05)
+
+
+def test_a_force_at_the_tip_is_corrected_on_the_twin(measured: tuple[Twin, Robot], tmp_path: Path) -> None:
+    twin, robot = measured
+    pushed = Wrench((0.0, 0.0, -12.0), (0.0, 0.0, 0.0), "world")
+    pushed_twin = replace(twin, robot=twin.robot.with_wrench(pushed, "1"))
+    way = planned(tmp_path, twin, 100, 500, 0.2)
+    blind, known = correct_path(robot, way, NEAR), correct_path(robot.with_wrench(pushed), way, NEAR)
+    blind_error, error = (true_errors(pushed_twin, path)["motion"].mean() for path in (blind, known))
+    assert blind_error > 0.1
+    assert error < 0.2 * blind_error
 
 
 def test_an_orientation_is_corrected_with_the_position(measured: tuple[Twin, Robot], tmp_path: Path) -> None:

@@ -250,6 +250,8 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "file": _written(folder / "path.yaml", PATH),
         "seed": (0.0, 0.2, 0.4, 0.0, 0.9, 0.0),
         "programs": ["rapid", "krl"],
+        "wrench": (0.0, 5.0, 0.0, 0.0, 0.0, 0.1),
+        "wrench_frame": "base",
         "spacing": 0.3,
         "payload": "1kg,0mm,0mm,50mm",
     },

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from truearm.cli.ik import read_seed
-from truearm.cli.loading import GravityText, JointsText, PayloadText, read_gravity
+from truearm.cli.loading import GravityText, JointsText, PayloadText, WrenchFrameText, WrenchText, read_gravity
 from truearm.cli.options import command_line
 from truearm.cli.output import Json, end_on_error, print_json, print_line, print_record
 
@@ -28,6 +28,8 @@ def path(
     ] = None,
     payload: PayloadText = None,
     gravity: GravityText = None,
+    wrench: WrenchText = None,
+    wrench_frame: WrenchFrameText = None,
     programs: Annotated[
         list[str] | None,
         typer.Option(
@@ -67,6 +69,8 @@ def path(
         seed=read_seed(robot, seed, joints),
         payload=payload,
         gravity=read_gravity(gravity),
+        wrench=wrench,
+        wrench_frame=wrench_frame,  # type: ignore[arg-type]
         programs=programs or [],
         targets=targets,
         spacing=spacing,

@@ -91,7 +91,8 @@ def correct_path(robot: Robot, planned: PlannedPath, seed: ArrayLike | None = No
     Parameters
     ----------
     robot
-        Calibrated, with what it carries. For one that is nominal there is no correction.
+        Calibrated, with what it carries and what acts on it, which then acts on the tip. For one that is nominal there
+        is no correction.
     planned
         The path.
     seed
@@ -155,7 +156,8 @@ class _Placed:
             on_nominal, on_real = np.linalg.inv(flange) @ np.append(at, 1.0), at
         turned = Transform.from_matrix(flange[:3, :3], on_real[:3])
         self.nominal = nominal.with_frames(IDENTITY, {TIP: on_nominal[:3].tolist()})
-        self.real = robot.with_frames(robot.base, {TIP: turned})
+        real = robot.with_frames(robot.base, {TIP: turned})
+        self.real = real if robot.wrench is None else real.with_wrench(robot.wrench, TIP)
         self.nominal_path = _trajectory(self.to_nominal, planned.trajectory)
 
 
@@ -173,13 +175,13 @@ def _models(robot: Robot, motion: JointMotion) -> list[tuple[Knowledge, Robot, J
     models: list[tuple[Knowledge, Robot, JointMotion]] = [("geometry", replace(robot, effect_names=()), still)]
     if robot.effects:
         models.append(("deflection", robot, still))
-    if any(effect.loaded for effect in robot.effects) and has_weight(robot):
+    if any(effect.loaded for effect in robot.effects) and has_weight(robot):  # a force alone needs no motion
         models.append(("motion", robot, motion))
     return models
 
 
 def _loads(robot: Robot, motion: JointMotion, joints: Array) -> Array | None:
-    if not has_weight(robot):
+    if not has_weight(robot) and robot.wrench is None:
         return None
     postures = motion.postures(joints)
     return joint_loads(

@@ -15,6 +15,7 @@ from truearm.compensation.programs.new_program import NewProgram
 from truearm.compensation.programs.program import Language, Source
 from truearm.errors import InputError, refusals_of
 from truearm.files import path_argument
+from truearm.identification.judging.external_force import check_force
 from truearm.jobs.arguments import (
     array_argument,
     choice_argument,
@@ -26,8 +27,10 @@ from truearm.jobs.arguments import (
     joints_argument,
     name_argument,
     payload_argument,
+    pushed_argument,
     python_call,
     robot_argument,
+    wrench_argument,
 )
 from truearm.jobs.proof import accept_argument, changed_since, refuse_unaccepted, told_of
 from truearm.modeling.chain import Array
@@ -36,6 +39,7 @@ from truearm.modeling.formats.controller_entry import STATED
 from truearm.modeling.formats.controller_kinematics import with_controller_kinematics
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
+from truearm.modeling.wrench import Wrench, WrenchFrame
 from truearm.notices import Notice
 from truearm.planning.paths.path_file import read_path
 from truearm.results.followed_path import CORRECTED, LOADS, MOTION, REPORT, FollowedPath
@@ -54,6 +58,8 @@ def path(
     seed: Array | Sequence[float] | None = None,
     payload: Payload | str | None = None,
     gravity: Sequence[float] | None = None,
+    wrench: Wrench | Sequence[float] | str | None = None,
+    wrench_frame: WrenchFrame | None = None,
     programs: Sequence[str] = (),
     targets: str = "joints",
     spacing: float = 0.02,
@@ -79,6 +85,9 @@ def path(
     payload, gravity
         What the robot carries (an object, or a text such as ``2.7kg,50mm,25mm,100mm``) and free fall in its base frame
         [m/s^2]; None for what its file says.
+    wrench, wrench_frame
+        External force and moment on the tip, the same all along the path, and whose axes it is given in, as for
+        :func:`truearm.inverse`.
     programs
         Languages in which to write the corrected path: ``rapid``, ``krl``, ``fanuc-ls``, ``urscript``, ``inform``,
         ``val3``, or ``all``.
@@ -122,8 +131,9 @@ def path(
     )
     written = (MOTION, CORRECTED, LOADS, REPORT)
     folder = None if out is None else folder_for(written, out, robot, file, *kinematics)
+    pushed = wrench_argument(wrench, wrench_frame)
     carried, fall = payload_argument(payload), gravity_argument(gravity)
-    arm = robot_argument(robot).with_payload(carried, fall)
+    arm = pushed_argument(robot_argument(robot).with_payload(carried, fall), pushed)
     if controller_kinematics is not None:
         with refusals_of("controller_kinematics"):
             said = str(path_argument(controller_kinematics, "controller_kinematics"))
@@ -136,6 +146,8 @@ def path(
         seed=None if seed is None else np.asarray(seed).tolist(),
         payload=carried,
         gravity=fall,
+        wrench=None if pushed is None else pushed.text,
+        wrench_frame=wrench_frame,
         programs=list(languages) or None,
         targets=kind,
         spacing=time,
@@ -153,7 +165,7 @@ def path(
     with refusals_of("file"):
         followed = correct_path(arm, read_path(read), near)
     chosen = [BY_NAME[one] for one in languages]
-    notices = [*changed_since(robot), *told_of(arm)]
+    notices = [*changed_since(robot), *told_of(arm), *check_force([(arm, followed.joints[followed.best])])]
     texts: dict[str, str] = {}
     if chosen:
         with refusals_of("name" if kind == "joints" else "targets"):

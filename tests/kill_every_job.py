@@ -58,6 +58,9 @@ PLACES: dict[str, Arguments] = {
     "validate": {"out": "."},
     "plan": {"out": "plan.csv"},
     "plan_inclinometers": {"out": "pairs.csv"},
+    "poses": {"out": "set.csv"},
+    "path": {"out": "."},
+    "sphere": {"out": "page.html"},
     "simulate": {"out": "data.csv"},
     "simulate_inclinometers": {"out": "inclinations.csv"},
     "inverse": {"out": "joints.csv"},
@@ -80,6 +83,8 @@ PLACES: dict[str, Arguments] = {
 EARLIER: dict[str, Arguments] = {
     "calibrate": {"seed": 2},
     "plan": {"seed": 2},
+    "poses": {"count": 6},
+    "path": {"programs": ["rapid"]},
     "simulate": {"seed": 2},
     "simulate_inclinometers": {"seed": 2},
     "influence": {"seed": 2},

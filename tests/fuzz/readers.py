@@ -33,6 +33,7 @@ from truearm.modeling.formats.dh_csv import complete_dh_csv, read_dh_csv
 from truearm.modeling.formats.robot_file import robot_text
 from truearm.modeling.robot import Robot
 from truearm.planning.constraints.constraints import read_constraints
+from truearm.planning.paths.path_file import read_path
 
 
 @dataclass(frozen=True)
@@ -183,6 +184,7 @@ READERS: Final[Mapping[str, Reader]] = {
         {"zones.yaml": "zones.yaml"}, lambda folder: boxes_of(read_zones(folder / "zones.yaml"), "zones.yaml")
     ),
     "bounds": Reader({"bounds.yaml": "bounds.yaml"}, lambda folder: read_bounds(folder / "bounds.yaml")),
+    "path": Reader({"way.yaml": "path.yaml"}, lambda folder: read_path(folder / "way.yaml")),
     "constraints": Reader({"limits.yaml": "constraints.yaml"}, lambda folder: read_constraints(folder / "limits.yaml")),
     "tools": Reader({"cell.yaml": "cell.yaml"}, lambda folder: read_tools(of_library("irb120"), folder / "cell.yaml")),
     "frames": Reader(

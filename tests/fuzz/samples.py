@@ -70,6 +70,8 @@ def folder() -> Path:
         "tilting",
         "compensate",
         "revert",
+        "path",
+        "sphere",
     ):
         EXAMPLES[job](place)
     truearm.import_ur_kinematics(**EXAMPLES["import_ur_kinematics"](place))

@@ -65,7 +65,7 @@ def simulate(
             read = simulate_inclinometers(
                 robot,
                 truth=truth,
-                poses=poses,
+                poses=_poses(poses),
                 out=out,
                 pull=20.0 if pull is None else pull,
                 seed=seed,

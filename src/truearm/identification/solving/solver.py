@@ -13,7 +13,7 @@ from typing import Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.identification.solving.losses import Loss, norms_of, robust_scale, weights
+from truearm.identification.solving.losses import ABSOLUTE, Loss, norms_of, robust_scale, weighed_together, weights
 from truearm.modeling.chain import Array
 from truearm.modeling.parameters import FreeParameters
 
@@ -21,7 +21,7 @@ from truearm.modeling.parameters import FreeParameters
 SMALL: Final = 1e-6
 #: Size of a step that counts as one, where the prior is no scale (base and targets) [m or rad].
 _GEOMETRIC: Final = 1e-3
-_STEPS: Final = {"linear": 60, "huber": 100, "cauchy": 100, "l1": 300}
+_STEPS: Final = {"linear": 60, "huber": 100, "cauchy": 100, "l1": 300, "l1-components": 300}
 #: How much larger the last step may be where single numbers pull with one strength however near they are.
 _CREEPING_FACTOR: Final = 10.0
 
@@ -83,7 +83,7 @@ class Solution:
     residual, jacobian
         Whitened residual ``(rows,)`` and Jacobian of the readings there, not weighted by a loss.
     weight
-        What the loss left of each reading, ``(readings,)``.
+        What the loss left of each reading, ``(readings,)``; where coordinates count alone, of their mean.
     """
 
     vector: Array
@@ -104,8 +104,8 @@ def solve(
     problem
         What is minimised; starts at its free parameters' values, moved inside the bounds.
     loss
-        ``linear`` is least squares; ``l1`` the sum of the norms of the readings (Li et al. 2016, with
-        "|X - X'|" read as each point's distance).
+        ``linear`` is least squares; ``l1`` the sum of the norms of the readings (Li et al. 2016, equation 4, with
+        "|X - X'|" read as each point's distance); ``l1-components`` that of the absolute values of their coordinates.
     bounds
         Lowest and highest value of every parameter [SI], infinite where there is none.
     small
@@ -116,11 +116,12 @@ def solve(
     prior = problem.free.prior
     damping = 0.0
     scale: float | None = None
+    components = weighed_together(loss, problem.components)
     steps, converged = 0, False
     for steps in range(1, _STEPS[loss] + 1):
         norms = _norms(here, loss)
-        scale = _next_scale(loss, norms, problem.components, scale, steps)
-        w = np.repeat(weights(loss, norms, scale), problem.components)
+        scale = _next_scale(loss, norms, components, scale, steps)
+        w = np.repeat(weights(loss, norms, scale), components)
         R, c = _triangle(here, w)
         cost = _cost(here, w)
         accepted = False
@@ -138,13 +139,16 @@ def solve(
             break
         here = trial
         last = float(np.abs(step / np.minimum(prior, _GEOMETRIC)).max()) < small * (
-            _CREEPING_FACTOR if loss == "l1" else 1.0
+            _CREEPING_FACTOR if loss in ABSOLUTE else 1.0
         )
         if last or predicted <= 1e-24 * max(cost, 1.0):
-            converged = loss != "l1" or scale <= _L1_FLOOR * float(np.median(_norms(here, loss)) + 1e-300)
+            converged = loss not in ABSOLUTE or scale <= _L1_FLOOR * float(np.median(_norms(here, loss)) + 1e-300)
             if converged:
                 break
     final = weights(loss, _norms(here, loss), scale or 1.0)
+    if len(components) != len(problem.components):
+        first = np.concatenate([[0], np.cumsum(problem.components)[:-1]])
+        final = problem.components / np.add.reduceat(1.0 / final, first)
     return Solution(here.vector, converged, steps, here.residual, here.jacobian, final)
 
 
@@ -154,7 +158,7 @@ _L1_FLOOR: Final = 1e-4  # an l1 reading closer than this share of the median co
 def _next_scale(loss: Loss, norms: Array, components: NDArray[np.intp], scale: float | None, step: int) -> float:
     if loss == "linear":
         return 1.0
-    if loss == "l1":
+    if loss in ABSOLUTE:
         floor = 0.3 * _L1_FLOOR * float(np.median(norms)) + 1e-300
         return max(floor, float(np.median(norms)) if scale is None else 0.5 * scale)
     if scale is None or step <= 10:  # then held, so that the weights can settle
@@ -164,7 +168,7 @@ def _next_scale(loss: Loss, norms: Array, components: NDArray[np.intp], scale: f
 
 def _norms(here: Evaluated, loss: Loss) -> Array:
     """Return the norm of each whitened reading; ones for the linear loss, which does not ask."""
-    components = here.problem.components
+    components = weighed_together(loss, here.problem.components)
     return np.ones(len(components)) if loss == "linear" else norms_of(here.residual, components)
 
 

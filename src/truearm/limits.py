@@ -82,6 +82,7 @@ LIMITS: Final[Mapping[str, Limit]] = {
     "candidates": Limit(50_000, "the number is out of range", "candidates"),
     "trials": Limit(1_000_000, "the number is out of range", "trials"),
     "repeats": Limit(100_000, "the number is out of range", "repeats"),
+    "bootstrap": Limit(10_000, "the number is out of range", "fits"),
     "seeds": Limit(1000, "the number is out of range", "seeds"),
 }
 

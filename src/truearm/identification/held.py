@@ -41,6 +41,12 @@ class Held:
         """Whether anything is held."""
         return self.base is not None or bool(self.targets) or bool(self.fixtures)
 
+    @property
+    def words(self) -> tuple[str, ...]:
+        """What is held, in words."""
+        base = () if self.base is None else ("base",)
+        return (*base, *(f"target {name}" for name in self.targets), *(f"fixture {name}" for name in self.fixtures))
+
     def names(self, robot: Robot) -> tuple[str, ...]:
         """Return the parameters of a robot that are held."""
         own = [p.name for p in robot.parameters.values() if p.group == "base"] if self.base is not None else []

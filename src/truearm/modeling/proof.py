@@ -17,6 +17,10 @@ from truearm.units import SHOWN_AS, from_si, to_si
 #: own deviation.
 _DIGITS: Final = 9
 _DECIMALS: Final = 7
+#: How a proof says that the base was known, or by targets on it all of the flange's pose.
+BASE: Final = "base"
+FLANGE: Final = "flange"
+HELD: Final = (BASE, FLANGE)
 
 
 @dataclass(frozen=True)
@@ -47,6 +51,9 @@ class Proof:
         Notes of the calibration that whoever corrects programs should hear again.
     lower_bound
         Whether the error may be larger than covariance and joint error say, for a reason that is known.
+    held
+        What was known beforehand and not found: ``base``; ``flange``, where the places of targets on it say all of its
+        pose; and parameters of the targets that were held, by name.
     digest
         SHA-256 of the values that it is about; empty if it is about none yet.
     """
@@ -60,6 +67,7 @@ class Proof:
     factor: tuple[tuple[float, ...], ...]
     lower_bound: bool = False
     warnings: tuple[Notice, ...] = ()
+    held: tuple[str, ...] = ()
     digest: str = ""
 
     @classmethod
@@ -74,6 +82,7 @@ class Proof:
         *,
         warnings: Sequence[Notice] = (),
         lower_bound: bool = False,
+        held: Sequence[str] = (),
     ) -> Self:
         """Make the proof of a calibration, rounded to what a file holds of it.
 
@@ -102,6 +111,7 @@ class Proof:
             ),
             lower_bound,
             tuple(warnings),
+            tuple(held),
         )
 
     def summary(self) -> dict[str, Any]:

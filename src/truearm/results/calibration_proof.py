@@ -7,11 +7,12 @@ from typing import Final
 
 import numpy as np
 
+from truearm.compensation.gauge import held_by
 from truearm.identification.judging.expected_error import ExpectedError, covariance_root, uncertain_names
 from truearm.identification.solving.fit import Fit, Status
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.parameters import PLACES
-from truearm.modeling.proof import Proof
+from truearm.modeling.proof import HELD, Proof
 from truearm.notices import Notice
 
 #: A note of the calibration that concerns every program: its controller may not have the nominal values of the file.
@@ -49,6 +50,7 @@ def proof_of(
     errors = [notice for notice in warnings if notice.level == "error"]
     repeated = [notice for notice in warnings if notice.code == _REPEATED]
     lower_bound = expected.lower_bound
+    held = [*held_by(fit)]
     names, root = uncertain_names(fit), covariance_root(fit, fit.covariance)
     parameters, covariance = [fit.robot.parameters[name] for name in names], root @ root.T
     region = list(zip(training.joints.min(axis=0).tolist(), training.joints.max(axis=0).tolist(), strict=True))
@@ -63,8 +65,17 @@ def proof_of(
             region = [(min(a, c), max(b, d)) for (a, b), (c, d) in zip(region, before.region or region, strict=True)]
             joint_error = np.maximum(joint_error, before.joint_error or 0.0)
             lower_bound = lower_bound or before.lower_bound
+            held += [word for word in before.held if word in HELD and word not in held]
             beside = np.zeros((len(covariance), len(kept)))
             covariance = np.block([[covariance, beside], [beside.T, before.covariance[np.ix_(kept, kept)]]])
     return Proof.of(
-        ended, errors, region, joint_error, parameters, covariance, warnings=repeated, lower_bound=lower_bound
+        ended,
+        errors,
+        region,
+        joint_error,
+        parameters,
+        covariance,
+        warnings=repeated,
+        lower_bound=lower_bound,
+        held=held,
     )

@@ -46,7 +46,6 @@ def cluster_covariance(
         What is known of each parameter before any reading: one by its deviation, in priors, ``(parameters,)``; 1 with
         priors, 0 where nothing is known.
     """
-    count = int(uncertain.sum())
     A, root = rows[:, uncertain], np.diag(beforehand[uncertain])
     _, s, Vt = np.linalg.svd(
         np.asarray(np.linalg.qr(np.concatenate([A, root]), mode="r"), dtype=np.float64), full_matrices=False

@@ -19,15 +19,17 @@ _LEAST_PROMISE: Final = 1e-9  # share of the objective that a step must promise
 _SMALLEST: Final = 1e-9  # longest step [priors] below which steps that fail are given up
 
 
-def least_absolute(problem: Solvable, bounds: tuple[Array, Array] | None = None) -> Array:
+def least_absolute(problem: Solvable, bounds: tuple[Array, Array] | None = None, start: Array | None = None) -> Array:
     """Minimise the sum of the absolute whitened residuals, without priors.
 
     Parameters
     ----------
     problem
-        What is minimised; starts at its free parameters' values, moved inside the bounds.
+        What is minimised.
     bounds
         Lowest and highest value of every parameter [SI], infinite where there is none.
+    start
+        Where it starts ``(parameters,)``, moved inside the bounds; the free parameters' values if None.
 
     Returns
     -------
@@ -39,7 +41,7 @@ def least_absolute(problem: Solvable, bounds: tuple[Array, Array] | None = None)
         If the solver of linear programs fails: residuals or Jacobian are not finite.
     """
     low, high = bounds if bounds is not None else (np.full(len(problem.free.names), side) for side in (-np.inf, np.inf))
-    x, longest = np.clip(problem.free.start, low, high), np.inf
+    x, longest = np.clip(problem.free.start if start is None else start, low, high), np.inf
     prior = problem.free.prior
     here = problem.at(x)
     for _ in range(_STEPS):
@@ -62,13 +64,17 @@ def least_absolute(problem: Solvable, bounds: tuple[Array, Array] | None = None)
 def _linear_program(A: Array, r: Array, room: Array) -> tuple[Array, float]:
     """Return the step within its room ``(parameters, 2)`` that is best where `A` holds, and the sum it promises."""
     from scipy.optimize import linprog
+    from scipy.sparse import coo_array
 
     rows, count = A.shape
-    unit = np.eye(rows)
+    twice = np.arange(2 * rows)
+    row = np.concatenate([np.repeat(twice, count), twice])
+    column = np.concatenate([np.tile(np.arange(count), 2 * rows), count + twice % rows])
+    entries = np.concatenate([A.ravel(), -A.ravel(), -np.ones(2 * rows)])
     limits: list[tuple[float, float]] = [(a, b) for a, b in room.tolist()]
     found = linprog(
         np.concatenate([np.zeros(count), np.ones(rows)]),
-        A_ub=np.block([[A, -unit], [-A, -unit]]),
+        A_ub=coo_array((entries, (row, column)), shape=(2 * rows, count + rows)).tocsc(),
         b_ub=np.concatenate([-r, r]),
         bounds=[*limits, *[(0.0, np.inf)] * rows],
         method="highs",

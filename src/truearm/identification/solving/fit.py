@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Final, Literal
@@ -268,13 +268,18 @@ def _fit(solved: Solved, model: Model, loss: Loss, draws: Array | None = None) -
     else:
         excess, joint_error = problem.widened, np.sqrt(components.likeliest.joints)
         joint_freedom = components.likeliest.freedom
+    open_ = _left_open(problem, x, limits) if not problem.priors and not solved.redundancies else []
     scattered = components is None or not components.holds
     if components is not None and not scattered and draws is None:
         covariance, parts = components.covariance, components.parts
     else:
         pull, rows = pulls(loss, solution.residual, solution.jacobian, problem.components)
         covariance, parts = cluster_covariance(
-            rows * free.prior, pull * free.prior, Arrivals(problem.arrivals), ~at_bound, _beforehand(problem, limits)
+            rows * free.prior,
+            pull * free.prior,
+            Arrivals(problem.arrivals),
+            ~at_bound,
+            _beforehand(problem, limits, open_),
         )
     if draws is not None:
         covariance, parts = _of_draws(draws / free.prior, parts)
@@ -291,11 +296,9 @@ def _fit(solved: Solved, model: Model, loss: Loss, draws: Array | None = None) -
     robot = start.with_parameters(identified)
     held = tuple(robot.parameters[r.dropped] for r in solved.redundancies)
     looked_at = FreeParameters((*(robot.parameters[n] for n in free.names), *held))
-    held = solved.held
-    unobservable = unobservable_parameters(robot, problem.data, looked_at, held=held)
-    if not problem.priors and not solved.redundancies:
-        unobservable = tuple(dict.fromkeys((*unobservable, *_left_open(problem, x, limits))))
-    gauge = gauge_freedoms(problem.data, held)
+    unobservable = unobservable_parameters(robot, problem.data, looked_at, held=solved.held)
+    unobservable = tuple(dict.fromkeys((*unobservable, *open_)))
+    gauge = gauge_freedoms(problem.data, solved.held)
     used = solution.weight / np.median(solution.weight) if loss in ABSOLUTE else solution.weight
     weight = np.full(len(problem.data.target), np.nan)
     first = 0
@@ -342,23 +345,23 @@ def _fit(solved: Solved, model: Model, loss: Loss, draws: Array | None = None) -
         scattered=scattered,
         weight=weight,
         steps=solution.steps,
-        held=held,
+        held=solved.held,
         bootstrap=0 if draws is None else len(draws),
     )
 
 
-def _beforehand(problem: Problem, limits: tuple[Array, Array] | None) -> Array:
+def _beforehand(problem: Problem, limits: tuple[Array, Array] | None, left_open: Sequence[str]) -> Array:
     """Return one by the deviation of what is known of each parameter before any reading, in priors, 0 for nothing.
 
-    Without priors a value may be anywhere between its bounds, and its deviation is that of an even distribution.
+    Without priors a value may be anywhere between its bounds, and its deviation is that of an even distribution. What
+    neither readings nor bounds determine is off by what its prior says, although the fit did not know that.
     """
-    prior = problem.free.prior
-    if problem.priors:
-        return np.ones(len(prior))
-    if limits is None:
-        return np.zeros(len(prior))
-    width = np.maximum(limits[1] - limits[0], 1e-12 * prior)
-    return np.asarray(prior * np.sqrt(12.0) / width)
+    free = problem.free
+    known = np.array([problem.priors or name in left_open for name in free.names], dtype=float)
+    if limits is None or problem.priors:
+        return known
+    width = np.maximum(limits[1] - limits[0], 1e-12 * free.prior)
+    return np.asarray(np.maximum(known, free.prior * np.sqrt(12.0) / width))
 
 
 def _of_draws(draws: Array, parts: tuple[CovariancePart, ...]) -> tuple[Array, tuple[CovariancePart, ...]]:

@@ -87,8 +87,8 @@ def pulls(loss: Loss, residual: Array, jacobian: Array, components: NDArray[np.i
     The first is its residual times its weight times its derivative. The second squared is the derivative of that
     by the parameters: a reading that a loss holds back follows the parameters across the line to its prediction, and
     along it less or not at all. Where a loss pushes a reading away (Cauchy), it counts as not following. For sums of
-    absolute values of single numbers, whose pull only jumps, it is the density of the residuals at zero, of a normal distribution
-    with their median.
+    absolute values of single numbers, whose pull only jumps, it is the density of the residuals at zero, of a normal
+    distribution with their median.
 
     Parameters
     ----------

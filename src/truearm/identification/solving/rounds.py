@@ -111,9 +111,33 @@ def find_parameters(
     check_circumstances(start, data)
     free = held.free_of(unanchored(model.free(start), data), start)
     check_bounds = None
+    if not free.names:
+        raise InputError(
+            "everything that this model frees is held, so there is nothing to find",
+            parameter="hold",
+            where=data.source,
+            came=f"model {model.name}",
+            cure="Hold less, or name a model that frees the robot's own parameters.",
+        )
     if bounds is not None:
+        for name in (*bounds.within, *bounds.between):
+            if name in held.names(start):
+                raise InputError(
+                    "the parameter has bounds, and it is held",
+                    parameter="bounds",
+                    where=bounds_file,
+                    came=name,
+                    cure="Remove its bounds, or do not hold it.",
+                )
         tried = start.with_effects(model.tried).parameters.values()
         check_bounds = bound_vectors(bounds, free, bounds_file, tried)
+    if redundancy == "none" and bounds is None and not held:
+        raise InputError(
+            "without priors, bounds and places that are held nothing tells base and joints apart",
+            parameter="redundancy",
+            came="none",
+            cure="Give `bounds`, `hold` what is known, or use `redundancy=drop`, which holds what is redundant.",
+        )
     problem = Problem(start, data, free, dict(_FIRST_NOISE), priors=redundancy == "prior")
     check_solvable(problem)
     dropped: tuple[Redundancy, ...] = ()

@@ -22,6 +22,8 @@ SMALL: Final = 1e-6
 #: Size of a step that counts as one, where the prior is no scale (base and targets) [m or rad].
 _GEOMETRIC: Final = 1e-3
 _STEPS: Final = {"linear": 60, "huber": 100, "cauchy": 100, "l1": 300, "l1-components": 300}
+#: Share of the cost that a step must promise where coordinates pull alone: the way to their vertex never ends.
+_CREEPING: Final = 1e-7
 #: How much larger the last step may be where single numbers pull with one strength however near they are.
 _CREEPING_FACTOR: Final = 10.0
 
@@ -141,10 +143,16 @@ def solve(
         last = float(np.abs(step / np.minimum(prior, _GEOMETRIC)).max()) < small * (
             _CREEPING_FACTOR if loss in ABSOLUTE else 1.0
         )
-        if last or predicted <= 1e-24 * max(cost, 1.0):
+        ended = last or predicted <= (_CREEPING if loss == "l1-components" else 1e-24) * max(cost, 1.0)
+        if ended:
             converged = loss not in ABSOLUTE or scale <= _L1_FLOOR * float(np.median(_norms(here, loss)) + 1e-300)
             if converged:
                 break
+    if loss == "l1-components" and not problem.priors and converged:
+        # The minimum is a vertex: linear programs reach it from nearby, which reweighting does not.
+        from truearm.identification.solving.componentwise import least_absolute
+
+        here = problem.at(least_absolute(problem, bounds, here.vector))
     final = weights(loss, _norms(here, loss), scale or 1.0)
     if len(components) != len(problem.components):
         first = np.concatenate([[0], np.cumsum(problem.components)[:-1]])

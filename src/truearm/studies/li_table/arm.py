@@ -180,7 +180,12 @@ def other_waypoints() -> Array:
 
 def library_arm() -> Robot:
     """Return the library's arm, beta included, with priors of the size of the document's bounds."""
-    return replace(load_robot("li3"), priors=_SIZE)
+    return believed(load_robot("li3"))
+
+
+def believed(robot: Robot) -> Robot:
+    """Return an arm whose nominal values are believed to be as good as the document's bounds say."""
+    return replace(robot, priors=_SIZE)
 
 
 def with_mistakes(data: Dataset, rng: np.random.Generator) -> Dataset:

@@ -2,14 +2,14 @@
 
 Two things speak against them. The readings may not fit: with the places held much more is left than without, as the
 comparison of two nested fits says (F test). Or they fit, but only by a robot that is none: with the height of the base
-held, a wrong number goes whole into ``d_1``, and only the prior of ``d_1`` says that no robot is like that. The places
-that are found have deviations that contain the priors, so their distance from the places held tells (Wald test).
+held, a wrong number goes whole into ``d_1``, and only the prior of ``d_1`` says that no robot is like that. So
+the squares of readings and priors together are compared as well (likelihood ratio).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Final
 
 import numpy as np
@@ -19,10 +19,12 @@ from truearm.identification.judging.left_over import chi_squared_tail
 from truearm.identification.solving.bounds import Bounds
 from truearm.identification.solving.fit import Fit, identify
 from truearm.identification.solving.losses import Loss
+from truearm.identification.solving.problem import Problem
 from truearm.identification.solving.rounds import Redundant
 from truearm.measurement.dataset import Dataset
+from truearm.measurement.observations import OBSERVATIONS
 from truearm.measurement.statistics import Errors, errors_of
-from truearm.modeling.chain import Array
+from truearm.modeling.parameters import PLACES
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform, rotation_from_quaternion, rotation_from_vector, rotation_vector
 from truearm.notices import Notice
@@ -69,16 +71,16 @@ def check_held(
             data,
             fit.model,
             loss=loss,
-            redundancy="prior" if priors else "none",
+            redundancy="prior" if priors else "drop" if bounds is None else "none",
             bounds=bounds,
             bounds_file=bounds_file,
         )
     except InputError:  # nothing but the places held makes a fit possible
         return []
     with_held, without = _left(errors_of(fit.robot, data)), _left(errors_of(found.robot, data))
-    apart = list(_apart(fit, found)) if data.anchored else []
-    far = [words for words, size, chance in apart if size >= 1.0 and chance < _CHANCE] if priors else []
-    added = len(found.free.names) - len(fit.free.names)
+    added = max(len(found.free.names) - len(fit.free.names), 1)
+    apart = [words for words, size in _apart(fit, found) if size >= 1.0] if data.anchored and priors else []
+    unlikely = bool(apart) and chi_squared_tail(max(_rise(fit, found, data), 0.0), added) < _CHANCE
     rows = 3 * with_held[1]
     freedom = rows - len(found.free.names)
     misfit = (
@@ -86,7 +88,7 @@ def check_held(
         and with_held[0] > max(_MORE * without[0], _NEGLIGIBLE)
         and (with_held[0] ** 2 - without[0] ** 2) * rows / added > _LEAST_F * without[0] ** 2 * rows / freedom
     )
-    if not misfit and not far:
+    if not misfit and not unlikely:
         return []
     message = "The places that are held contradict the readings"
     if misfit:
@@ -94,9 +96,8 @@ def check_held(
             f": with them the fit leaves {with_held[0] * 1e3:.3g} mm of the training readings, with all of them found "
             f"{without[0] * 1e3:.3g} mm (root mean square)"
         )
-    told = far or ([words for words, size, _ in apart if size >= 1.0] if priors else [])
-    if told:
-        message += f"{'. Found' if misfit else ': found'} from the readings, {listed(told)} from where it is held"
+    if apart:
+        message += f"{'. Found' if misfit else ': found'} from the readings, {listed(apart)} from where it is held"
     message += (
         ". Check the numbers, their units and what they refer to: the base is the frame of the robot's table, whose z "
         "axis is axis 1 in most conventions, and a tool is given in the flange's frame. Or do not hold them."
@@ -112,28 +113,31 @@ def _left(errors: Errors) -> tuple[float, int]:
     return (float(np.sqrt(np.mean(every**2))) if len(every) else 0.0), len(every)
 
 
-def _apart(fit: Fit, found: Fit) -> Iterator[tuple[str, float, float]]:
-    """Yield what is held: how far it is found from there, in words and by what is far, and how likely that is."""
-    index = {name: i for i, name in enumerate(found.free.names)}
+def _rise(fit: Fit, found: Fit, data: Dataset) -> float:
+    """Return by how much the squares of readings and priors rise with the places held, in units of what is left."""
+    with_held, without = _squares(fit, found.sigma, data), _squares(found, found.sigma, data)
+    left = without[0] / max(without[1] - len(found.free.names), 1)
+    return (sum(with_held[::2]) - sum(without[::2])) / max(left, 1.0)
+
+
+def _squares(fit: Fit, sigma: Mapping[str, float], data: Dataset) -> tuple[float, int, float]:
+    """Return the squares of the whitened readings, their number, and those of the arm's own priors."""
+    problem = Problem(fit.robot, data, fit.free, {o.name: sigma.get(o.name, 1.0) for o in OBSERVATIONS})
+    residual = problem.residual(np.array([fit.robot.values[name] for name in fit.free.names]))
+    moved = [(fit.robot.values[p.name] - p.nominal) / p.prior for p in fit.free.parameters if p.group not in PLACES]
+    return float(residual @ residual), len(residual), float(np.sum(np.square(moved)))
+
+
+def _apart(fit: Fit, found: Fit) -> Iterator[tuple[str, float]]:
+    """Yield what is held: how far it is found from there, in words and by what is far."""
     if fit.held.base is not None:
-        yield _difference("the base", _base(found.robot), fit.held.base, found, index, "base", turned=True)
+        place = _place(found.robot, "base", found.robot.base_quaternion)
+        yield _difference("the base", place, fit.held.base, turned=True)
     for target in found.robot.targets:
         if target.name in fit.held.targets:
-            quaternion = target.quaternion
-            place = _place(found.robot, target.parameter("x")[:-2], quaternion)
-            yield _difference(
-                f"target {target.name}",
-                place,
-                fit.held.targets[target.name],
-                found,
-                index,
-                target.parameter("x")[:-2],
-                turned=quaternion is not None,
-            )
-
-
-def _base(robot: Robot) -> Transform:
-    return _place(robot, "base", robot.base_quaternion)
+            place = _place(found.robot, target.parameter("x")[:-2], target.quaternion)
+            held = fit.held.targets[target.name]
+            yield _difference(f"target {target.name}", place, held, turned=target.quaternion is not None)
 
 
 def _place(robot: Robot, prefix: str, quaternion: tuple[float, float, float, float] | None) -> Transform:
@@ -145,24 +149,12 @@ def _place(robot: Robot, prefix: str, quaternion: tuple[float, float, float, flo
     return Transform.from_matrix(rotation_from_quaternion(np.array(quaternion)) @ rotation_from_vector(small), position)
 
 
-def _difference(
-    what: str, place: Transform, held: Transform, found: Fit, index: dict[str, int], prefix: str, *, turned: bool
-) -> tuple[str, float, float]:
-    """Return how far a place is found from where it is held: in words, in what counts as far, and its chance."""
-    shift = np.array(place.translation) - np.array(held.translation)
-    names = [f"{prefix}_{axis}" for axis in "xyz"]
-    off: Array = shift
-    words, size = f"{what} is {np.linalg.norm(shift) * 1e3:.3g} mm", float(np.linalg.norm(shift)) / _APART[0]
+def _difference(what: str, place: Transform, held: Transform, *, turned: bool) -> tuple[str, float]:
+    """Return how far a place is found from where it is held: in words, and in what counts as far."""
+    shift = float(np.linalg.norm(np.array(place.translation) - np.array(held.translation)))
+    words, size = f"{what} is {shift * 1e3:.3g} mm", shift / _APART[0]
     if turned:
-        turn = rotation_vector((held.rotation.T @ place.rotation)[None])[0]
-        names += [f"{prefix}_{axis}" for axis in ("rx", "ry", "rz")]
-        off = np.concatenate([shift, turn])
-        words += f" and {math.degrees(float(np.linalg.norm(turn))):.2g} deg"
-        size = max(size, float(np.linalg.norm(turn)) / _APART[1])
-    own = [index[name] for name in names if name in index]
-    if len(own) < len(names):
-        return words, size, 1.0
-    scale = found.free.prior[own]
-    covariance = found.covariance[np.ix_(own, own)] / np.outer(scale, scale)
-    known = (off / scale) @ np.linalg.pinv(covariance, rcond=1e-12, hermitian=True) @ (off / scale)
-    return words, size, chi_squared_tail(float(known), len(names))
+        turn = float(np.linalg.norm(rotation_vector((held.rotation.T @ place.rotation)[None])[0]))
+        words += f" and {math.degrees(turn):.2g} deg"
+        size = max(size, turn / _APART[1])
+    return words, size

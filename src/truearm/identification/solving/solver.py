@@ -113,6 +113,8 @@ def solve(
     small
         Step that is the last, in priors.
     """
+    if loss == "l1-components" and not problem.priors:
+        return _by_linear_programs(problem, bounds)
     start = problem.free.start
     here = problem.at(start if bounds is None else np.clip(start, *bounds))
     prior = problem.free.prior
@@ -148,16 +150,28 @@ def solve(
             converged = loss not in ABSOLUTE or scale <= _L1_FLOOR * float(np.median(_norms(here, loss)) + 1e-300)
             if converged:
                 break
-    if loss == "l1-components" and not problem.priors and converged:
-        # The minimum is a vertex: linear programs reach it from nearby, which reweighting does not.
-        from truearm.identification.solving.componentwise import least_absolute
-
-        here = problem.at(least_absolute(problem, bounds, here.vector))
     final = weights(loss, _norms(here, loss), scale or 1.0)
-    if len(components) != len(problem.components):
-        first = np.concatenate([[0], np.cumsum(problem.components)[:-1]])
-        final = problem.components / np.add.reduceat(1.0 / final, first)
+    if loss == "l1-components":
+        final = _of_readings(final, problem.components)
     return Solution(here.vector, converged, steps, here.residual, here.jacobian, final)
+
+
+def _by_linear_programs(problem: Solvable, bounds: tuple[Array, Array] | None) -> Solution:
+    """Minimise the sum of absolute coordinates without priors: a vertex, which reweighting does not reach."""
+    from truearm.identification.solving.componentwise import least_absolute
+
+    here, converged, steps = least_absolute(problem, bounds)
+    norms = _norms(here, "l1-components")
+    weight = weights("l1-components", norms, 0.3 * _L1_FLOOR * float(np.median(norms)) + 1e-300)
+    return Solution(
+        here.vector, converged, steps, here.residual, here.jacobian, _of_readings(weight, problem.components)
+    )
+
+
+def _of_readings(weight: Array, components: NDArray[np.intp]) -> Array:
+    """Return the weight of each reading whose coordinates weigh alone: that of their mean size, ``(readings,)``."""
+    first = np.concatenate([[0], np.cumsum(components)[:-1]])
+    return np.asarray(components / np.add.reduceat(1.0 / weight, first))
 
 
 _L1_FLOOR: Final = 1e-4  # an l1 reading closer than this share of the median counts as met

@@ -118,7 +118,7 @@ def fit(nominal: Robot, data: Dataset, objective: Objective, bounded: bool) -> R
     limits = bound_vectors(BOUNDS, free, "bounds of the document") if bounded else None
     problem = Problem(nominal, data, free, {"position": CAMERA}, priors=False)
     if objective == "components":
-        found = least_absolute(problem, limits)
+        found = least_absolute(problem, limits)[0].vector
     else:
         found = solve(problem, "l1" if objective == "distances" else "linear", limits).vector
     return nominal.with_values(dict(zip(free.names, map(float, found), strict=True)))

@@ -16,13 +16,14 @@ import numpy as np
 from truearm.errors import InputError
 from truearm.identification.solving.losses import Loss
 from truearm.identification.solving.rounds import Solved, solve_with_joints
-from truearm.identification.solving.solver import SMALL
 from truearm.modeling.chain import Array
 from truearm.modeling.parameters import FreeParameters
 
 #: Configurations below which draws are too much alike, and fits from which deviations are known to a tenth or so.
 LEAST_CONFIGURATIONS: Final = 10
 LEAST_FITS: Final = 20
+#: Step of each fit that is the last, in priors or mm: deviations need no more digits.
+_SMALL: Final = 1e-4
 
 
 def refit_draws(
@@ -69,7 +70,7 @@ def refit_draws(
         progress(f"bootstrap {_bar(number, count)} {number + 1} of {count}")
         drawn = problem.data.of_configurations(rng.integers(n, size=n))
         again = replace(problem, data=drawn, free=started)
-        found[number] = solve_with_joints(again, joints, loss, solved.limits, SMALL).vector
+        found[number] = solve_with_joints(again, joints, loss, solved.limits, _SMALL).vector
     return found
 
 

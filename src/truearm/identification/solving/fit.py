@@ -307,7 +307,9 @@ def _fit(solved: Solved, model: Model, loss: Loss, draws: Array | None = None) -
         if block.data is problem.data:
             weight[block.readings] = np.fmin(weight[block.readings], part)
         first += len(block.readings)
-    if not solution.converged:
+    if open_:  # along them the solver has no reason to stop
+        status = Status.RANK_LOSS
+    elif not solution.converged:
         status = Status.NOT_CONVERGED
     elif unobservable:
         status = Status.RANK_LOSS

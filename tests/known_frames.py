@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
-
-import yaml
 
 from truearm.modeling.robot import Robot
 
@@ -22,5 +21,5 @@ def frames_of(robot: Robot, path: Path, *, base: tuple[float, float, float] = (0
     place = [1e3 * v + off for v, off in zip(robot.base.translation, base, strict=True)]
     frames = {"base": {"of": "world", "translation": place, "quaternion": list(robot.base.quaternion)}}
     content = {"truearm": "truearm-cell/1", "units": {"length": "mm", "angle": "deg"}, "tools": tools, "frames": frames}
-    path.write_text(yaml.safe_dump(content))
+    path.write_text(json.dumps(content))
     return path

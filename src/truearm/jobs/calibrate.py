@@ -172,7 +172,7 @@ def calibrate(
     choice_argument(loss, "loss", {name: name for name in LOSSES})
     choice_argument(redundancy, "redundancy", {name: name for name in get_args(Redundant)})
     seed = whole_argument(seed, "seed")
-    hold = names_argument(hold, "hold")
+    hold = names_argument(hold, "hold", "base, targets, fixtures, or names of these")
     bootstrap = _fits_argument(bootstrap)
     payload, fall = payload_argument(payload), gravity_argument(gravity)
     call = command_argument(command) or python_call(
@@ -316,7 +316,7 @@ def calibrate(
 
 def _fits_argument(bootstrap: object) -> int:
     """Return how many fits the deviations shall follow from; none, or enough."""
-    if bootstrap == 0 and not isinstance(bootstrap, bool):
+    if isinstance(bootstrap, int) and not isinstance(bootstrap, bool) and bootstrap == 0:
         return 0
     return count_argument(bootstrap, "bootstrap", LEAST_FITS)
 

@@ -1,7 +1,7 @@
 """Frames that are known and held: where the base stands, where targets are on the flange, where fixtures stand.
 
 An instrument whose frame is the robot's base, or a tool that was measured on a coordinate measuring machine, make a
-calibration absolute (Patel 2013, section 3.3; Li et al. 2016): the base is not found from the readings, and what was
+calibration absolute (Patel 2017; Li et al. 2016): the base is not found from the readings, and what was
 redundant with it, such as the height of axis 2 over the base, is observed.
 """
 

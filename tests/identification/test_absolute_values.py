@@ -13,6 +13,7 @@ from tests.simulated import campaign
 
 from truearm.errors import InputError
 from truearm.identification.held import Held
+from truearm.identification.judging.expected_error import expected_error
 from truearm.identification.solving.bootstrap import refit_draws
 from truearm.identification.solving.componentwise import least_absolute
 from truearm.identification.solving.fit import Fit, Status, identify
@@ -21,6 +22,7 @@ from truearm.identification.solving.problem import Problem
 from truearm.identification.solving.rounds import find_parameters
 from truearm.identification.solving.solver import solve
 from truearm.jobs.calibrate import calibrate
+from truearm.jobs.simulate import simulate
 from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.parameters import FreeParameters
@@ -192,3 +194,12 @@ def test_numbers_of_fits_that_say_nothing_are_refused(count: Any, said: str) -> 
 def test_a_bootstrap_of_few_configurations_is_refused() -> None:
     with pytest.raises(InputError, match=r"too few training configurations to draw from; got 6; allowed: 10 or more"):
         calibrate("irb120", campaign("irb120", 8, 0.1e-3, 3)[1], model="offsets", bootstrap=20)
+
+
+@pytest.mark.parametrize("loss", ["l1", "l1-components"])
+def test_readings_that_are_met_exactly_do_not_pass_for_perfect(loss: Any) -> None:
+    """As many distances as parameters: all residuals are zero, and nothing is known of the noise."""
+    data = simulate("irb120", truth="random", device="sphere", poses=28, seed=3).data
+    found = identify(load_robot("irb120"), replace(data, sigma=None), GEOMETRIC, loss=loss)
+    assert found.sigma["distance"] > 0.5e-4
+    assert expected_error(found).overall.mean > 0.1e-3

@@ -62,6 +62,28 @@ def robust_scale(norms: Array, components: NDArray[np.intp]) -> float:
     return float(np.median(norms / np.where(components == 1, _MEDIAN_OF_ONE, MEDIAN_NORM)))
 
 
+def meets_exactly(loss: Loss, components: NDArray[np.intp]) -> bool:
+    """Return whether a fit meets as many numbers exactly as it has parameters: sums of absolute single numbers."""
+    return loss in ABSOLUTE and bool(np.all(components == 1))
+
+
+def scale_of(loss: Loss, norms: Array, components: NDArray[np.intp], spent: float) -> float:
+    """Return the deviation of one coordinate that a fit leaves.
+
+    Parameters
+    ----------
+    norms
+        As from :func:`norms_of`, of what the loss weighs together.
+    spent
+        How many coordinates the parameters used up: a sum of absolute single numbers leaves so many at zero, and those
+        say nothing of the noise.
+    """
+    if meets_exactly(loss, components):
+        smallest = np.argsort(norms)[min(int(spent), len(norms) - 1) :]
+        return robust_scale(norms[smallest], components[smallest])
+    return robust_scale(norms, components)
+
+
 def weights(loss: Loss, norms: Array, scale: float) -> Array:
     """Return the weight of each reading's squared residual, ``(readings,)``.
 
@@ -106,7 +128,7 @@ def pulls(loss: Loss, residual: Array, jacobian: Array, components: NDArray[np.i
         return residual[:, None] * jacobian, jacobian
     components = weighed_together(loss, components)
     norms = norms_of(residual, components)
-    scale = max(robust_scale(norms, components), 1e-300)
+    scale = max(scale_of(loss, norms, components, jacobian.shape[1]), 1e-300)
     across = weights(loss, norms, scale if loss not in ABSOLUTE else _L1_MET * float(np.median(norms)) + 1e-300)
     if loss == "huber":
         along = np.where(norms < _HUBER * scale, 1.0, 0.0)

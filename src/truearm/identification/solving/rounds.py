@@ -17,7 +17,7 @@ from truearm.identification.held import NOTHING_HELD, Held
 from truearm.identification.solving.arrivals import Arrivals, WhitenedProblem, Whitening
 from truearm.identification.solving.bounds import Bounds, bound_vectors
 from truearm.identification.solving.likelihood import Linearised
-from truearm.identification.solving.losses import Loss, norms_of, robust_scale, weighed_together
+from truearm.identification.solving.losses import Loss, meets_exactly, norms_of, scale_of, weighed_together
 from truearm.identification.solving.models import Model
 from truearm.identification.solving.problem import SETUP, Problem, check_circumstances, check_solvable
 from truearm.identification.solving.redundancy import Redundancy, find_redundancies
@@ -40,6 +40,8 @@ Redundant = Literal["prior", "drop", "none"]
 #: Noise assumed for readings that declare none, until their own residuals say better [m, rad].
 _FIRST_NOISE: Final = {observation.name: 1e-4 for observation in OBSERVATIONS}
 _NOISE_FLOOR: Final = 1e-9
+#: Share of the equations that parameters may use up, for what a sum of absolute numbers leaves to tell the noise.
+_LARGEST_SHARE_SPENT: Final = 0.8
 _LEAST_WIDENED: Final = 1e-12
 #: What the variances of readings with declared deviations are counted under.
 DECLARED: Final = "declared"
@@ -347,7 +349,10 @@ def noise_found(problem: Problem, solution: Solution, loss: Loss) -> dict[str, t
             found[name] = (float(np.sqrt(np.sum(mine**2) / freedom)), freedom)
         else:
             of_name = of_norms == name
-            found[name] = (robust_scale(norms[of_name], components[of_name]), freedom)
+            scale = scale_of(loss, norms[of_name], components[of_name], spent * float(of_name.mean()))
+            if meets_exactly(loss, components) and spent > _LARGEST_SHARE_SPENT * problem.rows:
+                scale = max(scale, 1.0)  # nearly all are met whatever the noise: it stays as it was assumed
+            found[name] = (scale, freedom)
     return found
 
 

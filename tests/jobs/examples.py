@@ -47,7 +47,15 @@ def _poses(_: Path) -> Arguments:
     """Return two poses of an IRB 120 that are easily reached."""
     q = np.radians([[10.0, 20.0, -30.0, 40.0, 50.0, 60.0], [-70.0, 30.0, 0.0, -20.0, 40.0, 0.0]])
     at = load_robot("irb120").forward_kinematics(q)
-    return {"robot": "irb120", "poses": at.position.T, "rotations": at.matrix(), "seed": q, "branch": "front-up-noflip"}
+    return {
+        "robot": "irb120",
+        "poses": at.position.T,
+        "rotations": at.matrix(),
+        "seed": q,
+        "branch": "front-up-noflip",
+        "wrench": (0.0, 5.0, 0.0, 0.0, 0.0, 0.1),
+        "wrench_frame": "tool",
+    }
 
 
 def _written(path: Path, text: str) -> Path:
@@ -89,6 +97,27 @@ def _circle(folder: Path) -> Arguments:
     rows = "configuration,joint_1 [deg],joint_2 [deg],angle [deg],height [mm]\n1,10,20,0,0.5\n2,12,22,180,-0.2\n"
     points = _written(folder / "page.csv", rows)
     return {"scans": {"a": drawn(folder / "page.png")}, "points": {"a": points}, "dpi": 300.0, "sigma": 2e-5}
+
+
+def _sockets(folder: Path) -> Arguments:
+    rows = "configuration,joint_1 [deg],joint_2 [deg],socket\n1,10,20,left\n2,12,22,right\n3,15,25,left\n"
+    return {"file": _written(folder / "sockets.csv", rows), "apart": "200mm,0.02mm", "ball": "25mm", "sigma": 2e-5}
+
+
+def _views(folder: Path) -> Arguments:
+    header = "configuration,joint_1 [deg],joint_2 [deg],x [mm],y [mm],z [mm],qw,qx,qy,qz,sigma [mm],sigma_rot [mrad]"
+    rows = "1,10,20,5,-3,400,1,0,0,0,0.05,0.2\n2,12,22,4,8,450,0.6,0.8,0,0,0.05,0.2\n"
+    return {"file": _written(folder / "views.csv", f"{header}\n{rows}"), "on_flange": "camera"}
+
+
+def _inclinations(folder: Path) -> Path:
+    """What inclinometers on a Katana read in eight pairs of configurations."""
+    import truearm
+
+    path = folder / "inclinations.csv"
+    if not path.exists():
+        truearm.simulate_inclinometers("katana450", truth="tilting", poses=16, out=path)
+    return path
 
 
 def _axis_runs(folder: Path) -> Path:
@@ -135,6 +164,12 @@ def _cell(folder: Path) -> Path:
     return path
 
 
+_FORCES = (
+    "truearm: truearm-cell/1\nunits: {length: mm, angle: deg, force: N}\n"
+    "wrenches:\n  - {targets: [pHole1], force: [0, 5, 0]}\n"
+)
+
+
 def _corrected(folder: Path) -> Path:
     import truearm
 
@@ -173,18 +208,53 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "payload": "1kg,0mm,0mm,50mm",
         "gravity": (0.0, 0.0, -9.81),
     },
-    "validate": lambda folder: {"robot": _calibrated(folder), "data": _data(folder)},
+    "tilting": lambda folder: {"robot": "katana450", "inclinations": _inclinations(folder)},
+    "validate": lambda folder: {
+        "robot": _calibrated(folder),
+        "data": _data(folder),
+        "wrench": "0N,5N,0N,0Nm,0Nm,0Nm",
+        "wrench_frame": "world",
+        "wrench_at": "1",
+    },
     "import_table": _table,
     "import_matrices": _matrices,
+    "import_robodk": lambda folder: {
+        "file": _written(
+            folder / "robodk.csv",
+            "J1,J2,J3,J4,J5,J6,X,Y,Z,RX,RY,RZ,TX,TY,TZ,TRX,TRY,TRZ\n10,20,30,0,45,90,500,20,800,0,0,90,0,0,50,0,0,0\n",
+        ),
+        "angle_unit": "deg",
+    },
+    "export_robodk": lambda folder: {"robot": _calibrated(folder), "data": _data(folder), "out": _new(folder, "r.csv")},
     "import_circle": _circle,
+    "import_sockets": _sockets,
+    "import_hand_eye": _views,
     "import_ur_kinematics": lambda folder: {
         "file": _written(folder / "calibration.conf", UR10_CONF),
         "robot": "ur10",
         "out": _new(folder, "ur10-controller.yaml"),
     },
     "distances": lambda folder: {"robot": _calibrated(folder), "data": _data(folder), "payload": "1kg,0mm,0mm,50mm"},
-    "plan": lambda _: {"robot": "irb120", "poses": 12, "candidates": 40, "device": "ballbar", "seed": 1},
-    "simulate": lambda _: {"robot": "irb120", "truth": "random", "poses": 3, "noise": 1e-4, "device": "tracker"},
+    "plan": lambda _: {
+        "robot": "irb120",
+        "poses": 12,
+        "candidates": 40,
+        "device": "ballbar",
+        "seed": 1,
+        "region": ((0.3, 0.5), (-0.1, 0.1), (0.2, 0.4)),
+    },
+    "plan_inclinometers": lambda _: {"robot": "katana450", "poses": 8, "candidates": 100, "seed": 1},
+    "simulate_inclinometers": lambda _: {"robot": "katana450", "truth": "tilting", "poses": 8},
+    "simulate": lambda _: {
+        "robot": "irb120",
+        "truth": "random",
+        "poses": 3,
+        "noise": 1e-4,
+        "device": "tracker",
+        "wrench": (0.0, 5.0, 0.0, 0.0, 0.0, 0.1),
+        "wrench_frame": "base",
+        "wrench_at": "flange",
+    },
     "inverse": _poses,
     "robots": lambda _: {},
     "devices": lambda _: {},
@@ -198,6 +268,15 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "truth": "axis-tests",
         "noise": 1e-5,
         "repeats": 2,
+    },
+    "influence": lambda folder: {
+        "robot": "irb120",
+        "data": _data(folder),
+        "model": "offsets",
+        "train": 14,
+        "target": "2",
+        "frames": "placed",
+        "combination": "mean",
     },
     "hexapod_enumerate": lambda _: {},
     "hexapod_uncertainty": lambda _: {"trials": 100, "seed": 1},
@@ -217,6 +296,7 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "tools": _cell(folder),
         "frames": _cell(folder),
         "payload": "1kg,0mm,0mm,50mm",
+        "wrench": _written(folder / "forces.yaml", _FORCES),
         "controller_kinematics": "nominal",
         "strict": True,
         "split": 5e-5,

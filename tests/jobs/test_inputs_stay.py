@@ -20,13 +20,14 @@ from truearm.modeling.formats.robot_file import robot_text
 from truearm.results.axis_calibration import AXIS_FILES
 from truearm.results.calibration import RESULT_FILES
 from truearm.results.program_correction import REPORT
+from truearm.results.validation import VALIDATION_FILES
 
 #: How a job refuses it; a program that is called as a record is no program to begin with.
 REFUSED = r"would be overwritten|not overwritten|of this name itself|no robot language has files of this kind"
 #: Parameters that name what a job writes.
 OUTPUTS = ("out", "steps", "file", "folder")
 #: Of these names those that a job reads.
-FILES = (("import_table", "file"), ("import_ur_kinematics", "file"))
+FILES = (("import_table", "file"), ("import_robodk", "file"), ("import_ur_kinematics", "file"))
 Arguments = dict[str, Any]
 
 
@@ -47,6 +48,9 @@ READ: dict[str, Callable[[Path], Arguments]] = {
     "calibrate": lambda folder: {
         "robot": _robot(folder),
         "bounds": _written(folder / "bounds.yaml", f"truearm: truearm-bounds/1\n{_UNITS}within: {{d_1: 5}}\n"),
+        "zones": _written(
+            folder / "zones.yaml", "truearm: truearm-zones/1\nunits: {length: mm}\nzones: {left: {y: [0, null]}}\n"
+        ),
     },
     "plan": lambda folder: {
         "robot": _robot(folder),
@@ -55,6 +59,10 @@ READ: dict[str, Callable[[Path], Arguments]] = {
         "constraints": _written(
             folder / "c.yaml", f"truearm: truearm-constraints/1\n{_UNITS}limits: {{1: [-99, 99]}}\n"
         ),
+        "region": None,
+        "accurate_at": EXAMPLES["compensate"](folder)["programs"][0],
+        "tools": EXAMPLES["compensate"](folder)["tools"],
+        "frames": shutil.copy(EXAMPLES["compensate"](folder)["tools"], folder / "tools.yaml"),
     },
     "simulate": lambda folder: {"robot": _robot(folder), "truth": EXAMPLES["validate"](folder)["robot"]},
     "inverse": lambda folder: {
@@ -89,6 +97,7 @@ ELSEWHERE = (("compensate", "controller_kinematics"),)
 #: The names of what a job writes into the folder `out`.
 INTO_FOLDERS = {
     "calibrate": RESULT_FILES,
+    "validate": VALIDATION_FILES,
     "axes": AXIS_FILES,
     "compensate": ("plate.mod", "plate.mod.truearm.json", REPORT),
     "revert": ("plate.mod",),

@@ -83,6 +83,18 @@ def calibrate(
             "--without", metavar="LABEL,...", help="Configurations to leave out; repeatable.", show_default=False
         ),
     ] = None,
+    monte_carlo: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N", help="Simulate N calibrations for intervals beside the linear ones.", show_default=False
+        ),
+    ] = None,
+    zones: Annotated[
+        str | None,
+        typer.Option(
+            metavar="N|FILE", help="Try a model for each of N zones, or for those of a file.", show_default=False
+        ),
+    ] = None,
     notes: NoteTexts = None,
     json: Json = False,
 ) -> None:
@@ -111,6 +123,8 @@ def calibrate(
             gravity=read_gravity(gravity),
             base_changes=[name.strip() for name in base_changes.split(",")] if base_changes else (),
             without=[name.strip() for text in without or () for name in text.split(",")],
+            monte_carlo=monte_carlo,
+            zones=_number_or(zones),
             notes=read_notes(notes),
             command=command_line(),
             progress=say,
@@ -119,14 +133,19 @@ def calibrate(
         print_json(calibration.summary())
     else:
         print_record(calibration)
-        print_line(f"Written to {out}: calibrated.yaml, result.json, report.html, calibrated.urdf")
+        print_line(f"Written to {out}: {', '.join(calibration.files)}")
     if not calibration.finished:
         raise typer.Exit(3)
 
 
-def read_train(text: str | None) -> Any:
-    """Return a number where the text is one; the job refuses what is neither that nor all."""
+def _number_or(text: str | None) -> Any:
+    """Return a number where the text is one, else the text."""
     try:
         return text if text is None else int(text)
     except ValueError:
         return text
+
+
+def read_train(text: str | None) -> Any:
+    """Return a number where the text is one; the job refuses what is neither that nor all."""
+    return _number_or(text)

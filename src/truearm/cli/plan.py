@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from truearm.cli.inclinometers import INCLINOMETERS, Pull, even_poses, refuse_beside, refuse_pull
 from truearm.cli.loading import GravityText, JointsText, PayloadText, read_gravity
 from truearm.cli.options import command_line
 from truearm.cli.output import Json, print_json, print_line, print_record, progress
@@ -24,7 +25,37 @@ def plan(
             "--from", metavar="DATA.csv", help="Choose among the configurations of a file.", show_default=False
         ),
     ] = None,
-    objective: Annotated[str, typer.Option(metavar="INDEX", help="O1, O2, O3, O4 or O5.")] = "O1",
+    objective: Annotated[
+        str | None,
+        typer.Option(
+            metavar="INDEX",
+            help="O1, O2, O3, O4 or O5; error: the error with --for or --region.",
+            show_default="O1, or error with --for or --region",
+        ),
+    ] = None,
+    accurate_at: Annotated[
+        Path | None,
+        typer.Option(
+            "--for",
+            metavar="PROGRAM|POSES.csv",
+            help="Where the robot shall be accurate: a robot program, or flange poses as for 'truearm ik'.",
+            show_default="everywhere",
+        ),
+    ] = None,
+    region: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X..X,Y..Y,Z..Z",
+            help='The same as a box for the flange in the base frame in mm: "300..600,-200..200,100..400".',
+            show_default="everywhere",
+        ),
+    ] = None,
+    tools: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Where the tools of the program are.", show_default=False)
+    ] = None,
+    frames: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Where the frames of the program are.", show_default=False)
+    ] = None,
     model: Annotated[
         str, typer.Option(metavar="MODEL", help="What will be identified, as in truearm calibrate, without auto.")
     ] = "geometric",
@@ -35,7 +66,7 @@ def plan(
         str | None,
         typer.Option(
             metavar="NAME",
-            help="An instrument of 'truearm devices'; not with --from.",
+            help="An instrument of 'truearm devices', or inclinometers; not with --from.",
             show_default="one that reads every target everywhere",
         ),
     ] = None,
@@ -49,15 +80,46 @@ def plan(
     payload: PayloadText = None,
     gravity: GravityText = None,
     joints: JointsText = None,
+    pull: Pull = None,
     json: Json = False,
 ) -> None:
     """Choose the configurations that tell most, in a measuring order, and say how accurate the result will be.
 
     Without a device every target on the robot's tool is measured at each of them. Writes PLAN.csv and PLAN.html.
     """
-    from truearm.jobs.plan import plan as run
     from truearm.units import sized_si
 
+    deviation = sized_si(noise, "mm", parameter="noise", deviation=True)
+    if device == INCLINOMETERS:
+        from truearm.jobs.plan_inclinometers import plan_inclinometers
+
+        beside = {"objective": objective, "accurate_at": accurate_at, "region": region, "tools": tools}
+        beside |= {"frames": frames, "candidates_from": candidates_from, "constraints": constraints}
+        refuse_beside(beside | {"model": None if model in ("geometric", "tilting") else model})
+        with progress() as say:
+            pairs = plan_inclinometers(
+                robot,
+                poses=even_poses(poses),
+                out=out,
+                pull=20.0 if pull is None else pull,
+                candidates=candidates,
+                noise=deviation,
+                seed=seed,
+                payload=payload,
+                gravity=read_gravity(gravity),
+                joints=joints,  # type: ignore[arg-type]
+                command=command_line(),
+                progress=say,
+            )
+        if json:
+            print_json(pairs.summary())
+        else:
+            print_record(pairs)
+            print_line(f"Written: {out}")
+        return
+    from truearm.jobs.plan import plan as run
+
+    refuse_pull(pull)
     with progress() as say:
         planned = run(
             robot,
@@ -65,11 +127,15 @@ def plan(
             out=out,
             candidates_from=candidates_from,
             objective=objective,
+            accurate_at=accurate_at,
+            region=_region(region),
+            tools=tools,
+            frames=frames,
             model=model,
             candidates=candidates,
             device=device,
             constraints=constraints,
-            noise=sized_si(noise, "mm", parameter="noise", deviation=True),
+            noise=deviation,
             seed=seed,
             payload=payload,
             gravity=read_gravity(gravity),
@@ -90,3 +156,21 @@ def _poses(text: str) -> Any:
         return int(text)
     except ValueError:
         return text
+
+
+def _region(text: str | None) -> list[list[float]] | None:
+    """Return lowest and highest x, y and z [m] of a text in mm."""
+    from truearm.errors import InputError
+    from truearm.units import as_number, sized_si
+
+    if text is None:
+        return None
+    ranges = [[as_number(end.strip()) for end in part.split("..")] for part in text.split(",")]
+    if len(ranges) != 3 or any(len(one) != 2 or None in one for one in ranges):
+        raise InputError(
+            "three ranges in mm belong here",
+            parameter="region",
+            came=text,
+            allowed="LOW..HIGH for x, y and z: 300..600,-200..200,100..400",
+        )
+    return [[sized_si(end, "mm", parameter="region") for end in one if end is not None] for one in ranges]

@@ -13,6 +13,7 @@ import numpy as np
 from truearm.errors import InputError, refusals_of
 from truearm.files import path_argument, read_bytes
 from truearm.identification.base_changes import with_one_base
+from truearm.identification.choosing.balancer_loads import refuse_balancers_that_are_not_there, without_unseen_balancers
 from truearm.identification.choosing.selection import AUTO, select
 from truearm.identification.judging.held_places import check_held
 from truearm.identification.judging.judgement import judge
@@ -42,6 +43,7 @@ from truearm.jobs.arguments import (
 )
 from truearm.jobs.check import notices_of
 from truearm.jobs.holding import held_argument
+from truearm.jobs.monte_carlo import simulate_calibrations, trials_argument
 from truearm.jobs.split import (
     check_copies,
     check_proof,
@@ -51,6 +53,7 @@ from truearm.jobs.split import (
     train_count,
     without_words,
 )
+from truearm.jobs.zones import choose_zones, zone_file_names, zones_argument
 from truearm.library import urdf_source
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.repeats import readings_digest
@@ -91,6 +94,8 @@ def calibrate(
     gravity: Sequence[float] | None = None,
     base_changes: Sequence[str] = (),
     without: Sequence[str] = (),
+    monte_carlo: int | None = None,
+    zones: int | str | Path | None = None,
     notes: Mapping[str, str] | None = None,
     command: str | None = None,
     progress: Callable[[str], None] = lambda _: None,
@@ -143,6 +148,14 @@ def calibrate(
         taken out of the readings; no deviation contains what is not known of it.
     without
         Configurations that are left out, by their labels: neither part of the split knows them.
+    monte_carlo
+        How many calibrations of the robot that is found are simulated (100 or more): their spread gives intervals of
+        the parameters and the predictions that need no linearity, beside the linear ones. With the linear loss and
+        without bounds; seeded by `seed`. None simulates none.
+    zones
+        Into how many zones the workspace is cut, 2 to 64, or a file of zones: each gets a model of its own, which is
+        kept if it is better on the held-out configurations there; it is written as ``zone-NAME.yaml``, and
+        ``zones.yaml`` says where they are.
     notes
         What to write on the report and into result.json, by its name: ``date``, ``serial``, ``operator``,
         ``instrument``, or any other.
@@ -174,6 +187,15 @@ def calibrate(
     seed = whole_argument(seed, "seed")
     hold = names_argument(hold, "hold", "base, targets, fixtures, or names of these")
     bootstrap = _fits_argument(bootstrap)
+    trials = trials_argument(monte_carlo, loss, bounds)
+    wanted_zones = zones_argument(zones, held_out=train != "all")
+    for given, name in ((trials, "monte_carlo"), (wanted_zones, "zones")):
+        if given is not None and hold:
+            raise InputError(
+                "this is not made with places that are held",
+                parameter=name,
+                cure="Leave it out, or leave out `hold`.",
+            )
     payload, fall = payload_argument(payload), gravity_argument(gravity)
     call = command_argument(command) or python_call(
         "calibrate",
@@ -191,19 +213,28 @@ def calibrate(
         effects=list(effects) or None,
         base_changes=list(base_changes) or None,
         without=list(without) or None,
+        monte_carlo=trials,
+        zones=zones,
         notes=notes or None,
         payload=payload,
         gravity=fall,
     )
     refuse_swapped(robot, data, "calibrate")
-    inputs = files_of(robot, data, bounds, frames)
-    folder = None if out is None else folder_for(RESULT_FILES, out, robot, data, bounds, frames, ours=True)
+    inputs = files_of(robot, data, bounds, zones, frames)
+    folder = (
+        None
+        if out is None
+        else folder_for(
+            (*RESULT_FILES, *zone_file_names(wanted_zones)), out, robot, data, bounds, zones, frames, ours=True
+        )
+    )
     progress("reading the robot")
     source = urdf_source(robot) if isinstance(robot, str | Path) else None
     urdf = None if source is None else read_bytes(source[0])
     nominal_robot = robot_argument(robot).with_payload(payload, fall)
     if effects and named is not None:
         with refusals_of("effects"):
+            refuse_balancers_that_are_not_there(nominal_robot, effects)
             asked = named.also(effects)
             asked.free(asked.prepared(nominal_robot))
     progress("reading the data")
@@ -257,6 +288,7 @@ def calibrate(
                 progress=progress,
             )
         chosen: Model = selection.model if named is None and selection is not None else named.also(effects)  # type: ignore[union-attr]
+        chosen, held_effects = without_unseen_balancers(chosen, first)
         progress("placing the nominal robot")
         placed = place(nominal_robot, first, loss, held)
         progress(f"identifying the {chosen.name} model on {count} configurations")
@@ -276,13 +308,26 @@ def calibrate(
         *check_copies(readings, training, held_out),
         *check_trained_before(nominal_robot, as_read, sha256, (count, n, seed), without_words(without)),
         *moved,
+        *held_effects,
     )
     judged = judge(
         fit, readings, first, validation or train_errors, noticed, of_split, loss, held_out=second is not None
     )
+    simulated, told = None, list[Notice]()
+    if trials is not None:
+        simulated, told = simulate_calibrations(
+            fit, first, second, trials, priors=redundancy == "prior", seed=seed, progress=progress
+        )
+    chosen_zones = None
+    if wanted_zones is not None and second is not None:
+        progress("identifying zones")
+        chosen_zones = choose_zones(
+            wanted_zones, nominal_robot, fit, (first, second), loss=loss, redundancy=redundancy, bounds=bounds
+        )
     digest = f" ({'' if sha256 is None else f'sha256 {sha256[:12]}, '}readings {readings_digest(as_read)[:12]})"
+    freed = " + ".join([chosen.name, *(name for name in effects if name in chosen.effects)])
     history = (
-        f"calibrated by truearm {__version__}: model {' + '.join([chosen.name, *effects])},"
+        f"calibrated by truearm {__version__}: model {freed},"
         f" {count} of {n} configurations of {Path(readings.source).name}{digest}, seed {seed}, loss {loss},"
         f"{without_words(without)}"
         f" redundancy {redundancy}{f', {listed(hold)} held' if hold else ''}"
@@ -295,7 +340,7 @@ def calibrate(
         train=train_errors,
         validation=validation,
         expected=judged.expected,
-        warnings=judged.warnings,
+        warnings=(*judged.warnings, *told),
         next=judged.next,
         data=readings,
         training=training,
@@ -308,6 +353,8 @@ def calibrate(
         known_before=_known_before(nominal_robot),
         without=without,
         notes=notes,
+        monte_carlo=simulated,
+        zones=chosen_zones,
     )
     if folder is not None:
         calibration.save(folder, progress)

@@ -21,6 +21,10 @@ _DECIMALS: Final = 7
 BASE: Final = "base"
 FLANGE: Final = "flange"
 HELD: Final = (BASE, FLANGE)
+#: Measured joint positions that are kept, and their decimals in deg or mm.
+MOST_MEASURED: Final = 1000
+_POSITION_DECIMALS: Final = 3
+_LOAD_DECIMALS: Final = 6
 
 
 @dataclass(frozen=True)
@@ -56,6 +60,12 @@ class Proof:
         pose; and parameters of the targets that were held, by name.
     digest
         SHA-256 of the values that it is about; empty if it is about none yet.
+    measured
+        Joint positions at which it was measured [rad or m], to a thousandth of a degree or millimetre; a thousand of
+        them at most, evenly taken. Empty where only the region is known.
+    loads
+        Lowest and highest moment about each joint's axis, or force along it, while it was measured [N m or N]; empty
+        if that is not known.
     """
 
     status: str
@@ -69,6 +79,8 @@ class Proof:
     warnings: tuple[Notice, ...] = ()
     held: tuple[str, ...] = ()
     digest: str = ""
+    measured: tuple[tuple[float, ...], ...] = ()
+    loads: tuple[tuple[float, float], ...] = ()
 
     @classmethod
     def of(
@@ -83,6 +95,9 @@ class Proof:
         warnings: Sequence[Notice] = (),
         lower_bound: bool = False,
         held: Sequence[str] = (),
+        measured: Sequence[Sequence[float]] = (),
+        joint_units: Sequence[str] = (),
+        loads: Sequence[tuple[float, float]] = (),
     ) -> Self:
         """Make the proof of a calibration, rounded to what a file holds of it.
 
@@ -92,6 +107,10 @@ class Proof:
             That were identified.
         covariance
             Of these parameters [SI], ``(parameters, parameters)``.
+        measured
+            Joint positions at which it was measured [rad or m].
+        joint_units
+            Units in which a file holds these, ``deg`` or ``mm``.
         """
         deviation = np.sqrt(np.diag(covariance))
         units = [SHOWN_AS[p.unit] for p in parameters]
@@ -111,7 +130,12 @@ class Proof:
             ),
             lower_bound,
             tuple(warnings),
-            tuple(held),
+            held=tuple(held),
+            measured=tuple(
+                tuple(to_si(float(position_text(v, u)), u) for v, u in zip(row, joint_units, strict=True))
+                for row in _some(measured)
+            ),
+            loads=tuple((round(low, _LOAD_DECIMALS) + 0.0, round(high, _LOAD_DECIMALS) + 0.0) for low, high in loads),
         )
 
     def summary(self) -> dict[str, Any]:
@@ -131,6 +155,20 @@ class Proof:
         """Covariance of the parameters [SI], ``(parameters, parameters)``."""
         root = self.root
         return np.asarray(root @ root.T)
+
+
+def position_text(value: float, unit: str) -> str:
+    """Return a measured joint position [rad or m] as a file holds it, in deg or mm."""
+    text = f"{from_si(value, unit):.{_POSITION_DECIMALS}f}"
+    return text.removeprefix("-") if float(text) == 0.0 else text
+
+
+def _some(measured: Sequence[Sequence[float]]) -> list[Sequence[float]]:
+    """Return different joint positions in their order, as many as a file holds, evenly taken."""
+    rows = [*{tuple(row): row for row in measured}.values()]
+    if len(rows) <= MOST_MEASURED:
+        return rows
+    return [rows[i] for i in np.linspace(0, len(rows) - 1, MOST_MEASURED).round().astype(int).tolist()]
 
 
 def _factor(covariance: Array, deviation: Array) -> Array:

@@ -19,6 +19,7 @@ import numpy as np
 
 from truearm.modeling.chain import Array, Element
 from truearm.modeling.parts import LinkMass
+from truearm.modeling.wrench import Wrench
 
 #: A frame with its first and second derivative by time, (3, 4, 4); of an arm at rest the frame alone, (1, 4, 4).
 Moving = Array
@@ -40,7 +41,7 @@ class Link:
     zero
         Value of the joint's own element [rad or m].
     axes
-        The joint's axes in the frame behind its element, z along the joint, as columns of ``(4, 4)``.
+        The joint's axes in the frame behind its element, z along the joint, at its bearing ``(4, 4)``.
     body
         Second moments of the link's masses in the link's frame ``(4, 4)``.
     """
@@ -55,9 +56,17 @@ class Link:
 
     @classmethod
     def made_of(
-        cls, elements: Sequence[Element], values: Mapping[str, float], growth: float, masses: Sequence[LinkMass]
+        cls,
+        elements: Sequence[Element],
+        values: Mapping[str, float],
+        growth: float,
+        masses: Sequence[LinkMass],
+        bearing: float,
     ) -> Link:
-        """Return the link of some elements, one of which is its joint, each nominal length longer by `growth`."""
+        """Return the link of some elements, one of which is its joint, each nominal length longer by `growth`.
+
+        The joint's bearing lies `bearing` [m] along its axis from the origin behind its element.
+        """
         place = next(i for i, element in enumerate(elements) if element.variable is not None)
         joint = elements[place]
         return cls(
@@ -65,7 +74,7 @@ class Link:
             generator=generator(joint),
             turns=joint.turns,
             zero=amount(joint, values, growth),
-            axes=_joint_axes(joint),
+            axes=_joint_axes(joint, bearing),
             after=product(elements[place + 1 :], values, growth),
             body=sum((second_moments(mass.mass, mass.cog, mass.inertia) for mass in masses), np.zeros((4, 4))),
         )
@@ -151,6 +160,29 @@ def forces_of(wrench: Array, point: Array) -> Array:
     return carried
 
 
+def forces_on_tool(wrench: Wrench, flange: Array, turned: Array) -> Array:
+    """Return the sum of ``p f^T`` of what acts on a tool ``(4, 4)``.
+
+    A force at a point is ``x f^T`` of that point; a moment is half a couple ``d f^T - f d^T`` of unit arms d across it.
+
+    Parameters
+    ----------
+    flange
+        Frame of the flange ``(4, 4)``.
+    turned
+        Axes that force and moment are given in, ``(3, 3)``; for those of the tool they are turned with it.
+    """
+    place = flange @ wrench.tool.matrix
+    axes = place[:3, :3] if wrench.frame == "tool" else turned
+    carried = np.outer(place[:, 3], [*(axes @ np.array(wrench.force)), 0.0])
+    for along, size in zip(axes.T, wrench.moment, strict=True):
+        d = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
+        d = d / np.linalg.norm(d)
+        f = size * np.cross(along, d)
+        carried[:3, :3] += (np.outer(d, f) - np.outer(f, d)) / 2
+    return carried
+
+
 def tilt(alpha: float, beta: float) -> Array:
     """Return ``Rx(alpha) Ry(beta)``."""
     about_x, about_y = generator(Element("Rx")), generator(Element("Ry"))
@@ -161,7 +193,7 @@ def _axis(element: Element) -> Array:
     return np.array(element.axis) if element.axis else np.eye(3)["xyz".index(element.motion[1])]
 
 
-def _joint_axes(element: Element) -> Array:
+def _joint_axes(element: Element, bearing: float) -> Array:
     """Return axes with z along the joint: those of the frame itself for a joint about z, else some across it."""
     z = _axis(element)
     least = np.eye(3)[np.argmin(np.abs(z))]
@@ -169,4 +201,5 @@ def _joint_axes(element: Element) -> Array:
     axes = np.eye(4)
     if z[2] != 1.0:
         axes[:3, :3] = np.column_stack([np.cross(y, z), y, z])
+    axes[:3, 3] = bearing * z
     return axes

@@ -22,7 +22,7 @@ from truearm.identification.solving.problem import Problem
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.observations import OBSERVATIONS
 from truearm.modeling.chain import Array, ForwardKinematics
-from truearm.modeling.parameters import FreeParameters, Parameter
+from truearm.modeling.parameters import SCALE, FreeParameters, Parameter
 from truearm.modeling.robot import Robot
 
 _ORDER: Final = ("base", "fixture", "target", "", "joint zero", "geometry")  # "" is every joint effect
@@ -188,6 +188,7 @@ def unobservable_parameters(
     held
         Places that are known. A fixture among them locates the robot.
     """
+    free = free.without([SCALE])  # as much as is known of it beforehand is enough
     if not free.names:
         return ()
     noise = {observation.name: 1.0 for observation in OBSERVATIONS}

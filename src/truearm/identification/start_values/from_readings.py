@@ -65,7 +65,7 @@ def start_from_readings(robot: Robot, data: Dataset, held: Held = NOTHING_HELD) 
         and fixture.
     """
     if data.fixture is None:
-        return initial_frames(robot, data, held)
+        return initial_frames(robot, data, held).with_scale(data.scale_sigma)
     kinds = _kinds(data)
     _refuse_few(data, kinds, held)
     placed = _placed(robot, data, kinds, held)
@@ -75,7 +75,7 @@ def start_from_readings(robot: Robot, data: Dataset, held: Held = NOTHING_HELD) 
             placed = _with_target(placed, data, target, kinds, held)
     placed = placed.with_fixtures(_fixture_places(placed, data, kinds, held))
     _refuse_alike(placed, data, held)
-    return placed
+    return placed.with_scale(data.scale_sigma)
 
 
 def with_fixtures_of(robot: Robot, data: Dataset) -> Robot:

@@ -339,7 +339,7 @@ def test_the_command_holds_as_the_job_does(tmp_path: Path) -> None:
     assert validated.errors.position.mean < 1e-9
 
 
-@pytest.mark.parametrize("more", [{"zones": 2}, {"monte_carlo": 20}])
+@pytest.mark.parametrize("more", [{"zones": 2}, {"monte_carlo": 100}])
 def test_zones_and_simulated_calibrations_are_refused_with_places_that_are_held(more: Any, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"this is not made with places that are held"):
         held(["base"], tmp_path, **more)

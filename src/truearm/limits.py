@@ -89,6 +89,7 @@ LIMITS: Final[Mapping[str, Limit]] = {
     "trials": Limit(1_000_000, "the number is out of range", "trials"),
     "monte_carlo": Limit(100_000, "the number is out of range", "trials"),
     "repeats": Limit(100_000, "the number is out of range", "repeats"),
+    "bootstrap": Limit(10_000, "the number is out of range", "fits"),
     "seeds": Limit(1000, "the number is out of range", "seeds"),
 }
 

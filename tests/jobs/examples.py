@@ -63,6 +63,15 @@ def _written(path: Path, text: str) -> Path:
     return path
 
 
+#: Where a target of the IRB 120 is on the flange.
+_KNOWN = """\
+truearm: truearm-cell/1
+units: {length: mm, angle: deg}
+tools:
+  "2": {of: flange, translation: [75, 93.7, 215]}
+"""
+
+
 def _matrices(folder: Path) -> Arguments:
     joints = _written(folder / "joints.txt", "0 10 20 30 40 50\n5 10 25 30 45 50\n")
     points = _written(folder / "points.txt", "100 200 300\n0 0 0\n")
@@ -220,6 +229,9 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "seed": 1,
         "loss": "linear",
         "redundancy": "prior",
+        "hold": ["2"],
+        "frames": _written(folder / "known.yaml", _KNOWN),
+        "bootstrap": 20,
         "effects": ["compliance"],
         "payload": "1kg,0mm,0mm,50mm",
         "gravity": (0.0, 0.0, -9.81),

@@ -29,13 +29,37 @@ def calibrate(
         typer.Option(metavar="N|all", help="Configurations to train on; the rest judges.", show_default="70 %"),
     ] = None,
     seed: Annotated[int, typer.Option(metavar="S", min=0, help="Of the split.")] = 0,
-    loss: Annotated[str, typer.Option(metavar="LOSS", help="linear, huber, cauchy or l1.")] = "linear",
+    loss: Annotated[str, typer.Option(metavar="LOSS", help="linear, huber, cauchy, l1 or l1-components.")] = "linear",
     redundancy: Annotated[
-        str, typer.Option(metavar="HOW", help="prior (keep all, near nominal) or drop (hold and name redundant ones).")
+        str,
+        typer.Option(
+            metavar="HOW",
+            help="prior (keep all, near nominal), drop (hold and name redundant ones), none (no priors, all free; with "
+            "--bounds or --hold).",
+        ),
     ] = "prior",
     bounds: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Limits of parameter values.", show_default=False)
     ] = None,
+    hold: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="WHAT,...",
+            help="What is known and not found: base, targets, fixtures, or names; repeatable.",
+            show_default=False,
+        ),
+    ] = None,
+    frames: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Where what is held stands.", show_default=False)
+    ] = None,
+    bootstrap: Annotated[
+        int,
+        typer.Option(
+            metavar="N",
+            help="Deviations from N fits to configurations drawn anew.",
+            show_default="from the residuals",
+        ),
+    ] = 0,
     effects: Annotated[
         list[str] | None,
         typer.Option(
@@ -91,6 +115,9 @@ def calibrate(
             loss=loss,  # type: ignore[arg-type]
             redundancy=redundancy,  # type: ignore[arg-type]
             bounds=bounds,
+            hold=[name.strip() for text in hold or () for name in text.split(",")],
+            frames=frames,
+            bootstrap=bootstrap,
             effects=effects or (),
             payload=payload,
             gravity=read_gravity(gravity),

@@ -40,6 +40,7 @@ from truearm.measurement.dataset import Dataset
 from truearm.measurement.repeats import readings_digest
 from truearm.measurement.statistics import errors_of
 from truearm.modeling.parts import Payload
+from truearm.modeling.proof import BASE
 from truearm.modeling.robot import Robot
 from truearm.modeling.wrench import Wrench, WrenchFrame
 from truearm.notices import Notice, has_error
@@ -133,7 +134,8 @@ def validate(
     robot = _pushed(robot, data, pushed, wrench_at)
     as_calibrated = as_calibrated.with_wrench(robot.wrench)
     identified = {p.group for p in robot.parameters.values() if p.deviation is not None}
-    if moved != "base" and data.anchored and robot.fixtures and identified and "base" not in identified:
+    found_or_held = "base" in identified or (robot.proof is not None and BASE in robot.proof.held)
+    if moved != "base" and data.anchored and robot.fixtures and identified and not found_or_held:
         raise InputError(
             "the robot was calibrated without the frame of an instrument, so the place of this instrument is unknown",
             parameter="data",

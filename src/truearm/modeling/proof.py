@@ -17,6 +17,10 @@ from truearm.units import SHOWN_AS, from_si, to_si
 #: own deviation.
 _DIGITS: Final = 9
 _DECIMALS: Final = 7
+#: How a proof says that the base was known, or by targets on it all of the flange's pose.
+BASE: Final = "base"
+FLANGE: Final = "flange"
+HELD: Final = (BASE, FLANGE)
 #: Measured joint positions that are kept, and their decimals in deg or mm.
 MOST_MEASURED: Final = 1000
 _POSITION_DECIMALS: Final = 3
@@ -51,6 +55,9 @@ class Proof:
         Notes of the calibration that whoever corrects programs should hear again.
     lower_bound
         Whether the error may be larger than covariance and joint error say, for a reason that is known.
+    held
+        What was known beforehand and not found: ``base``; ``flange``, where the places of targets on it say all of its
+        pose; and parameters of the targets that were held, by name.
     digest
         SHA-256 of the values that it is about; empty if it is about none yet.
     measured
@@ -70,6 +77,7 @@ class Proof:
     factor: tuple[tuple[float, ...], ...]
     lower_bound: bool = False
     warnings: tuple[Notice, ...] = ()
+    held: tuple[str, ...] = ()
     digest: str = ""
     measured: tuple[tuple[float, ...], ...] = ()
     loads: tuple[tuple[float, float], ...] = ()
@@ -86,6 +94,7 @@ class Proof:
         *,
         warnings: Sequence[Notice] = (),
         lower_bound: bool = False,
+        held: Sequence[str] = (),
         measured: Sequence[Sequence[float]] = (),
         joint_units: Sequence[str] = (),
         loads: Sequence[tuple[float, float]] = (),
@@ -121,6 +130,7 @@ class Proof:
             ),
             lower_bound,
             tuple(warnings),
+            held=tuple(held),
             measured=tuple(
                 tuple(to_si(float(position_text(v, u)), u) for v, u in zip(row, joint_units, strict=True))
                 for row in _some(measured)

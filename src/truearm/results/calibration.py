@@ -167,6 +167,7 @@ class Calibration(Record):
             "train": errors_summary(self.train),
             "validation": None if self.validation is None else errors_summary(self.validation),
             "expected_mm": expected_summary(self.expected),
+            **({"held": list(self.fit.held.words)} if self.fit.held else {}),
             **({"without": list(self.without)} if self.without else {}),
             **({"notes": self.notes} if self.notes else {}),
         }
@@ -199,6 +200,8 @@ class Calibration(Record):
             text.append(f"Nothing was held out; on the {counted(self.train.configurations, 'training configuration')}:")
             text.append(f"  nominal     {error_line(self.nominal)}")
         text.append(f"  calibrated  {error_line(self.train)}")
+        if self.fit.held:
+            text.append(f"Held at known places: {listed(self.fit.held.words)}")
         if self.without:
             text.append(f"Left out: {counted(len(self.without), 'configuration')} ({listed(self.without)})")
         text += expected_lines(self.expected)

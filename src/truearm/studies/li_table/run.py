@@ -157,6 +157,10 @@ class Outcome:
         Equation 4 per hole of the level table [mm]: by measure, and by the measure that was fitted by.
     without_camera
         By table, and by what was found.
+    touched
+        Readings of each table, and of all, joints having no play.
+    unseen
+        Where the tip truly is at the unseen points then.
     """
 
     play: Left
@@ -167,6 +171,8 @@ class Outcome:
     at_bounds: Mapping[Tilt, int]
     sums: Mapping[tuple[Measure, Measure], float]
     without_camera: Mapping[tuple[Tilt, Alone], WithoutCamera]
+    touched: Mapping[Surface, Dataset]
+    unseen: Dataset
 
 
 def run(seeds: int, progress: Progress, unseen: int) -> tuple[Outcome, ...]:
@@ -198,6 +204,7 @@ def _one(seed: Seed, unseen: int) -> Outcome:
 
     data = _measured(touched, exact, rng)
     there = true_positions(exact, judged, rng)
+    without_play, unseen_points = data, _as_read(data["normal"], judged, there)
     perfect = {(surface, method): _fit(nominal, data[surface], method) for surface in SURFACES for method in METHODS}
     mistaken = with_mistakes(data["roll"], rng)
     alone = {
@@ -217,6 +224,23 @@ def _one(seed: Seed, unseen: int) -> Outcome:
         at_bounds={tilt: at_bounds(nominal, fitted[tilt, "distances"]) for tilt in TILTS},
         sums=sums,
         without_camera=alone,
+        touched=without_play,
+        unseen=unseen_points,
+    )
+
+
+def _as_read(like: Dataset, joints: Array, positions: Array) -> Dataset:
+    """Return where the tip is at joint positions, as readings without noise."""
+    count = len(joints)
+    return Dataset(
+        source="unseen points",
+        labels=tuple(str(number + 1) for number in range(count)),
+        joints=joints,
+        joint_kinds=like.joint_kinds,
+        targets=like.targets,
+        configuration=np.arange(count),
+        target=np.zeros(count, dtype=np.intp),
+        position=positions,
     )
 
 

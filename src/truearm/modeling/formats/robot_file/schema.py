@@ -176,6 +176,7 @@ class ProofEntry(_Entry):
     lower_bound: Annotated[bool, Field(strict=True)] = False
     region: list[tuple[Number, Number]] = []
     joint_error: list[NotNegative] = []
+    held: list[TargetName] = []
     loads: list[tuple[Number, Number]] = []
     deviations: dict[str, NotNegative] = {}
     correlations: list[Annotated[str, StringConstraints(strict=True)]] = []

@@ -209,6 +209,8 @@ def _proof(
         made["warnings"] = [{"code": warning.code, "message": text(warning.message)} for warning in proof.warnings]
     if proof.lower_bound:
         made["lower_bound"] = True
+    if proof.held:
+        made["held"] = listed([text(name) for name in proof.held])
     if len(proof.region) == len(robot.joints) and all(name in robot.parameters for name in proof.names):
         units = ["deg" if joint.kind == "revolute" else "mm" for joint in robot.joints]
         made["region"] = [listed([written(v, u) for v in one]) for one, u in zip(proof.region, units, strict=True)]

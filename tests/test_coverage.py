@@ -1,4 +1,4 @@
-"""The page that lists every capability: each has a command that stands in a session of the guide, which the tests run."""
+"""The page of all capabilities: each has a command that stands in a session of the guide, which the tests run."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ ROWS = [
     for letter, count in (("M", 12), ("D", 12), ("S", 6), ("I", 9), ("C", 6), ("V", 5), ("U", 3))
     for number in range(1, count + 1)
 ]
-TABLE = re.compile(r"^\| (?P<row>[A-Z]\d+) \| (?P<what>[^|]+) \| [^|]+ \| (?P<command>[^|]*) \| (?P<page>[^|]*)\|$", re.M)
+TABLE = re.compile(r"^\| (?P<row>[A-Z]\d+) \| (?P<what>[^|]+) \| [^|]+ \|(?P<command>[^|]*)\|(?P<page>[^|]*)\|$", re.M)
 LISTED = {match["row"]: match for match in TABLE.finditer(PAGE.read_text())}
 
 

@@ -18,6 +18,9 @@ SOURCES: Final = {
     "remainder": "remainder",
 }
 
+#: Standard deviations of a share beyond which it is more than chance.
+_SURE: Final = 2.0
+
 
 def budget_summary(budget: ErrorBudget) -> dict[str, Any]:
     """Return what limits the accuracy as JSON holds it: squares in mm^2, which add up, and their roots in mm."""
@@ -54,19 +57,26 @@ def _sum(shares: Sequence[Share]) -> float:
 
 
 def budget_lines(budget: ErrorBudget | None) -> list[str]:
-    """Return what limits the accuracy in a line; a share whose square is negative has a minus."""
+    """Return what limits the accuracy in a line: the shares that are more than chance, the largest first."""
     if budget is None:
         return []
-    known = [share for share in budget.shares if share.rms is not None]
     places = min(max(3, 1 - math.floor(math.log10(max(budget.rms * 1e3, 1e-9)))), 6)
-    parts = [f"{SOURCES[share.source]} {(share.rms or 0.0) * 1e3:.{places}f}" for share in known]
-    if budget.held_out:
-        parts[-1] += " (within its uncertainty)" if budget.remainder_is_chance else " (not explained)"
-    missing = [SOURCES[share.source] for share in budget.shares if share.rms is None]
+    sure = [share for share in budget.shares if share.source != "remainder" and _is_sure(share)]
+    sure.sort(key=lambda share: -(share.square or 0.0))
+    parts = [f"{SOURCES[share.source]} {(share.rms or 0.0) * 1e3:.{places}f} mm" for share in sure]
     what = "held-out rms" if budget.held_out else "rms to expect at configurations like these"
-    below_zero = any((share.square or 0.0) < 0.0 for share in known)
-    unknown = f"; not measured: {', '.join(missing)}" if missing else ""
+    rest = "within their uncertainty"
+    if budget.held_out and not budget.remainder_is_chance:
+        left = next(share for share in budget.shares if share.source == "remainder").rms or 0.0
+        rest = f"but for {abs(left) * 1e3:.{places}f} mm {'more' if left > 0.0 else 'less'} than they explain"
+    for share in budget.shares:
+        if share.square is not None and share.source != "remainder" and share.square < -_SURE * share.deviation:
+            rest += f"; {SOURCES[share.source]} takes {abs(share.rms or 0.0) * 1e3:.{places}f} mm away, see the report"
     return [
-        f"What limits the accuracy, in squares that add up to the {what} of {budget.rms * 1e3:.{places}f} mm: "
-        f"{', '.join(parts)} mm{'; minus: a negative square' if below_zero else ''}{unknown}"
+        f"What limits the accuracy: {', '.join(parts) or 'nothing that is more than chance'}; squared they add up to "
+        f"the {what} of {budget.rms * 1e3:.{places}f} mm, {rest}"
     ]
+
+
+def _is_sure(share: Share) -> bool:
+    return share.square is not None and share.square > _SURE * share.deviation

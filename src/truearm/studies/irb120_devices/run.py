@@ -51,19 +51,19 @@ class Sphere:
     setup: str
     nest: str
     points: int
-    mean: float
-    std: float
-    max: float
+    mean: str
+    std: str
+    max: str
     table: str
 
 
 SPHERES: Final = (
-    Sphere("tracker", "1", 123, -0.105, 0.091, 0.327, "2.12"),
-    Sphere("planar artefact", "1", 123, 0.022, 0.110, 0.250, "2.12"),
-    Sphere("tracker", "2", 95, -0.148, 0.118, 0.437, "2.12"),
-    Sphere("planar artefact", "2", 95, -0.048, 0.135, 0.363, "2.12"),
-    Sphere("spatial artefact", "1", 108, 0.091, 0.126, 0.328, "2.13"),
-    Sphere("spatial artefact", "3", 90, 0.146, 0.130, 0.385, "2.13"),
+    Sphere("tracker", "1", 123, "-0.105", "0.091", "0.327", "2.12"),
+    Sphere("planar artefact", "1", 123, "0.022", "0.110", "0.250", "2.12"),
+    Sphere("tracker", "2", 95, "-0.148", "0.118", "0.437", "2.12"),
+    Sphere("planar artefact", "2", 95, "-0.048", "0.135", "0.363", "2.12"),
+    Sphere("spatial artefact", "1", 108, "0.091", "0.126", "0.328", "2.13"),
+    Sphere("spatial artefact", "3", 90, "0.146", "0.130", "0.385", "2.13"),
 )
 
 

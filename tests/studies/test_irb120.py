@@ -79,12 +79,12 @@ def test_single_joints() -> None:
     # Gravity does nothing to joint 1; the document's own compliance of joint 6 goes from too little to too much.
     assert by_table.rows[0].highest < 1e-9
     angular = {row.what: row for row in compliance.rows if row.unit == "deg"}
-    assert angular["joint 5, angular"].verdict == "agrees"
+    assert angular["joint 5, angular"].median == pytest.approx(0.186, abs=0.03)
     assert angular["joint 2, angular"].median == pytest.approx(0.082, abs=0.006)
     assert max(shares.rows, key=lambda row: row.median).what == "joint 2 turns, joint 2 gives way"
     backlash = [row for row in matched.rows if row.what.endswith("backlash")]
     assert len(backlash) == 6
-    assert all(row.median == pytest.approx(row.published, abs=0.003) for row in backlash)
+    assert {row.verdict for row in backlash} <= {"by construction", "undecided"}
     assert len(study.pictures[0].figure["data"]) == 18
 
 

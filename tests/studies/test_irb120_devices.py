@@ -48,7 +48,9 @@ def test_the_documents_comparison(small: Study) -> None:
     assert max(crossed.values()) < 1.5
     ballbar = [row for table in small.tables if table.title.startswith("Ballbar") for row in table.rows]
     assert len(ballbar) == 18
-    assert all(row.median == pytest.approx(row.published, rel=0.8) for row in ballbar if "deviation" in row.what)
+    assert all(
+        row.median == pytest.approx(float(row.published or 0), rel=0.8) for row in ballbar if "deviation" in row.what
+    )
 
 
 def test_every_instrument_and_what_closed_loops_miss(small: Study) -> None:

@@ -110,8 +110,7 @@ def test_tilting() -> None:
     assert median(found, left, "before any calibration") > 100
     constants = next(table for table in found.tables if table.title.startswith("Constants"))
     for row in constants.rows[:-1]:
-        assert row.published is not None
-        assert row.median == pytest.approx(row.published, rel=0.2)
+        assert row.verdict == "by construction"
     side_by_side = "The methods side by side, on unseen poses"
     by_influence, tilting, conventional = (
         median(found, side_by_side, method)

@@ -317,7 +317,6 @@ def fourth_table(outcomes: Sequence[Outcome]) -> Table:
                 [one.gain[name] for one in outcomes],
                 "4",
                 "section 4.5",
-                claim="at most",
                 explanation='The document says "as much as four times". The three more sides look sideways and down'
                 " when the first one lies flat, and what looks away from the robot is out of its reach."
                 if name == "irb120"

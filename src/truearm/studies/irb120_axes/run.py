@@ -21,12 +21,12 @@ from truearm.studies.seeds import Seed, over_seeds
 
 #: Table 2.3.
 TESTS: Final = {
-    1: AxisTest(-60, 60, 5, "0.114", "0.013", "0.004"),
-    2: AxisTest(-40, 40, 1, "1.363", "0.116", "0.002"),
-    3: AxisTest(-40, 40, 1, "0.912", "0.098", "0.004"),
-    4: AxisTest(-155, 155, 5, "0.445", "0.207", "0.037"),
-    5: AxisTest(-90, 90, 5, "0.606", "0.153", "0.017"),
-    6: AxisTest(-400, 400, 1, "0.156", "0.072", "0.037"),
+    1: AxisTest(-60, 60, 5, 0.114, 0.013, 0.004),
+    2: AxisTest(-40, 40, 1, 1.363, 0.116, 0.002),
+    3: AxisTest(-40, 40, 1, 0.912, 0.098, 0.004),
+    4: AxisTest(-155, 155, 5, 0.445, 0.207, 0.037),
+    5: AxisTest(-90, 90, 5, 0.606, 0.153, 0.017),
+    6: AxisTest(-400, 400, 1, 0.156, 0.072, 0.037),
 }
 #: Deviation of a coordinate [m]: over a run it makes radial and axial displacements of about 0.050 mm, as section 2.4.1
 #: says.
@@ -156,7 +156,7 @@ def _with_gears(twin: Twin, chosen: Mapping[int, RunOut]) -> Twin:
         number: replace(
             twin.joints.get(number, PERFECT),
             gear=((1, math.radians(found.amplitude), found.phase),),
-            hysteresis=-math.radians(float(TESTS[number].backlash)) / 2,
+            hysteresis=-math.radians(TESTS[number].backlash) / 2,
         )
         for number, found in chosen.items()
     }

@@ -15,14 +15,14 @@ from truearm.simulation.twin import Twin, measure
 
 @dataclass(frozen=True)
 class AxisTest:
-    """A row of Table 2.3: interval and increment [deg], printed ranges of the errors [mm, deg] and backlash [deg]."""
+    """A row of Table 2.3: interval and increment [deg], ranges of the errors [mm, deg], backlash [deg]."""
 
     low: int
     high: int
     step: int
-    tangential: str
-    angular: str
-    backlash: str
+    tangential: float
+    angular: float
+    backlash: float
 
 
 @dataclass(frozen=True)
@@ -106,12 +106,12 @@ def run_out(turn: Turn, test: AxisTest) -> RunOut:
         What compliance and noise do.
     """
     at = np.radians(turn.angle)
-    lagging = turn.error + np.repeat([-0.5, 0.5], len(at) // 2) * float(test.backlash)
+    lagging = turn.error + np.repeat([-0.5, 0.5], len(at) // 2) * test.backlash
     amplitudes, phases = np.arange(0.0, 0.2, 0.001), np.radians(np.arange(0, 360, 15))
-    found, printed = [], float(test.angular)
+    found = []
     for phase in phases.tolist():
         ranges = np.ptp(lagging + amplitudes[:, None] * np.sin(at + phase), axis=1)
-        passed = np.flatnonzero(np.sign(ranges - printed) != np.sign(ranges[0] - printed))
+        passed = np.flatnonzero(np.sign(ranges - test.angular) != np.sign(ranges[0] - test.angular))
         if len(passed):
             found.append((float(amplitudes[passed[0]]), phase))
     # Noise alone may make more than the printed range already.

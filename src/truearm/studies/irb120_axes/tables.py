@@ -18,8 +18,8 @@ def radii_table(found: Run) -> Table:
             Row(
                 f"joint {number}, printed tangential range over this distance",
                 "deg",
-                [math.degrees(float(test.tangential) / radius) for radius in radii],
-                test.angular,
+                [math.degrees(test.tangential / radius) for radius in radii],
+                f"{test.angular:.3f}",
                 "Table 2.3",
             ),
         ]
@@ -52,7 +52,7 @@ def compliance_table(found: Run) -> Table:
                 f"joint {number}, angular",
                 "deg",
                 [one.compliance[number].angular for one in found.outcomes],
-                test.angular,
+                f"{test.angular:.3f}",
                 "Table 2.3",
                 explanation=why[number],
             )
@@ -62,7 +62,7 @@ def compliance_table(found: Run) -> Table:
                 f"joint {number}, tangential",
                 "mm",
                 [one.compliance[number].tangential for one in found.outcomes],
-                test.tangential,
+                f"{test.tangential:.3f}",
                 "Table 2.3",
             )
         )
@@ -85,7 +85,7 @@ def noiseless_table(found: Run) -> Table:
                 f"joint {number}",
                 "deg",
                 [turns[number].angular for turns in found.noiseless],
-                test.angular,
+                f"{test.angular:.3f}",
                 "Table 2.3",
             )
             for number, test in found.tests.items()
@@ -117,7 +117,7 @@ def matched_table(found: Run) -> Table:
                 f"joint {number}, angular",
                 "deg",
                 [turn.angular for turn in turns],
-                test.angular,
+                f"{test.angular:.3f}",
                 "Table 2.3",
                 claim="construction",
             )
@@ -127,7 +127,7 @@ def matched_table(found: Run) -> Table:
                 f"joint {number}, backlash",
                 "deg",
                 [turn.backlash for turn in turns],
-                test.backlash,
+                f"{test.backlash:.3f}",
                 "Table 2.3",
                 claim="construction",
             )

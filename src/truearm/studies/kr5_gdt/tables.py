@@ -18,7 +18,7 @@ _TABLE_4: Final = (0.0346, 0.1742, 0.0013, 0.0145, 0.0086, 0.0164)
 #: Figure 8: largest difference between the document's model and its measurement [mm].
 _MODEL: Final = {"x": "0.56", "y": "0.58", "z": "0.52", "xy": "0.66", "yz": "0.65", "xz": "0.84", "xyz": "0.61"}
 #: Figures 9 to 11: by how much the largest error fell [percent].
-_REDUCTION: Final = {"x": "90.0", "y": "88.0", "z": "81.0", "xy": "80.0", "yz": "74.0", "xz": "71.0", "xyz": "85.0"}
+_REDUCTION: Final = {"x": "90", "y": "88", "z": "81", "xy": "80", "yz": "74", "xz": "71", "xyz": "85"}
 _LARGEST: Final = "3.98"
 
 

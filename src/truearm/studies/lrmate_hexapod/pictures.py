@@ -21,12 +21,13 @@ _DISTANCE: Final = "distance from the reference point [mm]"
 _ERROR: Final = "position error [mm]"
 
 
-def away_pictures(first: Outcome) -> tuple[Picture, Picture, Picture]:
+def away_pictures(first: Outcome) -> tuple[Picture, ...]:
     """Draw position errors of one seed against the distance from the calibrated region."""
     return (
         _bands(first),
-        _scattered("preliminary", "Preliminary calibration, base by three cups (Figure 4.7a)", first),
-        _scattered("final", "Final calibration, base by three cups (Figure 4.7b)", first),
+        _scattered("preliminary held", "Preliminary calibration, base held (Figure 4.7a)", first),
+        _scattered("final held", "Final calibration, base held (Figure 4.7b)", first),
+        _scattered("final following", "Final calibration, base following (Figure 4.7b)", first),
     )
 
 
@@ -35,8 +36,10 @@ def _bands(first: Outcome) -> Picture:
     drawn = [number for number in range(band.max() + 1) if np.sum(band == number) >= _FEW]
     traces: list[Figure] = []
     shown: tuple[tuple[Model, str, str, str], ...] = (
-        ("preliminary", "preliminary, base by three cups", COLOURS[0], "dot"),
-        ("final", "final, base by three cups", COLOURS[0], "solid"),
+        ("preliminary held", "preliminary, base held", COLOURS[0], "dot"),
+        ("final held", "final, base held", COLOURS[0], "solid"),
+        ("preliminary following", "preliminary, base following", COLOURS[2], "dot"),
+        ("final following", "final, base following", COLOURS[2], "solid"),
         ("preliminary found", "preliminary, base and cups found", AFTER, "dot"),
         ("final found", "final, base and cups found", AFTER, "solid"),
         ("tracker", "tracker", COLOURS[1], "solid"),
@@ -80,7 +83,7 @@ def _scattered(name: Model, title: str, first: Outcome) -> Picture:
     ]
     shown = "All configurations" if every == 1 else f"One of {every} configurations"
     return Picture(
-        f"away-{name}",
+        f"away-{name.replace(' ', '-')}",
         title,
         f"{shown}, first seed.",
         figure(traces, 380, xaxis=axis(_DISTANCE), yaxis=axis(_ERROR) | {"rangemode": "tozero"}),
@@ -90,8 +93,9 @@ def _scattered(name: Model, title: str, first: Outcome) -> Picture:
 def distance_pictures(first: Outcome) -> tuple[Picture, ...]:
     """Draw the histograms of distance errors of both calibrations as printed, and of a tracker's."""
     shown: tuple[tuple[Model, str], ...] = (
-        ("preliminary", "preliminary calibration, base by three cups (Figure 4.8a)"),
-        ("final", "final calibration, base by three cups (Figure 4.8b)"),
+        ("preliminary held", "preliminary calibration, base held (Figure 4.8a)"),
+        ("final held", "final calibration, base held (Figure 4.8b)"),
+        ("final following", "final calibration, base following (Figure 4.8b)"),
         ("tracker", "tracker"),
     )
     return tuple(

@@ -75,7 +75,8 @@ def test_no_run_out_is_chosen_where_noise_makes_more_than_the_printed_range() ->
 def test_single_joints() -> None:
     study = irb120_axes.study(1, silent, coarser=5)
     radii, compliance, by_table, shares, matched = study.tables
-    assert all(row.verdict == "agrees" for row in radii.rows)
+    places = [row.comparison for row in radii.rows if row.comparison]
+    assert all(place.median == pytest.approx(place.value, rel=0.03) for place in places)
     # Gravity does nothing to joint 1; the document's own compliance of joint 6 goes from too little to too much.
     assert by_table.rows[0].highest < 1e-9
     angular = {row.what: row for row in compliance.rows if row.unit == "deg"}

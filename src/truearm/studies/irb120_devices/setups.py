@@ -149,9 +149,9 @@ class Shares:
     back: float | None
 
 
-def twin_of(setup: Setup, truth: str) -> Twin:
+def twin_of(setup: Setup, truth: str, *, least: bool = False) -> Twin:
     """Return the twin with one of the robot file's truths and gears that run out, carrying what the set-up does."""
-    twin = running_out(truth_twin(driven(), truth, np.random.default_rng(0)))
+    twin = running_out(truth_twin(driven(), truth, np.random.default_rng(0)), least=least)
     robot = twin.robot.with_frames(twin.robot.base, setup.nests).with_payload(setup.payload)
     return replace(twin, robot=robot)
 

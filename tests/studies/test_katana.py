@@ -147,4 +147,11 @@ def test_trajectory() -> None:
     moments = "Moments of the load along the circle"
     about, across = (median(found, moments, f"joint 1, {way} its axis, largest") for way in ("about", "across"))
     assert about < 0.1 * across
-    assert {picture.name for picture in found.pictures} == {"joints", "about", "across", "predicted", "followed"}
+    assert {picture.name for picture in found.pictures} == {
+        "robot",
+        "joints",
+        "about",
+        "across",
+        "predicted",
+        "followed",
+    }

@@ -17,4 +17,4 @@ def test_kr5() -> None:
     percent = [row for row in reductions.rows if row.unit == "%"]
     assert min(row.lowest for row in percent) > 95.0
     assert {row.verdict for row in (*percent, *models.rows)} == {"differs"}
-    assert len(found.pictures) == 1
+    assert len(found.pictures) == 3

@@ -71,7 +71,7 @@ def test_it_says_that_the_truth_is_invented_and_is_written_whole(found: Study) -
     assert "invented" in found.answer
     assert "invented" in nominal_robot()[0].truths["invented"].source
     assert "invented" in found.html()
-    assert len(found.pictures) == 8
+    assert len(found.pictures) == 9
     json.dumps(found.summary(), allow_nan=False)
 
 

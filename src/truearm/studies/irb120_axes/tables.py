@@ -98,10 +98,10 @@ def allowed_table(found: Run) -> Table:
     own = ", ".join(f"{n}: {1e6 * c:.0f}" for n, c in found.nearest.items())
     return Table(
         "Smallest run-out that Table 2.3 allows",
-        "The smallest sine a turn of each joint that leaves the printed range and backlash, with the compliances of each"
-        f" of the document's three set-ups, and with compliances between theirs that come nearest to the ranges ({own}"
-        " in 1e-6 rad/(N m)). The document prints no run-out, and the test bounds it from below only: with compliances"
-        " that are its own it needs a quarter to three quarters of what Table 2.7 needs.",
+        "The smallest sine a turn of each joint that leaves the printed range and backlash, with the compliances of"
+        " each of the document's three set-ups, and with compliances between theirs that come nearest to the ranges"
+        f" ({own} in 1e-6 rad/(N m)). The document prints no run-out, and the test bounds it from below only: with"
+        " compliances that are its own it needs a quarter to three quarters of what Table 2.7 needs.",
         tuple(
             Row(
                 f"joint {number}, compliances {'' if words == BETWEEN else 'of '}{words}",

@@ -13,10 +13,13 @@ from truearm.identification.solving.models import named_model
 from truearm.measurement.statistics import Spread
 from truearm.modeling.chain import Array
 from truearm.simulation.devices import Device
+from truearm.simulation.devices.artefacts import Artefact
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import Twin, measure
 from truearm.studies import Progress
+from truearm.studies.irb120_devices.identified import deviations
 from truearm.studies.irb120_devices.instruments import Accuracy, ToolErrors, accuracy, tool_alone
+from truearm.studies.irb120_devices.nests import nest_errors
 from truearm.studies.irb120_devices.setups import (
     SETUPS,
     Calibrated,
@@ -123,6 +126,8 @@ class SetupOutcome:
         All errors that `after` sums up [mm].
     places
         Where the robot says nest 1 was measured [m], ``(n, 3)``.
+    identified
+        Deviations from nominal, by the document's names and in its units.
     """
 
     before: Spread
@@ -136,6 +141,7 @@ class SetupOutcome:
     shares: Shares
     errors: Array
     places: Array
+    identified: Mapping[str, float]
 
 
 @dataclass(frozen=True)
@@ -198,12 +204,15 @@ class Outcome:
         The document's set-ups, by name.
     crossed
         Errors of one set-up's calibration where another one sees, by both names [m].
+    nests
+        Errors of the nests against a measuring machine [m], by artefact and instrument, ``(4,)`` each.
     further
         What is looked at for few seeds only.
     """
 
     setups: Mapping[str, SetupOutcome]
     crossed: Mapping[tuple[str, str], Spread]
+    nests: Mapping[tuple[str, str], Array]
     further: Further | None
 
 
@@ -234,14 +243,15 @@ def _one(seed: Seed, settings: Settings) -> Outcome:
         if further:
             spheres |= _spheres("2.13", twin, {setup.name: robot}, settings, rng)
     twin, alike, crossed = _crossed(settings, rng)
+    nests = _nests(rng)
     if not further:
-        return Outcome(setups, crossed, None)
+        return Outcome(setups, crossed, nests, None)
     seed.step("ballbar")
     spheres |= _spheres("2.12", twin, alike, settings, rng)
     seed.step("every instrument")
     instruments, tool = _instruments(settings, rng)
     seed.step("zones")
-    return Outcome(setups, crossed, Further(spheres, instruments, tool, _zones(settings, rng)))
+    return Outcome(setups, crossed, nests, Further(spheres, instruments, tool, _zones(settings, rng)))
 
 
 def _one_setup(
@@ -273,7 +283,19 @@ def _one_setup(
         shares=shares(setup, _SHOWN, rng),
         errors=1e3 * errors,
         places=robot.places(robot.joints, "1"),
+        identified=deviations(robot.robot),
     )
+
+
+def _nests(rng: np.random.Generator) -> dict[tuple[str, str], Array]:
+    tracker, planar, spatial = SETUPS
+    found = {}
+    for artefact, setup in (("triangular", planar), ("spatial", spatial)):
+        device = setup.device
+        size = device.size if isinstance(device, Artefact) else None
+        found[artefact, "laser tracker"] = nest_errors(setup, tracker.device.sigma, None, rng)
+        found[artefact, "C-Track"] = nest_errors(setup, device.sigma, size, rng)
+    return found
 
 
 def _crossed(

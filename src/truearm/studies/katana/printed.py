@@ -11,6 +11,45 @@ from truearm.studies.katana.pose_errors import Quantity
 Columns = tuple[str, str, str]
 _Errors = Mapping[Quantity, Columns]
 
+#: Tables 3.2 and 3.3: deviations from nominal by the document's names [deg, mm]. Alphas and lengths are printed whole.
+TABLE_3_2: Final[Mapping[str, str]] = {
+    "theta 1": "-0.061",
+    "theta 2": "0.0232",
+    "theta 3": "-0.057",
+    "theta 4": "0.0641",
+    "theta 5": "-0.121",
+    "alpha 0": "0",
+    "alpha 1": "-0.08",
+    "alpha 2": "0.003",
+    "alpha 3": "0.007",
+    "alpha 4": "-0.01",
+    "alpha 5": "0.03",
+    "beta 2": "0.0021",
+    "beta 3": "0.0013",
+    "a 3": "0.003",
+    "a 4": "0.01",
+    "d 5": "0.002",
+    "d 6": "0.001",
+}
+TABLE_3_3: Final[Mapping[str, str]] = {
+    "theta 1": "-0.061",
+    "theta 2": "0.0341",
+    "theta 3": "0.066",
+    "theta 4": "0.0231",
+    "theta 5": "-0.01",
+    "alpha 0": "0",
+    "alpha 1": "0.053",
+    "alpha 2": "-0.016",
+    "alpha 3": "0.062",
+    "alpha 4": "0.18",
+    "alpha 5": "0.01",
+    "beta 2": "0.005",
+    "beta 3": "-0.003",
+    "a 3": "0.00",
+    "a 4": "0.00",
+    "d 5": "0.000",
+    "d 6": "0.000",
+}
 #: Table 3.4, mean over 118 poses: before, simultaneous, influence-based [mm, deg].
 TABLE_3_4: Final[_Errors] = {
     "dX": ("0.63", "0.28", "0.18"),

@@ -15,6 +15,7 @@ from truearm.studies.katana_influence.tables import (
     errors_table,
     influences_table,
     methods_table,
+    parameters_tables,
 )
 from truearm.studies.seeds import median_of
 from truearm.studies.study import Study
@@ -66,6 +67,7 @@ def study(seeds: int, progress: Progress, count: int = POSES, unseen: int = _UNS
             errors_table(outcomes, "After simultaneous identification", 1, "least squares"),
             errors_table(outcomes, "After influence-based identification", 2, "influence"),
             methods_table(outcomes),
+            *parameters_tables(outcomes),
             combinations_table(outcomes),
             contradictions_table(outcomes),
         ),

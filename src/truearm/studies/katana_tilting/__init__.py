@@ -16,6 +16,7 @@ from truearm.studies.katana_tilting.tables import (
     errors_table,
     methods_table,
     shares_table,
+    ten_points_table,
     unseen_table,
 )
 from truearm.studies.seeds import median_of
@@ -59,6 +60,7 @@ def study(seeds: int, progress: Progress, count: int = POSES, unseen: int = _UNS
             shares_table(outcomes),
             *(errors_table(outcomes, column) for column in range(3)),
             unseen_table(outcomes),
+            ten_points_table(outcomes),
             methods_table(outcomes),
             constants_table(outcomes),
             contradictions_table(),

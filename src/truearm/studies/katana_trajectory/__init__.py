@@ -15,6 +15,7 @@ from truearm.studies.katana_trajectory.pictures import (
     followed_picture,
     joints_picture,
     predicted_picture,
+    robot_picture,
 )
 from truearm.studies.katana_trajectory.run import MODELS, run
 from truearm.studies.katana_trajectory.tables import causes_table, corrected_table, moments_table, rest_table
@@ -67,6 +68,7 @@ def study(seeds: int, progress: Progress, step: float = _STEP, poses: int = POSE
             moments_table(outcomes),
         ),
         pictures=(
+            robot_picture(outcomes[0]),
             joints_picture(outcomes[0]),
             about_picture(outcomes[0]),
             across_picture(outcomes[0]),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from truearm.studies import Progress
-from truearm.studies.lrmate_hexapod.pictures import away_pictures, distance_pictures
+from truearm.studies.lrmate_hexapod.pictures import arms_picture, away_pictures, distance_pictures
 from truearm.studies.lrmate_hexapod.run import Model, run
 from truearm.studies.lrmate_hexapod.tables import (
     errors_tables,
@@ -74,7 +74,11 @@ def study(seeds: int, progress: Progress, configurations: int = _CONFIGURATIONS,
             near_and_away_table(outcomes),
             others_table(drawn),
         ),
-        pictures=(*away_pictures(outcomes[0]), *distance_pictures(outcomes[0])),
+        pictures=(
+            arms_picture(found.station.robot, outcomes[0]),
+            *away_pictures(outcomes[0]),
+            *distance_pictures(outcomes[0]),
+        ),
         notes=(
             "The truth in the robot file is one of 5457 random draws: the one whose nominal errors come nearest to"
             " Tables 4.3 and 4.4. The rows of the nominal model show how near; they are no result.",
@@ -86,8 +90,8 @@ def study(seeds: int, progress: Progress, configurations: int = _CONFIGURATIONS,
             " back/down is back-up here: elbow above, wrist behind axis 1.",
             "Held and following: 24 parameters by least squares without priors, cups of the tool at their nominal"
             " places. Held, the base stands where the model before (nominal, then preliminary) finds the three cups,"
-            " and is looked for again by the model that comes out. Following, the frame is found anew at every step by the"
-            " model of that step, and the Jacobian knows it. Below, truearm finds base and cups together with the"
+            " and is looked for again by the model that comes out. Following, the frame is found anew at every step by"
+            " the model of that step, and the Jacobian knows it. Below, truearm finds base and cups together with the"
             " robot, with priors, and no cup needs to be touched.",
             'Which one did the document do? Its words (section 4.3, the frame is found "using the relative calibrated'
             ' model") and its solution that is stable after four iterations are those of a frame that follows; its'
@@ -96,7 +100,7 @@ def study(seeds: int, progress: Progress, configurations: int = _CONFIGURATIONS,
             "The tracker reads one cup in each of 50 configurations chosen by O1 from 1000, with 0.02 mm a coordinate."
             " All errors are against true places in the true frame of the fixture; each configuration counts with"
             " one cup, in turns, as in the document.",
-            "Nothing is drawn of Figure 4.6, 61 pictures of the arm; Figures 4.1 to 4.5 show the set-up. The columns"
+            "Figures 4.1 to 4.5 show the set-up, so nothing is drawn of them. The columns"
             " mean + 3 std follow from the others.",
         ),
     )

@@ -258,4 +258,4 @@ _STEP: Final = 1e-5
 
 
 def _unit(k: int) -> Array:
-    return np.eye(9)[k].reshape(3, 3)
+    return np.asarray(np.eye(9)[k].reshape(3, 3))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from truearm.planning.poses.seven_lines import DIRECTIONS
-from truearm.reporting.drawing import AFTER, BEFORE, Figure, axis, figure, scene_axis
+from truearm.reporting.drawing import AFTER, BEFORE, Figure, axis, figure
 from truearm.reporting.numbers import rounded_to
 from truearm.studies.kr5_gdt.run import LARGER, Outcome, Run
 from truearm.studies.study import Picture
@@ -42,22 +42,25 @@ def circles_picture(found: Run) -> Picture:
     nominal, measured = found.circles
     traces: list[Figure] = [
         {
-            "type": "scatter3d",
-            "mode": "lines" if name == "nominal, C1" else "markers",
+            "type": "scatter",
+            "mode": mode,
             "name": name,
-            **{letter: rounded_to(1e3 * points[:, k], 3) for k, letter in enumerate("xyz")},
-            "line": {"color": colour, "width": 4},
-            "marker": {"color": colour, "size": 4},
+            "x": rounded_to(1e3 * points[:, 1], 3),
+            "y": rounded_to(1e3 * points[:, 2], 3),
+            "line": {"color": colour, "width": 2},
+            "marker": {"color": colour, "size": 5},
         }
-        for name, points, colour in (("nominal, C1", nominal, BEFORE), (f"{LARGER} times off, C2", measured, AFTER))
+        for name, points, colour, mode in (
+            ("nominal, C1", nominal, BEFORE, "lines"),
+            (f"{LARGER} times off, C2", measured, AFTER, "markers"),
+        )
     ]
-    scene = {f"{letter}axis": scene_axis(f"{letter} [mm]") for letter in "xyz"} | {"aspectmode": "data"}
     return Picture(
         "circles",
         "Nominal and measured circle of joint 2, as in Figure 7",
-        f"Where the reflector is while joint 2 turns, by the nominal robot and by the twin, whose errors of Table 3 are"
-        f" drawn {LARGER} times as large.",
-        figure(traces, 420, scene=scene),
+        "Where the reflector is while joint 2 turns, seen along the axis: by the nominal robot, and by the twin, whose"
+        f" errors of Table 3 are drawn {LARGER} times as large.",
+        figure(traces, 420, xaxis=axis("y [mm]"), yaxis=axis("z [mm]") | {"scaleanchor": "x"}),
     )
 
 

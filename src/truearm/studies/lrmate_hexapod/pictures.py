@@ -179,7 +179,7 @@ def arms_picture(robot: Robot, first: Outcome) -> Picture:
     return Picture(
         "arms",
         "Measured configurations, as in Figure 4.6",
-        "First seed, in the order of measurement, each seen from the side: base at the lower left of its cell, joint 1"
-        " turned into the plane. F is front/up, B back/down, the number that of the row.",
+        "First seed, in the order of measurement, each seen from the side in the plane of joint 1: base below,"
+        " flange at the end. F is front/up, B back/down, the number that of the row.",
         figure(traces, 860, xaxis=hidden, yaxis=hidden | {"scaleanchor": "x"}, annotations=labels),
     )

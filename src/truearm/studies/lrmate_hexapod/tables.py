@@ -174,7 +174,6 @@ def frames_table(outcomes: Sequence[Outcome]) -> Table:
                     [one.gain(model) for one in outcomes],
                     "15",
                     "section 4.2",
-                    claim="order",
                     explanation=_GAIN if model == "final held" else "",
                 )
                 for model in _HOLDING
@@ -376,7 +375,6 @@ def others_table(drawn: Sequence[Outcome]) -> Table:
                     ratio(final, preliminary),
                     "1.54",
                     "Table 4.3",
-                    claim="order",
                     explanation=why,
                 )
                 for how, final, preliminary, why in _RATIOS
@@ -389,7 +387,6 @@ def others_table(drawn: Sequence[Outcome]) -> Table:
                     ratio(name, "tracker"),
                     "3.31",
                     "section 4.4",
-                    claim="order",
                 )
                 for name in ("preliminary held", "preliminary following")
             ),
@@ -406,7 +403,6 @@ def others_table(drawn: Sequence[Outcome]) -> Table:
                     [one.gain(model) for one in drawn],
                     "15",
                     "section 4.2",
-                    claim="order",
                 )
                 for model in _HOLDING
             ),

@@ -55,10 +55,10 @@ def printed(truth: str) -> dict[str, str]:
 def _deviations(values: Mapping[str, float], base: Transform, place: Transform) -> dict[str, float]:
     nominal = load_robot("irb120").values
     R = place.rotation.T @ base.rotation
-    x, y, z = place.rotation.T @ (np.array(base.translation) - np.array(place.translation))
+    # The document's base holds d_1, along its own z before it is turned; ours is turned before d_1.
+    x, y, z = place.rotation.T @ (np.array(base.translation) - np.array(place.translation)) + R[:, 2] * values["d_1"]
     turns = (math.atan2(-R[1, 2], R[2, 2]), math.asin(R[0, 2]), math.atan2(-R[0, 1], R[0, 0]))
-    # The document's z holds what d_1 is off.
-    places = (x, y, z + values["d_1"] - nominal["d_1"])
+    places = (x, y, z - nominal["d_1"])
     found = dict(zip(UNITS, (*(1e3 * p for p in places), *map(math.degrees, turns)), strict=False))
     for name in _LINKS:
         off = values.get(name, 0.0) - nominal.get(name, 0.0)

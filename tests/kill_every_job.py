@@ -48,6 +48,7 @@ def _sheet(folder: Path) -> Arguments:
 PLACES: dict[str, Arguments] = {
     "import_table": {"out": "data.csv"},
     "import_matrices": {"out": "data.csv"},
+    "import_robodk": {"out": "data.csv"},
     "import_circle": {"out": "data.csv"},
     "import_ur_kinematics": {"out": "robot.yaml"},
     "calibrate": {"out": "."},
@@ -62,6 +63,7 @@ PLACES: dict[str, Arguments] = {
     "revert": {"out": "."},
     "convert": {"out": "robot.yaml"},
     "export": {"out": "robot.csv"},
+    "export_robodk": {"out": "table.csv"},
     "study": {"out": "."},
     "new_robot": {"file": "robot.yaml"},
     "example": {"folder": "."},

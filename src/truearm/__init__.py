@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from truearm.jobs.distances import distances
     from truearm.jobs.example import example
     from truearm.jobs.export import export
+    from truearm.jobs.export_robodk import export_robodk
     from truearm.jobs.hexapod_enumerate import hexapod_enumerate
     from truearm.jobs.hexapod_plan import hexapod_plan
     from truearm.jobs.hexapod_solve import hexapod_solve
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
     from truearm.jobs.hexapod_world_frame import hexapod_world_frame
     from truearm.jobs.import_circle import import_circle
     from truearm.jobs.import_matrices import import_matrices
+    from truearm.jobs.import_robodk import import_robodk
     from truearm.jobs.import_table import import_table
     from truearm.jobs.import_ur_kinematics import import_ur_kinematics
     from truearm.jobs.inverse import inverse
@@ -75,6 +77,7 @@ __all__ = [
     "distances",
     "example",
     "export",
+    "export_robodk",
     "hexapod_enumerate",
     "hexapod_plan",
     "hexapod_solve",
@@ -82,6 +85,7 @@ __all__ = [
     "hexapod_world_frame",
     "import_circle",
     "import_matrices",
+    "import_robodk",
     "import_table",
     "import_ur_kinematics",
     "inverse",

@@ -78,6 +78,9 @@ LIMITS: Final[Mapping[str, Limit]] = {
     "parameters": Limit(
         1000, "there are too many parameters", "parameters", "Leave out targets that say nothing more."
     ),
+    "wrenches": Limit(
+        100, "there are too many different forces for one run", "forces", "Correct the programs in several runs."
+    ),
     "poses": Limit(50_000, "the number is out of range", "poses"),
     "candidates": Limit(50_000, "the number is out of range", "candidates"),
     "trials": Limit(1_000_000, "the number is out of range", "trials"),

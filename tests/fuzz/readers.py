@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from truearm.compensation.cell import read_frames, read_tools
+from truearm.compensation.cell import read_frames, read_tools, read_wrenches
 from truearm.compensation.program_files import program_files, read_programs, restored
 from truearm.errors import InputError
 from truearm.identification.solving.bounds import read_bounds
@@ -23,6 +23,7 @@ from truearm.measurement.readers.canonical import csv_text, read_csv
 from truearm.measurement.readers.drawn_circles import Page, read_drawn_circles
 from truearm.measurement.readers.matrices import read_matrices
 from truearm.measurement.readers.poses import read_poses
+from truearm.measurement.readers.robodk import read_robodk
 from truearm.measurement.readers.table import read_table
 from truearm.modeling.formats.dh_csv import complete_dh_csv, read_dh_csv
 from truearm.modeling.formats.robot_file import robot_text
@@ -127,6 +128,10 @@ READERS: Final[Mapping[str, Reader]] = {
     "table": _table("table.csv", "mapping.yaml"),
     "spatial": _table("points.csv", "spatial.yaml", joints="joints"),
     "matrices": Reader({"joints.txt": "joints.txt", "points.txt": "points.txt"}, _matrices),
+    "robodk": Reader(
+        {"robodk.csv": "robodk.csv"},
+        lambda folder: _dataset(read_robodk(folder / "robodk.csv", "deg", "model").data, folder),
+    ),
     "poses": Reader({"poses.csv": "poses.csv"}, lambda folder: read_poses(folder / "poses.csv")),
     "drawn-circle": Reader(
         {"page.csv": "page.csv", "page.png": "page.png"},
@@ -158,6 +163,7 @@ READERS: Final[Mapping[str, Reader]] = {
     "frames": Reader(
         {"cell.yaml": "cell.yaml"}, lambda folder: read_frames(of_library("irb120"), folder / "cell.yaml")
     ),
+    "wrenches": Reader({"forces.yaml": "forces.yaml"}, lambda folder: read_wrenches(folder / "forces.yaml")),
     "rapid": _programs("rapid", "polish.mod"),
     "rapid-cell": _programs("rapid/cell", "MainModule.mod", "Data.sys"),
     "krl": _programs("krl", "milling.src"),

@@ -54,6 +54,7 @@ def folder() -> Path:
         "calibrate",
         "import_table",
         "import_matrices",
+        "import_robodk",
         "import_circle",
         "tolerance",
         "compensate",

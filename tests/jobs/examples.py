@@ -47,7 +47,15 @@ def _poses(_: Path) -> Arguments:
     """Return two poses of an IRB 120 that are easily reached."""
     q = np.radians([[10.0, 20.0, -30.0, 40.0, 50.0, 60.0], [-70.0, 30.0, 0.0, -20.0, 40.0, 0.0]])
     at = load_robot("irb120").forward_kinematics(q)
-    return {"robot": "irb120", "poses": at.position.T, "rotations": at.matrix(), "seed": q, "branch": "front-up-noflip"}
+    return {
+        "robot": "irb120",
+        "poses": at.position.T,
+        "rotations": at.matrix(),
+        "seed": q,
+        "branch": "front-up-noflip",
+        "wrench": (0.0, 5.0, 0.0, 0.0, 0.0, 0.1),
+        "wrench_frame": "tool",
+    }
 
 
 def _written(path: Path, text: str) -> Path:
@@ -126,6 +134,12 @@ def _cell(folder: Path) -> Path:
     return path
 
 
+_FORCES = (
+    "truearm: truearm-cell/1\nunits: {length: mm, angle: deg, force: N}\n"
+    "wrenches:\n  - {targets: [pHole1], force: [0, 5, 0]}\n"
+)
+
+
 def _corrected(folder: Path) -> Path:
     import truearm
 
@@ -161,9 +175,23 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "payload": "1kg,0mm,0mm,50mm",
         "gravity": (0.0, 0.0, -9.81),
     },
-    "validate": lambda folder: {"robot": _calibrated(folder), "data": _data(folder)},
+    "validate": lambda folder: {
+        "robot": _calibrated(folder),
+        "data": _data(folder),
+        "wrench": "0N,5N,0N,0Nm,0Nm,0Nm",
+        "wrench_frame": "world",
+        "wrench_at": "1",
+    },
     "import_table": _table,
     "import_matrices": _matrices,
+    "import_robodk": lambda folder: {
+        "file": _written(
+            folder / "robodk.csv",
+            "J1,J2,J3,J4,J5,J6,X,Y,Z,RX,RY,RZ,TX,TY,TZ,TRX,TRY,TRZ\n10,20,30,0,45,90,500,20,800,0,0,90,0,0,50,0,0,0\n",
+        ),
+        "angle_unit": "deg",
+    },
+    "export_robodk": lambda folder: {"robot": _calibrated(folder), "data": _data(folder), "out": _new(folder, "r.csv")},
     "import_circle": _circle,
     "import_ur_kinematics": lambda folder: {
         "file": _written(folder / "calibration.conf", UR10_CONF),
@@ -171,8 +199,24 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "out": _new(folder, "ur10-controller.yaml"),
     },
     "distances": lambda folder: {"robot": _calibrated(folder), "data": _data(folder), "payload": "1kg,0mm,0mm,50mm"},
-    "plan": lambda _: {"robot": "irb120", "poses": 12, "candidates": 40, "device": "ballbar", "seed": 1},
-    "simulate": lambda _: {"robot": "irb120", "truth": "random", "poses": 3, "noise": 1e-4, "device": "tracker"},
+    "plan": lambda _: {
+        "robot": "irb120",
+        "poses": 12,
+        "candidates": 40,
+        "device": "ballbar",
+        "seed": 1,
+        "region": ((0.3, 0.5), (-0.1, 0.1), (0.2, 0.4)),
+    },
+    "simulate": lambda _: {
+        "robot": "irb120",
+        "truth": "random",
+        "poses": 3,
+        "noise": 1e-4,
+        "device": "tracker",
+        "wrench": (0.0, 5.0, 0.0, 0.0, 0.0, 0.1),
+        "wrench_frame": "base",
+        "wrench_at": "flange",
+    },
     "inverse": _poses,
     "robots": lambda _: {},
     "devices": lambda _: {},
@@ -205,6 +249,7 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "tools": _cell(folder),
         "frames": _cell(folder),
         "payload": "1kg,0mm,0mm,50mm",
+        "wrench": _written(folder / "forces.yaml", _FORCES),
         "controller_kinematics": "nominal",
         "strict": True,
         "split": 5e-5,

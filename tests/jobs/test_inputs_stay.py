@@ -26,7 +26,7 @@ REFUSED = r"would be overwritten|not overwritten|of this name itself|no robot la
 #: Parameters that name what a job writes.
 OUTPUTS = ("out", "steps", "file", "folder")
 #: Of these names those that a job reads.
-FILES = (("import_table", "file"), ("import_ur_kinematics", "file"))
+FILES = (("import_table", "file"), ("import_robodk", "file"), ("import_ur_kinematics", "file"))
 Arguments = dict[str, Any]
 
 
@@ -55,6 +55,10 @@ READ: dict[str, Callable[[Path], Arguments]] = {
         "constraints": _written(
             folder / "c.yaml", f"truearm: truearm-constraints/1\n{_UNITS}limits: {{1: [-99, 99]}}\n"
         ),
+        "region": None,
+        "accurate_at": EXAMPLES["compensate"](folder)["programs"][0],
+        "tools": EXAMPLES["compensate"](folder)["tools"],
+        "frames": shutil.copy(EXAMPLES["compensate"](folder)["tools"], folder / "tools.yaml"),
     },
     "simulate": lambda folder: {"robot": _robot(folder), "truth": EXAMPLES["validate"](folder)["robot"]},
     "inverse": lambda folder: {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -72,3 +73,86 @@ def test_a_plan_says_what_noise_it_assumes(noise: float, said: str) -> None:
     assert said in planned.answer[-1]
     assert "give `noise` where you know better" in planned.answer[-1]
     assert planned.answer[-1] in planned.lines()
+
+
+POSES = """pose,x [mm],y [mm],z [mm],qw,qx,qy,qz
+a,400,0,300,0,0,1,0
+b,450,100,300,0,0,1,0
+"""
+RAPID = Path(__file__).parents[1] / "compensation" / "programs" / "samples" / "rapid" / "polish.mod"
+
+
+@pytest.mark.parametrize("nominal", [True, False])
+def test_a_plan_for_a_program_for_poses_and_for_a_region(tmp_path: Path, nominal: bool) -> None:
+    robot: object = "irb120"
+    if not nominal:
+        robot = truearm.calibrate("irb120", campaign("irb120", 20, 0.05e-3, 1)[1], train="all").fit.robot
+    file = tmp_path / "poses.csv"
+    file.write_text(POSES)
+    plan = partial(truearm.plan, robot, poses=12, candidates=60)  # type: ignore[arg-type]
+    plans = {
+        "at the 11 of 15 targets of polish.mod": plan(accurate_at=RAPID),
+        "at the 2 poses of poses.csv": plan(accurate_at=file),
+        "in the region x 300 to 500, y -100 to 100, z 200 to 400 mm": plan(
+            region=[(0.3, 0.5), (-0.1, 0.1), (0.2, 0.4)]
+        ),
+        "at the given configurations": plan(accurate_at=np.zeros((1, 6))),
+    }
+    for words, planned in plans.items():
+        there = planned.made.prediction.there
+        assert there is not None
+        assert planned.lines()[0] == f"12 of 60 usable configurations, chosen by the error {words}."
+        assert planned.summary()["prediction"]["there"]["places"] == len(there.error)
+        assert there.by_o1 is not None
+        assert there.error.mean() < there.by_o1.mean()
+        assert f"{words}, at most by" in planned.answer[0]
+    assert len(plans["at the 11 of 15 targets of polish.mod"].joints) == 12
+
+
+def test_of_many_places_some_are_looked_at() -> None:
+    joints = np.random.default_rng(0).uniform(-1.0, 1.0, (1200, 6))
+    planned = truearm.plan("irb120", poses=12, candidates=60, accurate_at=joints, objective="O3")
+    assert planned.lines()[0] == "12 of 60 usable configurations, chosen by O3."
+    assert "at the given configurations (judged at 500 of them)" in planned.answer[0]
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"region": [(0.3, 0.3), (0, 1), (0, 1)]}, "no extent along x; got '300 to 300 mm'"),
+        ({"region": [(3, 4), (0, 1), (0, 1)]}, "does not reach this region"),
+        ({"region": "300..400"}, "a box belongs here"),
+        ({"region": [(0, 1)]}, "3, 2"),
+        ({"region": [(0.3, 0.4), (0, 1), (0, 1)], "accurate_at": RAPID}, "for places or for a region"),
+        ({"tools": "tools.yaml"}, "only a program needs to know"),
+        ({"accurate_at": np.zeros((2, 5))}, "n, 6"),
+        ({"accurate_at": "nothing.mod"}, "no such file"),
+        ({"accurate_at": np.zeros((1, 6)), "poses": "auto"}, "only O1 can choose"),
+        ({"objective": "error"}, "nothing was said of where"),
+    ],
+)
+def test_where_a_robot_shall_be_accurate_is_refused(given: dict[str, object], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        truearm.plan("irb120", **{"poses": 12, "candidates": 60, **given})  # type: ignore[arg-type]
+
+
+def test_poses_and_targets_out_of_reach_are_refused(tmp_path: Path) -> None:
+    poses = tmp_path / "poses.csv"
+    poses.write_text(POSES + "c,1400,0,300,0,0,1,0\n")
+    with pytest.raises(InputError, match="cannot go to 1 pose; got 'c'"):
+        truearm.plan("irb120", poses=12, candidates=60, accurate_at=poses)
+    program = tmp_path / "far.mod"
+    program.write_text(
+        "MODULE far\nCONST robtarget p:=[[5000,0,300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n"
+        "PROC main()\nMoveJ p,v100,fine,tool0;\nENDPROC\nENDMODULE\n"
+    )
+    with pytest.raises(InputError, match="reaches none of the targets; got '1 target'"):
+        truearm.plan("irb120", poses=12, candidates=60, accurate_at=program)
+
+
+def test_a_plan_keeps_the_poses_it_was_made_for(tmp_path: Path) -> None:
+    poses = tmp_path / "poses.csv"
+    poses.write_text(POSES)
+    with pytest.raises(InputError, match="this file is read, and would be overwritten"):
+        truearm.plan("irb120", poses=12, candidates=60, accurate_at=poses, out=poses)
+    assert poses.read_text() == POSES

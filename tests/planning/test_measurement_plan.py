@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +11,9 @@ import pytest
 from truearm.errors import InputError
 from truearm.identification.solving.fit import identify
 from truearm.identification.solving.models import MODELS
+from truearm.jobs.accuracy_goal import accuracy_goal
 from truearm.library import load_robot
+from truearm.planning.choosing import prediction
 from truearm.planning.choosing.measurement_plan import (
     APPROACH,
     MeasurementPlan,
@@ -26,6 +29,7 @@ from truearm.results.plan import Plan
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import measure
 
+POLISHING = Path(__file__).parents[1] / "compensation" / "programs" / "samples" / "rapid" / "polish.mod"
 MODEL = {model.name: model for model in MODELS}
 
 
@@ -131,6 +135,7 @@ def test_auto_takes_eleven_or_more() -> None:
         ({"poses": 301}, "too few.*300 of 300.*301 or more"),
         ({"poses": 2}, "fewer equations.*4 or more"),
         ({"objective": "O6"}, "no objective of this name.*O1, O2"),
+        ({"objective": "error"}, "nothing was said of where the error shall be small"),
         ({"objective": "O3", "poses": None}, "only O1 can choose"),
     ],
 )
@@ -185,3 +190,44 @@ def test_the_predicted_error_comes_true() -> None:
     told = predict(arm, measured, np.arange(15), elsewhere, where[1].joints, noise, rng)
     assert told.planned == pytest.approx(np.mean(errors), rel=0.1)
     assert told.planned > 1.1 * told.floor
+
+
+def test_configurations_chosen_for_a_program_on_ten_robots(monkeypatch: pytest.MonkeyPatch) -> None:
+    """30 chosen for a program against 30 chosen by O1: the true error at its targets."""
+    monkeypatch.setattr(prediction, "NUMBERS", (30,))  # what other numbers would do takes most of the time
+    nominal, model = load_robot("irb120"), MODEL["geometric"]
+    arm, rng = with_targets(nominal), np.random.default_rng(0)
+    goal = accuracy_goal(nominal, POLISHING, None, None, None, rng)
+    assert goal is not None
+    at, targets = goal.postures, goal.postures.joints
+    plans = {
+        objective: plan_measurements(
+            arm,
+            random_candidates(arm, 1500, np.random.default_rng(1)),
+            model,
+            poses=30,
+            rng=rng,
+            objective=objective,
+            accurate_at=at,
+        )
+        for objective in ("O1", "error")
+    }
+    ratios = []
+    for seed in range(10):
+        twin = truth_twin(nominal, "random", np.random.default_rng(seed))
+        error = dict.fromkeys(plans, 0.0)
+        true = [twin.robot.world_poses(targets, name)[0] for name in ("1", "2", "3")]
+        for objective, plan in plans.items():
+            for campaign in range(5):
+                data = measure(twin, plan.joints, 1e-4, np.random.default_rng(100 * campaign + seed))
+                fit = identify(nominal, data, model).robot
+                found = [fit.world_poses(targets, name)[0] for name in data.targets]
+                error[objective] += float(np.linalg.norm(np.array(found) - true, axis=2).mean())
+        ratios.append(error["error"] / error["O1"])
+    there = plans["error"].prediction.there
+    assert there is not None
+    assert there.by_o1 is not None
+    assert float(there.error.mean() / there.by_o1.mean()) <= 0.8
+    assert np.median(ratios) <= 0.8
+    assert plans["O1"].prediction.there is not None
+    assert plans["O1"].prediction.there.error.mean() == pytest.approx(there.by_o1.mean())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from truearm.planning.choosing.observability import INDICES, OfInterest, observability
+from truearm.planning.choosing.observability import INDICES, Objective, OfInterest, OfPredictions, observability
 
 
 def test_an_orthogonal_jacobian_in_closed_form() -> None:
@@ -39,8 +39,19 @@ def test_twice_the_data_change_the_indices_as_they_should() -> None:
     assert ratio == pytest.approx({"O1": 1.0, "O2": 1.0, "O3": root, "O4": root, "O5": root})
 
 
-@pytest.mark.parametrize("objective", [*INDICES.values(), OfInterest(2)], ids=lambda o: getattr(o, "name", "interest"))
-def test_slopes_against_differences(objective: OfInterest) -> None:
+def predictions() -> OfPredictions:
+    return OfPredictions.of(np.random.default_rng(4).normal(size=(5, 3, 4)))
+
+
+def test_the_error_of_predictions_in_closed_form() -> None:
+    rows = np.array([[[1.0, 0.0]], [[0.0, 3.0]]])  # of one parameter, and of three times the other
+    information = np.diag([4.0, 9.0])
+    mean_square = (1.0 / 4.0 + 9.0 / 9.0) / 2.0
+    assert np.exp(OfPredictions.of(rows).value(information)) == pytest.approx(mean_square**-0.5)
+
+
+@pytest.mark.parametrize("objective", [*INDICES.values(), OfInterest(2), predictions()], ids=lambda o: type(o).__name__)
+def test_slopes_against_differences(objective: Objective) -> None:
     rng = np.random.default_rng(2)
     A = rng.normal(size=(9, 4))
     M, step = A.T @ A + np.diag([1.0, 2.0, 3.0, 4.0]), 1e-6
@@ -55,7 +66,7 @@ def test_slopes_against_differences(objective: OfInterest) -> None:
 def test_many_at_once_as_one_by_one() -> None:
     A = np.random.default_rng(3).normal(size=(7, 9, 4))
     M = A.swapaxes(1, 2) @ A
-    for objective in (*INDICES.values(), OfInterest(2)):
+    for objective in (*INDICES.values(), OfInterest(2), predictions()):
         assert objective.value(M) == pytest.approx([float(objective.value(one)) for one in M])
         assert objective.slope(M) == pytest.approx(np.array([objective.slope(one) for one in M]))
 

@@ -17,7 +17,7 @@ from truearm.cli.compensate import compensate
 from truearm.cli.convert import convert
 from truearm.cli.devices import devices
 from truearm.cli.distances import distances
-from truearm.cli.export import export
+from truearm.cli.export import export, export_robodk
 from truearm.cli.hexapod import app as hexapod
 from truearm.cli.ik import ik
 from truearm.cli.importing import app as importing
@@ -81,6 +81,7 @@ app.command()(robots)
 app.command()(show)
 app.command()(convert)
 app.command()(export)
+app.command()(export_robodk)
 app.command("new-robot")(new_robot)
 app.command(help=HELP)(study)
 app.command()(example)

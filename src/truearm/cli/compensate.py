@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from truearm.cli.loading import NoteTexts, PayloadText, read_notes
+from truearm.cli.loading import NoteTexts, PayloadText, WrenchFrameText, read_notes
 from truearm.cli.options import command_line
 from truearm.cli.output import Json, end_on_error, print_json, print_line, print_record, progress
 
@@ -35,6 +35,16 @@ def compensate(
         ),
     ] = None,
     payload: PayloadText = None,
+    wrench: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FX,FY,FZ,MX,MY,MZ|FILE",
+            help="What acts on the tool at every target besides weight, a force \\[N] at its point and a moment "
+            "\\[N m]; or a file that says it of targets and tools by name.",
+            show_default="nothing",
+        ),
+    ] = None,
+    wrench_frame: WrenchFrameText = None,
     controller_kinematics: Annotated[
         str | None,
         typer.Option(
@@ -103,6 +113,8 @@ def compensate(
             tools=tools,
             frames=frames,
             payload=payload,
+            wrench=wrench,
+            wrench_frame=wrench_frame,
             controller_kinematics=controller_kinematics,
             split=split,
             strict=strict or None,
@@ -126,6 +138,8 @@ def compensate(
             tools=tools,
             frames=frames,
             payload=payload,
+            wrench=wrench,
+            wrench_frame=wrench_frame,  # type: ignore[arg-type]
             controller_kinematics=controller_kinematics,
             strict=strict,
             split=None if split is None else split / 1e3,

@@ -1,4 +1,4 @@
-"""``truearm export``."""
+"""``truearm export`` and ``truearm export-robodk``."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from truearm.cli.output import Json, print_json, print_line
+from truearm.cli.loading import JointsText
+from truearm.cli.output import Json, print_json, print_line, print_record
 
 
 def export(
@@ -37,3 +38,22 @@ def export(
     print_line(written)
     for message in left_out:
         print_line(message, err=True)
+
+
+def export_robodk(
+    robot: Annotated[
+        str, typer.Argument(metavar="ROBOT", help="A calibrated robot, or one whose file has these targets on a tool.")
+    ],
+    data: Annotated[str, typer.Argument(metavar="DATA.csv", help="Measurements in the canonical CSV.")],
+    out: Annotated[Path, typer.Option("--out", metavar="TABLE.csv", help="File to write; nothing is overwritten.")],
+    joints: JointsText = None,
+    json: Json = False,
+) -> None:
+    """Write measurements as RoboDK's robot calibration has them: joints, measured points and tool points."""
+    from truearm.jobs.export_robodk import export_robodk as run
+
+    exported = run(robot, data, joints=joints, out=out)  # type: ignore[arg-type]
+    if json:
+        print_json(exported.summary())
+    else:
+        print_record(exported)

@@ -7,7 +7,15 @@ from typing import Annotated
 
 import typer
 
-from truearm.cli.loading import GravityText, JointsText, PayloadText, read_gravity, read_joints
+from truearm.cli.loading import (
+    GravityText,
+    JointsText,
+    PayloadText,
+    WrenchFrameText,
+    WrenchText,
+    read_gravity,
+    read_joints,
+)
 from truearm.cli.output import Json, print_json, print_line, print_record
 from truearm.errors import InputError
 
@@ -49,6 +57,8 @@ def ik(
     ] = False,
     payload: PayloadText = None,
     gravity: GravityText = None,
+    wrench: WrenchText = None,
+    wrench_frame: WrenchFrameText = None,
     joints: JointsText = None,
     json: Json = False,
 ) -> None:
@@ -70,6 +80,8 @@ def ik(
         orientation="free" if orientation_free else "axis" if orientation_axis else "full",
         payload=payload,
         gravity=read_gravity(gravity),
+        wrench=wrench,
+        wrench_frame=wrench_frame,  # type: ignore[arg-type]
         joints=joints,  # type: ignore[arg-type]
     )
     if json:

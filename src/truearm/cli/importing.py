@@ -76,6 +76,31 @@ def table(
 
 
 @app.command()
+def robodk(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Calibration or validation measurements, as exported.")],
+    out: Annotated[Path, typer.Option("--out", metavar="DATA.csv", help="File to write.")],
+    angle_unit: Annotated[
+        str | None, typer.Option(metavar="deg|rad", help="Unit of the angles of measured poses.", show_default=False)
+    ] = None,
+    joints_are: JointsAreText = None,
+    json: Json = False,
+) -> None:
+    """Calibration or validation measurements of RoboDK: joints, measured points and tool points."""
+    from truearm.jobs.import_robodk import import_robodk
+
+    imported = import_robodk(
+        file,
+        angle_unit=angle_unit,  # type: ignore[arg-type]
+        joints_are=joints_are or "model",  # type: ignore[arg-type]
+        out=out,
+    )
+    if json:
+        print_json(imported.summary())
+    else:
+        print_record(imported)
+
+
+@app.command()
 def circle(
     scans: Annotated[list[str], typer.Option("--scan", metavar="NAME=IMAGE", help="A scanned page; repeat for each.")],
     points: Annotated[

@@ -29,6 +29,34 @@ GravityText = Annotated[
         show_default="as the robot file says",
     ),
 ]
+WrenchText = Annotated[
+    str | None,
+    typer.Option(
+        "--wrench",
+        metavar="FX,FY,FZ,MX,MY,MZ",
+        help="What acts on the tool besides weight: a force \\[N] at its point and a moment \\[N m], or with units: "
+        '"0N,0N,80N,0Nm,0Nm,1.5Nm".',
+        show_default="nothing",
+    ),
+]
+WrenchFrameText = Annotated[
+    str | None,
+    typer.Option(
+        "--wrench-frame",
+        metavar="base|tool|world|controller",
+        help="Whose axes --wrench is given in.",
+        show_default="base",
+    ),
+]
+WrenchAtText = Annotated[
+    str | None,
+    typer.Option(
+        "--wrench-at",
+        metavar="NAME",
+        help="The target on which --wrench acts, or flange.",
+        show_default="the only target",
+    ),
+]
 NoteTexts = Annotated[
     list[str] | None,
     typer.Option(

@@ -24,7 +24,37 @@ def plan(
             "--from", metavar="DATA.csv", help="Choose among the configurations of a file.", show_default=False
         ),
     ] = None,
-    objective: Annotated[str, typer.Option(metavar="INDEX", help="O1, O2, O3, O4 or O5.")] = "O1",
+    objective: Annotated[
+        str | None,
+        typer.Option(
+            metavar="INDEX",
+            help="O1, O2, O3, O4 or O5; error: the error with --for or --region.",
+            show_default="O1, or error with --for or --region",
+        ),
+    ] = None,
+    accurate_at: Annotated[
+        Path | None,
+        typer.Option(
+            "--for",
+            metavar="PROGRAM|POSES.csv",
+            help="Where the robot shall be accurate: a robot program, or flange poses as for 'truearm ik'.",
+            show_default="everywhere",
+        ),
+    ] = None,
+    region: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X..X,Y..Y,Z..Z",
+            help='The same as a box for the flange in the base frame in mm: "300..600,-200..200,100..400".',
+            show_default="everywhere",
+        ),
+    ] = None,
+    tools: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Where the tools of the program are.", show_default=False)
+    ] = None,
+    frames: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Where the frames of the program are.", show_default=False)
+    ] = None,
     model: Annotated[
         str, typer.Option(metavar="MODEL", help="What will be identified, as in truearm calibrate, without auto.")
     ] = "geometric",
@@ -65,6 +95,10 @@ def plan(
             out=out,
             candidates_from=candidates_from,
             objective=objective,
+            accurate_at=accurate_at,
+            region=_region(region),
+            tools=tools,
+            frames=frames,
             model=model,
             candidates=candidates,
             device=device,
@@ -90,3 +124,21 @@ def _poses(text: str) -> Any:
         return int(text)
     except ValueError:
         return text
+
+
+def _region(text: str | None) -> list[list[float]] | None:
+    """Return lowest and highest x, y and z [m] of a text in mm."""
+    from truearm.errors import InputError
+    from truearm.units import as_number, sized_si
+
+    if text is None:
+        return None
+    ranges = [[as_number(end.strip()) for end in part.split("..")] for part in text.split(",")]
+    if len(ranges) != 3 or any(len(one) != 2 or None in one for one in ranges):
+        raise InputError(
+            "three ranges in mm belong here",
+            parameter="region",
+            came=text,
+            allowed="LOW..HIGH for x, y and z: 300..600,-200..200,100..400",
+        )
+    return [[sized_si(end, "mm", parameter="region") for end in one if end is not None] for one in ranges]

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from truearm.cli.loading import GravityText, PayloadText, read_gravity
+from truearm.cli.loading import GravityText, PayloadText, WrenchAtText, WrenchFrameText, WrenchText, read_gravity
 
 
 def simulate(
@@ -37,6 +37,9 @@ def simulate(
     seed: Annotated[int, typer.Option(metavar="S", min=0, help="Of configurations, noise and a random truth.")] = 0,
     payload: PayloadText = None,
     gravity: GravityText = None,
+    wrench: WrenchText = None,
+    wrench_frame: WrenchFrameText = None,
+    wrench_at: WrenchAtText = None,
     joints: Annotated[
         str,
         typer.Option(
@@ -61,6 +64,9 @@ def simulate(
             seed=seed,
             payload=payload,
             gravity=read_gravity(gravity),
+            wrench=wrench,
+            wrench_frame=wrench_frame,  # type: ignore[arg-type]
+            wrench_at=wrench_at,
             joints=joints,  # type: ignore[arg-type]
             progress=say,
         )

@@ -6,7 +6,16 @@ from typing import Annotated
 
 import typer
 
-from truearm.cli.loading import GravityText, NoteTexts, PayloadText, read_gravity, read_notes
+from truearm.cli.loading import (
+    GravityText,
+    NoteTexts,
+    PayloadText,
+    WrenchAtText,
+    WrenchFrameText,
+    WrenchText,
+    read_gravity,
+    read_notes,
+)
 from truearm.cli.output import Json, end_on_error, print_json, print_record
 
 
@@ -15,6 +24,9 @@ def validate(
     data: Annotated[str, typer.Argument(metavar="DATA.csv", help="New measurements in the same frames.")],
     payload: PayloadText = None,
     gravity: GravityText = None,
+    wrench: WrenchText = None,
+    wrench_frame: WrenchFrameText = None,
+    wrench_at: WrenchAtText = None,
     refit: Annotated[
         str | None,
         typer.Option(
@@ -29,7 +41,17 @@ def validate(
     """Judge a calibrated robot on new measurements taken in the same frames."""
     from truearm.jobs.validate import validate as run
 
-    validation = run(robot, data, payload=payload, gravity=read_gravity(gravity), refit=refit, notes=read_notes(notes))
+    validation = run(
+        robot,
+        data,
+        payload=payload,
+        gravity=read_gravity(gravity),
+        wrench=wrench,
+        wrench_frame=wrench_frame,  # type: ignore[arg-type]
+        wrench_at=wrench_at,
+        refit=refit,
+        notes=read_notes(notes),
+    )
     if json:
         print_json(validation.summary())
     else:

@@ -12,6 +12,13 @@ calibration has identified, somebody has to measure; a file says it::
       wobjTable: {of: world, translation: [812.4, 3.1, 250.0], quaternion: [1, 0, 0, 0]}
       "2": {of: controller, translation: [500, 0, 0], wpr: [0, 0, 90]}
 
+What acts on the tool at targets, by name or pattern, or with tools::
+
+    units: {length: mm, angle: deg, force: N, moment: N m}
+    wrenches:
+      - {targets: ["pHole*"], force: [0, 0, 80], moment: [0, 0, 1.5], frame: tool}
+      - {tools: [tSpindle], force: [12, 0, 0]}
+
 ``world`` is the instrument's frame, in which the robot was calibrated; ``base`` and ``flange`` are the identified base
 and flange; ``controller`` says what the controller has where the program does not define it. The robot's own base and
 flange are called ``base`` and ``flange``.
@@ -40,6 +47,7 @@ from truearm.modeling.orientations import (
 )
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
+from truearm.modeling.wrench import FORCE_UNITS, MOMENT_UNITS, Wrench
 from truearm.units import sized_si
 
 SCHEMA: Final = "truearm-cell/1"
@@ -84,6 +92,8 @@ class _Entry(BaseModel):
 class _Units(_Entry):
     length: Literal["mm", "m", "in"]
     angle: Literal["deg", "rad"]
+    force: Literal["N", "kN", "lbf"] | None = None
+    moment: Literal["N m", "N mm"] | None = None
 
 
 class _Place(_Entry):
@@ -113,6 +123,14 @@ class _Frame(_Place):
     controller: _Place | None = None
 
 
+class _Wrench(_Entry):
+    targets: list[Name] = []
+    tools: list[Name] = []
+    force: Triple = (0.0, 0.0, 0.0)
+    moment: Triple = (0.0, 0.0, 0.0)
+    frame: str = "base"
+
+
 class CellFile(_Entry):
     """Schema ``truearm-cell/1``."""
 
@@ -120,6 +138,7 @@ class CellFile(_Entry):
     units: _Units
     tools: dict[Name, _Tool] = {}
     frames: dict[Name, _Frame] = {}
+    wrenches: list[_Wrench] = []
 
 
 @dataclass(frozen=True)
@@ -144,6 +163,27 @@ class Cell:
 
     tools: dict[str, Placed]
     frames: dict[str, Placed]
+
+
+@dataclass(frozen=True)
+class TargetWrench:
+    """What acts on the tool at some targets of programs.
+
+    Attributes
+    ----------
+    targets, tools
+        Names or patterns of targets, and names of tools at whose targets it acts; those of both if there are both, all
+        targets if there are none.
+    wrench
+        What acts, at the tool's point.
+    where
+        Where that was said, for messages.
+    """
+
+    targets: tuple[str, ...]
+    tools: tuple[str, ...]
+    wrench: Wrench
+    where: str = ""
 
 
 #: No tool and no frame was given.
@@ -184,6 +224,55 @@ def read_frames(robot: Robot, path: Path | None) -> dict[str, Placed]:
         If the file is not of the schema, or has no frames.
     """
     return {} if path is None else _frames(robot, path, _file(path, "frames"))
+
+
+def read_wrenches(path: Path) -> tuple[TargetWrench, ...]:
+    """Read what acts on the tool at targets.
+
+    Parameters
+    ----------
+    path
+        File of the schema above, of which the wrenches are taken.
+
+    Raises
+    ------
+    InputError
+        If the file is not of the schema, or has no wrenches; one has no unit, acts nowhere, or is in no known frame.
+    """
+    content, made = _file(path, "wrenches"), []
+    units = content.units
+    for number, entry in enumerate(content.wrenches, 1):
+        where = f"{path}, wrenches[{number}]"
+        if not entry.targets and not entry.tools:
+            raise InputError("targets or tools belong here", where=where, cure="Name those at which the force acts.")
+        parts = {}
+        for name, unit, known in (("force", units.force, FORCE_UNITS), ("moment", units.moment, MOMENT_UNITS)):
+            given = getattr(entry, name)
+            if any(given) and unit is None:
+                raise InputError(
+                    f"no unit of a {name} is given",
+                    where=f"{path}, units.{name}",
+                    allowed="N, kN, lbf" if name == "force" else "N m, N mm",
+                    cure=f"Write units: {{.., {name}: {next(iter(known))}}}.",
+                )
+            x, y, z = (value * (1.0 if unit is None else known[unit]) for value in given)
+            parts[name] = (x, y, z)
+        with refusals_at(where):
+            wrench = Wrench(parts["force"], parts["moment"], entry.frame)  # type: ignore[arg-type]
+        made.append(TargetWrench(tuple(entry.targets), tuple(entry.tools), wrench, where))
+    return tuple(made)
+
+
+def refuse_wrenches_left_out(path: Path | None, parameter: str) -> None:
+    """Refuse a file of tools or frames that has wrenches, which nobody would take."""
+    if path is None or not read_yaml(path, CellFile).wrenches:
+        return
+    raise InputError(
+        "the file has wrenches, and nothing takes them",
+        parameter=parameter,
+        where=str(path),
+        cure="Give the file as `wrench`, too, or take the entry out.",
+    )
 
 
 def _file(path: Path, part: str) -> CellFile:

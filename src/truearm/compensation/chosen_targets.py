@@ -65,7 +65,7 @@ def kept_by_choice(programs: Sequence[Program], choice: Choice) -> list[dict[int
     InputError
         If a name or pattern fits no target.
     """
-    only, keep = (_Patterns(programs, given, name) for given, name in ((choice.only, "only"), (choice.keep, "keep")))
+    only, keep = (Patterns(programs, given, name) for given, name in ((choice.only, "only"), (choice.keep, "keep")))
     return [
         {
             row: why
@@ -76,7 +76,7 @@ def kept_by_choice(programs: Sequence[Program], choice: Choice) -> list[dict[int
     ]
 
 
-def _why_kept(target: ProgramTarget, choice: Choice, only: _Patterns, keep: _Patterns) -> Kept | None:
+def _why_kept(target: ProgramTarget, choice: Choice, only: Patterns, keep: Patterns) -> Kept | None:
     if keep.fit(target.name):
         return "in `keep`"
     if choice.only and not only.fit(target.name):
@@ -88,10 +88,27 @@ def _why_kept(target: ProgramTarget, choice: Choice, only: _Patterns, keep: _Pat
     return None
 
 
-class _Patterns:
-    """Names and patterns of targets; ``*`` stands for any text, ``?`` for a character, capitals count as small."""
+class Patterns:
+    """Names and patterns of targets; ``*`` stands for any text, ``?`` for a character, capitals count as small.
 
-    def __init__(self, programs: Sequence[Program], given: Iterable[str], parameter: str) -> None:
+    Parameters
+    ----------
+    programs
+        Whose targets they are.
+    given
+        The names and patterns.
+    parameter, where
+        What a refusal names.
+
+    Raises
+    ------
+    InputError
+        If one fits no target.
+    """
+
+    def __init__(
+        self, programs: Sequence[Program], given: Iterable[str], parameter: str, where: str | None = None
+    ) -> None:
         names = {target.name for program in programs for target in program.targets if target.name}
         self._names: set[str] = set()
         for text in given:
@@ -102,6 +119,7 @@ class _Patterns:
                 raise InputError(
                     "no target of the programs has this name",
                     parameter=parameter,
+                    where=where,
                     came=text,
                     allowed="a name as the program writes it, or a pattern such as pHole*",
                     cure=did_you_mean(text, sorted(names)),

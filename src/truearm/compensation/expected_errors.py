@@ -328,7 +328,8 @@ class _ModelErrors:
             for rows in _parts(targets):
                 mine = rows[(targets.frames[rows] == number) & targets.alone[rows]]
                 if len(mine):
-                    robot = targets.arms[targets.arm[mine[0]]]
+                    # A frame takes up what is wrong with the arm at rest; what acts on the tool moves no frame.
+                    robot = targets.arms[targets.arm[mine[0]]].with_wrench(None)
                     moved, turned, tips = self._motions(robot, targets.joints[mine], targets.tips[mine])
                     yield tips, moved, turned
 

@@ -36,14 +36,7 @@ def nominal_robot(robot: Robot) -> Robot:
     InputError
         If the robot is its nominal self, so that there is nothing to correct.
     """
-    nominal = replace(
-        robot,
-        effect_names=(),
-        base_quaternion=(1.0, 0.0, 0.0, 0.0),
-        known={},
-        targets=(),
-        fixtures=(),
-    )
+    nominal = _nominal(robot)
     controllers = controller_robot(nominal)
     if not robot.effect_names and (_same_arm(robot, nominal) or _same_arm(robot, controllers)):
         raise InputError(
@@ -52,6 +45,23 @@ def nominal_robot(robot: Robot) -> Robot:
             cure="Give the calibrated.yaml of truearm calibrate; a converted robot has lost its nominal values.",
         )
     return controllers
+
+
+def controllers_robot(robot: Robot) -> Robot:
+    """Return the robot that the controller believes in, also of one that was not calibrated."""
+    return controller_robot(_nominal(robot))
+
+
+def _nominal(robot: Robot) -> Robot:
+    return replace(
+        robot,
+        effect_names=(),
+        wrench=None,
+        base_quaternion=(1.0, 0.0, 0.0, 0.0),
+        known={},
+        targets=(),
+        fixtures=(),
+    )
 
 
 def _same_arm(robot: Robot, other: Robot) -> bool:

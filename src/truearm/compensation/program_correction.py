@@ -14,7 +14,7 @@ from typing import Final
 
 import numpy as np
 
-from truearm.compensation.cell import EMPTY_CELL, Cell
+from truearm.compensation.cell import EMPTY_CELL, Cell, TargetWrench
 from truearm.compensation.chosen_targets import EVERY_POSE, Choice, kept_by_choice
 from truearm.compensation.correction import Correction
 from truearm.compensation.expected_errors import expected_errors
@@ -23,8 +23,10 @@ from truearm.compensation.gauge import base_shift, best_agreement
 from truearm.compensation.program_places import Provenance, provenance
 from truearm.compensation.programs.program import Program
 from truearm.compensation.resolved_program import Between, ResolvedProgram
+from truearm.compensation.target_wrenches import wrenches_of_targets
 from truearm.compensation.tool_loads import arms_of_tools, loads_of_tools
 from truearm.errors import InputError
+from truearm.limits import refuse_beyond
 from truearm.modeling.chain import Array
 from truearm.modeling.formats.robot_file import arm_is_known
 from truearm.modeling.parts import Payload
@@ -81,6 +83,8 @@ class CorrectedPrograms:
         What the robot carries with each tool in use, by the name of the tool; None where the programs do not say it.
     tools_apart
         How far the tip of each tool that was measured is from where the program has it [m], by the name of the tool.
+    pushed
+        The robot with what acts on its tool, and joint positions ``(n, joints)`` at which it does.
     """
 
     corrections: tuple[Correction, ...]
@@ -90,6 +94,7 @@ class CorrectedPrograms:
     choice: Choice
     loads: Mapping[str, Payload | None]
     tools_apart: Mapping[str, float]
+    pushed: tuple[tuple[Robot, Array], ...] = ()
 
 
 def corrected_programs(
@@ -100,6 +105,7 @@ def corrected_programs(
     *,
     choice: Choice = EVERY_POSE,
     weigh_tools: bool = True,
+    wrenches: Sequence[TargetWrench] = (),
 ) -> CorrectedPrograms:
     """Correct programs.
 
@@ -117,6 +123,8 @@ def corrected_programs(
         Which targets are corrected.
     weigh_tools
         Whether the robot carries what the programs say of each tool, where they do.
+    wrenches
+        What acts on the tool at which targets. The base is found without it: no frame was located under a force.
 
     Raises
     ------
@@ -145,10 +153,12 @@ def corrected_programs(
         start = np.eye(4)
     progress("resolving the configurations")
     arms = arms_of_tools(robot, loads)
+    acting = wrenches_of_targets(programs, wrenches)
     resolved = [
-        ResolvedProgram(robot, nominal, program, cell, arms, staying)
-        for program, staying in zip(programs, kept, strict=True)
+        ResolvedProgram(robot, nominal, program, cell, arms, staying, at_targets, flange)
+        for program, staying, at_targets in zip(programs, kept, acting, strict=True)
     ]
+    refuse_beyond("wrenches", sum(one.forces for one in resolved), parameter="wrench")
     names = tuple(dict.fromkeys(name for one in resolved for name in one.frames))
     if frames == "identified":
         # What is given by joints stays where it is to the first frame that was measured.
@@ -179,6 +189,7 @@ def corrected_programs(
         choice,
         loads,
         {name: apart for one in resolved for name, apart in one.tools_apart(agreed).items()},
+        tuple(case for one, made in zip(resolved, corrections, strict=True) for case in one.pushed(made)),
     )
 
 

@@ -36,6 +36,8 @@ from truearm.compensation.resolved_configurations import (
 from truearm.modeling.chain import Array
 from truearm.modeling.inverse.solutions import PoseStatus
 from truearm.modeling.robot import Robot
+from truearm.modeling.transform import Transform
+from truearm.modeling.wrench import Wrench
 
 _NOT_BETTER: Final[Kept] = "not better corrected"
 #: A joint within this of a bound [rad] is on it: the numbers of programs are rounded.
@@ -69,6 +71,11 @@ class ResolvedProgram:
         The calibrated robot as it carries each tool, by the tool's name.
     kept
         Targets that stay, by their index. Those that are offsets from them go along with the real robot.
+    wrenches
+        What acts on the tool at each target; None of nothing.
+    flange
+        Where the nominal flange is in the identified one: there are the points of tools that were not measured, on
+        which it acts.
     """
 
     def __init__(
@@ -79,18 +86,23 @@ class ResolvedProgram:
         cell: Cell,
         arms: Mapping[str, Robot] | None = None,
         kept: Mapping[int, Kept] | None = None,
+        wrenches: Sequence[Wrench | None] | None = None,
+        flange: Shift | None = None,
     ) -> None:
         self._robot, self._nominal, self._program = robot, nominal, program
         self._kept = {} if kept is None else kept
         by_tool = {} if arms is None else arms
-        carried = [by_tool.get(target.tool, robot) for target in program.targets]
-        self._arms = tuple({id(arm): arm for arm in carried}.values())
-        number = {id(arm): index for index, arm in enumerate(self._arms)}
-        self._arm: NDArray[np.intp] = np.array([number[id(arm)] for arm in carried], dtype=np.intp)
         controller = robot.controller
         targets = program.targets
         self._base = Places(program, cell.frames, "frame", controller.base.matrix)
         self._tool = Places(program, cell.tools, "tool", controller.flange.matrix)
+        carried = [by_tool.get(target.tool, robot) for target in targets]
+        pushed = carried
+        if wrenches is not None:
+            pushed = self._pushed(carried, wrenches, np.eye(4) if flange is None else flange)
+        self._arms, self._arm = _each_once(pushed)
+        #: The same without what acts on the tool: bases are found by what the arm does at rest.
+        self._free_arms, self._free_arm = _each_once(carried)
         known = joints_of(nominal, program)
         self._joints_given: NDArray[np.bool_] = np.asarray(~np.isnan(known).any(axis=1))
         poses = poses_of(program)
@@ -119,6 +131,29 @@ class ResolvedProgram:
         #: Which are offsets from targets that stay.
         self._anchored: NDArray[np.bool_] = ~stays & stays[first] & (first != np.arange(len(targets)))
         self._usable &= ~self._anchored | self._found_joints[first]
+
+    def _pushed(self, carried: Sequence[Robot], wrenches: Sequence[Wrench | None], flange: Shift) -> list[Robot]:
+        """Return the robot of each target with what acts on the tool there, one for all that have the same."""
+        places = self._tool.real(np.arange(len(carried)), flange)
+        known: dict[tuple[int, str, Wrench | None], Robot] = {}
+        made = []
+        for target, arm, wrench, at in zip(self._program.targets, carried, wrenches, places, strict=True):
+            key = (id(arm), target.tool.lower(), wrench)
+            if key not in known:
+                tool = Transform.from_matrix(at[:3, :3], at[:3, 3])
+                known[key] = arm if wrench is None else arm.with_wrench(wrench, tool)
+            made.append(known[key])
+        return made
+
+    @property
+    def forces(self) -> int:
+        """How many robots with something that acts on their tools there are."""
+        return sum(arm.wrench is not None for arm in self._arms)
+
+    def pushed(self, correction: Correction) -> list[tuple[Robot, Array]]:
+        """Return the robots on whose tool something acts, and the joint positions ``(n, joints)`` at which it does."""
+        some = [(arm, correction.corrected & (self._arm == number)) for number, arm in enumerate(self._arms)]
+        return [(arm, correction.joints[rows]) for arm, rows in some if arm.wrench is not None and rows.any()]
 
     @property
     def frames(self) -> tuple[str, ...]:
@@ -150,7 +185,7 @@ class ResolvedProgram:
         """Return tips of targets in the controller's base frame, before and after correction, where found."""
         if not len(rows):
             return np.zeros((0, 4, 4)), np.zeros((0, 4, 4))
-        found = self._found(rows, base, flange)
+        found = self._found(rows, base, flange, pushed=False)
         good = found.solutions.usable
         tips = self._base.nominal[rows] @ self._poses[rows]
         return tips[good], (found.flange @ self._tool.nominal[rows])[good]
@@ -255,10 +290,11 @@ class ResolvedProgram:
         fakes = np.linalg.inv(self._base.nominal[rows]) @ found.flange @ self._tool.nominal[rows]
         return fakes, found.solutions.usable
 
-    def _found(self, rows: NDArray[np.intp], base: Shift, flange: Array) -> FakeTargets:
+    def _found(self, rows: NDArray[np.intp], base: Shift, flange: Array, *, pushed: bool = True) -> FakeTargets:
         poses = self._meant(base, flange)
         wanted = self._base.real(rows, base) @ poses[rows] @ np.linalg.inv(self._tool.real(rows, flange))
-        return fake_targets_of(self._arms, self._arm[rows], wanted, self._resolved.joints[rows])
+        arms, arm = (self._arms, self._arm) if pushed else (self._free_arms, self._free_arm)
+        return fake_targets_of(arms, arm[rows], wanted, self._resolved.joints[rows])
 
     def _first(self, row: int) -> int:
         """Return the target that the offsets up to this one begin at."""
@@ -333,6 +369,13 @@ class ResolvedProgram:
                 groups.setdefault(configuration, []).append(row)
         for configuration, members in groups.items():
             yield configuration, np.array(members)
+
+
+def _each_once(arms: Sequence[Robot]) -> tuple[tuple[Robot, ...], NDArray[np.intp]]:
+    """Return robots each once, and which of them each is."""
+    once = tuple({id(arm): arm for arm in arms}.values())
+    number = {id(arm): index for index, arm in enumerate(once)}
+    return once, np.array([number[id(arm)] for arm in arms], dtype=np.intp)
 
 
 def _reason(found: FakeTargets, at: int) -> str:

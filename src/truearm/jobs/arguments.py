@@ -22,6 +22,8 @@ from truearm.modeling.chain import Array
 from truearm.modeling.controller import JointsOf
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
+from truearm.modeling.transform import Transform
+from truearm.modeling.wrench import WRENCH_FRAMES, Wrench
 from truearm.units import accepted_range, sized_si
 from truearm.writing import new_file, output_file, output_folder
 
@@ -30,6 +32,8 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
+#: Where a force acts that acts on no target.
+FLANGE: Final = "flange"
 #: Whose joint positions can be asked for.
 JOINTS_OF: Final[dict[str, JointsOf]] = {"controller": "controller", "model": "model"}
 
@@ -147,6 +151,62 @@ def files_argument(files: object, parameter: str) -> dict[str, Path]:
 def payload_argument(payload: object, parameter: str = "payload") -> Payload | None:
     """Return the payload that was given, or that a text such as ``2.7kg,50mm,25mm,100mm`` names; None for None."""
     return None if payload is None else Payload.of(payload, parameter)
+
+
+def wrench_argument(wrench: object, frame: object, parameter: str = "wrench") -> Wrench | None:
+    """Return what acts on the tool, of an object, a text or six numbers, in the axes of a frame; None for None."""
+    given = f"{parameter}_frame"
+    if wrench is None:
+        if frame is not None:
+            raise InputError(
+                "a frame says in whose axes a force is, and no force is given",
+                parameter=given,
+                came=frame,
+                cure=f"Give `{parameter}`, or leave it out.",
+            )
+        return None
+    axes_of = "base" if frame is None else choice_argument(frame, given, {name: name for name in WRENCH_FRAMES})
+    if not isinstance(wrench, Wrench):
+        return Wrench.of(wrench, axes_of, parameter)
+    if frame is not None and axes_of != wrench.frame:
+        raise InputError("the wrench says its own frame", parameter=given, came=frame, allowed=wrench.frame)
+    return wrench
+
+
+def pushed_argument(robot: Robot, wrench: Wrench | None, tool: Transform | str | None = None) -> Robot:
+    """Return a robot with what acts on its tool, or refuse what it is not rated for."""
+    return robot if wrench is None else robot.with_wrench(wrench, tool)
+
+
+def pushed_at_argument(robot: Robot, wrench: Wrench | None, at: object) -> Robot:
+    """Return a robot with what acts on one of its targets, or on its flange, by name.
+
+    Raises
+    ------
+    InputError
+        If there is no such target, or several and none is named.
+    """
+    names = [target.name for target in robot.targets]
+    if wrench is None:
+        if at is not None:
+            raise InputError(
+                "no force is given", parameter="wrench_at", came=at, cure="Give `wrench`, or leave it out."
+            )
+        return robot
+    if at is None and len(names) > 1:
+        raise InputError(
+            "there are several targets, and a force acts on one point",
+            parameter="wrench_at",
+            where=robot.name,
+            allowed=", ".join([*names, FLANGE]),
+            cure="Name the target that is the tool's point, or the flange.",
+        )
+    if at is None:
+        place = names[0] if names else None
+    else:
+        known: dict[str, str | None] = {**{name: name for name in names}, FLANGE: None}
+        place = choice_argument(at, "wrench_at", known, "target")
+    return robot.with_wrench(wrench, robot.tool_place(place))
 
 
 def gravity_argument(gravity: object, parameter: str = "gravity") -> tuple[float, float, float] | None:
@@ -361,7 +421,7 @@ def _written(value: object) -> str:
         value = value.item()
     if isinstance(value, Path):
         return repr(str(value))
-    if isinstance(value, Payload):
+    if isinstance(value, Payload | Wrench):
         return repr(value.text)
     if isinstance(value, list | tuple):
         words = ", ".join(_written(entry) for entry in value)

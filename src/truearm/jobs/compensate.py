@@ -10,7 +10,15 @@ from pathlib import Path
 
 from truearm.arrays import finite_number
 from truearm.compensation.advice import check_correction
-from truearm.compensation.cell import Cell, Placed, read_frames, read_tools
+from truearm.compensation.cell import (
+    Cell,
+    Placed,
+    TargetWrench,
+    read_frames,
+    read_tools,
+    read_wrenches,
+    refuse_wrenches_left_out,
+)
 from truearm.compensation.chosen_targets import TAUGHT, Choice, Taught
 from truearm.compensation.controller_model import (
     controller_notices,
@@ -22,8 +30,9 @@ from truearm.compensation.program_correction import CorrectedPrograms, corrected
 from truearm.compensation.program_files import edited, language_called, program_files, read_programs
 from truearm.compensation.programs.program import Edit
 from truearm.compensation.split import ProgramSplit, check_tolerance, split_program
-from truearm.errors import InputError, refusals_of
+from truearm.errors import InputError, refusals_at, refusals_of
 from truearm.files import path_argument
+from truearm.identification.judging.external_force import check_force
 from truearm.identification.judging.payload import check_payload
 from truearm.jobs.arguments import (
     choice_argument,
@@ -39,12 +48,14 @@ from truearm.jobs.arguments import (
     progress_argument,
     python_call,
     robot_argument,
+    wrench_argument,
 )
 from truearm.jobs.proof import NOT_BETTER, accept_argument, changed_since, check_maker, known_of, refuse_unaccepted
 from truearm.modeling.formats.controller_entry import STATED
 from truearm.modeling.formats.controller_kinematics import with_controller_kinematics
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
+from truearm.modeling.wrench import Wrench, WrenchFrame
 from truearm.notices import Notice
 from truearm.results.program_correction import REPORT, FileCorrection, ProgramCorrection
 
@@ -57,6 +68,8 @@ def compensate(
     tools: str | Path | None = None,
     frames: str | Path | None = None,
     payload: Payload | str | None = None,
+    wrench: Wrench | Sequence[float] | str | Path | None = None,
+    wrench_frame: WrenchFrame | None = None,
     controller_kinematics: str | Path | None = None,
     strict: bool = False,
     split: float | None = None,
@@ -86,6 +99,12 @@ def compensate(
     payload
         What the flange carries in production (an object, or a text such as ``2.7kg,50mm,25mm,100mm``); None for what
         the program says of each tool, and what it carried in calibration where the program does not say it.
+    wrench
+        External force and moment on the tool at its point: six numbers [N, N m], a text such as
+        ``0N,0N,80N,0Nm,0Nm,1.5Nm``, or an object, at every target; or a file that says it of targets and tools by name,
+        see :mod:`truearm.compensation.cell`. None for none.
+    wrench_frame
+        Whose axes it is given in, if not by a file: ``base`` (also for None), ``tool``, ``world`` or ``controller``.
     controller_kinematics
         With what the controller turns poses into joint positions: ``nominal`` (the table of the robot file),
         ``proprietary`` (a calibration of its maker that nobody else can read), ``unknown``, or the file of its
@@ -129,6 +148,10 @@ def compensate(
     tool_file = None if tools is None else path_argument(tools, "tools")
     frame_file = None if frames is None else path_argument(frames, "frames")
     payload = payload_argument(payload)
+    wrench_file = _wrench_file(wrench)
+    pushed = None if wrench_file is not None else wrench_argument(wrench, wrench_frame)
+    if wrench_file is not None and wrench_frame is not None:
+        raise InputError("the file says the frame of each force", parameter="wrench_frame", came=wrench_frame)
     notes = notes_argument(notes)
     strict, again = flag_argument(strict, "strict"), flag_argument(again, "again")
     if split is not None:
@@ -143,9 +166,18 @@ def compensate(
     folder = (
         None
         if out is None
-        else folder_for((REPORT,), out, robot, tools, frames, *_kinematics_file(controller_kinematics), *paths)
+        else folder_for(
+            (REPORT,), out, robot, tools, frames, wrench_file, *_kinematics_file(controller_kinematics), *paths
+        )
     )
     arm = _with_controller(robot_argument(robot).with_payload(payload), controller_kinematics)
+    if arm.wrench is not None:
+        raise InputError(
+            "something acts on the tool of this robot already",
+            parameter="robot",
+            came=arm.wrench.text,
+            cure="Give it as `wrench`, and the robot without it.",
+        )
     accepted = accept_argument(accept, arm)
     invocation = command_argument(command) or python_call(
         "compensate",
@@ -154,6 +186,8 @@ def compensate(
         tools=tools,
         frames=frames,
         payload=payload,
+        wrench=wrench,
+        wrench_frame=wrench_frame,
         controller_kinematics=controller_kinematics,
         strict=strict or None,
         split=split,
@@ -171,6 +205,10 @@ def compensate(
     with refusals_of("frames"):
         frames_given = read_frames(arm, frame_file)
     cell = Cell(tools_given, frames_given)
+    acting = _wrenches(arm, pushed, wrench_file)
+    for path, parameter in ((tool_file, "tools"), (frame_file, "frames")):
+        if path != wrench_file:
+            refuse_wrenches_left_out(path, parameter)
     _refuse_taught_and_measured(choice, cell)
     with refusals_of("programs"):
         files = program_files(paths, again=again)
@@ -189,6 +227,7 @@ def compensate(
             progress,
             choice=replace(choice, every=NOT_BETTER in accepted),
             weigh_tools=payload is None,
+            wrenches=acting,
         )
     if strict:
         _refuse_skipped(result)
@@ -218,16 +257,35 @@ def compensate(
             *foreign,
             *controller_notices(arm, read),
             *_payloads_unlikely(arm, result),
+            *check_force(result.pushed),
             *check_correction(arm, result, splits),
         ),
         command=invocation,
-        inputs=files_of(robot, tools, frames, *_kinematics_file(controller_kinematics)),
+        inputs=files_of(robot, tools, frames, wrench_file, *_kinematics_file(controller_kinematics)),
         notes=notes,
     )
     if folder is not None:
         with refusals_of("out"):
             made.save(folder, progress)
     return made
+
+
+def _wrench_file(wrench: object) -> Path | None:
+    """Return the file that says what acts on tools; None if that is said otherwise, or not at all."""
+    named = isinstance(wrench, str) and wrench.lower().endswith((".yaml", ".yml"))
+    return path_argument(wrench, "wrench") if named or isinstance(wrench, Path) else None
+
+
+def _wrenches(arm: Robot, pushed: Wrench | None, file: Path | None) -> tuple[TargetWrench, ...]:
+    """Return what acts on the tool, and where: at every target, or as a file says."""
+    if file is None:
+        return () if pushed is None else (TargetWrench((), (), pushed),)
+    with refusals_of("wrench"):
+        acting = read_wrenches(file)
+        for one in acting:
+            with refusals_at(one.where):
+                arm.with_wrench(one.wrench)
+    return acting
 
 
 def _payloads_unlikely(arm: Robot, result: CorrectedPrograms) -> list[Notice]:

@@ -9,6 +9,7 @@ from truearm.jobs.arguments import choice_argument, new_file_for, robot_argument
 from truearm.jobs.proof import told_of
 from truearm.modeling.formats.export import FORMATS
 from truearm.modeling.robot import Robot
+from truearm.modeling.wrench import refuse_pushed
 from truearm.results.exported_robot import ExportedRobot
 from truearm.writing import write_new_text
 
@@ -36,6 +37,7 @@ def export(robot: Robot | str | Path, format: str, *, out: str | Path | None = N
     exported = choice_argument(format, "format", FORMATS)
     file = None if out is None else new_file_for(out)
     loaded = robot_argument(robot)
+    refuse_pushed(loaded)
     with refusals_of("robot"):
         made = exported(loaded)
     if file is not None:

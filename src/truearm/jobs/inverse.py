@@ -8,6 +8,7 @@ from pathlib import Path
 from truearm.arrays import axes
 from truearm.errors import InputError, refusals_of, wrong_kind
 from truearm.files import path_argument
+from truearm.identification.judging.external_force import check_force
 from truearm.jobs.arguments import (
     array_argument,
     choice_argument,
@@ -15,7 +16,9 @@ from truearm.jobs.arguments import (
     gravity_argument,
     joints_argument,
     payload_argument,
+    pushed_argument,
     robot_argument,
+    wrench_argument,
 )
 from truearm.jobs.proof import told_of
 from truearm.measurement.readers.poses import read_poses
@@ -23,12 +26,13 @@ from truearm.modeling.chain import Array
 from truearm.modeling.controller import JointsOf
 from truearm.modeling.formats.joint_columns import counting
 from truearm.modeling.formats.joint_table import joints_csv
-from truearm.modeling.frames import FRAMES, Frame
+from truearm.modeling.frames import FRAMES, Frame, frame_and_tip
 from truearm.modeling.inverse import inverse as inverse_kinematics
 from truearm.modeling.inverse.pose_solver import Orientation
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY, rotation_from_quaternion
+from truearm.modeling.wrench import Wrench, WrenchFrame
 from truearm.notices import Notice
 from truearm.results.joint_table import JointTable
 from truearm.writing import write_text
@@ -47,11 +51,13 @@ def inverse(
     orientation: Orientation = "full",
     payload: Payload | str | None = None,
     gravity: Sequence[float] | None = None,
+    wrench: Wrench | Sequence[float] | str | None = None,
+    wrench_frame: WrenchFrame | None = None,
     joints: JointsOf | None = None,
 ) -> JointTable:
     """Find the joints that bring a robot to poses, with its calibration and joint effects.
 
-    The arm is at rest; what depends on the way it came, on temperature or on an external force is left out.
+    The arm is at rest; what depends on the way it came or on temperature is left out.
 
     Parameters
     ----------
@@ -78,6 +84,12 @@ def inverse(
     payload, gravity
         What the robot carries (an object, or a text such as ``2.7kg,50mm,25mm,100mm``) and free fall in its base frame
         [m/s^2]; None for what its file says.
+    wrench
+        External force and moment on what goes to the poses, the target or the flange: six numbers [N, N m], a text such
+        as ``0N,0N,80N,0Nm,0Nm,1.5Nm``, or an object; None for none.
+    wrench_frame
+        Whose axes it is given in: ``base`` (also for None), ``tool``, those of the target or the flange, ``world`` or
+        ``controller``.
     joints
         Whose joint positions the file holds: the ``model``'s, or as the ``controller`` shows them; None for the
         controller's where the robot file says that they differ.
@@ -90,10 +102,13 @@ def inverse(
     file = None if out is None else file_for(out, robot, poses)
     choice_argument(frame, "frame", dict.fromkeys(FRAMES))
     choice_argument(orientation, "orientation", dict.fromkeys(("full", "axis", "free")))
+    pushed = wrench_argument(wrench, wrench_frame)
     arm = robot_argument(robot).with_payload(payload_argument(payload), gravity_argument(gravity))
     joints_are = joints_argument(joints, arm)
     if target is not None:
         choice_argument(target, "target", {known.name: known for known in arm.targets})
+    tip = frame_and_tip(arm, frame, None)[1] if target is None and frame == "controller" else arm.tool_place(target)
+    arm = pushed_argument(arm, pushed, tip)
     if branch is not None and not isinstance(branch, str):
         raise wrong_kind("the name of a branch belongs here", branch, "branch", "front-up-noflip, for example, or all")
     labels, positions, turned = _poses(poses, rotations)
@@ -117,7 +132,8 @@ def inverse(
         )
     if file is not None:
         write_text(file, joints_csv(solutions, labels, arm.joints, counting(arm, joints_are)))
-    return JointTable(labels, solutions, (*told_of(arm), *_other_frame(arm, frame, target)), joints_are)
+    told = (*told_of(arm), *check_force([(arm, solutions.joints[solutions.usable])]))
+    return JointTable(labels, solutions, (*told, *_other_frame(arm, frame, target)), joints_are)
 
 
 def _other_frame(robot: Robot, frame: Frame, target: str | None) -> list[Notice]:

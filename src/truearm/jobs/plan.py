@@ -11,6 +11,7 @@ import numpy as np
 from truearm.errors import InputError, kind_of, refusals_of
 from truearm.files import path_argument
 from truearm.identification.solving.models import MODELS
+from truearm.jobs.accuracy_goal import accuracy_goal
 from truearm.jobs.arguments import (
     choice_argument,
     command_argument,
@@ -29,10 +30,12 @@ from truearm.jobs.arguments import (
     whole_argument,
 )
 from truearm.measurement.dataset import Dataset
+from truearm.modeling.chain import Array
 from truearm.modeling.controller import JointsOf
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
 from truearm.planning.choosing.measurement_plan import (
+    ERROR,
     device_candidates,
     plan_measurements,
     random_candidates,
@@ -49,7 +52,11 @@ def plan(
     poses: int | Literal["auto"],
     out: str | Path | None = None,
     candidates_from: Dataset | str | Path | None = None,
-    objective: str = "O1",
+    objective: str | None = None,
+    accurate_at: Array | str | Path | None = None,
+    region: Sequence[Sequence[float]] | None = None,
+    tools: str | Path | None = None,
+    frames: str | Path | None = None,
     model: str = "geometric",
     candidates: int = 5000,
     device: str | None = None,
@@ -75,7 +82,15 @@ def plan(
     candidates_from
         Readings, or a canonical CSV file, among whose configurations to choose; None draws them within the limits.
     objective
-        ``O1`` to ``O5``.
+        ``O1`` to ``O5``, or ``error``: the mean square error where the robot shall be accurate. None is ``error`` if
+        that was said, otherwise ``O1``.
+    accurate_at
+        Where the robot shall be accurate: a program, a CSV file of poses of the flange in the base frame as
+        :func:`truearm.inverse` takes it, or joint positions of the model ``(n, joints)`` [rad or m].
+    region
+        The same as a box for the flange: lowest and highest x, y and z in the base frame [m].
+    tools, frames
+        Files that say where tools and frames of the program are, as for :func:`truearm.compensate`.
     model
         What will be identified, one of :data:`truearm.identification.solving.models.MODELS` by name.
     candidates
@@ -106,9 +121,11 @@ def plan(
         For anything that cannot be used, with a message that says what to do.
     """
     progress_argument(progress)
-    table = None if out is None else _files(out, robot, candidates_from, constraints)
+    read = (robot, candidates_from, constraints, accurate_at, tools, frames)
+    table = None if out is None else _files(out, *read)
     count = _count(poses)
-    choice_argument(objective, "objective", {name: name for name in INDICES})
+    if objective is not None:
+        choice_argument(objective, "objective", dict.fromkeys((*INDICES, ERROR)))
     wanted = choice_argument(model, "model", {m.name: m for m in MODELS})
     deviation = deviation_argument(noise, "noise")
     number = count_argument(candidates, "candidates")
@@ -129,6 +146,10 @@ def plan(
         poses=poses,
         candidates_from=candidates_from,
         objective=objective,
+        accurate_at=accurate_at,
+        region=region,
+        tools=tools,
+        frames=frames,
         model=model,
         candidates=candidates,
         device=device,
@@ -153,6 +174,8 @@ def plan(
         data = readings_argument(carrying, candidates_from, "candidates_from")
         seen, choice, labels = with_targets(carrying, data), data.postures, data.labels
         own = own or bool(data.has_position.any())
+    progress("looking where the robot shall be accurate")
+    goal = accuracy_goal(seen, accurate_at, region, tools, frames, np.random.default_rng(seed))
     progress(f"choosing among {len(choice)} configurations")
     made = plan_measurements(
         seen,
@@ -160,7 +183,8 @@ def plan(
         wanted,
         poses=count,
         rng=rng,
-        objective=objective,
+        objective=objective or ("O1" if goal is None else ERROR),
+        accurate_at=None if goal is None else goal.postures,
         noise=deviation,
         labels=labels,
         constraints=rules,
@@ -168,7 +192,7 @@ def plan(
         seen_from_the_origin=own,
         readings=readings,
     )
-    planned = Plan(made, call, files_of(robot, candidates_from, constraints), deviation, joints_are)
+    planned = Plan(made, call, files_of(*read), deviation, joints_are, "" if goal is None else goal.words)
     if table is not None:
         progress("writing the files")
         planned.save(table)

@@ -22,8 +22,10 @@ from truearm.jobs.arguments import (
     joints_argument,
     payload_argument,
     progress_argument,
+    pushed_at_argument,
     robot_argument,
     whole_argument,
+    wrench_argument,
 )
 from truearm.limits import refuse_beyond
 from truearm.measurement.controller_joints import in_controller_joints
@@ -31,10 +33,11 @@ from truearm.measurement.readers.canonical import csv_text
 from truearm.modeling.controller import JointsOf
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
+from truearm.modeling.wrench import Wrench, WrenchFrame
 from truearm.results.simulation import Simulation
 from truearm.simulation.devices import in_view_of, measured_with
 from truearm.simulation.truths import truth_twin
-from truearm.simulation.twin import measure
+from truearm.simulation.twin import measure, with_wrench_read
 from truearm.writing import write_text
 
 
@@ -49,6 +52,9 @@ def simulate(
     seed: int = 0,
     payload: Payload | str | None = None,
     gravity: Sequence[float] | None = None,
+    wrench: Wrench | Sequence[float] | str | None = None,
+    wrench_frame: WrenchFrame | None = None,
+    wrench_at: str | None = None,
     joints: JointsOf = "model",
     progress: Callable[[str], None] = lambda _: None,
 ) -> Simulation:
@@ -77,6 +83,11 @@ def simulate(
     payload, gravity
         What the robot truly carries (an object, or a text such as ``2.7kg,50mm,25mm,100mm``) and free fall in its base
         frame [m/s^2]; None for what its file says.
+    wrench, wrench_frame
+        External force and moment, the same at every configuration, and whose axes it is given in, as for
+        :func:`truearm.inverse`. The data say what it was on the flange, ``force_x`` to ``moment_z``.
+    wrench_at
+        The target on which it acts, or ``flange``; None where there is one target.
     joints
         Whose joint positions the data hold: the ``model``'s, or as the ``controller`` shows them.
     progress
@@ -106,6 +117,7 @@ def simulate(
     with refusals_of("truth"):
         twin = truth_twin(nominal, truth, rng)
     twin = replace(twin, robot=twin.robot.with_payload(payload_argument(payload), gravity_argument(gravity)))
+    twin = replace(twin, robot=pushed_at_argument(twin.robot, wrench_argument(wrench, wrench_frame), wrench_at))
     seen = twin.robot if instrument is None else in_view_of(instrument, twin.robot)
     refuse_beyond("readings", count * len(seen.targets), parameter="poses")
     progress(f"measuring {count} configurations")
@@ -113,6 +125,8 @@ def simulate(
         data = measure(twin, nominal.random_configurations(count, rng), sigma, rng)
     else:
         data = measured_with(instrument, nominal, twin, count, rng, sigma)
+    if twin.robot.wrench is not None:
+        data = with_wrench_read(twin, data)
     if joints_are == "controller":
         data = in_controller_joints(nominal, data)
     if file is not None:

@@ -12,6 +12,7 @@ from typing import Final
 from truearm.errors import InputError, refusals_of
 from truearm.files import path_argument, read_bytes
 from truearm.identification.judging.beyond_proof import check_proof
+from truearm.identification.judging.external_force import check_force
 from truearm.identification.judging.payload import check_payload
 from truearm.identification.judging.same_frames import check_frames
 from truearm.identification.judging.target_names import check_names
@@ -23,9 +24,11 @@ from truearm.jobs.arguments import (
     gravity_argument,
     notes_argument,
     payload_argument,
+    pushed_at_argument,
     readings_argument,
     refuse_swapped,
     robot_argument,
+    wrench_argument,
 )
 from truearm.jobs.proof import changed_since
 from truearm.measurement.dataset import Dataset
@@ -33,6 +36,7 @@ from truearm.measurement.repeats import readings_digest
 from truearm.measurement.statistics import errors_of
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
+from truearm.modeling.wrench import Wrench, WrenchFrame
 from truearm.notices import Notice
 from truearm.results.validation import Validation
 
@@ -43,6 +47,9 @@ def validate(
     *,
     payload: Payload | str | None = None,
     gravity: Sequence[float] | None = None,
+    wrench: Wrench | Sequence[float] | str | None = None,
+    wrench_frame: WrenchFrame | None = None,
+    wrench_at: str | None = None,
     refit: str | None = None,
     notes: Mapping[str, str] | None = None,
 ) -> Validation:
@@ -57,6 +64,11 @@ def validate(
     payload, gravity
         What the robot carried (an object, or a text such as ``2.7kg,50mm,25mm,100mm``) and free fall in its base frame
         [m/s^2] this time, if they differ from the calibration.
+    wrench, wrench_frame
+        External force and moment while it was measured, the same at every configuration, and whose axes it is given in,
+        as for :func:`truearm.inverse`; None where none acted, or the data have their own (``force_x`` to ``moment_z``).
+    wrench_at
+        The target on which it acted, or ``flange``; None where there is one target.
     refit
         What was moved since and is found anew from these readings, while everything else stays: ``base`` (the
         instrument, or the robot's base), ``targets`` (each by itself), or ``tool`` (all targets as one rigid body). The
@@ -77,8 +89,11 @@ def validate(
         with refusals_of("data"):
             digest = hashlib.sha256(read_bytes(path_argument(data, "data"))).hexdigest()
     changed = changed_since(robot)
+    pushed = wrench_argument(wrench, wrench_frame)
     as_calibrated = robot_argument(robot)
     robot, data = as_measured(robot, data, payload, gravity)
+    robot = _pushed(robot, data, pushed, wrench_at)
+    as_calibrated = as_calibrated.with_wrench(robot.wrench)
     identified = {p.group for p in robot.parameters.values() if p.deviation is not None}
     if moved != "base" and data.anchored and robot.fixtures and identified and "base" not in identified:
         raise InputError(
@@ -104,8 +119,27 @@ def validate(
         or check_frames(judged, data, agreed, moved)
         or check_proof(as_calibrated, data, agreed)
     )
-    warnings = (*changed, *mistaken, *check_payload(robot), *_seen_in_training(robot, data, digest))
+    warnings = (
+        *changed,
+        *mistaken,
+        *check_payload(robot),
+        *check_force([(robot, data.postures)]),
+        *_seen_in_training(robot, data, digest),
+    )
     return Validation(data.source, errors, warnings, found, notes)
+
+
+def _pushed(robot: Robot, data: Dataset, wrench: Wrench | None, at: str | None) -> Robot:
+    """Return the robot with what acted on it, or refuse data that say that themselves."""
+    if wrench is not None and data.wrench is not None:
+        raise InputError(
+            "the data say what acted on the flange",
+            parameter="wrench",
+            where=data.source,
+            came="the columns force_x to moment_z",
+            cure="Leave `wrench` out, or take the columns out.",
+        )
+    return pushed_at_argument(robot, wrench, at)
 
 
 #: How a calibration says in the robot's history which configurations of which data it was trained on: by the hash of

@@ -60,6 +60,17 @@ def postures_in_equilibrium(robot: Robot, at: Postures) -> Postures:
     return replace(at, loads=_loads(robot, at, variables))
 
 
+def joint_efforts(robot: Robot, q: Array | Postures) -> Array:
+    """Return the load about each turning joint's axis [N m], or along a sliding one's [N], ``(n, joints)``.
+
+    It is that of the arm as it has bent; of a model without elastic joints, of the rigid arm.
+    """
+    at = robot.loaded(q)
+    loads = at.loads if at.loads is not None else _loads(robot, at, robot.variables(at, robot.values))
+    rows = [loads[i, 5 if joint.kind == "revolute" else 2] for i, joint in enumerate(robot.joints)]
+    return np.ascontiguousarray(np.array(rows).T)
+
+
 def joints_in_equilibrium(robot: Robot, variables: Array) -> Array:
     """Return the joint positions ``(joints, n)`` that lead to variables, whose loads are known from the start."""
     loads = joint_loads(robot, variables) if any(effect.loaded for effect in robot.effects) else None

@@ -32,6 +32,7 @@ from truearm.modeling.chain import (
     in_frame_behind,
 )
 from truearm.modeling.parts import POINT_MASS, Inertia
+from truearm.modeling.wrench import wrench_on_flange
 
 if TYPE_CHECKING:
     from truearm.modeling.robot import Robot
@@ -65,7 +66,8 @@ def joint_loads(
     velocity, acceleration
         Of the joints, ``(joints, n)`` [rad/s and rad/s^2, or m/s and m/s^2]; zero if None.
     wrench
-        External force [N], then moment [N m], on the flange at its origin, in the axes of the base, ``(6, n)``.
+        External force [N], then moment [N m], on the flange at its origin, in the axes of the base, ``(6, n)``. What
+        acts on the robot's tool comes on top.
 
     Returns
     -------
@@ -91,7 +93,11 @@ def joint_loads(
                 allowed=f"({rows}, {size}): one column for each configuration",
             )
     elements = robot.arm.elements
-    moves = robot.arm.forward_kinematics(variables, robot.values).moves
+    arm = robot.arm.forward_kinematics(variables, robot.values)
+    moves = arm.moves
+    if robot.wrench is not None:
+        at_tool = wrench_on_flange(robot, robot.wrench, arm)
+        wrench = at_tool if wrench is None else wrench + at_tool
     ends = [0, *accumulate(len(link) for link in robot.moved_links)]
     bodies = [(ends[link.joint], link.mass, link.cog, link.inertia) for link in robot.masses]
     bodies.append((len(elements), robot.payload.mass, robot.payload.cog, POINT_MASS))

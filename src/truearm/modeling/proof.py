@@ -17,6 +17,7 @@ from truearm.units import SHOWN_AS, from_si, to_si
 #: own deviation.
 _DIGITS: Final = 9
 _DECIMALS: Final = 7
+_LOAD_DECIMALS: Final = 6
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,9 @@ class Proof:
         Whether the error may be larger than covariance and joint error say, for a reason that is known.
     digest
         SHA-256 of the values that it is about; empty if it is about none yet.
+    loads
+        Lowest and highest moment about each joint's axis, or force along it, while it was measured [N m or N]; empty
+        if that is not known.
     """
 
     status: str
@@ -61,6 +65,7 @@ class Proof:
     lower_bound: bool = False
     warnings: tuple[Notice, ...] = ()
     digest: str = ""
+    loads: tuple[tuple[float, float], ...] = ()
 
     @classmethod
     def of(
@@ -74,6 +79,7 @@ class Proof:
         *,
         warnings: Sequence[Notice] = (),
         lower_bound: bool = False,
+        loads: Sequence[tuple[float, float]] = (),
     ) -> Self:
         """Make the proof of a calibration, rounded to what a file holds of it.
 
@@ -102,6 +108,7 @@ class Proof:
             ),
             lower_bound,
             tuple(warnings),
+            loads=tuple((round(low, _LOAD_DECIMALS) + 0.0, round(high, _LOAD_DECIMALS) + 0.0) for low, high in loads),
         )
 
     def summary(self) -> dict[str, Any]:

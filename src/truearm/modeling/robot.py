@@ -24,7 +24,8 @@ from truearm.modeling.placing import fixtures_placed, placed
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot_data import STRUCTURE, RobotData
 from truearm.modeling.robot_parameters import by_parameters, effect_rates
-from truearm.modeling.transform import Transform
+from truearm.modeling.transform import IDENTITY, Transform
+from truearm.modeling.wrench import Wrench, in_base, refuse_above_rating
 
 if TYPE_CHECKING:
     from truearm.modeling.inverse.pose_solver import Orientation
@@ -112,6 +113,42 @@ class Robot(RobotData):
         from truearm.modeling.formats.robot_file import is_intact, sealed
 
         return sealed(other, self.proof) if is_intact(self) else other
+
+    def with_wrench(self, wrench: Wrench | None, tool: Transform | str | None = None) -> Robot:
+        """Return the robot with another external force and moment at its tool; None takes them away.
+
+        What is known of its calibration is about the arm and holds as before. No file holds a wrench.
+
+        Parameters
+        ----------
+        wrench
+            What acts on the tool.
+        tool
+            The tool on the flange, or the name of a target; None for where the wrench says it is.
+
+        Raises
+        ------
+        InputError
+            If there is no such target, the wrench is larger than the robot is rated for, or is given in axes of the
+            controller that are not known.
+        """
+        if not isinstance(wrench, Wrench | None):
+            raise wrong_kind("a wrench belongs here", wrench, "wrench", "a Wrench, or None")
+        if wrench is None or not wrench.acts:
+            return replace(self, wrench=None)
+        if tool is not None:
+            wrench = wrench.at(self.tool_place(tool) if isinstance(tool, str) else tool)
+        if wrench.frame != "tool":
+            in_base(self, wrench)
+        refuse_above_rating(self, wrench)
+        return replace(self, wrench=wrench)
+
+    def tool_place(self, target: str | None) -> Transform:
+        """Return where a target is on the flange; the flange itself for None."""
+        if target is None:
+            return IDENTITY
+        kinematics = self.target(target).chain.forward_kinematics(np.zeros((0, 1)), self.values)
+        return Transform.from_matrix(kinematics.matrix()[0], kinematics.position[:, 0])
 
     def with_effects(self, names: Sequence[str]) -> Robot:
         """Return the robot with these joint effects added.

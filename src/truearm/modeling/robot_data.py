@@ -32,6 +32,7 @@ from truearm.modeling.parts import (
 from truearm.modeling.proof import Proof
 from truearm.modeling.robot_parameters import all_parameters
 from truearm.modeling.transform import IDENTITY, Transform, fixed_rotation
+from truearm.modeling.wrench import Wrench
 from truearm.shown import as_html, counted, listed, short_text
 
 Part = TypeVar("Part", Target, Fixture)
@@ -67,6 +68,10 @@ class RobotData:
         What hangs on the flange.
     gravity
         Acceleration of free fall in the base frame [m/s^2].
+    wrench
+        What acts on its tool besides weight; None of nothing. Robot files do not hold it.
+    rated_load
+        Mass that its maker rates it for [kg]; None if that is not known.
     base_quaternion
         Reference orientation of the base in the world.
     targets
@@ -100,6 +105,8 @@ class RobotData:
     masses: tuple[LinkMass, ...] = ()
     payload: Payload = NO_PAYLOAD
     gravity: tuple[float, float, float] = GRAVITY
+    wrench: Wrench | None = None
+    rated_load: float | None = None
     base_quaternion: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
     targets: tuple[Target, ...] = ()
     fixtures: tuple[Fixture, ...] = ()
@@ -124,6 +131,7 @@ class RobotData:
         ]
         lines += [f"fixtures: {listed([fixture.name for fixture in self.fixtures])}"] if self.fixtures else []
         lines += [f"payload: {self.payload.text}"] if self.payload.mass else []
+        lines += [f"wrench at the tool: {self.wrench.text}, {self.wrench.frame}"] if self.wrench else []
         return short_text(lines)
 
     def _repr_html_(self) -> str:

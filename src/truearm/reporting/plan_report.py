@@ -31,6 +31,7 @@ def plan_html(planned: Plan) -> str:
         "plan.html.jinja",
         figures,
         plan=plan,
+        chosen_by=planned.chosen_by,
         command=planned.command,
         words=planned.answer,
         indices=[(name, _INDEX_WORDS[name], f"{value:.4g}") for name, value in plan.indices.items()],
@@ -97,6 +98,20 @@ def workspace_figure(plan: MeasurementPlan) -> Figure:
         "hovertemplate": "flange at %{x}, %{y}, %{z} mm: %{customdata} mm<extra></extra>",
         "showlegend": False,
     }
+    traces = [trace]
+    if prediction.there is not None:
+        there = 1e3 * (prediction.there.places - np.array(base.translation)) @ base.rotation
+        trace["name"] = "elsewhere"
+        traces.append(
+            trace
+            | {letter: rounded_to(column, 1) for letter, column in zip("xyz", there.T, strict=True)}
+            | {
+                "name": "where it shall be accurate",
+                "marker": {"size": 5, "color": "#b3261e", "symbol": "diamond"},
+                "customdata": rounded(1e3 * prediction.there.error, 3),
+                "showlegend": True,
+            }
+        )
     length = float(10.0 ** math.floor(math.log10(max(float(np.abs(points).max()), 1.0) / 2.0)))
     axes = {f"{letter}axis": scene_axis(f"{letter} [mm]") for letter in "xyz"}
-    return figure([trace, *base_axes(length)], 620, scene={**axes, "aspectmode": "data", "camera": CAMERA})
+    return figure([*traces, *base_axes(length)], 620, scene={**axes, "aspectmode": "data", "camera": CAMERA})

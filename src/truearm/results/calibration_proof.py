@@ -10,8 +10,11 @@ import numpy as np
 from truearm.identification.judging.expected_error import ExpectedError, covariance_root, uncertain_names
 from truearm.identification.solving.fit import Fit, Status
 from truearm.measurement.dataset import Dataset
+from truearm.modeling.equilibrium import joint_efforts
 from truearm.modeling.parameters import PLACES
+from truearm.modeling.postures import Postures
 from truearm.modeling.proof import Proof
+from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 
 #: A note of the calibration that concerns every program: its controller may not have the nominal values of the file.
@@ -52,6 +55,7 @@ def proof_of(
     names, root = uncertain_names(fit), covariance_root(fit, fit.covariance)
     parameters, covariance = [fit.robot.parameters[name] for name in names], root @ root.T
     region = list(zip(training.joints.min(axis=0).tolist(), training.joints.max(axis=0).tolist(), strict=True))
+    loads = loads_of(fit.robot, training.postures)
     if before is not None:
         arm = {n: p for n, p in fit.robot.parameters.items() if p.group not in PLACES}
         kept = [i for i, name in enumerate(before.names) if name in arm and name not in names]
@@ -61,10 +65,27 @@ def proof_of(
             repeated += [warning for warning in before.warnings if not repeated]
             parameters += [arm[before.names[i]] for i in kept]
             region = [(min(a, c), max(b, d)) for (a, b), (c, d) in zip(region, before.region or region, strict=True)]
+            # By older versions nothing is known of the loads before.
+            pairs = zip(loads, before.loads, strict=True) if before.loads else ()
+            loads = [(min(a, c), max(b, d)) for (a, b), (c, d) in pairs]
             joint_error = np.maximum(joint_error, before.joint_error or 0.0)
             lower_bound = lower_bound or before.lower_bound
             beside = np.zeros((len(covariance), len(kept)))
             covariance = np.block([[covariance, beside], [beside.T, before.covariance[np.ix_(kept, kept)]]])
     return Proof.of(
-        ended, errors, region, joint_error, parameters, covariance, warnings=repeated, lower_bound=lower_bound
+        ended,
+        errors,
+        region,
+        joint_error,
+        parameters,
+        covariance,
+        warnings=repeated,
+        lower_bound=lower_bound,
+        loads=loads,
     )
+
+
+def loads_of(robot: Robot, postures: Postures) -> list[tuple[float, float]]:
+    """Return the lowest and highest load about, or along, each joint's axis in some postures [N m or N]."""
+    efforts = joint_efforts(robot, postures)
+    return list(zip(efforts.min(axis=0).tolist(), efforts.max(axis=0).tolist(), strict=True))

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from truearm.measurement.dataset import Dataset
+from truearm.modeling.chain import Array
 from truearm.results.record import Record
 from truearm.shown import counted
 
@@ -46,6 +47,46 @@ class Imported(Record):
         many = counted(self.data.configurations, "configuration")
         text = [f"{many}, targets {', '.join(self.data.targets)}{where}"]
         return text + [f"  {name}: {count} missing {_nouns('reading', count)}" for name, count in self.missing.items()]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ImportedRoboDK(Record):
+    """Measurements that came from a table of RoboDK.
+
+    Attributes
+    ----------
+    data
+        The measurements.
+    tool_points
+        Where each target is in the flange frame, as RoboDK was told [m], ``(targets, 3)``.
+    out
+        The canonical CSV file that holds them; None if none was written.
+    missing
+        How many readings are missing.
+    """
+
+    data: Dataset
+    tool_points: Array
+    out: Path | None = None
+    missing: int = 0
+
+    def summary(self) -> dict[str, Any]:
+        """Return it as JSON holds it."""
+        return {
+            "configurations": self.data.configurations,
+            "tool_points_mm": {
+                name: (1e3 * point).tolist() for name, point in zip(self.data.targets, self.tool_points, strict=True)
+            },
+            "missing": self.missing,
+        }
+
+    def lines(self) -> list[str]:
+        """Return what was read."""
+        where = "" if self.out is None else f": {self.out}"
+        text = [f"{counted(self.data.configurations, 'configuration')}{where}"]
+        for name, point in zip(self.data.targets, self.tool_points, strict=True):
+            text.append(f"  target {name}: tool point ({', '.join(f'{1e3 * v:g}' for v in point)}) mm")
+        return text + ([f"  {self.missing} missing {_nouns('reading', self.missing)}"] if self.missing else [])
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -9,8 +9,9 @@ from typing import Any, Final
 from truearm.errors import InputError
 from truearm.modeling.chain import Array
 from truearm.modeling.controller import JointsOf
-from truearm.planning.choosing.measurement_plan import MeasurementPlan
+from truearm.planning.choosing.measurement_plan import ERROR, MeasurementPlan
 from truearm.planning.choosing.plan_table import plan_csv
+from truearm.planning.choosing.prediction import There
 from truearm.results.record import Record, joints_lines
 from truearm.writing import output_file, write_files
 
@@ -34,6 +35,8 @@ class Plan(Record):
         Standard deviation of a coordinate about the model that was assumed [m].
     joints_are
         Whose joint positions the file holds: the ``model``'s, or those that the ``controller`` shows.
+    accurate_at
+        Where the robot shall be accurate, in words; empty for everywhere.
     """
 
     made: MeasurementPlan
@@ -41,6 +44,7 @@ class Plan(Record):
     inputs: tuple[Path, ...] = ()
     noise: float = 1e-4
     joints_are: JointsOf = "model"
+    accurate_at: str = ""
 
     @property
     def joints(self) -> Array:
@@ -53,8 +57,34 @@ class Plan(Record):
         return self.made.labels
 
     @property
+    def chosen_by(self) -> str:
+        """What was made large or small by the choice, in words."""
+        return f"the error {self.accurate_at}" if self.made.objective == ERROR else self.made.objective
+
+    @property
     def answer(self) -> tuple[str, ...]:
         """How accurate the calibration will be and how many poses it needs, in words."""
+        return (*self._there, *self._everywhere)
+
+    @property
+    def _there(self) -> tuple[str, ...]:
+        """How accurate the robot will be where it shall be, in words."""
+        from truearm.reporting.numbers import significant
+
+        there = self.made.prediction.there
+        if there is None:
+            return ()
+        mean, most = (significant(1e3 * value, 3) for value in (there.error.mean(), there.error.max()))
+        told = f"The model itself will be off by {mean} mm on average {self.accurate_at}, at most by {most} mm."
+        if there.by_o1 is None:
+            return (told,)
+        return (
+            told,
+            f"As many configurations chosen by O1 would leave {significant(1e3 * there.by_o1.mean(), 3)} mm there.",
+        )
+
+    @property
+    def _everywhere(self) -> tuple[str, ...]:
         from truearm.reporting.numbers import significant
 
         prediction = self.made.prediction
@@ -90,6 +120,7 @@ class Plan(Record):
                 "floor_mm": prediction.floor * 1e3,
                 "planned_mm": prediction.planned * 1e3,
                 "enough": prediction.sufficient_number,
+                **({} if prediction.there is None else {"there": self._there_summary(prediction.there)}),
                 "by_number": [
                     {"poses": int(n), "chosen_mm": c * 1e3, "random_mm": r * 1e3}
                     for n, c, r in zip(
@@ -99,10 +130,19 @@ class Plan(Record):
             },
         }
 
+    def _there_summary(self, there: There) -> dict[str, Any]:
+        return {
+            "accurate_at": self.accurate_at,
+            "places": len(there.error),
+            "mean_mm": 1e3 * float(there.error.mean()),
+            "max_mm": 1e3 * float(there.error.max()),
+            "by_O1_mean_mm": None if there.by_o1 is None else 1e3 * float(there.by_o1.mean()),
+        }
+
     def lines(self) -> list[str]:
         """Return what was chosen, what constraints cost, and how accurate the calibration will be."""
         made = self.made
-        text = [f"{len(made.joints)} of {made.usable} usable configurations, chosen by {made.objective}."]
+        text = [f"{len(made.joints)} of {made.usable} usable configurations, chosen by {self.chosen_by}."]
         text += [f"  {name}: broken by {lost} of {made.candidates}" for name, lost in made.rejected.items() if lost]
         text.append("  " + "  ".join(f"{name} {value:.4g}" for name, value in made.indices.items()))
         for name, place in made.fixtures.items():

@@ -338,6 +338,7 @@ class ProgramCorrection(Record):
             "history": list(self.robot.history),
             "proof": None if self.robot.proof is None else self.robot.proof.summary(),
             "payload_kg": self._masses(),
+            **({"wrenches": self._wrenches()} if self.result.pushed else {}),
             "controller": controller_summary(self.robot.controller.kinematics),
             "tools": frames.tools,
             "frames": frames.frames,
@@ -359,6 +360,11 @@ class ProgramCorrection(Record):
         """Return what the robot carries [kg], by the tool where the programs say it."""
         own = self.robot.payload.mass
         return {tool: own if load is None else load.mass for tool, load in self.result.loads.items()} or own
+
+    def _wrenches(self) -> list[dict[str, Any]]:
+        """Return what acts on the tool at some targets [N, N m], each once."""
+        acting = dict.fromkeys(arm.wrench for arm, _ in self.result.pushed if arm.wrench is not None)
+        return [{"force_n": [*w.force], "moment_nm": [*w.moment], "frame": w.frame} for w in acting]
 
     def as_written(self) -> tuple[Program, ...]:
         """Return the programs as they are read again from their new texts."""

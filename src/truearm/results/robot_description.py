@@ -66,6 +66,7 @@ class RobotDescription(Record):
                 "mass_kg": robot.payload.mass,
                 "cog_mm": [written(v, "mm") for v in robot.payload.cog],
             },
+            "rated_load_kg": robot.rated_load,
             "gravity": list(robot.gravity),
             "controller": controller_entry(robot.controller, robot.joints),
             "tools": list(robot.tools),
@@ -93,6 +94,8 @@ class RobotDescription(Record):
         if payload["mass_kg"]:
             x, y, z = payload["cog_mm"]
             text.append(f"Payload: {payload['mass_kg']:g} kg at x {x:g}  y {y:g}  z {z:g} mm of the flange")
+        if robot.rated_load is not None:
+            text.append(f"Rated load: {robot.rated_load:g} kg")
         if robot.gravity != GRAVITY:
             text.append("Free fall: {:g}, {:g}, {:g} m/s^2 in the base frame".format(*robot.gravity))
         if content["controller"]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Final, TypedDict, Unpack
 
@@ -22,6 +22,7 @@ from truearm.modeling.robot import Robot
 from truearm.simulation.twin_body import (
     Link,
     forces_of,
+    forces_on_tool,
     moved,
     product,
     second_moments,
@@ -81,12 +82,15 @@ class Posture:
     deflection
         What each joint leans about x and y and turns about, or slides along, z beyond its joint position ``(joints,
         3)``.
+    wrench
+        External force [N] and moment about the flange's origin [N m] on the flange, in base axes, ``(6,)``.
     """
 
     links: Array
     targets: Mapping[str, Array]
     loads: Array
     deflection: Array
+    wrench: Array
 
 
 @dataclass(frozen=True)
@@ -211,7 +215,10 @@ class Twin:
             frames.append(T[0])
             weights.append(weight(link.body, T, gravity))
         flange = T @ self._flange
-        carried = weight(self._payload, flange, gravity) + forces_of(wrench, flange[0, :3, 3])
+        pushed = forces_of(wrench, flange[0, :3, 3])
+        if self.robot.wrench is not None:
+            pushed = pushed + forces_on_tool(self.robot.wrench, flange[0], self._wrench_axes)
+        carried = weight(self._payload, flange, gravity) + pushed
         loads = []
         for axis, of_link in zip(reversed(axes), reversed(weights), strict=True):
             carried = carried + of_link
@@ -222,6 +229,7 @@ class Twin:
             targets={name: world @ place for name, place in self._targets.items()},
             loads=np.stack(loads[::-1]),
             deflection=deflection,
+            wrench=wrench_at(pushed, np.block([[np.eye(3), flange[0, :3, 3:]], [np.zeros((1, 3)), np.eye(1)]])),
         )
 
     def _links(self, warmer: float, cold: float) -> tuple[Link, ...]:
@@ -249,6 +257,14 @@ class Twin:
     @cached_property
     def _flange(self) -> Array:
         return product(self.robot.flange_elements, self.robot.values)
+
+    @cached_property
+    def _wrench_axes(self) -> Array:
+        """Axes in the base that a wrench is given in that does not turn with the tool, ``(3, 3)``."""
+        if self.robot.wrench is not None and self.robot.wrench.frame == "world":
+            return np.asarray(self._base[:3, :3].T)
+        controller = self.robot.wrench is not None and self.robot.wrench.frame == "controller"
+        return self.robot.controller.base.matrix[:3, :3] if controller else np.eye(3)
 
     @cached_property
     def _payload(self) -> Array:
@@ -310,6 +326,13 @@ def measure(
         temperature=conditions.get("temperature"),
         wrench=conditions.get("wrench"),
     )
+
+
+def with_wrench_read(twin: Twin, data: Dataset) -> Dataset:
+    """Return readings of a twin with what acted on its flange at each configuration, as a force sensor there says."""
+    given = {"approach": data.approach, "number": data.number, "temperature": data.temperature}
+    conditions: Conditions = {name: values for name, values in given.items() if values is not None}  # type: ignore[assignment]
+    return replace(data, wrench=np.array([at.wrench for at in twin.postures(data.joints, **conditions)]))
 
 
 def _shaped(what: str, values: Array, shape: tuple[int, ...]) -> Array:

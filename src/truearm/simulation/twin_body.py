@@ -19,6 +19,7 @@ import numpy as np
 
 from truearm.modeling.chain import Array, Element
 from truearm.modeling.parts import LinkMass
+from truearm.modeling.wrench import Wrench
 
 #: A frame with its first and second derivative by time, (3, 4, 4); of an arm at rest the frame alone, (1, 4, 4).
 Moving = Array
@@ -148,6 +149,29 @@ def forces_of(wrench: Array, point: Array) -> Array:
     carried = np.zeros((4, 4))
     carried[3, :3] = force
     carried[:3, :3] = np.outer(point, force) + np.array([[0, z, -y], [-z, 0, x], [y, -x, 0]])
+    return carried
+
+
+def forces_on_tool(wrench: Wrench, flange: Array, turned: Array) -> Array:
+    """Return the sum of ``p f^T`` of what acts on a tool ``(4, 4)``.
+
+    A force at a point is ``x f^T`` of that point; a moment is half a couple ``d f^T - f d^T`` of unit arms d across it.
+
+    Parameters
+    ----------
+    flange
+        Frame of the flange ``(4, 4)``.
+    turned
+        Axes that force and moment are given in, ``(3, 3)``; for those of the tool they are turned with it.
+    """
+    place = flange @ wrench.tool.matrix
+    axes = place[:3, :3] if wrench.frame == "tool" else turned
+    carried = np.outer(place[:, 3], [*(axes @ np.array(wrench.force)), 0.0])
+    for along, size in zip(axes.T, wrench.moment, strict=True):
+        d = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
+        d = d / np.linalg.norm(d)
+        f = size * np.cross(along, d)
+        carried[:3, :3] += (np.outer(d, f) - np.outer(f, d)) / 2
     return carried
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
@@ -21,9 +21,9 @@ from truearm.modeling.parts import NO_PAYLOAD, Payload
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
 from truearm.planning.choosing.exchange import FIRST, most_informative, most_informative_number
-from truearm.planning.choosing.observability import INDICES, observability
+from truearm.planning.choosing.observability import INDICES, OfPredictions, observability
 from truearm.planning.choosing.ordering import short_order
-from truearm.planning.choosing.prediction import Prediction, predict
+from truearm.planning.choosing.prediction import Prediction, There, model_error, predict
 from truearm.planning.choosing.sensitivity import sensitivity, sensitivity_of_readings
 from truearm.planning.constraints.constraints import Constraints, allowed
 from truearm.simulation.devices import Device, in_view_of
@@ -45,7 +45,7 @@ class MeasurementPlan:
     model
         What will be identified.
     objective
-        ``O1`` to ``O5``.
+        ``O1`` to ``O5``, or ``error``.
     labels
         Name of each configuration.
     chosen
@@ -153,6 +153,7 @@ def plan_measurements(
     poses: int | None,
     rng: np.random.Generator,
     objective: str = "O1",
+    accurate_at: Postures | None = None,
     noise: float = 1e-4,
     labels: tuple[str, ...] | None = None,
     constraints: Constraints | None = None,
@@ -175,7 +176,9 @@ def plan_measurements(
     rng
         For the prediction.
     objective
-        ``O1`` to ``O5``.
+        ``O1`` to ``O5``; ``error`` for the mean square error where the robot shall be accurate.
+    accurate_at
+        Where that is; None for everywhere.
     noise
         Standard deviation of a coordinate about a well identified model [m].
     labels
@@ -194,21 +197,7 @@ def plan_measurements(
         If the objective is not known or does not decide on a number, too few candidates keep the constraints, or
         there are fewer rows than parameters.
     """
-    if objective not in INDICES:
-        raise InputError(
-            "there is no objective of this name",
-            parameter="objective",
-            came=objective,
-            allowed=", ".join(INDICES),
-            cure=did_you_mean(objective, INDICES),
-        )
-    if poses is None and objective != "O1":
-        raise InputError(
-            "only O1 can choose the number of poses",
-            parameter="poses",
-            came=f"auto, and the objective {objective}",
-            cure="Name a number of poses, or use `objective=O1`.",
-        )
+    _check_objective(objective, poses, accurate_at)
     seen = model.prepared(robot)
     kept = allowed(seen, candidates, constraints, where, seen_from_the_origin=seen_from_the_origin)
     rejected = {name: int(np.sum(~keeps)) for name, keeps in kept.items()}
@@ -245,18 +234,24 @@ def plan_measurements(
             came=poses,
             allowed=f"{-(-needed // rows.shape[1])} or more for the model {model.name}, or auto",
         )
+    wanted = None if accurate_at is None else sensitivity(seen, accurate_at, free, noise, gauge)
+    goal = INDICES["O1"] if wanted is None else OfPredictions.of(wanted.rows[..., among])
+    goal = INDICES.get(objective, goal)
     started = time.process_time()
-    found = (
-        most_informative_number(rows, known)
-        if poses is None
-        else most_informative(rows, poses, known, INDICES[objective])
-    )
+    found = most_informative_number(rows, known) if poses is None else most_informative(rows, poses, known, goal)
     seconds = time.process_time() - started
     order = np.array(found, dtype=np.intp)
     order = order[short_order(candidates.joints[usable[order]])]
     chosen = usable[order]
     joints = candidates.joints[chosen]
     chosen_rows = rows[order].reshape(-1, len(among))
+    there = None
+    if wanted is not None and accurate_at is not None:
+        alike = None
+        if objective != "O1":
+            by_o1 = np.array(most_informative(rows, len(order), known, INDICES["O1"]), dtype=np.intp)
+            alike = model_error(derivatives, by_o1, wanted, noise)
+        there = There(seen.world_poses(accurate_at)[0], model_error(derivatives, order, wanted, noise), alike)
     at_fixtures = {}
     for fixture in seen.fixtures if readings is not None else ():
         place = seen.fixture_kinematics(fixture.name).position[:, 0]
@@ -277,8 +272,38 @@ def plan_measurements(
         usable=len(usable),
         left_out=tuple(name for k, name in enumerate(derivatives.free.names) if k not in among),
         seconds=seconds,
-        prediction=predict(seen, derivatives, order, predicted, elsewhere.joints, noise, rng),
+        prediction=replace(predict(seen, derivatives, order, predicted, elsewhere.joints, noise, rng), there=there),
     )
+
+
+#: What is made small where the robot shall be accurate.
+ERROR: Final = "error"
+
+
+def _check_objective(objective: str, poses: int | None, accurate_at: Postures | None) -> None:
+    known = (*INDICES, ERROR)
+    if objective not in known:
+        raise InputError(
+            "there is no objective of this name",
+            parameter="objective",
+            came=objective,
+            allowed=", ".join(known),
+            cure=did_you_mean(objective, known),
+        )
+    if objective == ERROR and accurate_at is None:
+        raise InputError(
+            "nothing was said of where the error shall be small",
+            parameter="objective",
+            came=objective,
+            cure="Give `accurate_at` or `region`, or another objective.",
+        )
+    if poses is None and objective != "O1":
+        raise InputError(
+            "only O1 can choose the number of poses",
+            parameter="poses",
+            came=f"auto, and the objective {objective}",
+            cure="Name a number of poses, or use `objective=O1`.",
+        )
 
 
 def _in_words(readings: Dataset) -> tuple[str, ...]:

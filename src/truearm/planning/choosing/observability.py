@@ -162,6 +162,39 @@ class OfInterest(Objective):
         return np.asarray(inverse)
 
 
+@dataclass(frozen=True, eq=False)
+class OfPredictions(Objective):
+    """The inverse of the root mean square error of predictions, about all that are of interest.
+
+    That is the trace of the covariance times the mean information of the predictions (I- or V-optimality: Atkinson,
+    Donev and Tobias 2007, "Optimum experimental designs, with SAS", section 10.6).
+
+    Attributes
+    ----------
+    weight
+        Mean of D' D over the predictions, D their derivatives by the parameters, ``(m, m)``.
+    """
+
+    weight: Array
+
+    @classmethod
+    def of(cls, rows: Array) -> OfPredictions:
+        """Return the objective for predictions with derivatives ``(predictions, rows, m)``."""
+        flat = rows.reshape(-1, rows.shape[2])
+        return cls(flat.T @ flat / len(flat))
+
+    def value(self, information: Array) -> Array:
+        """Return the logarithm of the inverse error."""
+        covariance = np.linalg.inv(information)
+        return np.asarray(-0.5 * np.log(np.maximum(np.sum(covariance * self.weight, axis=(-2, -1)), _SMALLEST)))
+
+    def slope(self, information: Array) -> Array:
+        """Return the derivative."""
+        covariance = np.linalg.inv(information)
+        mean = np.maximum(np.sum(covariance * self.weight, axis=(-2, -1)), _SMALLEST)
+        return np.asarray(0.5 * covariance @ self.weight @ covariance / mean[..., None, None])
+
+
 def observability(information: Array, configurations: int) -> dict[str, float]:
     """Return the indices O1 to O5 of an information matrix ``(m, m)`` gathered at so many configurations."""
     found = {name: float(np.exp(index.value(information))) for name, index in INDICES.items()}

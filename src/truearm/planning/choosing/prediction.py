@@ -35,6 +35,25 @@ _MEAN_LENGTH: Final = math.sqrt(8.0 / math.pi)
 
 
 @dataclass(frozen=True, eq=False)
+class There:
+    """How far the model will be off where the robot is wanted to be accurate [m], without the noise of a reading.
+
+    Attributes
+    ----------
+    places
+        Where the flange is, in the world, ``(k, 3)``.
+    error
+        Mean error of the targets there after the plan, ``(k,)``.
+    by_o1
+        The same after as many configurations that O1 chooses; None where the plan is O1's.
+    """
+
+    places: Array
+    error: Array
+    by_o1: Array | None
+
+
+@dataclass(frozen=True, eq=False)
 class Prediction:
     """Mean errors of positions that were not measured [m].
 
@@ -52,6 +71,8 @@ class Prediction:
         Where the flange is at random configurations, in the world, ``(k, 3)``.
     error
         Mean error of the targets there, of the model alone, without the noise of a reading, ``(k,)``.
+    there
+        The same where the robot is wanted to be accurate; None if nothing was said of that.
     """
 
     floor: float
@@ -61,12 +82,40 @@ class Prediction:
     random: Array
     places: Array
     error: Array
+    there: There | None = None
 
     @property
     def sufficient_number(self) -> int | None:
         """The smallest of the numbers with an error at most 10 % above the floor; None if all are too small."""
         near = self.numbers[self.chosen <= NEAR * self.floor]
         return int(near[0]) if len(near) else None
+
+
+def variances(candidates: Sensitivity, measured: NDArray[np.intp], elsewhere: Sensitivity) -> Array:
+    """Return the mean variance of a coordinate at each configuration elsewhere, in variances of the noise, ``(k,)``.
+
+    Parameters
+    ----------
+    candidates
+        What could be measured.
+    measured
+        Which of them are.
+    elsewhere
+        Where the model is judged, of the same parameters.
+    """
+    known = candidates.known
+    rows = candidates.rows[measured]
+    together = rows.reshape(len(rows), -1, 3, len(known)).sum(axis=1).reshape(-1, len(known))
+    rows = rows.reshape(-1, len(known))
+    information = rows.T @ rows
+    spread = (1.0 - _COMMON_SHARE) * information + _COMMON_SHARE * (together.T @ together) + known
+    moved = elsewhere.rows @ np.linalg.solve(known + information, np.linalg.cholesky(spread))
+    return np.asarray(np.mean(np.sum(moved**2, axis=2), axis=1))
+
+
+def model_error(candidates: Sensitivity, measured: NDArray[np.intp], elsewhere: Sensitivity, noise: float) -> Array:
+    """Return the mean error of a position at each configuration elsewhere [m], of the model alone, ``(k,)``."""
+    return np.asarray(_MEAN_LENGTH * noise * np.sqrt(variances(candidates, measured, elsewhere)))
 
 
 def predict(
@@ -93,18 +142,8 @@ def predict(
     """
     known = candidates.known
 
-    def variances(measured: NDArray[np.intp]) -> Array:
-        """Return the mean variance of a coordinate at each configuration elsewhere, in variances of the noise."""
-        rows = candidates.rows[measured]
-        together = rows.reshape(len(rows), -1, 3, len(known)).sum(axis=1).reshape(-1, len(known))
-        rows = rows.reshape(-1, len(known))
-        information = rows.T @ rows
-        spread = (1.0 - _COMMON_SHARE) * information + _COMMON_SHARE * (together.T @ together) + known
-        moved = elsewhere.rows @ np.linalg.solve(known + information, np.linalg.cholesky(spread))
-        return np.asarray(np.mean(np.sum(moved**2, axis=2), axis=1))
-
     def mean_error(measured: NDArray[np.intp]) -> float:
-        return float(_MEAN_LENGTH * noise * np.mean(np.sqrt(1.0 + variances(measured))))
+        return float(_MEAN_LENGTH * noise * np.mean(np.sqrt(1.0 + variances(candidates, measured, elsewhere))))
 
     count = len(candidates.rows)
     pool = rng.permutation(count)[:_POOL]
@@ -122,5 +161,5 @@ def predict(
         chosen=np.array(by_choice),
         random=np.array(by_chance),
         places=robot.world_poses(q)[0],
-        error=_MEAN_LENGTH * noise * np.sqrt(variances(chosen)),
+        error=model_error(candidates, chosen, elsewhere, noise),
     )

@@ -90,6 +90,7 @@ def _robot(content: RobotFile, where: str) -> Robot:
         payload=NO_PAYLOAD
         if content.payload is None
         else Payload(si(content.payload.mass, "1", "payload.mass"), metres(content.payload.cog, "payload.cog")),
+        rated_load=None if content.rated_load is None else si(content.rated_load, "1", "rated_load"),
         gravity=content.gravity,
         base_quaternion=content.base_quaternion,
         targets=tuple(Target(t.name, t.quaternion) for t in content.targets),
@@ -204,8 +205,9 @@ def _proof(robot: Robot, entry: ProofEntry, shown: Mapping[str, str], where: str
     cure = "Leave the entry proof as calibration wrote it, or take it out: the robot is then unproven."
     joints = [shown["rad" if joint.kind == "revolute" else "m"] for joint in robot.joints]
     measured = bool(entry.region or entry.joint_error or entry.deviations)
-    for name, rows in (("region", entry.region), ("joint_error", entry.joint_error)):
-        if measured and len(rows) != len(joints):
+    for name, rows in (("region", entry.region), ("joint_error", entry.joint_error), ("loads", entry.loads)):
+        left_out = name == "loads" and not rows  # by older versions
+        if measured and not left_out and len(rows) != len(joints):
             raise InputError(
                 "one entry belongs here for each joint",
                 where=f"{where}, proof.{name}",
@@ -238,6 +240,7 @@ def _proof(robot: Robot, entry: ProofEntry, shown: Mapping[str, str], where: str
         lower_bound=entry.lower_bound,
         warnings=tuple(Notice(warning.code, warning.message, "note") for warning in entry.warnings),
         digest=entry.sha256,
+        loads=tuple(entry.loads),
     )
 
 

@@ -169,6 +169,7 @@ class ProofEntry(_Entry):
     lower_bound: Annotated[bool, Field(strict=True)] = False
     region: list[tuple[Number, Number]] = []
     joint_error: list[NotNegative] = []
+    loads: list[tuple[Number, Number]] = []
     deviations: dict[str, NotNegative] = {}
     correlations: list[Annotated[str, StringConstraints(strict=True)]] = []
     sha256: Annotated[str, StringConstraints(strict=True, pattern="^[0-9a-f]{64}$")]
@@ -202,6 +203,7 @@ class RobotFile(_Entry):
     controller: ControllerEntry = ControllerEntry()
     masses: list[MassEntry] = []
     payload: PayloadEntry | None = None
+    rated_load: Positive | None = None
     gravity: Annotated[Triple, AfterValidator(_falls)] = GRAVITY
     tools: dict[Name, ToolEntry] = {}
     truths: dict[Name, TruthEntry] = {}

@@ -16,11 +16,19 @@ from truearm.modeling.parts import GRAVITY, NO_PAYLOAD, Joint
 from truearm.modeling.proof import Proof
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
+from truearm.modeling.wrench import refuse_pushed
 from truearm.units import SHOWN_AS, written
 
 
 def robot_text(robot: Robot) -> str:
-    """Return the robot as the text of a robot file, in mm and degrees."""
+    """Return the robot as the text of a robot file, in mm and degrees.
+
+    Raises
+    ------
+    InputError
+        If something acts on its tool, which a robot file does not hold.
+    """
+    refuse_pushed(robot)
     from ruamel.yaml import YAML
 
     yaml = YAML()
@@ -98,6 +106,8 @@ def file_content(robot: Robot) -> dict[str, Any]:
         ]
     if robot.payload != NO_PAYLOAD:
         content["payload"] = flow({"mass": robot.payload.mass, "cog": mm(robot.payload.cog)})
+    if robot.rated_load is not None:
+        content["rated_load"] = robot.rated_load
     if robot.gravity != GRAVITY:
         content["gravity"] = listed(list(robot.gravity))
     if robot.tools:
@@ -179,6 +189,8 @@ def _proof(
         units = ["deg" if joint.kind == "revolute" else "mm" for joint in robot.joints]
         made["region"] = [listed([written(v, u) for v in one]) for one, u in zip(proof.region, units, strict=True)]
         made["joint_error"] = listed([written(v, u) for v, u in zip(proof.joint_error, units, strict=True)])
+        if proof.loads:
+            made["loads"] = [listed([*one]) for one in proof.loads]
         made["deviations"] = flow(
             {
                 text(name): written(deviation, SHOWN_AS[robot.parameters[name].unit])

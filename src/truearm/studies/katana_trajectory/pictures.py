@@ -40,7 +40,8 @@ def robot_picture(first: Outcome) -> Picture:
             ("arm", arm, AFTER, "lines+markers", 7),
         )
     ]
-    scene = {f"{letter}axis": scene_axis(f"{letter} [mm]") for letter in "xyz"} | {"aspectmode": "data"}
+    scene: Figure = {f"{letter}axis": scene_axis(f"{letter} [mm]") for letter in "xyz"}
+    scene |= {"aspectmode": "data", "camera": {"eye": {"x": 1.9, "y": 2.3, "z": 1.3}, "center": {"z": -0.2}}}
     return Picture(
         "robot",
         "The arm at the beginning of the circle, as in Figure 5.6",

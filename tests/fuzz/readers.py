@@ -21,9 +21,12 @@ from truearm.measurement.hexapod.sheet import read_sheet
 from truearm.measurement.hexapod.touches import read_touches
 from truearm.measurement.readers.canonical import csv_text, read_csv
 from truearm.measurement.readers.drawn_circles import Page, read_drawn_circles
+from truearm.measurement.readers.hand_eye import read_hand_eye
+from truearm.measurement.readers.inclinations import inclinations_text, read_inclinations
 from truearm.measurement.readers.matrices import read_matrices
 from truearm.measurement.readers.poses import read_poses
 from truearm.measurement.readers.robodk import read_robodk
+from truearm.measurement.readers.sockets import Apart, read_sockets
 from truearm.measurement.readers.table import read_table
 from truearm.modeling.formats.dh_csv import complete_dh_csv, read_dh_csv
 from truearm.modeling.formats.robot_file import robot_text
@@ -117,6 +120,15 @@ def _programs(language: str, *names: str) -> Reader:
     return Reader({Path(name).name: f"{language}/{name}" for name in names}, read)
 
 
+def _inclinations(folder: Path) -> None:
+    """Check that angles are angles, and that what is written is read again."""
+    read = read_inclinations(folder / "inclinations.csv")
+    assert not np.abs(read.angle[np.isfinite(read.angle)]).max(initial=0.0) > np.pi / 2, "an angle is none"
+    text = inclinations_text(read)
+    (folder / "again.csv").write_text(text, encoding="utf-8", newline="")
+    assert inclinations_text(read_inclinations(folder / "again.csv")) == text, "what was written is not what is read"
+
+
 def _record(folder: Path) -> None:
     read_programs(restored([folder / "done.mod"]))
 
@@ -128,6 +140,7 @@ READERS: Final[Mapping[str, Reader]] = {
     "table": _table("table.csv", "mapping.yaml"),
     "spatial": _table("points.csv", "spatial.yaml", joints="joints"),
     "matrices": Reader({"joints.txt": "joints.txt", "points.txt": "points.txt"}, _matrices),
+    "inclinations": Reader({"inclinations.csv": "inclinations.csv"}, _inclinations),
     "robodk": Reader(
         {"robodk.csv": "robodk.csv"},
         lambda folder: _dataset(read_robodk(folder / "robodk.csv", "deg", "model").data, folder),
@@ -138,6 +151,14 @@ READERS: Final[Mapping[str, Reader]] = {
         lambda folder: _dataset(
             read_drawn_circles({"a": Page(folder / "page.png", folder / "page.csv")}, 300.0, 2e-5), folder
         ),
+    ),
+    "sockets": Reader(
+        {"sockets.csv": "sockets.csv"},
+        lambda folder: _dataset(read_sockets(folder / "sockets.csv", Apart(0.2, 2e-5), 0.025, None), folder),
+    ),
+    "hand-eye": Reader(
+        {"views.csv": "views.csv"},
+        lambda folder: _dataset(read_hand_eye(folder / "views.csv", "camera", None).data, folder),
     ),
     "hexapod-sheet": Reader(
         {"sheet.csv": "sheet.csv"}, lambda folder: _dataset(read_sheet(folder / "sheet.csv").dataset(), folder)

@@ -56,7 +56,10 @@ def folder() -> Path:
         "import_matrices",
         "import_robodk",
         "import_circle",
+        "import_sockets",
+        "import_hand_eye",
         "tolerance",
+        "tilting",
         "compensate",
         "revert",
     ):

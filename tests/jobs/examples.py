@@ -90,6 +90,27 @@ def _circle(folder: Path) -> Arguments:
     return {"scans": {"a": drawn(folder / "page.png")}, "points": {"a": points}, "dpi": 300.0, "sigma": 2e-5}
 
 
+def _sockets(folder: Path) -> Arguments:
+    rows = "configuration,joint_1 [deg],joint_2 [deg],socket\n1,10,20,left\n2,12,22,right\n3,15,25,left\n"
+    return {"file": _written(folder / "sockets.csv", rows), "apart": "200mm,0.02mm", "ball": "25mm", "sigma": 2e-5}
+
+
+def _views(folder: Path) -> Arguments:
+    header = "configuration,joint_1 [deg],joint_2 [deg],x [mm],y [mm],z [mm],qw,qx,qy,qz,sigma [mm],sigma_rot [mrad]"
+    rows = "1,10,20,5,-3,400,1,0,0,0,0.05,0.2\n2,12,22,4,8,450,0.6,0.8,0,0,0.05,0.2\n"
+    return {"file": _written(folder / "views.csv", f"{header}\n{rows}"), "on_flange": "camera"}
+
+
+def _inclinations(folder: Path) -> Path:
+    """What inclinometers on a Katana read in eight pairs of configurations."""
+    import truearm
+
+    path = folder / "inclinations.csv"
+    if not path.exists():
+        truearm.simulate_inclinometers("katana450", truth="tilting", poses=16, out=path)
+    return path
+
+
 def _axis_runs(folder: Path) -> Path:
     """Runs in which one joint of a KR5 with joint errors moves at a time, in its own frame."""
     path = folder / "axes.csv"
@@ -175,6 +196,7 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "payload": "1kg,0mm,0mm,50mm",
         "gravity": (0.0, 0.0, -9.81),
     },
+    "tilting": lambda folder: {"robot": "katana450", "inclinations": _inclinations(folder)},
     "validate": lambda folder: {
         "robot": _calibrated(folder),
         "data": _data(folder),
@@ -193,6 +215,8 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
     },
     "export_robodk": lambda folder: {"robot": _calibrated(folder), "data": _data(folder), "out": _new(folder, "r.csv")},
     "import_circle": _circle,
+    "import_sockets": _sockets,
+    "import_hand_eye": _views,
     "import_ur_kinematics": lambda folder: {
         "file": _written(folder / "calibration.conf", UR10_CONF),
         "robot": "ur10",
@@ -207,6 +231,8 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "seed": 1,
         "region": ((0.3, 0.5), (-0.1, 0.1), (0.2, 0.4)),
     },
+    "plan_inclinometers": lambda _: {"robot": "katana450", "poses": 8, "candidates": 100, "seed": 1},
+    "simulate_inclinometers": lambda _: {"robot": "katana450", "truth": "tilting", "poses": 8},
     "simulate": lambda _: {
         "robot": "irb120",
         "truth": "random",
@@ -230,6 +256,15 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "truth": "axis-tests",
         "noise": 1e-5,
         "repeats": 2,
+    },
+    "influence": lambda folder: {
+        "robot": "irb120",
+        "data": _data(folder),
+        "model": "offsets",
+        "train": 14,
+        "target": "2",
+        "frames": "placed",
+        "combination": "mean",
     },
     "hexapod_enumerate": lambda _: {},
     "hexapod_uncertainty": lambda _: {"trials": 100, "seed": 1},

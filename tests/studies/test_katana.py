@@ -76,7 +76,7 @@ def test_twin_and_model_tilt_alike() -> None:
     model = with_tilting(katana(), TILTING)
     true = true_poses(twin(katana()), q)[0]
     left = np.linalg.norm(model.world_poses(q, TIP)[0] - true, axis=1)
-    assert np.quantile(left, 0.25) < 1e-9  # elsewhere some moment is near zero, where the twin's backlash jumps
+    assert np.quantile(left, 0.1) < 1e-9  # elsewhere some moment is near zero, where the twin's backlash jumps
     assert np.median(np.linalg.norm(katana().world_poses(q, TIP)[0] - true, axis=1)) > 1e-4
 
 

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from truearm.cli.inclinometers import INCLINOMETERS, Pull, refuse_beside, refuse_pull
 from truearm.cli.loading import GravityText, PayloadText, WrenchAtText, WrenchFrameText, WrenchText, read_gravity
 
 
@@ -30,13 +31,14 @@ def simulate(
         str | None,
         typer.Option(
             metavar="NAME",
-            help="An instrument of 'truearm devices'.",
+            help="An instrument of 'truearm devices', or inclinometers.",
             show_default="one that sees every target everywhere",
         ),
     ] = None,
     seed: Annotated[int, typer.Option(metavar="S", min=0, help="Of configurations, noise and a random truth.")] = 0,
     payload: PayloadText = None,
     gravity: GravityText = None,
+    pull: Pull = None,
     wrench: WrenchText = None,
     wrench_frame: WrenchFrameText = None,
     wrench_at: WrenchAtText = None,
@@ -50,9 +52,30 @@ def simulate(
 ) -> None:
     """Measure a digital twin whose truth is known, with a simulated instrument."""
     from truearm.cli.output import print_record, progress
-    from truearm.jobs.simulate import simulate as run
     from truearm.units import sized_si
 
+    if device == INCLINOMETERS:
+        from truearm.jobs.simulate_inclinometers import simulate_inclinometers
+
+        refuse_beside({"noise": noise, "wrench": wrench, "wrench_frame": wrench_frame, "wrench_at": wrench_at})
+        with progress() as say:
+            read = simulate_inclinometers(
+                robot,
+                truth=truth,
+                poses=poses,
+                out=out,
+                pull=20.0 if pull is None else pull,
+                seed=seed,
+                payload=payload,
+                gravity=read_gravity(gravity),
+                joints=joints,  # type: ignore[arg-type]
+                progress=say,
+            )
+        print_record(read)
+        return
+    from truearm.jobs.simulate import simulate as run
+
+    refuse_pull(pull)
     with progress() as say:
         simulated = run(
             robot,

@@ -13,6 +13,7 @@ import numpy as np
 from truearm.errors import InputError, refusals_of
 from truearm.files import path_argument, read_bytes
 from truearm.identification.base_changes import with_one_base
+from truearm.identification.choosing.balancer_loads import refuse_balancers_that_are_not_there, without_unseen_balancers
 from truearm.identification.choosing.selection import AUTO, select
 from truearm.identification.judging.judgement import judge
 from truearm.identification.solving.bounds import Bounds, read_bounds
@@ -181,6 +182,7 @@ def calibrate(
     nominal_robot = robot_argument(robot).with_payload(payload, fall)
     if effects and named is not None:
         with refusals_of("effects"):
+            refuse_balancers_that_are_not_there(nominal_robot, effects)
             asked = named.also(effects)
             asked.free(asked.prepared(nominal_robot))
     progress("reading the data")
@@ -232,6 +234,7 @@ def calibrate(
                 progress=progress,
             )
         chosen: Model = selection.model if named is None and selection is not None else named.also(effects)  # type: ignore[union-attr]
+        chosen, held_effects = without_unseen_balancers(chosen, first)
         progress("placing the nominal robot")
         placed = place(nominal_robot, first, loss)
         progress(f"identifying the {chosen.name} model on {count} configurations")
@@ -248,13 +251,15 @@ def calibrate(
         *check_copies(readings, training, held_out),
         *check_trained_before(nominal_robot, as_read, sha256, (count, n, seed), without_words(without)),
         *moved,
+        *held_effects,
     )
     judged = judge(
         fit, readings, first, validation or train_errors, noticed, of_split, loss, held_out=second is not None
     )
     digest = f" ({'' if sha256 is None else f'sha256 {sha256[:12]}, '}readings {readings_digest(as_read)[:12]})"
+    freed = " + ".join([chosen.name, *(name for name in effects if name in chosen.effects)])
     history = (
-        f"calibrated by truearm {__version__}: model {' + '.join([chosen.name, *effects])},"
+        f"calibrated by truearm {__version__}: model {freed},"
         f" {count} of {n} configurations of {Path(readings.source).name}{digest}, seed {seed}, loss {loss},"
         f"{without_words(without)}"
         f" redundancy {redundancy}{f', another base from {listed(base_changes)} on' if base_changes else ''}"

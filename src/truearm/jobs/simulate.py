@@ -77,7 +77,8 @@ def simulate(
     noise
         Standard deviation of a reading [m], 0 for none; None for the deviation of the device.
     device
-        Name of the instrument, of ``truearm.devices()``; None for one that sees every target everywhere.
+        Name of the instrument, of ``truearm.devices()``; None for one that sees every target everywhere. For
+        inclinometers there is :func:`truearm.simulate_inclinometers`.
     seed
         Of configurations, noise and a random truth.
     payload, gravity

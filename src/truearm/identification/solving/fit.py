@@ -34,7 +34,7 @@ from truearm.identification.solving.solver import SMALL
 from truearm.identification.solving.variance_components import CovariancePart
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
-from truearm.modeling.parameters import FreeParameters
+from truearm.modeling.parameters import SCALE, FreeParameters
 from truearm.modeling.robot import Robot
 
 #: ``uninformed``: the data removed less than 5 % of the prior variance, so the value is still a belief.
@@ -311,6 +311,9 @@ def _fit(solved: Solved, model: Model, loss: Loss) -> Fit:
 
 def _unobservable_combinations(problem: Problem, vector: Array) -> tuple[str, ...]:
     """Return the combinations of the robot's own parameters that the readings do not observe."""
+    if SCALE in problem.free.names:
+        vector = np.delete(vector, problem.free.names.index(SCALE))
+        problem = replace(problem, free=problem.free.without([SCALE]))
     beside = {p.name for p in problem.free.parameters if p.group in ("target", "fixture")}
     own = [
         {n: c for n, c in redundancy.members.items() if n not in beside}

@@ -21,7 +21,7 @@ from truearm.identification.solving.problem import Problem
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.observations import OBSERVATIONS
 from truearm.modeling.chain import Array, ForwardKinematics
-from truearm.modeling.parameters import FreeParameters, Parameter
+from truearm.modeling.parameters import SCALE, FreeParameters, Parameter
 from truearm.modeling.robot import Robot
 
 _ORDER: Final = ("base", "fixture", "target", "", "joint zero", "geometry")  # "" is every joint effect
@@ -183,6 +183,7 @@ def unobservable_parameters(robot: Robot, data: Dataset, free: FreeParameters, s
     free
         The parameters to look at; all others are held.
     """
+    free = free.without([SCALE])  # as much as is known of it beforehand is enough
     noise = {observation.name: 1.0 for observation in OBSERVATIONS}
     plain = Problem(robot, _unit_noise(data), free, noise, priors=False)
     A = plain.linearised(free.start)[1] * free.prior

@@ -31,7 +31,7 @@ from truearm.identification.start_values.from_readings import start_from_reading
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.observations import OBSERVATIONS
 from truearm.modeling.chain import Array
-from truearm.modeling.parameters import FreeParameters
+from truearm.modeling.parameters import SCALE, FreeParameters
 from truearm.modeling.robot import Robot
 
 Redundant = Literal["prior", "drop"]
@@ -105,6 +105,8 @@ def find_parameters(
     start = start_from_readings(model.prepared(robot), data)
     check_circumstances(start, data)
     free = unanchored(model.free(start), data)
+    if redundancy == "drop":  # what is known of an instrument's scale is a prior: without any it is exact
+        free = free.without([SCALE])
     check_bounds = None
     if bounds is not None:
         tried = start.with_effects(model.tried).parameters.values()

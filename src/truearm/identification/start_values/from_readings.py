@@ -62,7 +62,7 @@ def start_from_readings(robot: Robot, data: Dataset) -> Robot:
         and fixture.
     """
     if data.fixture is None:
-        return initial_frames(robot, data)
+        return initial_frames(robot, data).with_scale(data.scale_sigma)
     kinds = _kinds(data)
     _refuse_few(data, kinds)
     placed = _placed(robot, data, kinds)
@@ -72,7 +72,7 @@ def start_from_readings(robot: Robot, data: Dataset) -> Robot:
             placed = _with_target(placed, data, target, kinds)
     placed = placed.with_fixtures(_fixture_places(placed, data, kinds))
     _refuse_alike(placed, data)
-    return placed
+    return placed.with_scale(data.scale_sigma)
 
 
 def with_fixtures_of(robot: Robot, data: Dataset) -> Robot:

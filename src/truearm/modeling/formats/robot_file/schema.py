@@ -11,6 +11,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstra
 from truearm.errors import InputError, did_you_mean
 from truearm.modeling.effects import EFFECTS
 from truearm.modeling.fixtures import FixtureKind
+from truearm.modeling.formats.balancer_entry import BalancerEntry
 from truearm.modeling.formats.controller_entry import ControllerEntry
 from truearm.modeling.formats.entries import STRICT, Name, NotNegative, Number, Place, Positive, Quaternion, Triple
 from truearm.modeling.parts import GRAVITY, POINT_MASS, Inertia
@@ -78,6 +79,7 @@ class JointEntry(BaseModel):
     type: Literal["revolute", "prismatic"] = "revolute"
     limits: tuple[Number, Number] | None = None
     transmission_periods: Annotated[int, Field(strict=True, ge=1, le=10_000)] | None = None
+    bearing: Number | None = None
 
 
 class MassEntry(_Entry):
@@ -118,6 +120,8 @@ class TruthEntry(_Entry):
     source: str
     values: dict[str, Number]
     compliance: dict[Annotated[int, Field(strict=True)], NotNegative] = {}
+    backlash: dict[Annotated[int, Field(strict=True)], NotNegative] = {}
+    clearance: dict[Annotated[int, Field(strict=True)], NotNegative] = {}
 
 
 class TargetEntry(_Entry):
@@ -202,6 +206,7 @@ class RobotFile(_Entry):
     flange: Place = Place()
     controller: ControllerEntry = ControllerEntry()
     masses: list[MassEntry] = []
+    balancers: list[BalancerEntry] = Field([], max_length=20)
     payload: PayloadEntry | None = None
     rated_load: Positive | None = None
     gravity: Annotated[Triple, AfterValidator(_falls)] = GRAVITY

@@ -52,7 +52,7 @@ def study(seeds: int, progress: Progress, count: int = POSES, unseen: int = _UNS
     return Study(
         name="katana-influence",
         title="Influence-based identification of a Katana 450",
-        source="D. A. Patel, doctoral thesis on the Katana 450, sections 3.5 to 3.7, Figure 3.8, Tables 3.2 to 3.4",
+        source="D. A. Patel, thesis on the Katana 450, sections 3.5 to 3.7, Figure 3.8, Tables 3.2 to 3.4",
         answer=f"{verdict}: on unseen poses of a geometric robot (Table 3.2) it leaves"
         f" {left('table 3.2', 'influence'):.3f} mm, minimum norm {left('table 3.2', 'minimum norm'):.3f} mm, joint"
         f" least squares {left('table 3.2', 'least squares'):.4f} mm; where joints tilt as well"

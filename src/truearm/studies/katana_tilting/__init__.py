@@ -48,8 +48,7 @@ def study(seeds: int, progress: Progress, count: int = POSES, unseen: int = _UNS
     return Study(
         name="katana-tilting",
         title="A Katana 450 whose joints tilt",
-        source="D. A. Patel, doctoral thesis on the Katana 450, chapter 4, Figure 4.8, Tables 4.3 to 4.6; geometry of"
-        " Table 3.2",
+        source="D. A. Patel, thesis on the Katana 450, chapter 4, Figure 4.8, Tables 4.3 to 4.6; geometry of Table 3.2",
         answer=f"On unseen poses the conventional calibration leaves {conventional:.3f} mm on average, and"
         f" {tilting:.3f} mm are left if clearance, backlash and stiffness are found by inclinometers first:"
         f" {share:.1f} % (asked: at most {ASKED:g} %, the document has"

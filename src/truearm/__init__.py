@@ -48,13 +48,16 @@ if TYPE_CHECKING:
     from truearm.jobs.load_data import load_data
     from truearm.jobs.load_robot import load_robot
     from truearm.jobs.new_robot import new_robot
+    from truearm.jobs.path import path
     from truearm.jobs.plan import plan
     from truearm.jobs.plan_inclinometers import plan_inclinometers
+    from truearm.jobs.poses import poses
     from truearm.jobs.revert import revert
     from truearm.jobs.robots import robots
     from truearm.jobs.show import show
     from truearm.jobs.simulate import simulate
     from truearm.jobs.simulate_inclinometers import simulate_inclinometers
+    from truearm.jobs.sphere import sphere
     from truearm.jobs.study import study
     from truearm.jobs.tilting import tilting
     from truearm.jobs.tolerance import tolerance
@@ -102,13 +105,16 @@ __all__ = [
     "load_data",
     "load_robot",
     "new_robot",
+    "path",
     "plan",
     "plan_inclinometers",
+    "poses",
     "revert",
     "robots",
     "show",
     "simulate",
     "simulate_inclinometers",
+    "sphere",
     "study",
     "tilting",
     "tolerance",

@@ -12,6 +12,7 @@ import numpy as np
 from truearm.compensation.cell import read_frames, read_tools, read_wrenches
 from truearm.compensation.program_files import program_files, read_programs, restored
 from truearm.errors import InputError
+from truearm.identification.choosing.zone_boxes import boxes_of, read_zones
 from truearm.identification.solving.bounds import read_bounds
 from truearm.jobs.import_ur_kinematics import import_ur_kinematics
 from truearm.jobs.load_robot import load_robot
@@ -32,6 +33,7 @@ from truearm.modeling.formats.dh_csv import complete_dh_csv, read_dh_csv
 from truearm.modeling.formats.robot_file import robot_text
 from truearm.modeling.robot import Robot
 from truearm.planning.constraints.constraints import read_constraints
+from truearm.planning.paths.path_file import read_path
 
 
 @dataclass(frozen=True)
@@ -178,7 +180,11 @@ READERS: Final[Mapping[str, Reader]] = {
     "dh": _dh_table("dh.csv", "standard-dh"),
     "mdh": _dh_table("mdh.csv", "modified-dh"),
     "hayati": _dh_table("hayati.csv", "hayati"),
+    "zones": Reader(
+        {"zones.yaml": "zones.yaml"}, lambda folder: boxes_of(read_zones(folder / "zones.yaml"), "zones.yaml")
+    ),
     "bounds": Reader({"bounds.yaml": "bounds.yaml"}, lambda folder: read_bounds(folder / "bounds.yaml")),
+    "path": Reader({"way.yaml": "path.yaml"}, lambda folder: read_path(folder / "way.yaml")),
     "constraints": Reader({"limits.yaml": "constraints.yaml"}, lambda folder: read_constraints(folder / "limits.yaml")),
     "tools": Reader({"cell.yaml": "cell.yaml"}, lambda folder: read_tools(of_library("irb120"), folder / "cell.yaml")),
     "frames": Reader(

@@ -63,6 +63,15 @@ def _written(path: Path, text: str) -> Path:
     return path
 
 
+#: Where a target of the IRB 120 is on the flange.
+_KNOWN = """\
+truearm: truearm-cell/1
+units: {length: mm, angle: deg}
+tools:
+  "2": {of: flange, translation: [75, 93.7, 215]}
+"""
+
+
 def _matrices(folder: Path) -> Arguments:
     joints = _written(folder / "joints.txt", "0 10 20 30 40 50\n5 10 25 30 45 50\n")
     points = _written(folder / "points.txt", "100 200 300\n0 0 0\n")
@@ -170,6 +179,34 @@ def _corrected(folder: Path) -> Path:
     return path
 
 
+#: A line, a circle and waypoints with times, over an IRB 120's table.
+PATH = """\
+truearm: truearm-path/1
+units: {length: mm, angle: deg, time: s}
+frame: nominal
+tip: [0, 0, 100]
+orientation: {quaternion: [0, 1, 0, 0]}
+speed: 200
+acceleration: 1000
+step: 0.1
+joint_speeds: [250, 250, 250, 320, 320, 420]
+start: [350, 0, 250]
+sections:
+  - line: [350, 60, 250]
+  - {circle: {centre: [350, 80, 250], normal: [0, 0, 1]}, speed: 100}
+  - {hermite: [[340, 30, 260], [350, 0, 250]], velocities: [[0, 0, 0], [0, -80, 0], [0, 0, 0]], times: [0, 0.6, 1.2]}
+"""
+
+
+def _ballbar(folder: Path) -> Path:
+    import truearm
+
+    path = folder / "ballbar.csv"
+    if not path.exists():
+        truearm.simulate("irb120", truth="random", poses=24, device="ballbar", seed=1, out=path)
+    return path
+
+
 def _new(folder: Path, name: str) -> Path:
     """Return a path that does not exist."""
     path = folder / name
@@ -192,6 +229,9 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "seed": 1,
         "loss": "linear",
         "redundancy": "prior",
+        "hold": ["2"],
+        "frames": _written(folder / "known.yaml", _KNOWN),
+        "bootstrap": 20,
         "effects": ["compliance"],
         "payload": "1kg,0mm,0mm,50mm",
         "gravity": (0.0, 0.0, -9.81),
@@ -233,6 +273,32 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
     },
     "plan_inclinometers": lambda _: {"robot": "katana450", "poses": 8, "candidates": 100, "seed": 1},
     "simulate_inclinometers": lambda _: {"robot": "katana450", "truth": "tilting", "poses": 8},
+    "poses": lambda _: {
+        "robot": "irb120",
+        "set": "diagonal",
+        "centre": (0.35, 0.0, 0.35),
+        "side": 0.2,
+        "count": 5,
+        "tip": (0.0, 0.0, 0.05),
+        "orientation": (0.0, 1.0, 0.0, 0.0),
+        "seed": 1,
+    },
+    "path": lambda folder: {
+        "robot": _calibrated(folder),
+        "file": _written(folder / "path.yaml", PATH),
+        "seed": (0.0, 0.2, 0.4, 0.0, 0.9, 0.0),
+        "programs": ["rapid", "krl"],
+        "wrench": (0.0, 5.0, 0.0, 0.0, 0.0, 0.1),
+        "wrench_frame": "base",
+        "spacing": 0.3,
+        "payload": "1kg,0mm,0mm,50mm",
+    },
+    "sphere": lambda folder: {
+        "robot": "irb120",
+        "data": _ballbar(folder),
+        "tip": (0.0, 0.0, 0.125),
+        "payload": "1kg,0mm,0mm,50mm",
+    },
     "simulate": lambda _: {
         "robot": "irb120",
         "truth": "random",

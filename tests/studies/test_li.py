@@ -1,8 +1,12 @@
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from truearm.jobs.calibrate import calibrate
+from truearm.jobs.validate import validate
 from truearm.studies.li_table import study
 from truearm.studies.li_table.arm import (
     BEYOND,
@@ -116,3 +120,25 @@ def test_the_table_alone(found: Study) -> None:
 def test_absolute_values_do_not_notice_mistakes(found: Study) -> None:
     distances, components, squares, unbounded = (r.median for r in named(found, "Three holes").rows)
     assert max(distances, components) < 0.4 < 0.8 < min(squares, unbounded)
+
+
+def test_the_documents_fit_is_one_command(found: Study, tmp_path: Path) -> None:
+    """On the study's readings it leaves what the study's own code leaves."""
+    for name, text in found.files.items():
+        (tmp_path / name).write_text(text)
+    ways = named(found, "Without play")
+    for surface in ("normal", "roll", "pitch"):
+        calibrated = calibrate(
+            tmp_path / "robot.yaml",
+            tmp_path / f"{surface}.csv",
+            train="all",
+            loss="l1",
+            redundancy="none",
+            hold=["base", "targets"],
+            frames=tmp_path / "frames.yaml",
+            bounds=tmp_path / "bounds.yaml",
+        )
+        left = validate(calibrated.robot, tmp_path / "unseen.csv").errors.position
+        assert left is not None
+        assert 1e3 * left.mean == pytest.approx(row(ways, f"{surface}: {THEIRS}").values[0], rel=1e-3)
+        assert "hold-contradicts" not in {notice.code for notice in calibrated.warnings}

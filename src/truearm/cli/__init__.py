@@ -25,8 +25,11 @@ from truearm.cli.influence import influence
 from truearm.cli.library import robots, show
 from truearm.cli.lines import lines
 from truearm.cli.options import CommandError, Commands
+from truearm.cli.path import path
 from truearm.cli.plan import plan
+from truearm.cli.poses import poses
 from truearm.cli.simulate import simulate
+from truearm.cli.sphere import sphere
 from truearm.cli.starting import demo, example, new_robot
 from truearm.cli.study import HELP, study
 from truearm.cli.tilting import tilting
@@ -73,10 +76,13 @@ app.command()(distances)
 app.command()(compensate)
 app.command()(ik)
 app.command()(plan)
+app.command()(poses)
+app.command()(path)
 app.command()(axes)
 app.command()(tolerance)
 app.command()(lines)
 app.command()(influence)
+app.command()(sphere)
 app.command()(simulate)
 app.command()(devices)
 app.add_typer(importing, name="import")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -19,7 +19,10 @@ def simulate(
             metavar="NAME|FILE", help="nominal, random, a truth of the robot file ('truearm show'), or a robot file."
         ),
     ],
-    poses: Annotated[int, typer.Option(metavar="N", min=1, help="Configurations, drawn evenly within the limits.")],
+    poses: Annotated[
+        str,
+        typer.Option(metavar="N|FILE.csv", help="Configurations, drawn evenly within the limits; or those of a file."),
+    ],
     out: Annotated[Path, typer.Option("--out", metavar="DATA.csv", help="File to write.")],
     noise: Annotated[
         float | None,
@@ -62,7 +65,7 @@ def simulate(
             read = simulate_inclinometers(
                 robot,
                 truth=truth,
-                poses=poses,
+                poses=_poses(poses),
                 out=out,
                 pull=20.0 if pull is None else pull,
                 seed=seed,
@@ -80,7 +83,7 @@ def simulate(
         simulated = run(
             robot,
             truth=truth,
-            poses=poses,
+            poses=_poses(poses),
             out=out,
             noise=sized_si(noise, "mm", parameter="noise", deviation=True) if noise else noise,
             device=device,
@@ -94,3 +97,11 @@ def simulate(
             progress=say,
         )
     print_record(simulated)
+
+
+def _poses(text: str) -> Any:
+    """Return a number where the text is one, else the file of configurations."""
+    try:
+        return int(text)
+    except ValueError:
+        return text

@@ -113,9 +113,12 @@ class RobotDescription(Record):
         for key, label in (("effects", "Joint effects"), ("truths", "Truths for simulation"), ("targets", "Targets")):
             if content[key]:
                 text.append(f"{label}: {', '.join(content[key])}")
-        if content["proof"]:
+        if self.robot.proof is not None:
             words = ", ".join(dict.fromkeys([content["proof"]["status"], *content["proof"]["errors"]]))
-            text.append(f"Calibration: {words}{'' if content['proof']['intact'] else '; values were changed since'}")
+            known = f"; held at known places: {', '.join(self.robot.proof.held)}" if self.robot.proof.held else ""
+            text.append(
+                f"Calibration: {words}{known}{'' if content['proof']['intact'] else '; values were changed since'}"
+            )
         text += [f"History: {line}" for line in robot.history]
         return text if self.at is None else [*text, *self.at.lines()]
 

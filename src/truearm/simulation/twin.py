@@ -18,6 +18,7 @@ import numpy as np
 from truearm.errors import InputError
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
+from truearm.modeling.parts import LinkMass
 from truearm.modeling.robot import Robot
 from truearm.simulation.twin_body import (
     Link,
@@ -261,18 +262,24 @@ class Twin:
         )
 
     def _link(self, number: int, growth: float) -> Link:
-        links, values = self.robot.link_elements, self.robot.values
+        bearing, masses = self._places[number - 1]
+        return Link.made_of(self.robot.link_elements[number - 1], self.robot.values, growth, masses, bearing)
+
+    @cached_property
+    def _places(self) -> tuple[tuple[float, tuple[LinkMass, ...]], ...]:
+        """How far along its axis each joint's bearing lies, and the masses of its link with nominal slides."""
+        links, found = self.robot.link_elements, []
         every = [element for link in links for element in link]
-        before = sum(len(link) for link in links[: number - 1])
-        turning = before + next(i for i, element in enumerate(links[number - 1]) if element.variable is not None)
-        joint, bearing = every[turning], 0.0
-        if joint.turns:
-            along = np.array(joint.axis) if joint.axis else np.eye(3)["xyz".index(joint.motion[1])]
-            bearing = (self.robot.joints[number - 1].bearing or 0.0) - carried(every, turning, along, values)
-        masses = [
-            replace(mass, cog=self._stayed(number, mass.cog)) for mass in self.robot.masses if mass.joint == number
-        ]
-        return Link.made_of(links[number - 1], values, growth, masses, bearing)
+        for number, link in enumerate(links, 1):
+            own = next(i for i, element in enumerate(link) if element.variable is not None)
+            joint, bearing = link[own], 0.0
+            if joint.turns:
+                along = np.array(joint.axis) if joint.axis else np.eye(3)["xyz".index(joint.motion[1])]
+                passed = carried(every, sum(map(len, links[: number - 1])) + own, along, self.robot.values)
+                bearing = (self.robot.joints[number - 1].bearing or 0.0) - passed
+            masses = (replace(m, cog=self._stayed(number, m.cog)) for m in self.robot.masses if m.joint == number)
+            found.append((bearing, tuple(masses)))
+        return tuple(found)
 
     def _stayed(self, number: int, point: tuple[float, float, float]) -> tuple[float, float, float]:
         """Return a point of a link given with nominal slides, in the link's frame."""

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from statistics import median
@@ -161,6 +161,8 @@ class Study(Record):
         What was found.
     notes
         How it was done, and what a reader must know, one thing each.
+    files
+        What else is written, by its name: robots and readings to try on one's own.
     command
         How to make it again, as whoever asked for it calls it; empty if that is not known.
     """
@@ -173,6 +175,7 @@ class Study(Record):
     tables: tuple[Table, ...]
     pictures: tuple[Picture, ...] = ()
     notes: tuple[str, ...] = ()
+    files: Mapping[str, str] = field(default_factory=dict)
     command: str = ""
 
     @property
@@ -220,7 +223,7 @@ class Study(Record):
         return page("study.html.jinja", figures, study=self, number=number, silent=SILENT)
 
     def save(self, folder: str | Path) -> tuple[Path, ...]:
-        """Write ``report.html`` and ``study.json`` into a folder.
+        """Write ``report.html``, ``study.json`` and the study's own files into a folder.
 
         Returns
         -------
@@ -228,8 +231,9 @@ class Study(Record):
         """
         folder = output_folder(folder)
         text = json.dumps(self.summary(), indent=2, allow_nan=False) + "\n"
-        write_files(folder, dict(zip(STUDY_FILES, (self.html(), text), strict=True)), self.command or None)
-        return tuple(folder / name for name in STUDY_FILES)
+        files = {**dict(zip(STUDY_FILES, (self.html(), text), strict=True)), **self.files}
+        write_files(folder, files, self.command or None)
+        return tuple(folder / name for name in files)
 
 
 def _line(row: Row) -> str:

@@ -7,6 +7,7 @@ from typing import Final
 from truearm.studies import Progress
 from truearm.studies.li_table.pictures import paths_pictures, trajectory_picture
 from truearm.studies.li_table.run import Method, Surface, run
+from truearm.studies.li_table.session import session_files
 from truearm.studies.li_table.tables import (
     alone_table,
     geometry_table,
@@ -71,6 +72,7 @@ def study(seeds: int, progress: Progress, unseen: int = _UNSEEN) -> Study:
             mistakes_table(outcomes),
         ),
         pictures=(*paths_pictures(outcomes[0]), trajectory_picture(outcomes[0])),
+        files=session_files(outcomes[0]),
         notes=(
             "INVENTED, because the document's Tables 2 to 6 and its figures are lost: all dimensions of the arm, the"
             " size and place of the table, the verification points and the trajectory.",

@@ -118,7 +118,7 @@ def fit(nominal: Robot, data: Dataset, objective: Objective, bounded: bool) -> R
     limits = bound_vectors(BOUNDS, free, "bounds of the document") if bounded else None
     problem = Problem(nominal, data, free, {"position": CAMERA}, priors=False)
     if objective == "components":
-        found = least_absolute(problem, limits)
+        found = least_absolute(problem, limits)[0].vector
     else:
         found = solve(problem, "l1" if objective == "distances" else "linear", limits).vector
     return nominal.with_values(dict(zip(free.names, map(float, found), strict=True)))
@@ -185,7 +185,12 @@ def other_waypoints() -> Array:
 
 def library_arm() -> Robot:
     """Return the library's arm, beta included, with priors of the size of the document's bounds."""
-    return replace(load_robot("li3"), priors=_SIZE)
+    return believed(load_robot("li3"))
+
+
+def believed(robot: Robot) -> Robot:
+    """Return an arm whose nominal values are believed to be as good as the document's bounds say."""
+    return replace(robot, priors=_SIZE)
 
 
 def with_mistakes(data: Dataset, rng: np.random.Generator) -> Dataset:

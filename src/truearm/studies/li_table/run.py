@@ -161,6 +161,10 @@ class Outcome:
     paths
         Where the nominal arm should go and where the twin goes [m], ``(n, 3)`` each: through the verification points,
         and along the other trajectory; with play.
+    touched
+        Readings of each table, and of all, joints having no play.
+    unseen
+        Where the tip truly is at the unseen points then.
     """
 
     play: Left
@@ -172,6 +176,8 @@ class Outcome:
     sums: Mapping[tuple[Measure, Measure], float]
     without_camera: Mapping[tuple[Tilt, Alone], WithoutCamera]
     paths: tuple[tuple[Array, Array], tuple[Array, Array]]
+    touched: Mapping[Surface, Dataset]
+    unseen: Dataset
 
 
 def run(seeds: int, progress: Progress, unseen: int) -> tuple[Outcome, ...]:
@@ -203,6 +209,7 @@ def _one(seed: Seed, unseen: int) -> Outcome:
 
     data = _measured(touched, exact, rng)
     there = true_positions(exact, judged, rng)
+    without_play, unseen_points = data, _as_read(data["normal"], judged, there)
     perfect = {(surface, method): _fit(nominal, data[surface], method) for surface in SURFACES for method in METHODS}
     mistaken = with_mistakes(data["roll"], rng)
     alone = {
@@ -223,6 +230,23 @@ def _one(seed: Seed, unseen: int) -> Outcome:
         sums=sums,
         without_camera=alone,
         paths=(_path(nominal, twin, verification()), _path(nominal, twin, other_waypoints())),
+        touched=without_play,
+        unseen=unseen_points,
+    )
+
+
+def _as_read(like: Dataset, joints: Array, positions: Array) -> Dataset:
+    """Return where the tip is at joint positions, as readings without noise."""
+    count = len(joints)
+    return Dataset(
+        source="unseen points",
+        labels=tuple(str(number + 1) for number in range(count)),
+        joints=joints,
+        joint_kinds=like.joint_kinds,
+        targets=like.targets,
+        configuration=np.arange(count),
+        target=np.zeros(count, dtype=np.intp),
+        position=positions,
     )
 
 

@@ -18,7 +18,7 @@ from truearm.modeling.formats.controller_entry import STATED
 from truearm.modeling.formats.robot_file.schema import JointEntry, ProofEntry, RobotFile
 from truearm.modeling.parameters import SCALE, SCALE_GROUP, Parameter
 from truearm.modeling.parts import NO_PAYLOAD, Inertia, Joint, LinkMass, Payload, Target, Tool, Truth
-from truearm.modeling.proof import Proof
+from truearm.modeling.proof import HELD, Proof
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.schemas import shown_entry
@@ -229,6 +229,15 @@ def _proof(robot: Robot, entry: ProofEntry, shown: Mapping[str, str], where: str
     unknown = next((name for name in entry.deviations if name not in robot.parameters), None)
     if unknown is not None:
         raise InputError("the robot has no such parameter", where=f"{where}, proof.deviations", came=unknown, cure=cure)
+    strange = next((name for name in entry.held if name not in (*HELD, *robot.parameters)), None)
+    if strange is not None:
+        raise InputError(
+            "nothing of this name can be held",
+            where=f"{where}, proof.held",
+            came=strange,
+            allowed=f"{', '.join(HELD)}, or parameters of targets",
+            cure=cure,
+        )
     if len(entry.correlations) != len(entry.deviations):
         raise InputError(
             "one row belongs here for each of the deviations",
@@ -250,9 +259,30 @@ def _proof(robot: Robot, entry: ProofEntry, shown: Mapping[str, str], where: str
         ),
         lower_bound=entry.lower_bound,
         warnings=tuple(Notice(warning.code, warning.message, "note") for warning in entry.warnings),
+        held=tuple(entry.held),
         digest=entry.sha256,
+        measured=tuple(
+            _position(row, robot, f"{where}, proof.measured[{number}]", cure)
+            for number, row in enumerate(entry.measured, 1)
+        ),
         loads=tuple(entry.loads),
     )
+
+
+def _position(text: str, robot: Robot, where: str, cure: str) -> tuple[float, ...]:
+    """Return joint positions of a measured configuration in SI units."""
+    numbers = [as_number(word) for word in text.split()]
+    known = tuple(number for number in numbers if number is not None and math.isfinite(number))
+    if len(known) != len(robot.joints) or len(numbers) != len(known):
+        raise InputError(
+            "one number belongs here for each joint, in deg or mm",
+            where=where,
+            came=text,
+            allowed=counted(len(robot.joints), "number"),
+            cure=cure,
+        )
+    units = ["deg" if joint.kind == "revolute" else "mm" for joint in robot.joints]
+    return tuple(to_si(value, unit) for value, unit in zip(known, units, strict=True))
 
 
 def _row(text: str, count: int, where: str, cure: str) -> tuple[float, ...]:

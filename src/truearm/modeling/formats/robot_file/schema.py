@@ -165,7 +165,10 @@ class NoticeEntry(_Entry):
 
 
 class ProofEntry(_Entry):
-    """What the calibration knew about its result; `correlations` are the rows of a lower triangular factor."""
+    """What the calibration knew about its result; `correlations` are the rows of a lower triangular factor.
+
+    `measured` are joint positions in deg and mm, whatever the units of the file.
+    """
 
     status: Literal["converged", "at-bound", "rank-loss", "not-converged", "implausible"]
     errors: list[NoticeEntry] = []
@@ -173,9 +176,11 @@ class ProofEntry(_Entry):
     lower_bound: Annotated[bool, Field(strict=True)] = False
     region: list[tuple[Number, Number]] = []
     joint_error: list[NotNegative] = []
+    held: list[TargetName] = []
     loads: list[tuple[Number, Number]] = []
     deviations: dict[str, NotNegative] = {}
     correlations: list[Annotated[str, StringConstraints(strict=True)]] = []
+    measured: list[Annotated[str, StringConstraints(strict=True)]] = []
     sha256: Annotated[str, StringConstraints(strict=True, pattern="^[0-9a-f]{64}$")]
 
 

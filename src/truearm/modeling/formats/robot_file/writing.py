@@ -14,7 +14,7 @@ from truearm.modeling.formats.entries import NAME, place_entry
 from truearm.modeling.formats.robot_file.schema import SCHEMA
 from truearm.modeling.parameters import Parameter
 from truearm.modeling.parts import GRAVITY, NO_PAYLOAD, Joint
-from truearm.modeling.proof import Proof
+from truearm.modeling.proof import Proof, position_text
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 from truearm.modeling.wrench import refuse_pushed
@@ -209,6 +209,8 @@ def _proof(
         made["warnings"] = [{"code": warning.code, "message": text(warning.message)} for warning in proof.warnings]
     if proof.lower_bound:
         made["lower_bound"] = True
+    if proof.held:
+        made["held"] = listed([text(name) for name in proof.held])
     if len(proof.region) == len(robot.joints) and all(name in robot.parameters for name in proof.names):
         units = ["deg" if joint.kind == "revolute" else "mm" for joint in robot.joints]
         made["region"] = [listed([written(v, u) for v in one]) for one, u in zip(proof.region, units, strict=True)]
@@ -222,5 +224,9 @@ def _proof(
             }
         )
         made["correlations"] = [text(" ".join(f"{v:.7g}" for v in row)) for row in proof.factor]
+        if proof.measured:
+            made["measured"] = [
+                text(" ".join(position_text(v, u) for v, u in zip(row, units, strict=True))) for row in proof.measured
+            ]
     made["sha256"] = proof.digest
     return made

@@ -147,8 +147,13 @@ def following_errors(fitted: Robot, twin: Twin, points: Array) -> Array:
 
     As the document verifies: the joints are those at which the fitted robot is on each point.
     """
+    return np.asarray(1e3 * np.linalg.norm(followed_places(fitted, twin, points) - points, axis=1))
+
+
+def followed_places(fitted: Robot, twin: Twin, points: Array) -> Array:
+    """Return where the true tip is when a robot is sent to points in turn [m], ``(n, 3)``."""
     joints = _joints_at(fitted, points)
-    return np.asarray(1e3 * np.linalg.norm(_tip_of(twin, joints, directions(joints)) - points, axis=1))
+    return _tip_of(twin, joints, directions(joints))
 
 
 def _joints_at(robot: Robot, points: Array) -> Array:

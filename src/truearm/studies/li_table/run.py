@@ -29,6 +29,7 @@ from truearm.studies.li_table.arm import (
     at_bounds,
     board,
     fit,
+    followed_places,
     following_errors,
     library_arm,
     other_waypoints,
@@ -157,6 +158,9 @@ class Outcome:
         Equation 4 per hole of the level table [mm]: by measure, and by the measure that was fitted by.
     without_camera
         By table, and by what was found.
+    paths
+        Where the nominal arm should go and where the twin goes [m], ``(n, 3)`` each: through the verification points,
+        and along the other trajectory; with play.
     touched
         Readings of each table, and of all, joints having no play.
     unseen
@@ -171,6 +175,7 @@ class Outcome:
     at_bounds: Mapping[Tilt, int]
     sums: Mapping[tuple[Measure, Measure], float]
     without_camera: Mapping[tuple[Tilt, Alone], WithoutCamera]
+    paths: tuple[tuple[Array, Array], tuple[Array, Array]]
     touched: Mapping[Surface, Dataset]
     unseen: Dataset
 
@@ -224,6 +229,7 @@ def _one(seed: Seed, unseen: int) -> Outcome:
         at_bounds={tilt: at_bounds(nominal, fitted[tilt, "distances"]) for tilt in TILTS},
         sums=sums,
         without_camera=alone,
+        paths=(_path(nominal, twin, verification()), _path(nominal, twin, other_waypoints())),
         touched=without_play,
         unseen=unseen_points,
     )
@@ -269,6 +275,11 @@ def _following(nominal: Robot, robots: Mapping[Surface, Robot], twin: Twin) -> F
         return Followed(following_errors(robot, twin, points), following_errors(robot, twin, path))
 
     return Following(followed(nominal), {surface: followed(robot) for surface, robot in robots.items()})
+
+
+def _path(nominal: Robot, twin: Twin, waypoints: Array) -> tuple[Array, Array]:
+    path = trajectory(waypoints)
+    return path, followed_places(nominal, twin, path)
 
 
 def _sums(by: Measure, robot: Robot, data: Dataset) -> dict[tuple[Measure, Measure], float]:

@@ -88,7 +88,8 @@ def _stairs(shares: Sequence[Share], total: float, together: str) -> Figure:
     return figure(
         [trace],
         _AROUND + _BAR * len(names),
-        xaxis=axis("mean square [mm²]") | {"exponentformat": "none", "range": [low - (room if low < 0.0 else 0.0), high + room]},
+        xaxis=axis("mean square [mm²]")
+        | {"exponentformat": "none", "range": [low - (room if low < 0.0 else 0.0), high + room]},
         yaxis={**axis(""), "autorange": "reversed", "showgrid": False, "ticks": ""},
         bargap=0.3,
         margin={"l": 60, "r": 20, "t": 12, "b": 50},

@@ -13,7 +13,7 @@ from tests.cli.conftest import Truearm
 from truearm.library import load_robot
 from truearm.measurement.hexapod.geometry import triangle
 from truearm.measurement.hexapod.poses import poses
-from truearm.measurement.hexapod.sheet import read_sheet
+from truearm.measurement.hexapod.sheet_reading import read_sheet
 from truearm.measurement.readers.canonical import read_csv
 
 

@@ -17,7 +17,7 @@ from truearm.jobs.import_ur_kinematics import import_ur_kinematics
 from truearm.jobs.load_robot import load_robot
 from truearm.library import load_robot as of_library
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.hexapod.sheet import read_sheet
+from truearm.measurement.hexapod.sheet_reading import read_sheet
 from truearm.measurement.hexapod.touches import read_touches
 from truearm.measurement.readers.canonical import csv_text, read_csv
 from truearm.measurement.readers.drawn_circles import Page, read_drawn_circles

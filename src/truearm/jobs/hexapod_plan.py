@@ -1,4 +1,4 @@
-"""Which configurations of a robot can be measured with the hexapod device at one place."""
+"""Which configurations of a robot can be measured with the hexapod device, at one place or several."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from truearm.modeling.inverse.branches import BRANCHES
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 from truearm.planning.hexapod.clearance import ARM_RADIUS
-from truearm.planning.hexapod.reachable import reachable
+from truearm.planning.hexapod.reachable import reachable_at_places
 from truearm.planning.hexapod.tool import with_cups
 from truearm.results.hexapod import HexapodPlan
 from truearm.writing import same_place, write_files
@@ -35,17 +35,18 @@ from truearm.writing import same_place, write_files
 
 def hexapod_plan(
     robot: Robot | str | Path,
-    fixture: Transform | Sequence[float],
+    fixture: Transform | Sequence[float] | Sequence[Transform | Sequence[float]],
     *,
     out: str | Path | None = None,
     steps: str | Path | None = None,
     tool: str | None = None,
     distinct: bool = False,
     branches: Sequence[str] = (),
+    fourth_cup: bool = False,
     arm_radius: float = ARM_RADIUS,
     joints: JointsOf | None = None,
 ) -> HexapodPlan:
-    """Plan which configurations of a robot can be measured with the base fixture at one place.
+    """Plan which configurations of a robot can be measured with the base fixture at one place or several.
 
     Parameters
     ----------
@@ -53,7 +54,7 @@ def hexapod_plan(
         A robot, or what :func:`truearm.load_robot` takes, with six joints that are solved in closed form.
     fixture
         The base fixture in the robot's base frame: a transform; x, y, z of B1 [m] and a turn about z [rad]; or x, y, z
-        [m] and a quaternion w, x, y, z.
+        [m] and a quaternion w, x, y, z. Several of them are places where it stands one after the other.
     out
         CSV file for the sheet to fill in; None writes nothing.
     steps
@@ -64,6 +65,8 @@ def hexapod_plan(
         Leave out near-equal poses.
     branches
         Only branches whose names begin so, such as ``front-up``; all of them if empty.
+    fourth_cup
+        Plan for a fourth cup below the three others, and poses on all four sides.
     arm_radius
         Of the arm's links, for the room at the bars [m].
     joints
@@ -73,11 +76,12 @@ def hexapod_plan(
     Raises
     ------
     InputError
-        If the robot has no such tool or no closed form, or can reach none of the poses with the fixture there.
+        If the robot has no such tool or no closed form, or can reach none of the poses with the fixture at a place.
     """
-    place = _fixture_argument(fixture)
+    places = _places_argument(fixture)
     wanted_branches = _branches_argument(branches)
     radius = length_argument(arm_radius, "arm_radius", 0.0)
+    four_cups = flag_argument(fourth_cup, "fourth_cup")
     only_distinct = flag_argument(distinct, "distinct")
     sheet = None if out is None else file_for(out, robot)
     text = None if steps is None else file_for(steps, robot, parameter="steps")
@@ -90,12 +94,13 @@ def hexapod_plan(
         arm, cups = with_cups(loaded, name)
         wanted = poses(cups)
     with refusals_of("robot"):
-        found = reachable(
+        found = reachable_at_places(
             arm,
-            place,
+            places,
             distinct_poses(wanted) if only_distinct else wanted,
             arm_radius=radius,
             branches=wanted_branches,
+            fourth_cup=four_cups,
         )
     plan = HexapodPlan(arm, found, joints_are)
     files = {sheet: plan.sheet_text(), text: plan.steps_text()}
@@ -103,6 +108,13 @@ def hexapod_plan(
     if written:
         write_files(next(iter(written)).parent, {str(file): content for file, content in written.items()})
     return plan
+
+
+def _places_argument(fixture: object) -> tuple[Transform, ...]:
+    listed = isinstance(fixture, Sequence | np.ndarray) and not isinstance(fixture, str) and len(fixture)
+    if listed and all(isinstance(one, Transform | Sequence | np.ndarray) for one in fixture):  # type: ignore[attr-defined]
+        return tuple(_fixture_argument(one) for one in fixture)  # type: ignore[attr-defined]
+    return (_fixture_argument(fixture),)
 
 
 def _fixture_argument(fixture: object) -> Transform:

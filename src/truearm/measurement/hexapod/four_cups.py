@@ -50,7 +50,7 @@ def side_frames(cups: Array) -> tuple[Transform, ...]:
 
 
 def side_distances(side: int, base: Sequence[float] | Array, to_fourth: Sequence[float] | Array) -> Array:
-    """Return the distances 12, 23 and 31 of a side [m], ``(3,)``; `side` is 1 to 4, the rest as in :func:`four_cups`."""
+    """Return the distances 12, 23 and 31 of a side, 1 to 4 [m], ``(3,)``; the rest as in :func:`four_cups`."""
     between = dict(zip((frozenset(ends) for ends in SIDES), np.asarray(base, float), strict=True))
     between |= {frozenset((cup, 3)): length for cup, length in enumerate(np.asarray(to_fourth, float))}
     cups = SIDES_OF_FOUR[side - 1]

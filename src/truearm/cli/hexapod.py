@@ -109,6 +109,9 @@ def plan(
     fourth_cup: Annotated[
         bool, typer.Option("--fourth-cup", help="Plan for a fourth cup below the three others, on all four sides.")
     ] = False,
+    attachments: Annotated[
+        int, typer.Option(metavar="N", min=1, help="How often the tool is attached; what is measured again then.")
+    ] = 1,
     arm_radius: Annotated[float, typer.Option(metavar="MM", min=0.0, help="Of the arm, for room at the bars.")] = 50.0,
     joints: JointsText = None,
     json: Json = False,
@@ -126,6 +129,7 @@ def plan(
         distinct=distinct,
         branches=() if branches is None else branches.split(","),
         fourth_cup=fourth_cup,
+        attachments=attachments,
         arm_radius=sized_si(arm_radius, "mm", parameter="arm_radius"),
         joints=joints,  # type: ignore[arg-type]
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from truearm.jobs.arguments import (
     lengths_argument,
     name_argument,
     robot_argument,
+    whole_argument,
 )
 from truearm.measurement.hexapod.poses import distinct as distinct_poses
 from truearm.measurement.hexapod.poses import poses
@@ -27,10 +29,13 @@ from truearm.modeling.inverse.branches import BRANCHES
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 from truearm.planning.hexapod.clearance import ARM_RADIUS
-from truearm.planning.hexapod.reachable import reachable_at_places
+from truearm.planning.hexapod.reachable import attached_anew, reachable_at_places
 from truearm.planning.hexapod.tool import with_cups
 from truearm.results.hexapod import HexapodPlan
 from truearm.writing import same_place, write_files
+
+#: More attachments than anybody compares.
+_MOST_ATTACHMENTS: Final = 50
 
 
 def hexapod_plan(
@@ -43,6 +48,7 @@ def hexapod_plan(
     distinct: bool = False,
     branches: Sequence[str] = (),
     fourth_cup: bool = False,
+    attachments: int = 1,
     arm_radius: float = ARM_RADIUS,
     joints: JointsOf | None = None,
 ) -> HexapodPlan:
@@ -67,6 +73,9 @@ def hexapod_plan(
         Only branches whose names begin so, such as ``front-up``; all of them if empty.
     fourth_cup
         Plan for a fourth cup below the three others, and poses on all four sides.
+    attachments
+        How often the tool is attached. After each time but the first, five configurations of the last place are
+        measured again, which tells how well the tool changer repeats the cups.
     arm_radius
         Of the arm's links, for the room at the bars [m].
     joints
@@ -82,6 +91,7 @@ def hexapod_plan(
     wanted_branches = _branches_argument(branches)
     radius = length_argument(arm_radius, "arm_radius", 0.0)
     four_cups = flag_argument(fourth_cup, "fourth_cup")
+    times = whole_argument(attachments, "attachments", 1, _MOST_ATTACHMENTS)
     only_distinct = flag_argument(distinct, "distinct")
     sheet = None if out is None else file_for(out, robot)
     text = None if steps is None else file_for(steps, robot, parameter="steps")
@@ -102,7 +112,7 @@ def hexapod_plan(
             branches=wanted_branches,
             fourth_cup=four_cups,
         )
-    plan = HexapodPlan(arm, found, joints_are)
+    plan = HexapodPlan(arm, attached_anew(found, times), joints_are)
     files = {sheet: plan.sheet_text(), text: plan.steps_text()}
     written = {file.absolute(): content for file, content in files.items() if file is not None}
     if written:

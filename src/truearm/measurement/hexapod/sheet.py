@@ -182,6 +182,8 @@ class PlannedRow:
         Name of the place of the base fixture; empty if there is one place only.
     side
         Of four cups, 1 to 4; 1 is that of three cups.
+    attachment
+        Which attachment of the tool; empty if it stays on.
     """
 
     configuration: str
@@ -192,6 +194,7 @@ class PlannedRow:
     joints: Array
     place: str = ""
     side: int = 1
+    attachment: str = ""
 
     @property
     def leg_names(self) -> tuple[str, ...]:
@@ -230,6 +233,6 @@ def sheet_csv(
         known = lengths[number] if lengths else {}
         cells = (repr(written(known[name], "mm")) if name in known else "" for name in names)
         said = {"configuration": row.configuration, "place": row.place, "pose": row.pose, "branch": row.branch}
-        said |= {"side": row.side, "design": row.design.name, "solution": row.solution, "attachment": ""}
+        said |= {"side": row.side, "design": row.design.name, "solution": row.solution, "attachment": row.attachment}
         writer.writerow([*(said[name] for name in plain), *positions[number], *cells])
     return stream.getvalue()

@@ -32,6 +32,9 @@ BEYOND_LIMITS: Final = "beyond joint limits"
 TOO_NEAR: Final = "arm at the bars"
 NOT_WANTED: Final = "another branch"
 
+#: How many configurations are measured again with every attachment of the tool.
+_AGAIN: Final = 5
+
 
 @dataclass(frozen=True, eq=False)
 class Reachable:
@@ -191,6 +194,24 @@ def reachable_at_places(
         dict(sum((Counter(part.left_out) for part in found), Counter())),
         sum(part.poses for part in found),
     )
+
+
+def attached_anew(plan: Reachable, attachments: int) -> Reachable:
+    """Return a plan in which, after each attachment of the tool but the first, a few configurations come again.
+
+    They are spread over those of the last place, and called ``7-2`` where ``7`` is measured with the second attachment.
+    """
+    if attachments == 1:
+        return plan
+    last = [number for number, row in enumerate(plan.rows) if row.place == plan.rows[-1].place]
+    chosen = np.unique(np.linspace(last[0], last[-1], _AGAIN).round().astype(int)).tolist()
+    again = [
+        replace(row, configuration=f"{row.configuration}-{attachment}", attachment=str(attachment))
+        for attachment in range(2, attachments + 1)
+        for row in (plan.rows[number] for number in chosen)
+    ]
+    room = np.concatenate([plan.clearance, np.tile(plan.clearance[chosen], attachments - 1)])
+    return replace(plan, rows=(*(replace(row, attachment="1") for row in plan.rows), *again), clearance=room)
 
 
 def _in_frame(outer: Transform, inner: Transform) -> Transform:

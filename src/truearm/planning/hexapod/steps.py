@@ -14,8 +14,8 @@ from truearm.planning.hexapod.reachable import Reachable
 from truearm.units import from_si
 
 _FOURTH: Final = (
-    "   Set the fourth cup below the three others in the same way, at the fourth corner of a tetrahedron. It must be as far",
-    "   from each of them as they are from each other, to the range of the bar.",
+    "   Set the fourth cup below the three others in the same way, at the fourth corner of a tetrahedron. It must be",
+    "   as far from each of them as they are from each other, to the range of the bar.",
 )
 _ANEW: Final = (
     "   Before the first configuration of every place, set the base fixture up there and repeat steps 2 and 3. The",
@@ -51,7 +51,7 @@ def steps_text(plan: Reachable, robot: Robot, controller: Controller | None = No
     joints = np.array([row.joints for row in plan.rows])
     shown = joints if controller is None else controller.from_model(joints)
     called = "joints" if controller is None else "joints as the controller shows them"
-    there = ""
+    there, attached = "", plan.rows[0].attachment
     for row, at, room in zip(plan.rows, shown.tolist(), plan.clearance.tolist(), strict=True):
         positions = " ".join(
             f"{from_si(value, 'deg' if joint.kind == 'revolute' else 'mm'):.3f}"
@@ -60,6 +60,9 @@ def steps_text(plan: Reachable, robot: Robot, controller: Controller | None = No
         if row.place != there:
             lines += [f"Place {row.place}: set the base fixture up there; steps 2 and 3.", ""]
             there = row.place
+        if row.attachment != attached:
+            lines += [f"Attachment {row.attachment}: take the tool off, and attach it again.", ""]
+            attached = row.attachment
         pose = f"pose {row.pose} on side {row.side}" if with_sides else f"pose {row.pose}"
         lines.append(f"Configuration {row.configuration}  ({pose}, {row.branch}, {room * 1e3:.0f} mm of room)")
         lines.append(f"   {called} {positions}")

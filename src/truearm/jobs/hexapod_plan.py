@@ -121,10 +121,14 @@ def hexapod_plan(
 
 
 def _places_argument(fixture: object) -> tuple[Transform, ...]:
-    listed = isinstance(fixture, Sequence | np.ndarray) and not isinstance(fixture, str) and len(fixture)
-    if listed and all(isinstance(one, Transform | Sequence | np.ndarray) for one in fixture):  # type: ignore[attr-defined]
-        return tuple(_fixture_argument(one) for one in fixture)  # type: ignore[attr-defined]
+    places = list(fixture) if isinstance(fixture, np.ndarray) and fixture.ndim == 2 else fixture
+    if isinstance(places, list | tuple) and places and all(_is_place(one) for one in places):
+        return tuple(_fixture_argument(one) for one in places)
     return (_fixture_argument(fixture),)
+
+
+def _is_place(one: object) -> bool:
+    return isinstance(one, Transform | np.ndarray | list | tuple)
 
 
 def _fixture_argument(fixture: object) -> Transform:

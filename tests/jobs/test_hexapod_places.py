@@ -11,22 +11,24 @@ import pytest
 import truearm
 from truearm.errors import InputError
 from truearm.measurement.hexapod.geometry import Device
+from truearm.measurement.hexapod.poses import poses
 from truearm.measurement.hexapod.sheet import PlannedRow
 from truearm.measurement.hexapod.world_frame import plain_frame
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform, rigid_motion
+from truearm.planning.hexapod.reachable import reachable_at_places
 from truearm.planning.hexapod.tool import with_cups
 from truearm.results.hexapod import HexapodPlan
 from truearm.simulation.hexapod.filled_sheet import filled_sheet, locked_cups
 from truearm.simulation.hexapod.simulated import ballbar
 from truearm.simulation.hexapod.tool_changer import ToolChanger
 from truearm.simulation.twin import Twin
-from truearm.simulation.twin_joint import JointTruth
 
 PLACES = (Transform((0.2268, 0.0, 0.3)), Transform((0.05, 0.25, 0.3), (np.cos(0.2), 0.0, 0.0, np.sin(0.2))))
 #: A bar whose range no error of the twin exceeds.
 EXACT = Device(sigma=0.0, reach=5e-3)
+FRONT = ["front-up", "front-down"]
 #: What is wrong with the twin [m or rad].
 WRONG = {"a_3": 2e-4, "d_4": -3e-4, "theta_offset_2": 5e-4, "theta_offset_5": -8e-4, "alpha_2": 3e-4, "a_1": 2e-4}
 
@@ -38,7 +40,7 @@ def robot() -> Robot:
 
 @pytest.fixture(scope="module")
 def plan(robot: Robot) -> HexapodPlan:
-    return truearm.hexapod_plan(robot, PLACES, fourth_cup=True, attachments=4)
+    return truearm.hexapod_plan(robot, PLACES, fourth_cup=True, attachments=4, branches=FRONT)
 
 
 def wrong(robot: Robot) -> Robot:
@@ -56,7 +58,7 @@ def campaign(
     rows = [
         row
         for number, row in enumerate(every)
-        if (number % 6 == 0 and "-" not in row.configuration) or row.configuration.split("-")[0] in again
+        if (number % 4 == 0 and "-" not in row.configuration) or row.configuration.split("-")[0] in again
     ]
     cups = {f"fixture_{number}": locked_cups(place, rng, 1e-4, fourth=True) for number, place in enumerate(PLACES, 1)}
     return rows, cups, filled_sheet(twin, rows, cups, ballbar(rng, device), ToolChanger(rng) if changer else None)
@@ -85,41 +87,6 @@ def test_cups_of_all_sides_and_places_are_exact_and_calibrate_to_the_truth(
     )
     R, p = rigid_motion(predicted, true)
     assert predicted @ R.T + p == pytest.approx(true, abs=1e-9)
-
-
-def test_places_and_sides_reach_further_than_one_place(robot: Robot, tmp_path: Path) -> None:
-    """Run-out of the gears is in no model, so what is measured elsewhere must be seen to be predicted."""
-    left: dict[str, list[float]] = {"one place": [], "two places": [], "a fourth cup": []}
-    for seed in range(3):
-        rng = np.random.default_rng(seed)
-        joints = {
-            joint: JointTruth(gear=((1, 1e-4, rng.uniform(0, 6.28)), (2, 5e-5, rng.uniform(0, 6.28))))
-            for joint in range(1, 7)
-        }
-        twin = Twin(wrong(robot), joints)
-        unseen = robot.random_configurations(60, rng)
-        true = np.array([[twin.target_frames(q)[t.name][:3, 3] for t in robot.targets] for q in unseen])
-        for name, places, fourth in (
-            ("one place", PLACES[:1], False),
-            ("two places", PLACES, False),
-            ("a fourth cup", PLACES[:1], True),
-        ):
-            rows = truearm.hexapod_plan(robot, places, fourth_cup=fourth).reachable.rows[::2]
-            cups = {
-                f"fixture_{number}" if len(places) > 1 else "": locked_cups(place, rng, 1e-4, fourth=fourth)
-                for number, place in enumerate(places, 1)
-            }
-            file = tmp_path / "sheet.csv"
-            file.write_text(filled_sheet(twin, rows, cups, ballbar(rng, replace(EXACT, sigma=5e-7))))
-            data = truearm.hexapod_solve(file, reach=5e-3).data
-            assert data is not None
-            found = truearm.calibrate(robot, data, model="geometric").robot
-            predicted = np.stack([found.world_poses(unseen, t.name)[0] for t in robot.targets], axis=1)
-            R, p = rigid_motion(predicted.reshape(-1, 3), true.reshape(-1, 3))
-            left[name].append(float(np.linalg.norm(predicted @ R.T + p - true, axis=2).mean()))
-    one, two, fourth_cup = (float(np.mean(errors)) for errors in left.values())
-    assert two < one
-    assert fourth_cup < one
 
 
 def test_the_tool_changer_is_found(robot: Robot, plan: HexapodPlan, tmp_path: Path) -> None:
@@ -171,8 +138,8 @@ def test_a_plan_names_places_and_counts_sides(plan: HexapodPlan) -> None:
 
 
 def test_a_place_that_is_out_of_reach_is_named(robot: Robot) -> None:
-    with pytest.raises(InputError, match="fixture_2.*can reach none of the 288 poses") as refused:
-        truearm.hexapod_plan(robot, [PLACES[0], Transform((3.0, 0.0, 0.3))], fourth_cup=True)
+    with pytest.raises(InputError, match=r"fixture_2.*can reach none of the 8 poses") as refused:
+        reachable_at_places(robot, [PLACES[0], Transform((3.0, 0.0, 0.3))], poses()[:2], fourth_cup=True)
     assert refused.value.parameter == "fixture"
 
 

@@ -23,6 +23,7 @@ from truearm.modeling.chain import Array
 from truearm.modeling.parts import Joint
 from truearm.modeling.transform import rotation_from_quaternion
 
+POSES = poses()
 JOINTS = [Joint(f"axis_{n}", "revolute", {}) for n in range(1, 7)]
 Rows = list[dict[str, str]]
 #: Label, pose, place, side and attachment of each row.
@@ -49,7 +50,7 @@ def filled(base: Array) -> Rows:
     between = [float(np.linalg.norm(base[a] - base[b])) for a, b in ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))]
     rows, lengths = [], []
     for number, (label, pose, place, side, attachment) in enumerate(SAID):
-        planned = poses()[pose - 1]
+        planned = POSES[pose - 1]
         joints = np.full(6, 0.1 * pose)
         row = PlannedRow(label, "front", pose, planned.design, planned.solution, joints, place, side, attachment)
         own = dict(zip(row.leg_names, _legs(base, pose, side), strict=True))
@@ -63,7 +64,7 @@ def filled(base: Array) -> Rows:
 
 
 def _legs(base: Array, pose: int, side: int) -> list[float]:
-    return [float(v) for v in leg_lengths(poses()[pose - 1].design, base[_feet(side)], _cups(base, pose, side))]
+    return [float(v) for v in leg_lengths(POSES[pose - 1].design, base[_feet(side)], _cups(base, pose, side))]
 
 
 def _feet(side: int) -> list[int]:
@@ -73,7 +74,7 @@ def _feet(side: int) -> list[int]:
 def _cups(base: Array, pose: int, side: int) -> Array:
     """Return true cups of a pose on a side, in the frame in which the base cups are given."""
     frame = side_frames(base)[side - 1]
-    return np.asarray(poses()[pose - 1].cups @ frame.rotation.T + np.array(frame.translation))
+    return np.asarray(POSES[pose - 1].cups @ frame.rotation.T + np.array(frame.translation))
 
 
 def read(folder: Path, rows: Rows, name: str = "sheet.csv") -> Sheet:
@@ -98,7 +99,7 @@ def test_all_sides_are_in_the_frame_of_the_first(tmp_path: Path, filled: Rows, b
 
 def test_each_side_has_its_own_distances_and_names() -> None:
     assert side_distances(3, (1.0, 2.0, 3.0), (4.0, 5.0, 6.0)).tolist() == [2.0, 5.0, 6.0]  # B3, B2, B4
-    design = next(pose.design for pose in poses() if pose.design.name == "112212331")
+    design = next(pose.design for pose in POSES if pose.design.name == "112212331")
     assert legs_of_side(design, 1) == design.leg_names
     assert legs_of_side(design, 2) == ("B2-T1", "B1-T1", "B4-T1", "B2-T2", "B1-T2", "B1-T3")
 
@@ -172,7 +173,7 @@ def test_bad_cells(tmp_path: Path, filled: Rows, words: str, cure: str, row: int
 
 
 def test_an_attachment_is_needed_only_where_something_was_measured(tmp_path: Path, filled: Rows) -> None:
-    leg = legs_of_side(poses()[39].design, 2)[0]
+    leg = legs_of_side(POSES[39].design, 2)[0]
     filled[1] |= {f"{leg} [mm]": "", "attachment": ""}
     assert read(tmp_path, filled).attachments == ("1", "", "1", "2", "2", "2")
     assert read(tmp_path, [row | {"attachment": ""} for row in filled]).attachments is None
@@ -264,7 +265,7 @@ def test_one_configuration_cannot_tell_the_robot_from_the_changer() -> None:
 
 def test_what_the_changer_does_not_repeat_is_declared(tmp_path: Path, filled: Rows) -> None:
     again = filled[1] | {"configuration": "b2", "attachment": "2"}
-    leg = f"{legs_of_side(poses()[39].design, 2)[0]} [mm]"
+    leg = f"{legs_of_side(POSES[39].design, 2)[0]} [mm]"
     again[leg] = str(float(again[leg]) + 0.05)
     sheet = together([read(tmp_path, [*filled[:2], again, *filled[2:]])])
     attached = sheet.attached()

@@ -107,7 +107,9 @@ def test_the_tool_changer_is_found(robot: Robot, plan: HexapodPlan, tmp_path: Pa
     assert any("The data declare it." in line for line in solved.lines())
     assert solved.data is not None
     assert solved.data.sigma is not None
-    assert (solved.data.sigma[:3] >= solved.attached.found.changer).all()
+    # most rows are of the first attachment, which is where the tool is found; the others are declared to differ more
+    assert solved.data.sigma[:3].max() < 0.5 * solved.attached.found.changer.min()
+    assert (solved.data.sigma[-3:] > solved.attached.found.changer).all()
 
 
 def test_attachments_that_were_not_compared_are_told(robot: Robot, plan: HexapodPlan, tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from truearm.errors import InputError
-from truearm.measurement.hexapod.attachments import compared
+from truearm.measurement.hexapod.attachments import ChangerRepeatability, compared
 from truearm.measurement.hexapod.four_cups import TO_FOURTH, four_cups, legs_of_side, side_distances, side_frames
 from truearm.measurement.hexapod.geometry import DEVICE, side_names
 from truearm.measurement.hexapod.kinematics import leg_lengths
@@ -252,12 +252,24 @@ def test_the_changer_is_told_from_the_robot() -> None:
     assert np.sqrt(np.mean(rest, axis=0)) == pytest.approx(np.full(3, 1e-5), rel=0.1)
 
 
+def test_an_attachment_counts_as_it_differs_from_the_mean_of_all_rows() -> None:
+    """The place of the tool is found from all rows, so what all rows share is no error."""
+    rng = np.random.default_rng(5)
+    found = ChangerRepeatability(np.full(3, 2e-5), np.full(3, 1e-6), np.zeros(3), np.zeros(3), 1, 2)
+    assert found.declared(["1"] * 4) == pytest.approx(np.full((4, 3), 1e-6))
+    names = ["1", "1", "1", "1", "1", "1", "2", "3"]
+    moved = 2e-5 * rng.standard_normal((20000, 3))[:, np.array([int(name) - 1 for name in names])]
+    moved = moved - moved.mean(axis=1, keepdims=True) + 1e-6 * rng.standard_normal(moved.shape)
+    assert found.declared(names)[:, 0] == pytest.approx(moved.std(axis=0), rel=0.03)
+
+
 def test_one_configuration_cannot_tell_the_robot_from_the_changer() -> None:
     cups, joints = _attached(np.random.default_rng(4), 2e-5, 0.0, 0.0, 2)
     seen = compared(cups[:2], joints[:2], ["", ""], ["1", "2"]).found
     assert seen is not None
     assert seen.rest is None
-    assert seen.deviation == pytest.approx(np.linalg.norm(cups[1] - cups[0], axis=1) / np.sqrt(6))
+    assert seen.changer == pytest.approx(np.linalg.norm(cups[1] - cups[0], axis=1) / np.sqrt(6))
+    assert seen.declared(["1", "2", "2"]) == pytest.approx(np.tile(seen.changer, (3, 1)))
     # at another place, or at other joint positions, nothing was measured again
     assert compared(cups[:2], joints[:2], ["left", "right"], ["1", "2"]).found is None
     assert compared(cups[:2], joints[[0, -1]], ["", ""], ["1", "2"]).found is None
@@ -273,7 +285,8 @@ def test_what_the_changer_does_not_repeat_is_declared(tmp_path: Path, filled: Ro
     assert attached.found is not None
     sigma = sheet.dataset().sigma
     assert sigma is not None
-    assert sigma[:3] == pytest.approx(np.maximum(attached.found.deviation, CUP_DEVIATION * DEVICE.sigma))
+    assert attached.found.rest is None
+    assert sigma[:3] == pytest.approx(np.maximum(attached.found.changer, CUP_DEVIATION * DEVICE.sigma))
     assert sigma.max() > 1e-5
     # without anything measured again nothing is known, and nothing declared
     assert together([read(tmp_path, filled)]).dataset().sigma is None

@@ -49,10 +49,27 @@ class ChangerRepeatability:
     pairs: int
     compared: int
 
-    @property
-    def deviation(self) -> Array:
-        """Standard deviation of a coordinate of a cup, attachment and rest together [m], ``(3,)``."""
-        return self.changer if self.rest is None else np.hypot(self.changer, self.rest)
+    def declared(self, attachments: Sequence[str]) -> Array:
+        """Return the standard deviation of a coordinate of each cup in each row [m], ``(rows, 3)``.
+
+        What an attachment moves is the same in all its rows, and the place of the tool is found from all rows. So it
+        counts as it differs from the mean over the rows: by nothing where there is one attachment only, in full where
+        each row has its own. With the shares ``w`` of the attachments in the rows, the variance of an attachment ``a``
+        less that mean is ``1 - 2 w_a + sum(w ** 2)`` times that of the changer. Where the rest is not known it is
+        contained in `changer`, which then counts in full.
+
+        Parameters
+        ----------
+        attachments
+            Of each row.
+        """
+        if self.rest is None:
+            return np.tile(self.changer, (len(attachments), 1))
+        rows = np.array(attachments)
+        _, of_row, counts = np.unique(rows, return_inverse=True, return_counts=True)
+        share = counts / len(rows)
+        part = np.maximum(1.0 - 2.0 * share + (share**2).sum(), 0.0)[of_row]
+        return np.asarray(np.sqrt(self.rest**2 + part[:, None] * self.changer**2))
 
 
 @dataclass(frozen=True, eq=False)

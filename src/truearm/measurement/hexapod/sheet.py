@@ -144,8 +144,9 @@ class Sheet:
         several = self.places is not None and len(fixtures) > 1
         attached = self.attached()
         sigma = None
-        if attached is not None and attached.found is not None:
-            sigma = np.tile(np.maximum(attached.found.deviation, CUP_DEVIATION * DEVICE.sigma), len(rows))
+        if attached is not None and attached.found is not None and self.attachments is not None:
+            found = attached.found.declared([self.attachments[row] for row in rows])
+            sigma = np.maximum(found, CUP_DEVIATION * DEVICE.sigma).reshape(-1)
         return Dataset(
             source=self.source,
             labels=tuple(self.labels[row] for row in rows),

@@ -199,19 +199,18 @@ def reachable_at_places(
 def attached_anew(plan: Reachable, attachments: int) -> Reachable:
     """Return a plan in which, after each attachment of the tool but the first, a few configurations come again.
 
-    They are spread over those of the last place, and called ``7-2`` where ``7`` is measured with the second attachment.
+    They are spread over those of the last place. Their numbers go on, so that the order of measurement stays known.
     """
     if attachments == 1:
         return plan
     last = [number for number, row in enumerate(plan.rows) if row.place == plan.rows[-1].place]
     chosen = np.unique(np.linspace(last[0], last[-1], _AGAIN).round().astype(int)).tolist()
-    again = [
-        replace(row, configuration=f"{row.configuration}-{attachment}", attachment=str(attachment))
-        for attachment in range(2, attachments + 1)
-        for row in (plan.rows[number] for number in chosen)
-    ]
+    rows = [replace(row, attachment="1") for row in plan.rows]
+    for attachment in range(2, attachments + 1):
+        rows += [replace(rows[number], attachment=str(attachment)) for number in chosen]
+    numbered = tuple(replace(row, configuration=str(number)) for number, row in enumerate(rows, 1))
     room = np.concatenate([plan.clearance, np.tile(plan.clearance[chosen], attachments - 1)])
-    return replace(plan, rows=(*(replace(row, attachment="1") for row in plan.rows), *again), clearance=room)
+    return replace(plan, rows=numbered, clearance=room)
 
 
 def _in_frame(outer: Transform, inner: Transform) -> Transform:

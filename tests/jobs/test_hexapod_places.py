@@ -54,11 +54,12 @@ def campaign(
     """Return every sixth row with what comes again, the true base cups, and the sheet filled in."""
     rng = np.random.default_rng(7)
     every = plan.reachable.rows
-    again = {row.configuration.split("-")[0] for row in every if "-" in row.configuration} if changer else set()
+    again = [row.joints for row in every if row.attachment != "1"]
     rows = [
         row
         for number, row in enumerate(every)
-        if (number % 4 == 0 and "-" not in row.configuration) or row.configuration.split("-")[0] in again
+        if (number % 4 == 0 and row.attachment == "1")
+        or (changer and any(np.array_equal(row.joints, joints) for joints in again))
     ]
     cups = {f"fixture_{number}": locked_cups(place, rng, 1e-4, fourth=True) for number, place in enumerate(PLACES, 1)}
     return rows, cups, filled_sheet(twin, rows, cups, ballbar(rng, device), ToolChanger(rng) if changer else None)

@@ -4,7 +4,7 @@ A tool that is attached anew is shifted and turned on the flange by a little, th
 the robot stands. What moved between two attachments is therefore counted in the frame of the cups. Each displacement is
 the sum of what is of its configuration, what is of its attachment, and the rest, which is of the robot's repeatability
 and of the ballbar. How much of the variance is of the attachments follows from sums of squares with and without them
-(C. R. Henderson, Biometrics 9, 1953, method 3), so that configurations need not all be measured equally often.
+(Henderson 1953, method 3), so that configurations need not all be measured equally often.
 """
 
 from __future__ import annotations

@@ -116,7 +116,7 @@ def _sheet() -> str:
         read = measured_legs(bar, pose.design, base, pose.cups)
         lengths.append({name: read[own] for name, own in zip(row.leg_names, pose.design.leg_names, strict=True)})
         rows.append(row)
-        if label != "b":
+        if label in "ae":
             lengths[-1] |= measured_sides(bar, base, "B") | dict.fromkeys(("B1-B4", "B2-B4", "B3-B4"), 0.3)
     lengths[0] |= measured_sides(bar, found[0].cups, "T")
     return sheet_csv(rows, [Joint(f"axis_{n}", "revolute", {}) for n in range(1, 7)], lengths)

@@ -34,6 +34,8 @@ SAID = (
     ("d", 12, "left", 4, "2"),
     ("e", 5, "right", 1, "2"),
     ("f", 40, "right", 1, "2"),
+    ("g", 12, "right", 1, "2"),
+    ("h", 20, "right", 1, "2"),
 )
 
 
@@ -46,7 +48,7 @@ def base() -> Array:
 
 @pytest.fixture
 def filled(base: Array) -> Rows:
-    """Six rows with exact lengths."""
+    """Eight rows with exact lengths."""
     between = [float(np.linalg.norm(base[a] - base[b])) for a, b in ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))]
     rows, lengths = [], []
     for number, (label, pose, place, side, attachment) in enumerate(SAID):
@@ -108,7 +110,7 @@ def test_places_are_fixtures(tmp_path: Path, filled: Rows) -> None:
     data = together([read(tmp_path, filled)]).dataset()
     assert data.fixtures == ("left", "right")
     assert data.fixture is not None
-    assert data.fixture.tolist() == [0] * 12 + [1] * 6
+    assert data.fixture.tolist() == [0] * 12 + [1] * 12
     assert not data.anchored
 
 
@@ -126,7 +128,7 @@ def test_sheets_without_places_are_a_place_each(tmp_path: Path, filled: Rows) ->
     data = together(parts).dataset()
     assert data.fixtures == ("fixture_1", "fixture_2")
     assert data.position == pytest.approx(together([read(tmp_path, filled)]).dataset().position, abs=1e-12)
-    assert data.labels == ("a", "b", "c", "d", "e", "f")
+    assert data.labels == ("a", "b", "c", "d", "e", "f", "g", "h")
 
 
 def test_sheets_of_the_same_place_share_it(tmp_path: Path, filled: Rows) -> None:
@@ -151,8 +153,8 @@ def _with_tool(rows: Rows) -> Rows:
         (r"line 6, column B1-B2 \[mm\]: the first row of a place", "locked anew", 4, "B1-B2 [mm]", ""),
         ("the attachment of the tool is missing", "leave the whole column empty", 2, "attachment", ""),
         ("line 4, column place: the cell is empty", "", 2, "place", ""),
-        ("rows of the place left do not stand together", "call that another place", 5, "place", "left"),
-        ("no row of the place here has all six legs", "remove the rows", 5, "place", "here"),
+        ("rows of the place left do not stand together", "call that another place", 6, "place", "left"),
+        ("too few rows of the place right have all six legs; got 3; allowed: 4", "remove the rows", 7, "place", "here"),
         ("there is no such side; got '5'; allowed: 1, 2, 3, 4", "", 1, "side", "5"),
         ("there is no such side; got ''", "", 1, "side", ""),
         (r"has no leg B3-T\d on this side", "which cups", 1, "B3", "300"),
@@ -175,7 +177,7 @@ def test_bad_cells(tmp_path: Path, filled: Rows, words: str, cure: str, row: int
 def test_an_attachment_is_needed_only_where_something_was_measured(tmp_path: Path, filled: Rows) -> None:
     leg = legs_of_side(POSES[39].design, 2)[0]
     filled[1] |= {f"{leg} [mm]": "", "attachment": ""}
-    assert read(tmp_path, filled).attachments == ("1", "", "1", "2", "2", "2")
+    assert read(tmp_path, filled).attachments == ("1", "", "1", "2", "2", "2", "2", "2")
     assert read(tmp_path, [row | {"attachment": ""} for row in filled]).attachments is None
 
 

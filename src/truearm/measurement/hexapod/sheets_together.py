@@ -18,6 +18,8 @@ from truearm.measurement.readers.rows import Configurations
 #: Distances of one fixture differ by less than this from one sheet to the next [m]: 300 mm of steel grow by 0.035 mm in
 #: 10 K, of aluminium by 0.07 mm.
 _SAME_FIXTURE: Final = 0.1e-3
+#: Rows that say where each of several places is, as for any fixture that is measured against.
+_LEAST_ROWS: Final = 4
 
 
 def together(sheets: Sequence[Sheet]) -> Sheet:
@@ -29,8 +31,8 @@ def together(sheets: Sequence[Sheet]) -> Sheet:
     Raises
     ------
     InputError
-        If they are not of one robot and one tool, only some of them name places or attachments, or a place has no row
-        with all legs, or base distances that cannot be those of a fixture that stands still.
+        If they are not of one robot and one tool, only some of them name places or attachments, or a place has too
+        few rows with all legs, or base distances that cannot be those of a fixture that stands still.
     """
     first, *others = sheets
     for other in others:
@@ -116,12 +118,16 @@ def _configurations(sheets: Sequence[Sheet], labels: tuple[str, ...]) -> Configu
 
 
 def _refuse_moved(sheet: Sheet, place: str) -> None:
-    """Refuse a place where nothing was measured, or whose fixture cannot have stood still."""
+    """Refuse a place where too little was measured, or whose fixture cannot have stood still."""
     rows = [row for row, name in enumerate(sheet.places or ()) if name == place]
-    if not np.isfinite(sheet.legs[rows]).all(axis=1).any():
+    measured = int(np.isfinite(sheet.legs[rows]).all(axis=1).sum())
+    least = _LEAST_ROWS if len(set(sheet.places or ())) > 1 else 1
+    if measured < least:
         raise InputError(
-            f"no row of the place {place} has all six legs",
+            f"too few rows of the place {place} have all six legs",
             where=sheet.source,
+            came=measured,
+            allowed=f"{least} or more",
             cure="Fill in the lengths, or remove the rows of this place.",
         )
     between = np.hstack([sheet.base[rows], sheet.to_fourth[rows]])

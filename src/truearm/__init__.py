@@ -36,21 +36,30 @@ if TYPE_CHECKING:
     from truearm.jobs.hexapod_uncertainty import hexapod_uncertainty
     from truearm.jobs.hexapod_world_frame import hexapod_world_frame
     from truearm.jobs.import_circle import import_circle
+    from truearm.jobs.import_hand_eye import import_hand_eye
     from truearm.jobs.import_matrices import import_matrices
     from truearm.jobs.import_robodk import import_robodk
+    from truearm.jobs.import_sockets import import_sockets
     from truearm.jobs.import_table import import_table
     from truearm.jobs.import_ur_kinematics import import_ur_kinematics
+    from truearm.jobs.influence import influence
     from truearm.jobs.inverse import inverse
     from truearm.jobs.lines import lines
     from truearm.jobs.load_data import load_data
     from truearm.jobs.load_robot import load_robot
     from truearm.jobs.new_robot import new_robot
+    from truearm.jobs.path import path
     from truearm.jobs.plan import plan
+    from truearm.jobs.plan_inclinometers import plan_inclinometers
+    from truearm.jobs.poses import poses
     from truearm.jobs.revert import revert
     from truearm.jobs.robots import robots
     from truearm.jobs.show import show
     from truearm.jobs.simulate import simulate
+    from truearm.jobs.simulate_inclinometers import simulate_inclinometers
+    from truearm.jobs.sphere import sphere
     from truearm.jobs.study import study
+    from truearm.jobs.tilting import tilting
     from truearm.jobs.tolerance import tolerance
     from truearm.jobs.validate import validate
     from truearm.measurement.dataset import Dataset
@@ -84,21 +93,30 @@ __all__ = [
     "hexapod_uncertainty",
     "hexapod_world_frame",
     "import_circle",
+    "import_hand_eye",
     "import_matrices",
     "import_robodk",
+    "import_sockets",
     "import_table",
     "import_ur_kinematics",
+    "influence",
     "inverse",
     "lines",
     "load_data",
     "load_robot",
     "new_robot",
+    "path",
     "plan",
+    "plan_inclinometers",
+    "poses",
     "revert",
     "robots",
     "show",
     "simulate",
+    "simulate_inclinometers",
+    "sphere",
     "study",
+    "tilting",
     "tolerance",
     "validate",
 ]

@@ -82,9 +82,14 @@ LIMITS: Final[Mapping[str, Limit]] = {
         100, "there are too many different forces for one run", "forces", "Correct the programs in several runs."
     ),
     "poses": Limit(50_000, "the number is out of range", "poses"),
+    "samples": Limit(
+        20_000, "the path has too many samples", "samples", "Take a longer step in the file, or go faster."
+    ),
     "candidates": Limit(50_000, "the number is out of range", "candidates"),
     "trials": Limit(1_000_000, "the number is out of range", "trials"),
+    "monte_carlo": Limit(100_000, "the number is out of range", "trials"),
     "repeats": Limit(100_000, "the number is out of range", "repeats"),
+    "bootstrap": Limit(10_000, "the number is out of range", "fits"),
     "seeds": Limit(1000, "the number is out of range", "seeds"),
 }
 

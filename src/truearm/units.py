@@ -15,7 +15,7 @@ from truearm.errors import InputError, did_you_mean
 
 # How many of the unit make one SI unit (lengths and grams, as divisors) or how much SI one unit is (angles, inch):
 # mm to m divides by 1000, which is correctly rounded, where multiplying by 0.001 is not.
-_PER_SI: Final = {"m": 1.0, "mm": 1e3, "um": 1e6, "g": 1e3, "1/deg": math.pi / 180.0}
+_PER_SI: Final = {"m": 1.0, "mm": 1e3, "um": 1e6, "g": 1e3, "ppm": 1e6, "1/deg": math.pi / 180.0}
 _SI_PER: Final = {
     **{"in": 0.0254, "rad": 1.0, "deg": math.pi / 180.0, "mrad": 1e-3, "1": 1.0, "1/mm": 1e3},
     **{"mrad/(N m)": 1e-3, "mrad/(N m)^2": 1e-3, "mrad/(N m)^3": 1e-3, "um/N": 1e-6, "um/(m K)": 1e-6},
@@ -109,6 +109,40 @@ def sized_si(
         allowed=f"{low:.6g} to {high:.6g}{'' if unit == '1' else f' {unit}'}",
         cure="Correct the number, or its unit.",
     )
+
+
+def quantity_si(
+    text: str, units: tuple[str, ...], parameter: str, number: str, whole: str, *, deviation: bool = False
+) -> float:
+    """Return a number that a text gives with its unit, such as ``50mm``, in SI units.
+
+    Parameters
+    ----------
+    units
+        Those that it may have.
+    parameter
+        What the refusal names.
+    number, whole
+        A number as an example, and an example of everything that the parameter takes.
+    deviation
+        Whether it is a standard deviation, which can be too small as well.
+
+    Raises
+    ------
+    InputError
+        If it is no number, or has no unit that fits.
+    """
+    match = re.fullmatch(r"\s*(?P<number>[^a-zA-Z]*(?:[eE][-+0-9]+)?)\s*(?P<unit>[a-zA-Z]*)\s*", text)
+    found = None if match is None else as_number(match["number"].strip())
+    if match is None or found is None or match["unit"] not in units:
+        raise InputError(
+            "a number with its unit belongs here" if found is None else "no unit that fits is given",
+            parameter=parameter,
+            came=text,
+            allowed=" or ".join(f"{number}{unit}" for unit in units),
+            cure=f"Units are never guessed: write {whole}.",
+        )
+    return sized_si(found, match["unit"], parameter=parameter, came=text, deviation=deviation)
 
 
 def written(value: float, unit: str) -> float:

@@ -20,6 +20,7 @@ from truearm.measurement.readers.canonical import csv_text, read_csv
 from truearm.results.demonstration import Demonstration
 
 IDS = [
+    "fr3",
     "irb120",
     "irb1600",
     "katana450",

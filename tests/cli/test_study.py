@@ -35,7 +35,8 @@ def test_it_writes_its_files_and_compares(truearm: Truearm, quick: None, tmp_pat
     assert sorted(path.name for path in (tmp_path / "new").iterdir()) == ["report.html", "study.json", MANIFEST]
     page = (tmp_path / "new" / "report.html").read_text()
     assert "<pre>truearm study irb120-simulation --seeds 1 --out DIR</pre>" in page
-    assert "agrees  after, drawn errors:" in run.out
+    assert "  not worse       after, drawn errors:" in run.out
+    assert run.out.count("Verdicts: agrees ") == 1
     assert "published 0.004 mm" in run.out
 
 

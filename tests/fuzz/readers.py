@@ -12,6 +12,7 @@ import numpy as np
 from truearm.compensation.cell import read_frames, read_tools, read_wrenches
 from truearm.compensation.program_files import program_files, read_programs, restored
 from truearm.errors import InputError
+from truearm.identification.choosing.zone_boxes import boxes_of, read_zones
 from truearm.identification.solving.bounds import read_bounds
 from truearm.jobs.import_ur_kinematics import import_ur_kinematics
 from truearm.jobs.load_robot import load_robot
@@ -22,14 +23,18 @@ from truearm.measurement.hexapod.sheets_together import together
 from truearm.measurement.hexapod.touches import read_touches
 from truearm.measurement.readers.canonical import csv_text, read_csv
 from truearm.measurement.readers.drawn_circles import Page, read_drawn_circles
+from truearm.measurement.readers.hand_eye import read_hand_eye
+from truearm.measurement.readers.inclinations import inclinations_text, read_inclinations
 from truearm.measurement.readers.matrices import read_matrices
 from truearm.measurement.readers.poses import read_poses
 from truearm.measurement.readers.robodk import read_robodk
+from truearm.measurement.readers.sockets import Apart, read_sockets
 from truearm.measurement.readers.table import read_table
 from truearm.modeling.formats.dh_csv import complete_dh_csv, read_dh_csv
 from truearm.modeling.formats.robot_file import robot_text
 from truearm.modeling.robot import Robot
 from truearm.planning.constraints.constraints import read_constraints
+from truearm.planning.paths.path_file import read_path
 
 
 @dataclass(frozen=True)
@@ -118,6 +123,15 @@ def _programs(language: str, *names: str) -> Reader:
     return Reader({Path(name).name: f"{language}/{name}" for name in names}, read)
 
 
+def _inclinations(folder: Path) -> None:
+    """Check that angles are angles, and that what is written is read again."""
+    read = read_inclinations(folder / "inclinations.csv")
+    assert not np.abs(read.angle[np.isfinite(read.angle)]).max(initial=0.0) > np.pi / 2, "an angle is none"
+    text = inclinations_text(read)
+    (folder / "again.csv").write_text(text, encoding="utf-8", newline="")
+    assert inclinations_text(read_inclinations(folder / "again.csv")) == text, "what was written is not what is read"
+
+
 def _record(folder: Path) -> None:
     read_programs(restored([folder / "done.mod"]))
 
@@ -129,6 +143,7 @@ READERS: Final[Mapping[str, Reader]] = {
     "table": _table("table.csv", "mapping.yaml"),
     "spatial": _table("points.csv", "spatial.yaml", joints="joints"),
     "matrices": Reader({"joints.txt": "joints.txt", "points.txt": "points.txt"}, _matrices),
+    "inclinations": Reader({"inclinations.csv": "inclinations.csv"}, _inclinations),
     "robodk": Reader(
         {"robodk.csv": "robodk.csv"},
         lambda folder: _dataset(read_robodk(folder / "robodk.csv", "deg", "model").data, folder),
@@ -139,6 +154,14 @@ READERS: Final[Mapping[str, Reader]] = {
         lambda folder: _dataset(
             read_drawn_circles({"a": Page(folder / "page.png", folder / "page.csv")}, 300.0, 2e-5), folder
         ),
+    ),
+    "sockets": Reader(
+        {"sockets.csv": "sockets.csv"},
+        lambda folder: _dataset(read_sockets(folder / "sockets.csv", Apart(0.2, 2e-5), 0.025, None), folder),
+    ),
+    "hand-eye": Reader(
+        {"views.csv": "views.csv"},
+        lambda folder: _dataset(read_hand_eye(folder / "views.csv", "camera", None).data, folder),
     ),
     "hexapod-sheet": Reader(
         {"sheet.csv": "sheet.csv"},
@@ -159,7 +182,11 @@ READERS: Final[Mapping[str, Reader]] = {
     "dh": _dh_table("dh.csv", "standard-dh"),
     "mdh": _dh_table("mdh.csv", "modified-dh"),
     "hayati": _dh_table("hayati.csv", "hayati"),
+    "zones": Reader(
+        {"zones.yaml": "zones.yaml"}, lambda folder: boxes_of(read_zones(folder / "zones.yaml"), "zones.yaml")
+    ),
     "bounds": Reader({"bounds.yaml": "bounds.yaml"}, lambda folder: read_bounds(folder / "bounds.yaml")),
+    "path": Reader({"way.yaml": "path.yaml"}, lambda folder: read_path(folder / "way.yaml")),
     "constraints": Reader({"limits.yaml": "constraints.yaml"}, lambda folder: read_constraints(folder / "limits.yaml")),
     "tools": Reader({"cell.yaml": "cell.yaml"}, lambda folder: read_tools(of_library("irb120"), folder / "cell.yaml")),
     "frames": Reader(

@@ -30,6 +30,14 @@ units: {length: mm, angle: deg}
 within: {theta_offset: 2, d: 5, a_3: 0.05}
 between: {alpha_4: [-90.2, -89.8]}
 """
+ZONES = """\
+truearm: truearm-zones/1
+units: {length: mm}
+overlap: 30
+zones:
+  left: {y: [0, null], z: [100, 900]}
+  right: {x: [-500, 500], y: [-600, 0]}
+"""
 CONSTRAINTS = """\
 truearm: truearm-constraints/1
 units: {length: mm, angle: deg}
@@ -56,9 +64,14 @@ def folder() -> Path:
         "import_matrices",
         "import_robodk",
         "import_circle",
+        "import_sockets",
+        "import_hand_eye",
         "tolerance",
+        "tilting",
         "compensate",
         "revert",
+        "path",
+        "sphere",
     ):
         EXAMPLES[job](place)
     truearm.import_ur_kinematics(**EXAMPLES["import_ur_kinematics"](place))
@@ -79,6 +92,7 @@ def folder() -> Path:
         "spatial.yaml": SPATIAL,
         "joints.csv": JOINTS,
         "bounds.yaml": BOUNDS,
+        "zones.yaml": ZONES,
         "constraints.yaml": CONSTRAINTS,
         "sheet.csv": _sheet(),
         "touches.csv": _touches(),

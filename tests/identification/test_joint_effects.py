@@ -184,3 +184,12 @@ def test_temperatures_of_no_arm_are_told(warmth: tuple[float, float], told_of: b
     data = replace(bent(20), temperature=np.linspace(*warmth, 20))
     codes = [notice.code for notice in check_data(data)]
     assert ("temperature-unlikely" in codes) == told_of
+
+
+def test_bearings_that_are_assumed_are_told_where_joints_tilt() -> None:
+    data = bent(30)
+    told_of = told(identify(IRB120, data, MODEL["tilting"]))["bearing-assumed"]
+    assert all(joint.name in told_of for joint in IRB120.joints)
+    stated = replace(IRB120, joints=tuple(replace(joint, bearing=0.0) for joint in IRB120.joints))
+    assert "bearing-assumed" not in told(identify(stated, data, MODEL["tilting"]))
+    assert "bearing-assumed" not in told(identify(IRB120, data, MODEL["elastic"]))

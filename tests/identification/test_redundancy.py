@@ -8,6 +8,7 @@ import pytest
 from tests.simulated import campaign, more_of
 
 from truearm.errors import InputError
+from truearm.identification.held import NOTHING_HELD, Held
 from truearm.identification.solving.bounds import Bounds
 from truearm.identification.solving.fit import Fit, Status, identify
 from truearm.identification.solving.models import MODELS
@@ -102,8 +103,9 @@ def test_a_joint_that_never_moved_is_a_loss_of_rank(still: list[int]) -> None:
     joints[:, still] = 0.3
     positions = np.stack([twin.robot.world_poses(joints, t)[0] for t in data.targets], axis=1).reshape(-1, 3)
     for redundancy in get_args(Redundant):
+        held = Held(twin.robot.base) if redundancy == "none" else NOTHING_HELD  # it needs something that is known
         fit = identify(load_robot("irb120"), replace(data, joints=joints, position=positions), GEOMETRIC,
-                       redundancy=redundancy)  # fmt: skip
+                       redundancy=redundancy, held=held)  # fmt: skip
         assert fit.status is Status.RANK_LOSS, redundancy
         assert fit.unobservable
         assert all(fit.parameter_status(name) == "not-determined" for name in fit.unobservable)

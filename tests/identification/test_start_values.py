@@ -39,6 +39,7 @@ LOOPS = (
     "sphere",
     "two-spheres",
     "point",
+    "two-sockets",
     "calibration-table",
     "touch-up",
     "drawn-circle",

@@ -63,6 +63,15 @@ def _written(path: Path, text: str) -> Path:
     return path
 
 
+#: Where a target of the IRB 120 is on the flange.
+_KNOWN = """\
+truearm: truearm-cell/1
+units: {length: mm, angle: deg}
+tools:
+  "2": {of: flange, translation: [75, 93.7, 215]}
+"""
+
+
 def _matrices(folder: Path) -> Arguments:
     joints = _written(folder / "joints.txt", "0 10 20 30 40 50\n5 10 25 30 45 50\n")
     points = _written(folder / "points.txt", "100 200 300\n0 0 0\n")
@@ -88,6 +97,27 @@ def _circle(folder: Path) -> Arguments:
     rows = "configuration,joint_1 [deg],joint_2 [deg],angle [deg],height [mm]\n1,10,20,0,0.5\n2,12,22,180,-0.2\n"
     points = _written(folder / "page.csv", rows)
     return {"scans": {"a": drawn(folder / "page.png")}, "points": {"a": points}, "dpi": 300.0, "sigma": 2e-5}
+
+
+def _sockets(folder: Path) -> Arguments:
+    rows = "configuration,joint_1 [deg],joint_2 [deg],socket\n1,10,20,left\n2,12,22,right\n3,15,25,left\n"
+    return {"file": _written(folder / "sockets.csv", rows), "apart": "200mm,0.02mm", "ball": "25mm", "sigma": 2e-5}
+
+
+def _views(folder: Path) -> Arguments:
+    header = "configuration,joint_1 [deg],joint_2 [deg],x [mm],y [mm],z [mm],qw,qx,qy,qz,sigma [mm],sigma_rot [mrad]"
+    rows = "1,10,20,5,-3,400,1,0,0,0,0.05,0.2\n2,12,22,4,8,450,0.6,0.8,0,0,0.05,0.2\n"
+    return {"file": _written(folder / "views.csv", f"{header}\n{rows}"), "on_flange": "camera"}
+
+
+def _inclinations(folder: Path) -> Path:
+    """What inclinometers on a Katana read in eight pairs of configurations."""
+    import truearm
+
+    path = folder / "inclinations.csv"
+    if not path.exists():
+        truearm.simulate_inclinometers("katana450", truth="tilting", poses=16, out=path)
+    return path
 
 
 def _axis_runs(folder: Path) -> Path:
@@ -149,6 +179,34 @@ def _corrected(folder: Path) -> Path:
     return path
 
 
+#: A line, a circle and waypoints with times, over an IRB 120's table.
+PATH = """\
+truearm: truearm-path/1
+units: {length: mm, angle: deg, time: s}
+frame: nominal
+tip: [0, 0, 100]
+orientation: {quaternion: [0, 1, 0, 0]}
+speed: 200
+acceleration: 1000
+step: 0.1
+joint_speeds: [250, 250, 250, 320, 320, 420]
+start: [350, 0, 250]
+sections:
+  - line: [350, 60, 250]
+  - {circle: {centre: [350, 80, 250], normal: [0, 0, 1]}, speed: 100}
+  - {hermite: [[340, 30, 260], [350, 0, 250]], velocities: [[0, 0, 0], [0, -80, 0], [0, 0, 0]], times: [0, 0.6, 1.2]}
+"""
+
+
+def _ballbar(folder: Path) -> Path:
+    import truearm
+
+    path = folder / "ballbar.csv"
+    if not path.exists():
+        truearm.simulate("irb120", truth="random", poses=24, device="ballbar", seed=1, out=path)
+    return path
+
+
 def _new(folder: Path, name: str) -> Path:
     """Return a path that does not exist."""
     path = folder / name
@@ -171,10 +229,14 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "seed": 1,
         "loss": "linear",
         "redundancy": "prior",
+        "hold": ["2"],
+        "frames": _written(folder / "known.yaml", _KNOWN),
+        "bootstrap": 20,
         "effects": ["compliance"],
         "payload": "1kg,0mm,0mm,50mm",
         "gravity": (0.0, 0.0, -9.81),
     },
+    "tilting": lambda folder: {"robot": "katana450", "inclinations": _inclinations(folder)},
     "validate": lambda folder: {
         "robot": _calibrated(folder),
         "data": _data(folder),
@@ -193,6 +255,8 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
     },
     "export_robodk": lambda folder: {"robot": _calibrated(folder), "data": _data(folder), "out": _new(folder, "r.csv")},
     "import_circle": _circle,
+    "import_sockets": _sockets,
+    "import_hand_eye": _views,
     "import_ur_kinematics": lambda folder: {
         "file": _written(folder / "calibration.conf", UR10_CONF),
         "robot": "ur10",
@@ -206,6 +270,34 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "device": "ballbar",
         "seed": 1,
         "region": ((0.3, 0.5), (-0.1, 0.1), (0.2, 0.4)),
+    },
+    "plan_inclinometers": lambda _: {"robot": "katana450", "poses": 8, "candidates": 100, "seed": 1},
+    "simulate_inclinometers": lambda _: {"robot": "katana450", "truth": "tilting", "poses": 8},
+    "poses": lambda _: {
+        "robot": "irb120",
+        "set": "diagonal",
+        "centre": (0.35, 0.0, 0.35),
+        "side": 0.2,
+        "count": 5,
+        "tip": (0.0, 0.0, 0.05),
+        "orientation": (0.0, 1.0, 0.0, 0.0),
+        "seed": 1,
+    },
+    "path": lambda folder: {
+        "robot": _calibrated(folder),
+        "file": _written(folder / "path.yaml", PATH),
+        "seed": (0.0, 0.2, 0.4, 0.0, 0.9, 0.0),
+        "programs": ["rapid", "krl"],
+        "wrench": (0.0, 5.0, 0.0, 0.0, 0.0, 0.1),
+        "wrench_frame": "base",
+        "spacing": 0.3,
+        "payload": "1kg,0mm,0mm,50mm",
+    },
+    "sphere": lambda folder: {
+        "robot": "irb120",
+        "data": _ballbar(folder),
+        "tip": (0.0, 0.0, 0.125),
+        "payload": "1kg,0mm,0mm,50mm",
     },
     "simulate": lambda _: {
         "robot": "irb120",
@@ -230,6 +322,15 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "truth": "axis-tests",
         "noise": 1e-5,
         "repeats": 2,
+    },
+    "influence": lambda folder: {
+        "robot": "irb120",
+        "data": _data(folder),
+        "model": "offsets",
+        "train": 14,
+        "target": "2",
+        "frames": "placed",
+        "combination": "mean",
     },
     "hexapod_enumerate": lambda _: {},
     "hexapod_uncertainty": lambda _: {"trials": 100, "seed": 1},

@@ -19,14 +19,17 @@ from truearm.manifest import MANIFEST, UNFINISHED
 from truearm.modeling.formats.robot_file import robot_text
 from truearm.results.axis_calibration import AXIS_FILES
 from truearm.results.calibration import RESULT_FILES
+from truearm.results.followed_path import MOTION
+from truearm.results.followed_path import REPORT as PATH_REPORT
 from truearm.results.program_correction import REPORT
+from truearm.results.validation import VALIDATION_FILES
 
 #: How a job refuses it; a program that is called as a record is no program to begin with.
 REFUSED = r"would be overwritten|not overwritten|of this name itself|no robot language has files of this kind"
 #: Parameters that name what a job writes.
 OUTPUTS = ("out", "steps", "file", "folder")
 #: Of these names those that a job reads.
-FILES = (("import_table", "file"), ("import_robodk", "file"), ("import_ur_kinematics", "file"))
+FILES = (("import_table", "file"), ("import_robodk", "file"), ("import_ur_kinematics", "file"), ("path", "file"))
 Arguments = dict[str, Any]
 
 
@@ -47,6 +50,9 @@ READ: dict[str, Callable[[Path], Arguments]] = {
     "calibrate": lambda folder: {
         "robot": _robot(folder),
         "bounds": _written(folder / "bounds.yaml", f"truearm: truearm-bounds/1\n{_UNITS}within: {{d_1: 5}}\n"),
+        "zones": _written(
+            folder / "zones.yaml", "truearm: truearm-zones/1\nunits: {length: mm}\nzones: {left: {y: [0, null]}}\n"
+        ),
     },
     "plan": lambda folder: {
         "robot": _robot(folder),
@@ -60,7 +66,15 @@ READ: dict[str, Callable[[Path], Arguments]] = {
         "tools": EXAMPLES["compensate"](folder)["tools"],
         "frames": shutil.copy(EXAMPLES["compensate"](folder)["tools"], folder / "tools.yaml"),
     },
-    "simulate": lambda folder: {"robot": _robot(folder), "truth": EXAMPLES["validate"](folder)["robot"]},
+    "poses": lambda folder: {"robot": _robot(folder)},
+    "path": lambda folder: {"robot": _robot(folder), "programs": (), "payload": None},
+    "sphere": lambda folder: {"robot": _robot(folder)},
+    "simulate": lambda folder: {
+        "robot": _robot(folder),
+        "truth": EXAMPLES["validate"](folder)["robot"],
+        "poses": EXAMPLES["load_data"](folder)["data"],
+        "device": None,
+    },
     "inverse": lambda folder: {
         "robot": _robot(folder),
         "poses": _written(folder / "p.csv", "pose,x [mm],y [mm],z [mm],qw,qx,qy,qz\n1,300,0,500,0,0,1,0\n"),
@@ -87,19 +101,22 @@ READ: dict[str, Callable[[Path], Arguments]] = {
 #: What is no file that a job reads and overwrites: a folder of data whose files have names of their own.
 FOLDERS = (("study", "data"), ("lines", "data"))
 #: What only another robot reads: tests/compensation/test_controller_model.py tries it.
-ELSEWHERE = (("compensate", "controller_kinematics"),)
+ELSEWHERE = (("compensate", "controller_kinematics"), ("path", "controller_kinematics"))
 
 
 #: The names of what a job writes into the folder `out`.
 INTO_FOLDERS = {
     "calibrate": RESULT_FILES,
+    "validate": VALIDATION_FILES,
     "axes": AXIS_FILES,
     "compensate": ("plate.mod", "plate.mod.truearm.json", REPORT),
     "revert": ("plate.mod",),
+    "path": (MOTION, PATH_REPORT),
 }
 #: The names of what a job writes where `out` is one of them, or the parameter beside it.
 BESIDE = {
     "plan": {"plan.csv": {"out": "plan.csv"}, "plan.html": {"out": "plan.csv"}},
+    "poses": {name: {"out": "set.csv"} for name in ("set.csv", "set-poses.csv", "set.html")},
     "hexapod_plan": {
         "sheet.csv": {"out": "sheet.csv", "steps": "steps.txt"},
         "steps.txt": {"out": "sheet.csv", "steps": "steps.txt"},

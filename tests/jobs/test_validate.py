@@ -11,6 +11,7 @@ from tests.simulated import campaign, more_of
 from typer.testing import CliRunner
 
 from truearm.cli import app
+from truearm.errors import InputError
 from truearm.jobs.calibrate import calibrate
 from truearm.jobs.validate import validate
 from truearm.measurement.dataset import Dataset
@@ -56,3 +57,40 @@ def test_renamed_targets_are_told(calibrated: tuple[Path, Dataset]) -> None:
     )
     assert told.exit_code == 3
     assert json.loads(told.stdout)["warnings"][0]["code"] == "targets-renamed"
+
+
+def test_a_page_and_its_figures_are_written(calibrated: tuple[Path, Dataset], tmp_path: Path) -> None:
+    folder, new = calibrated
+    found = validate(folder / "result" / "calibrated.yaml", new, out=tmp_path / "out", notes={"serial": "4711"})
+    content = json.loads((tmp_path / "out" / "result.json").read_text())
+    assert content["truearm"] == "truearm-validation/1"
+    assert {name: content[name] for name in found.summary()} == found.summary()
+    assert sum(span["readings"] for span in content["distance_from_training"]["tip_mm"]) == 36
+    page = (tmp_path / "out" / "report.html").read_text()
+    for place in ("error-over-tip", "error-over-joints", "error-over-middle", "residuals"):
+        assert f'id="{place}"' in page
+    assert "orientation-parts" not in page
+    assert "4711" in page
+    assert "truearm.validate(" in content["command"]
+    assert "From the nearest of 20 training configurations: tips " in "\n".join(found.lines())
+    told = CliRunner().invoke(
+        app,
+        [
+            "validate",
+            str(folder / "result" / "calibrated.yaml"),
+            str(folder / "first.csv"),
+            "--out",
+            str(tmp_path / "x"),
+        ],
+    )
+    assert told.exit_code == 0
+    assert told.stdout.splitlines()[-1] == f"Written to {tmp_path / 'x'}: result.json, report.html"
+
+
+def test_the_folder_of_a_calibration_is_not_written_over(calibrated: tuple[Path, Dataset], tmp_path: Path) -> None:
+    folder, new = calibrated
+    (tmp_path / "report.html").write_text("mine")
+    with pytest.raises(InputError, match="was not written here by truearm"):
+        validate(folder / "result" / "calibrated.yaml", new, out=tmp_path)
+    with pytest.raises(InputError, match="belong to another result"):
+        validate(folder / "result" / "calibrated.yaml", new, out=folder / "result")

@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 from tests.modeling.pinocchio_oracle import PinocchioChain
 
 from truearm.library import library, load_robot
+from truearm.modeling.balancers import Anchor, Balancer
 from truearm.modeling.chain import Array, Chain, Element, Motion
 from truearm.modeling.conventions import CONVENTIONS, Convention, JointKind
 from truearm.modeling.effects import EFFECTS, Effect
@@ -187,7 +188,8 @@ def test_derivatives_of_effect_are_central_differences(effect: type[Effect], con
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.name)
 def test_effect_does_nothing_at_its_nominal_values(effect: type[Effect]) -> None:
     rng = np.random.default_rng(2)
-    plain = load_robot("irb120")
+    spring = Balancer("spring", Anchor(1, (-0.15, 0.05, 0.1)), Anchor(2, (0.2, 0.08, 0.03)), 90.0, 0.2, 1500.0)
+    plain = replace(load_robot("irb120"), balancers=(spring,))
     q = plain.random_configurations(CONFIGURATIONS, rng)
     robot = plain.with_effects([effect.name])
     assert set(robot.parameters) > set(plain.parameters)

@@ -42,7 +42,8 @@ def centres(robot: Robot, q: Array) -> Array:
     for mass in robot.masses:
         links = Chain((*robot.base_elements, *(e for link in robot.link_elements[: mass.joint] for e in link)))
         kinematics = links.forward_kinematics(robot.variables(q, robot.values), robot.values)
-        found.append(kinematics.matrix() @ mass.cog + kinematics.position.T)
+        centre = robot.axial_slides.stayed(mass.joint, mass.cog, robot.values)
+        found.append(kinematics.matrix() @ centre + kinematics.position.T)
     return np.array(found)
 
 
@@ -110,6 +111,28 @@ def test_random_robot_goes_from_its_convention_to_any(convention: Convention) ->
             assert "left out: link masses" in made.history[-1]
         expected = loads_along_axes(robot if made.masses else unladen, q)
         assert_allclose(loads_along_axes(made, q), expected, rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize("stated", [True, False], ids=["stated", "assumed"])
+@pytest.mark.parametrize("name", CONVERSIONS)
+def test_bearings_stay_where_they_are(name: str, stated: bool) -> None:
+    rng = np.random.default_rng(4)
+    robot = load_robot("katana450").with_effects(["bearing-compliance"])
+    joints = [replace(joint, bearing=float(rng.uniform(-0.1, 0.1)) if stated else None) for joint in robot.joints]
+    robot = replace(robot, joints=tuple(joints))
+    away = {"bearing_compliance": 1e-5, "d": 1e-3, "a": 1e-3, "theta_offset": 1e-3}
+    robot = robot.with_values({n: p.value + away.get(n[:-2], 0.0) * rng.normal() for n, p in robot.parameters.items()})
+    made = converted(robot, name)
+    q = robot.random_configurations(20, rng)
+    if made.masses:
+        for ours, theirs in zip(made.world_poses(q), robot.world_poses(q), strict=True):
+            assert_allclose(ours, theirs, rtol=0, atol=1e-11)
+    assert [made.bearings[i] is not None for i in range(5)] == [True] * 5
+
+
+def test_bearings_that_nobody_knows_stay_unknown() -> None:
+    made = converted(load_robot("irb120"), "standard-dh")
+    assert [joint.bearing for joint in made.joints] == [None] * 6
 
 
 # -- what stays ------------------------------------------------------------------------------------------

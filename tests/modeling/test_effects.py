@@ -7,6 +7,7 @@ import runpy
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import truearm
 from truearm.errors import InputError
 from truearm.library import load_robot
+from truearm.modeling.balancers import Anchor, Balancer
 from truearm.modeling.effects import EFFECTS, NON_NEGATIVE, Effect
 from truearm.modeling.effects.backlash import SEATED
 from truearm.modeling.formats.export import exported
@@ -27,6 +29,7 @@ from truearm.simulation.twin import Twin
 from truearm.simulation.twin_joint import JointTruth
 
 #: All together; of clearance in one form.
+SPRING = Balancer("spring", Anchor(1, (-0.15, 0.05, 0.1)), Anchor(2, (0.2, 0.08, 0.03)), 400.0, 0.2, 1000.0)
 NAMES = tuple(effect.name for effect in EFFECTS if effect.name != "clearance-linear-contact")
 
 
@@ -35,6 +38,8 @@ def loaded_arm(effects: tuple[str, ...], seed: int) -> Robot:
     rng = np.random.default_rng(seed)
     plain = load_robot("irb120").with_frames(load_robot("irb120").base, {"tip": (0.05, 0.02, 0.15)})
     masses = tuple(LinkMass(i, float(rng.uniform(1, 4)), tuple(rng.uniform(-0.1, 0.1, 3))) for i in range(1, 7))
+    if "balancer" in effects:  # which moves nothing that does not give way
+        plain, effects = replace(plain, balancers=(SPRING,)), (*effects, "compliance")
     robot = replace(plain, masses=masses, payload=Payload(2.0, (0.05, 0.03, 0.1))).with_effects(effects)
     own = [p for effect in robot.effects for p in effect.parameters]
     return robot.with_values({p.name: p.nominal + 0.3 * p.prior * abs(rng.normal()) for p in own})
@@ -171,7 +176,7 @@ def test_what_is_not_known_does_nothing(effect: str) -> None:
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.name)
 def test_the_group_of_its_parameters_is_its_name(effect: type[Effect]) -> None:
     robot = loaded_arm((effect.name,), 3)
-    (own,) = robot.effects
+    own = next(each for each in robot.effects if each.name == effect.name)
     assert own.parameters
     assert {p.group for p in own.parameters} == {effect.name}
     assert len({e.name for e in EFFECTS}) == len(EFFECTS)
@@ -186,7 +191,7 @@ def test_it_depends_on_what_it_says(effect: type[Effect]) -> None:
     assert at.number is not None
     assert at.temperature is not None
 
-    def matters(**changed: np.ndarray) -> bool:
+    def matters(**changed: Any) -> bool:
         """Whether the effect moves the arm otherwise in other circumstances."""
         return bool(np.abs(robot.world_poses(replace(at, **changed))[0] - robot.world_poses(at)[0]).max() > 1e-9)
 

@@ -252,7 +252,8 @@ def test_json_holds_what_is_known_of_every_parameter() -> None:
     model = json.loads(exported(replace(robot.with_parameters([known]), history=("one", "twö")), "json").text)
     assert list(model) == [
         *("truearm", "name", "title", "source", "units", "frames", "left_out", "convention", "base", "joints"),
-        *("flange", "targets", "fixtures", "effects", "masses", "payload", "gravity", "parameters", "history"),
+        *("flange", "targets", "fixtures", "effects", "masses", "balancers"),
+        *("payload", "gravity", "parameters", "history"),
     ]
     assert model["truearm"] == "truearm-model/1"
     assert model["history"] == ["one", "twö"]

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +17,7 @@ from truearm.modeling.loads import joint_loads
 from truearm.modeling.parts import GRAVITY, Joint, LinkMass, Payload
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
+from truearm.simulation.twin_slides import carried, directions_at
 
 CONFIGURATIONS = 7
 WITH_MASSES = [name for name in library() if load_robot(name).masses]
@@ -47,12 +49,21 @@ def laden(robot: Robot, rng: np.random.Generator) -> Robot:
     )
 
 
+def with_bearings(robot: Robot, rng: np.random.Generator) -> Robot:
+    """The robot with the bearing of every joint that turns somewhere on its axis."""
+    joints = [
+        replace(joint, bearing=float(rng.uniform(-0.3, 0.3))) if joint.kind == "revolute" else joint
+        for joint in robot.joints
+    ]
+    return replace(robot, joints=tuple(joints))
+
+
 def heavy_robot(convention: Convention, rng: np.random.Generator) -> Robot:
-    """Up to seven joints of both kinds; masses on most links, two on some."""
+    """Up to seven joints of both kinds with bearings anywhere; masses on most links, two on some."""
     kinds: tuple[JointKind, ...] = tuple(
         "revolute" if rng.random() < 0.7 else "prismatic" for _ in range(int(rng.integers(2, 8)))
     )
-    robot = random_robot(convention, (), rng, kinds)
+    robot = with_bearings(random_robot(convention, (), rng, kinds), rng)
     links = [i + 1 for i in range(len(kinds)) for _ in range(int(rng.choice([0, 1, 1, 1, 2])))]
     return laden(replace(robot, masses=tuple(random_link(i, rng) for i in links)), rng)
 
@@ -67,6 +78,20 @@ def motion(robot: Robot, rng: np.random.Generator, count: int = CONFIGURATIONS) 
 # -- against Pinocchio -----------------------------------------------------------------------------------
 
 
+def stayed(elements: Sequence[Element], end: int, point: Direction, robot: Robot) -> Array:
+    """Where a point of the link that ends there is, by the twin's way to tell how far slides have carried it."""
+    axes = directions_at(elements, end)
+    return np.array(point) - sum((carried(elements, end, a, robot.values) * a for a in axes), np.zeros(3))
+
+
+def bearing_of(elements: Sequence[Element], place: int, robot: Robot) -> float:
+    """How far from its origin the bearing of the joint at a place lies, by the twin's way."""
+    if not elements[place].turns:
+        return 0.0
+    bearing = robot.joints[elements[place].variable or 0].bearing or 0.0
+    return bearing - carried(elements, place, np.array(axis_of(elements[place])), robot.values)
+
+
 def by_pinocchio(robot: Robot, variables: Array, velocity: Array, acceleration: Array, wrench: Array) -> Array:
     elements = [e for link in robot.link_elements for e in link]
     ends = np.cumsum([len(link) for link in robot.link_elements])
@@ -75,18 +100,21 @@ def by_pinocchio(robot: Robot, variables: Array, velocity: Array, acceleration: 
     for link in robot.masses:
         xx, yy, zz, xy, xz, yz = link.inertia
         tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        bodies.append(Body(int(ends[link.joint - 1]), link.mass, np.array(link.cog), tensor))
+        end = int(ends[link.joint - 1])
+        bodies.append(Body(end, link.mass, stayed(elements, end, link.cog, robot), tensor))
     bodies.append(Body(len(whole.elements), robot.payload.mass, np.array(robot.payload.cog), np.zeros((3, 3))))
     oracle = PinocchioChain(whole, robot.values, bodies)
     joints = [e for e in whole.elements if e.variable is not None]
     own_axes = [np.array([*across(e), axis_of(e)]) for e in joints]
+    lever = [bearing_of(elements, elements.index(e), robot) * np.array(axis_of(e)) for e in joints]
     loads = np.empty((len(joints), 6, variables.shape[1]))
     for k in range(variables.shape[1]):
         held = oracle.reactions(
             variables[:, k], velocity[:, k], acceleration[:, k], np.array(robot.gravity), wrench[:, k]
         )
         for i, axes in enumerate(own_axes):
-            loads[i, :3, k], loads[i, 3:, k] = -axes @ held[i, :3], -axes @ held[i, 3:]
+            moment = held[i, 3:] - np.cross(lever[i], held[i, :3])
+            loads[i, :3, k], loads[i, 3:, k] = -axes @ held[i, :3], -axes @ moment
     return loads
 
 
@@ -122,7 +150,7 @@ def test_library_robot_agrees_with_pinocchio(robot_id: str) -> None:
     compare_with_pinocchio(robot, rng)
     step = {"m": 1e-3, "rad": 1e-3}
     off = robot.with_values({n: p.value + step[p.unit] * rng.normal() for n, p in robot.parameters.items()})
-    compare_with_pinocchio(laden(off, rng), rng)
+    compare_with_pinocchio(with_bearings(laden(off, rng), rng), rng)
 
 
 def test_library_has_masses() -> None:
@@ -194,12 +222,20 @@ def test_horizontal_pull_turns_an_upright_axis() -> None:
 # -- what must hold for every arm ------------------------------------------------------------------------
 
 
+def centre_of(robot: Robot, link: LinkMass) -> list[Element]:
+    """The way from a link's frame to its centre of gravity."""
+    every = [e for each in robot.link_elements for e in each]
+    end = sum(len(each) for each in robot.link_elements[: link.joint])
+    x, y, z = (float(v) for v in stayed(every, end, link.cog, robot))
+    return [Element("Tx", x), Element("Ty", y), Element("Tz", z)]
+
+
 def height_of_weight(robot: Robot, bodies: Array, elements: tuple[tuple[Element, ...], ...]) -> Array:
     """Potential energy [J] of the links, by the poses of their centres of gravity."""
     energy = np.zeros(bodies.shape[1])
     for link in robot.masses:
         way = [e for each in elements[: link.joint] for e in each]
-        way += [Element("Tx", link.cog[0]), Element("Ty", link.cog[1]), Element("Tz", link.cog[2])]
+        way += centre_of(robot, link)
         energy -= (
             link.mass * np.array(robot.gravity) @ Chain(tuple(way)).forward_kinematics(bodies, robot.values).position
         )
@@ -222,7 +258,10 @@ def test_arm_that_yields_to_its_load_sags(convention: Convention) -> None:
                 yielding = Element(motion_, variable=len(joints), axis=axis)  # type: ignore[arg-type]
                 bent = list(robot.link_elements)
                 place = bent[i].index(joint) + 1
-                bent[i] = (*bent[i][:place], yielding, *bent[i][place:])
+                every = [e for each in robot.link_elements for e in each]
+                away = bearing_of(every, every.index(joint), robot)
+                there, back_again = (Element("T", s * away, axis=axis_of(joint)) for s in (1.0, -1.0))
+                bent[i] = (*bent[i][:place], there, yielding, back_again, *bent[i][place:])
                 step = 1e-6
                 moved = height_of_weight(robot, np.vstack([variables, np.full(CONFIGURATIONS, step)]), tuple(bent))
                 back = height_of_weight(robot, np.vstack([variables, np.full(CONFIGURATIONS, -step)]), tuple(bent))
@@ -247,7 +286,7 @@ def test_power_of_the_loads_is_what_kinetic_and_potential_energy_lose(name: str)
     energy = height_of_weight(robot, variables, robot.link_elements)
     for link in robot.masses:
         way = [e for each in robot.link_elements[: link.joint] for e in each]
-        way += [Element("Tx", link.cog[0]), Element("Ty", link.cog[1]), Element("Tz", link.cog[2])]
+        way += centre_of(robot, link)
         kinematics = Chain(tuple(way)).forward_kinematics(variables, robot.values)
         R = kinematics.matrix()
         energy += 0.5 * link.mass * (rate(kinematics.position) ** 2).sum(axis=0)

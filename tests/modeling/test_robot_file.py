@@ -88,7 +88,7 @@ def with_effect(effect: str, name: str, unit: str, nominal: float = 0.0, value: 
                 "joints[2]",
                 "modified-hayati",
                 "got 'alpa'",
-                "allowed: name, type, limits, transmission_periods, alpha, beta",
+                "allowed: name, type, limits, transmission_periods, bearing, alpha, beta",
                 "Did you mean alpha",
             ],
             id="unknown column",

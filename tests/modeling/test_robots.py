@@ -15,6 +15,7 @@ from truearm.modeling.formats.urdf_writing import urdf_text
 from truearm.modeling.robot import Robot
 
 IDS = (
+    "fr3",
     "irb120",
     "irb1600",
     "katana450",
@@ -142,6 +143,8 @@ def test_invented_numbers_say_so() -> None:
         ("irb1600", [0, 0, 0, 0, 0, 0], [150 + 600 + 65, 0, 486.5 + 700]),
         # Reach of the IRB 1600-6/1.45: wrist centre 1450 mm from axis 1, arm stretched out level.
         ("irb1600", [0, 90, -90, 0, 0, 0], [1450 + 65, 0, 486.5]),
+        # Franka: stretched upright, 333 + 316 + 384 high, the flange 88 out and 107 below the wrist.
+        ("fr3", [0, 0, 0, 0, 0, 0, 0], [88, 0, 333 + 316 + 384 - 107]),
         # FANUC dimension drawing: 330 + 300 + 75 high, 75 + 320 + 80 out.
         ("lrmate200ic", [0, 0, 0, 0, 0, 0], [475, 0, 705]),
         # KR5 paper, section 3, and KUKA's drawing for the arm stretched out.

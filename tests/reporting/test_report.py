@@ -171,7 +171,8 @@ def test_every_place_has_its_figure() -> None:
     places = {a["id"] for t, a in shown.elements if t == "div" and a.get("class") == "figure"}
     assert places == set(shown.figures)
     histograms = {"position-histogram", "orientation-histogram"}
-    assert places == {*histograms, "expected-error", "workspace", "residuals", "correlations"}
+    limits = {"limits-of-accuracy", "limits-over-the-workspace"}
+    assert places == {*histograms, *limits, "expected-error", "workspace", "residuals", "correlations"}
 
 
 def test_the_same_report_is_the_same_page() -> None:
@@ -513,3 +514,22 @@ def test_parameters_named_in_a_notice_are_shown_as_code() -> None:
     notice = Notice("odd", "Leave `train` out, or use `loss=cauchy` & <b>.")
     html = report_html(replace(made(), warnings=(notice,)))
     assert "Leave <code>train</code> out, or use <code>loss=cauchy</code> &amp; &lt;b&gt;." in html
+
+
+def test_the_shares_of_the_square_are_drawn_and_listed() -> None:
+    shown = page(made())
+    budget = made().budget
+    assert budget is not None
+    (bars,) = shown.figures["limits-of-accuracy"]["data"]
+    assert bars["y"] == [
+        "instrument noise",
+        "what the model cannot express",
+        "uncertain parameters",
+        "remainder",
+        "held out, together",
+    ]
+    assert sum(bars["x"][:-1]) == pytest.approx(bars["x"][-1], rel=1e-3)
+    for begin, length, after in zip(bars["base"], bars["x"][:-1], bars["base"][1:-1], strict=False):
+        assert begin + length == pytest.approx(after, abs=1e-3 * bars["x"][-1])
+    assert "no posture was visited again: it is in what the model cannot express" in shown.text
+    assert "Nothing was held out, so together they are what to expect" in page(made(train=40)).text

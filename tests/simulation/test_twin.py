@@ -358,9 +358,9 @@ def test_the_katana_on_its_circle_is_as_far_off_as_the_document_measured() -> No
         return float(np.linalg.norm(measure(Twin(robot, joints), q, 0.0, RNG(0)).position - exact, axis=1).mean()) * 1e3
 
     # The thesis measured 0.653 mm in all and prints no orientations; other postures give 0.46 to 0.86.
-    assert mean_mm(1.0, 1.0) == pytest.approx(0.67, abs=0.015)
+    assert mean_mm(1.0, 1.0) == pytest.approx(0.666, abs=0.01)
     # With the printed gap on either side, as equation 5.19 has it, it would be half as much again.
-    assert mean_mm(2.0, 1.0) == pytest.approx(0.97, abs=0.015)
+    assert mean_mm(2.0, 1.0) == pytest.approx(0.953, abs=0.01)
     assert 0.01 < mean_mm(0.0, 0.0) < 0.06
 
 

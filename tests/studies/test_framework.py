@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+from dataclasses import fields, replace
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -18,14 +18,15 @@ from truearm.studies import STUDIES, Entry, run_study
 from truearm.studies.regions import IRB120
 from truearm.studies.seeds import Seed, median_of, over_seeds
 from truearm.studies.study import Picture, Row, Study, Table, number
+from truearm.studies.verdicts import VERDICTS, Comparison
 
 HOSTILE = "</script><b>"
 
 
 def small() -> Study:
     rows = (
-        Row("near", "mm", [0.9, 1.1, 5.0], 1.0, "Table 1", absolute=0.15),
-        Row("far", "mm", [1.3], 1.0, "Table 1", relative=0.1, explanation=HOSTILE),
+        Row("near", "mm", [0.95, 1.05, 1.0], "1.0", "Table 1"),
+        Row("far", "mm", [1.3, 1.31, 1.32], "1.00", "Table 1", explanation=HOSTILE),
         Row("alone", "deg", [2.0, 4.0]),
     )
     drawn = figure([{"type": "scatter", "x": [0, 1], "y": [1, 2]}], 200, xaxis=axis("x"), yaxis=axis("y"))
@@ -42,18 +43,32 @@ def small() -> Study:
     )
 
 
-def test_the_median_is_judged_by_the_stated_tolerance() -> None:
+def test_a_row_has_the_verdict_of_its_figures() -> None:
     near, far, alone = small().tables[0].rows
-    assert (near.median, near.lowest, near.highest) == (1.1, 0.9, 5.0)
-    assert [row.verdict for row in (near, far, alone)] == ["agrees", "differs", "no figure published"]
-    assert near.tolerance == 0.15
-    assert far.tolerance == pytest.approx(0.1)
-    assert alone.tolerance is None
+    assert (near.median, near.lowest, near.highest) == (1.0, 0.95, 1.05)
+    assert [row.verdict for row in (near, far, alone)] == ["agrees", "differs", None]
 
 
-def test_the_larger_tolerance_counts() -> None:
-    assert Row("x", "mm", [1.4], 1.0, absolute=0.1, relative=0.5).verdict == "agrees"
-    assert Row("x", "mm", [1.4], 1.0, absolute=0.5, relative=0.1).verdict == "agrees"
+def test_no_study_can_say_how_far_off_a_figure_may_be() -> None:
+    assert [field.name for field in fields(Row)] == [
+        "what",
+        "unit",
+        "ours",
+        "published",
+        "source",
+        "claim",
+        "explanation",
+    ]
+    assert [field.name for field in fields(Comparison)] == ["ours", "printed", "claim"]
+
+
+def test_every_row_is_counted_and_the_counts_are_printed() -> None:
+    study = small()
+    assert study.counts == dict.fromkeys(VERDICTS, 0) | {"agrees": 1, "differs": 1}
+    assert study.lines()[-1] == (
+        "Verdicts: agrees 1, same order 0, not worse 0, by construction 0, undecided 0, differs 1."
+    )
+    assert study.lines()[2] == "  agrees          near: 1, published 1.0 mm, within 0.1"
 
 
 @pytest.mark.parametrize(
@@ -75,21 +90,24 @@ def test_a_study_is_written_whole(tmp_path: Path) -> None:
         "source",
         "answer",
         "seeds",
+        "counts",
         "tables",
         "pictures",
         "notes",
     ]
-    assert content["truearm"] == "truearm-study/1"
+    assert content["truearm"] == "truearm-study/2"
     assert content["tables"][0]["rows"][1] == {
         "what": "far",
         "unit": "mm",
-        "ours": [1.3],
-        "median": 1.3,
+        "ours": [1.3, 1.31, 1.32],
+        "median": 1.31,
         "lowest": 1.3,
-        "highest": 1.3,
+        "highest": 1.32,
         "published": 1.0,
+        "printed": "1.00",
         "source": "Table 1",
-        "tolerance": 0.1,
+        "claim": "equal",
+        "tolerance": pytest.approx(0.02),
         "verdict": "differs",
         "explanation": HOSTILE,
     }
@@ -102,7 +120,7 @@ def test_the_report_is_one_page_that_trusts_no_text() -> None:
     assert "<link" not in page
     assert '<div class="figure" id="line"' in page
     assert "<pre>again &lt;/script&gt;" in page
-    assert "1 figure agrees with the published one, 1 differs; 3 seeds." in page
+    assert "Beside published figures: agrees 1, differs 1; 3 seeds." in page
 
 
 def test_a_report_without_a_command_shows_none() -> None:

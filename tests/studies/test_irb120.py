@@ -74,17 +74,25 @@ def test_no_run_out_is_chosen_where_noise_makes_more_than_the_printed_range() ->
 
 def test_single_joints() -> None:
     study = irb120_axes.study(1, silent, coarser=5)
-    radii, compliance, by_table, shares, matched = study.tables
-    assert all(row.verdict == "agrees" for row in radii.rows)
+    radii, compliance, by_table, shares, allowed, matched = study.tables
+    places = [row.comparison for row in radii.rows if row.comparison]
+    assert all(place.median == pytest.approx(place.value, rel=0.03) for place in places)
     # Gravity does nothing to joint 1; the document's own compliance of joint 6 goes from too little to too much.
     assert by_table.rows[0].highest < 1e-9
     angular = {row.what: row for row in compliance.rows if row.unit == "deg"}
-    assert angular["joint 5, angular"].verdict == "agrees"
+    assert angular["joint 5, angular"].median == pytest.approx(0.153, rel=0.25)
     assert angular["joint 2, angular"].median == pytest.approx(0.082, abs=0.006)
     assert max(shares.rows, key=lambda row: row.median).what == "joint 2 turns, joint 2 gives way"
+    # With compliances of the document's own that suit Table 2.3 better, less run-out is enough.
+    needed = {row.what: row.median for row in allowed.rows}
+    of_2_7, between = (
+        sum(amplitude for what, amplitude in needed.items() if what.endswith(words))
+        for words in ("of Table 2.7", "between those of the three tables")
+    )
+    assert between < 0.7 * of_2_7
     backlash = [row for row in matched.rows if row.what.endswith("backlash")]
     assert len(backlash) == 6
-    assert all(row.median == pytest.approx(row.published, abs=0.003) for row in backlash)
+    assert {row.verdict for row in backlash} <= {"by construction", "undecided"}
     assert len(study.pictures[0].figure["data"]) == 18
 
 

@@ -1,8 +1,12 @@
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from truearm.jobs.calibrate import calibrate
+from truearm.jobs.validate import validate
 from truearm.studies.li_table import study
 from truearm.studies.li_table.arm import (
     BEYOND,
@@ -78,8 +82,8 @@ def test_gains_are_those_of_the_mean_errors() -> None:
 
 def test_with_play(found: Study) -> None:
     points, path, ways = found.tables[0], found.tables[1], named(found, "With play")
-    assert row(points, "before").verdict == "agrees"
-    assert row(points, "after, normal table").verdict == "agrees"
+    assert row(points, "before").verdict == "same order"
+    assert row(points, "after, normal table").verdict == "by construction"
     assert all(row.published is None for row in path.rows if row.what.startswith("mean"))
     for tilt in ("normal", "roll", "pitch", TOGETHER):
         assert row(ways, f"{tilt}: {THEIRS}").median < row(ways, "before").median
@@ -89,18 +93,18 @@ def test_with_play(found: Study) -> None:
 def test_without_play(found: Study) -> None:
     ways = named(found, "Without play")
     bounded, unbounded = row(ways, f"normal: {THEIRS}"), row(ways, f"normal: {UNBOUNDED}")
-    assert all(2 * a < b for a, b in zip(bounded.ours, unbounded.ours, strict=True))
+    assert all(2 * a < b for a, b in zip(bounded.values, unbounded.values, strict=True))
     assert all(row(ways, f"{TOGETHER}: {method}").highest < 0.3 for method in METHOD_WORDS.values())
 
 
 def test_geometry_beyond_the_bounds_is_still_mostly_taken_away(found: Study) -> None:
     table = named(found, "Geometry alone")
-    assert [r.verdict for r in table.rows] == ["agrees", "agrees", "differs", "differs", "differs"]
+    assert [r.verdict for r in table.rows] == ["by construction", "same order", "differs", "differs", "differs"]
     assert max(r.highest for r in table.rows[2:]) < 8.0
 
 
 def test_each_reading_of_the_objective_is_best_by_itself(found: Study) -> None:
-    distances, distances_other, components_other, components = (r.ours for r in named(found, "Two readings").rows)
+    distances, distances_other, components_other, components = (r.values for r in named(found, "Two readings").rows)
     assert all(a < b for a, b in zip(distances, distances_other, strict=True))
     assert all(a < b for a, b in zip(components, components_other, strict=True))
 
@@ -116,3 +120,25 @@ def test_the_table_alone(found: Study) -> None:
 def test_absolute_values_do_not_notice_mistakes(found: Study) -> None:
     distances, components, squares, unbounded = (r.median for r in named(found, "Three holes").rows)
     assert max(distances, components) < 0.4 < 0.8 < min(squares, unbounded)
+
+
+def test_the_documents_fit_is_one_command(found: Study, tmp_path: Path) -> None:
+    """On the study's readings it leaves what the study's own code leaves."""
+    for name, text in found.files.items():
+        (tmp_path / name).write_text(text)
+    ways = named(found, "Without play")
+    for surface in ("normal", "roll", "pitch"):
+        calibrated = calibrate(
+            tmp_path / "robot.yaml",
+            tmp_path / f"{surface}.csv",
+            train="all",
+            loss="l1",
+            redundancy="none",
+            hold=["base", "targets"],
+            frames=tmp_path / "frames.yaml",
+            bounds=tmp_path / "bounds.yaml",
+        )
+        left = validate(calibrated.robot, tmp_path / "unseen.csv").errors.position
+        assert left is not None
+        assert 1e3 * left.mean == pytest.approx(row(ways, f"{surface}: {THEIRS}").values[0], rel=1e-3)
+        assert "hold-contradicts" not in {notice.code for notice in calibrated.warnings}

@@ -21,13 +21,18 @@ from truearm.cli.export import export, export_robodk
 from truearm.cli.hexapod import app as hexapod
 from truearm.cli.ik import ik
 from truearm.cli.importing import app as importing
+from truearm.cli.influence import influence
 from truearm.cli.library import robots, show
 from truearm.cli.lines import lines
 from truearm.cli.options import CommandError, Commands
+from truearm.cli.path import path
 from truearm.cli.plan import plan
+from truearm.cli.poses import poses
 from truearm.cli.simulate import simulate
+from truearm.cli.sphere import sphere
 from truearm.cli.starting import demo, example, new_robot
 from truearm.cli.study import HELP, study
+from truearm.cli.tilting import tilting
 from truearm.cli.tolerance import tolerance
 from truearm.cli.validate import validate
 from truearm.errors import InputError
@@ -65,14 +70,19 @@ def _root(
 
 app.command()(check)
 app.command()(calibrate)
+app.command()(tilting)
 app.command()(validate)
 app.command()(distances)
 app.command()(compensate)
 app.command()(ik)
 app.command()(plan)
+app.command()(poses)
+app.command()(path)
 app.command()(axes)
 app.command()(tolerance)
 app.command()(lines)
+app.command()(influence)
+app.command()(sphere)
 app.command()(simulate)
 app.command()(devices)
 app.add_typer(importing, name="import")

@@ -29,13 +29,37 @@ def calibrate(
         typer.Option(metavar="N|all", help="Configurations to train on; the rest judges.", show_default="70 %"),
     ] = None,
     seed: Annotated[int, typer.Option(metavar="S", min=0, help="Of the split.")] = 0,
-    loss: Annotated[str, typer.Option(metavar="LOSS", help="linear, huber, cauchy or l1.")] = "linear",
+    loss: Annotated[str, typer.Option(metavar="LOSS", help="linear, huber, cauchy, l1 or l1-components.")] = "linear",
     redundancy: Annotated[
-        str, typer.Option(metavar="HOW", help="prior (keep all, near nominal) or drop (hold and name redundant ones).")
+        str,
+        typer.Option(
+            metavar="HOW",
+            help="prior (keep all, near nominal), drop (hold and name redundant ones), none (no priors, all free; with "
+            "--bounds or --hold).",
+        ),
     ] = "prior",
     bounds: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Limits of parameter values.", show_default=False)
     ] = None,
+    hold: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="WHAT,...",
+            help="What is known and not found: base, targets, fixtures, or names; repeatable.",
+            show_default=False,
+        ),
+    ] = None,
+    frames: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Where what is held stands.", show_default=False)
+    ] = None,
+    bootstrap: Annotated[
+        int,
+        typer.Option(
+            metavar="N",
+            help="Deviations from N fits to configurations drawn anew.",
+            show_default="from the residuals",
+        ),
+    ] = 0,
     effects: Annotated[
         list[str] | None,
         typer.Option(
@@ -59,6 +83,18 @@ def calibrate(
             "--without", metavar="LABEL,...", help="Configurations to leave out; repeatable.", show_default=False
         ),
     ] = None,
+    monte_carlo: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N", help="Simulate N calibrations for intervals beside the linear ones.", show_default=False
+        ),
+    ] = None,
+    zones: Annotated[
+        str | None,
+        typer.Option(
+            metavar="N|FILE", help="Try a model for each of N zones, or for those of a file.", show_default=False
+        ),
+    ] = None,
     notes: NoteTexts = None,
     json: Json = False,
 ) -> None:
@@ -79,11 +115,16 @@ def calibrate(
             loss=loss,  # type: ignore[arg-type]
             redundancy=redundancy,  # type: ignore[arg-type]
             bounds=bounds,
+            hold=[name.strip() for text in hold or () for name in text.split(",")],
+            frames=frames,
+            bootstrap=bootstrap,
             effects=effects or (),
             payload=payload,
             gravity=read_gravity(gravity),
             base_changes=[name.strip() for name in base_changes.split(",")] if base_changes else (),
             without=[name.strip() for text in without or () for name in text.split(",")],
+            monte_carlo=monte_carlo,
+            zones=_number_or(zones),
             notes=read_notes(notes),
             command=command_line(),
             progress=say,
@@ -92,14 +133,19 @@ def calibrate(
         print_json(calibration.summary())
     else:
         print_record(calibration)
-        print_line(f"Written to {out}: calibrated.yaml, result.json, report.html, calibrated.urdf")
+        print_line(f"Written to {out}: {', '.join(calibration.files)}")
     if not calibration.finished:
         raise typer.Exit(3)
 
 
-def read_train(text: str | None) -> Any:
-    """Return a number where the text is one; the job refuses what is neither that nor all."""
+def _number_or(text: str | None) -> Any:
+    """Return a number where the text is one, else the text."""
     try:
         return text if text is None else int(text)
     except ValueError:
         return text
+
+
+def read_train(text: str | None) -> Any:
+    """Return a number where the text is one; the job refuses what is neither that nor all."""
+    return _number_or(text)

@@ -74,7 +74,7 @@ def ik(
         poses,
         out=out,
         branch=branch,
-        seed=_seed(robot, seed, joints),
+        seed=read_seed(robot, seed, joints),
         target=target,
         frame=frame,  # type: ignore[arg-type]
         orientation="free" if orientation_free else "axis" if orientation_axis else "full",
@@ -93,7 +93,7 @@ def ik(
         raise typer.Exit(3)
 
 
-def _seed(robot: str, text: str | None, joints: str | None) -> list[float] | None:
+def read_seed(robot: str, text: str | None, joints: str | None) -> list[float] | None:
     """Return the model's joint positions [rad or m] that a text in deg or mm names, of the kind that is written."""
     if text is None:
         return None

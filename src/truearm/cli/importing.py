@@ -129,6 +129,77 @@ def circle(
     print_record(imported)
 
 
+@app.command()
+def sockets(
+    file: Annotated[Path, typer.Argument(metavar="TOUCHES.csv", help="Joint positions, and the socket, row by row.")],
+    apart: Annotated[
+        str, typer.Option(metavar="DISTANCE,SIGMA", help="How far apart the sockets are, with units: 200mm,0.02mm.")
+    ],
+    ball: Annotated[str, typer.Option(metavar="DIAMETER", help="Of the ball, with its unit: 25mm.")],
+    out: Annotated[Path, typer.Option("--out", metavar="DATA.csv", help="File to write.")],
+    sigma: Annotated[
+        float | None,
+        typer.Option(
+            metavar="MM", help="How well the ball comes to rest in a socket, a deviation.", show_default="not declared"
+        ),
+    ] = None,
+) -> None:
+    """Joint positions of a ball on the flange that was put into two sockets, without any instrument."""
+    from truearm.jobs.import_sockets import import_sockets
+    from truearm.units import sized_si
+
+    imported = import_sockets(
+        file,
+        apart=apart,
+        ball=ball,
+        sigma=None if sigma is None else sized_si(sigma, "mm", parameter="sigma", deviation=True),
+        out=out,
+    )
+    print_record(imported)
+
+
+@app.command("hand-eye")
+def hand_eye(
+    file: Annotated[
+        Path, typer.Argument(metavar="VIEWS.csv", help="Joint positions, and poses or pictures of the board.")
+    ],
+    on_flange: Annotated[
+        str, typer.Option(metavar="camera|board", help="What moves with the robot; the other one stands beside it.")
+    ],
+    out: Annotated[Path, typer.Option("--out", metavar="DATA.csv", help="File to write.")],
+    board: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SQUARES,SIDE,MARKER,DICTIONARY",
+            help="The ChArUco board in the pictures: 14x10,25mm,18mm,5X5_250.",
+            show_default="the table holds poses",
+        ),
+    ] = None,
+    scale_sigma: Annotated[
+        float | None,
+        typer.Option(
+            metavar="PPM", help="How well the size of the board is known, a deviation.", show_default="taken as exact"
+        ),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Poses of a board in a camera, one of them on the flange, or pictures that show it."""
+    from truearm.jobs.import_hand_eye import import_hand_eye
+    from truearm.units import to_si
+
+    imported = import_hand_eye(
+        file,
+        on_flange=on_flange,  # type: ignore[arg-type]
+        board=board,
+        scale_sigma=None if scale_sigma is None else to_si(scale_sigma, "ppm"),
+        out=out,
+    )
+    if json:
+        print_json(imported.summary())
+    else:
+        print_record(imported)
+
+
 @app.command("ur-kinematics")
 def ur_kinematics(
     file: Annotated[

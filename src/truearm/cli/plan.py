@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from truearm.cli.inclinometers import INCLINOMETERS, Pull, even_poses, refuse_beside, refuse_pull
 from truearm.cli.loading import GravityText, JointsText, PayloadText, read_gravity
 from truearm.cli.options import command_line
 from truearm.cli.output import Json, print_json, print_line, print_record, progress
@@ -65,7 +66,7 @@ def plan(
         str | None,
         typer.Option(
             metavar="NAME",
-            help="An instrument of 'truearm devices'; not with --from.",
+            help="An instrument of 'truearm devices', or inclinometers; not with --from.",
             show_default="one that reads every target everywhere",
         ),
     ] = None,
@@ -79,15 +80,46 @@ def plan(
     payload: PayloadText = None,
     gravity: GravityText = None,
     joints: JointsText = None,
+    pull: Pull = None,
     json: Json = False,
 ) -> None:
     """Choose the configurations that tell most, in a measuring order, and say how accurate the result will be.
 
     Without a device every target on the robot's tool is measured at each of them. Writes PLAN.csv and PLAN.html.
     """
-    from truearm.jobs.plan import plan as run
     from truearm.units import sized_si
 
+    deviation = sized_si(noise, "mm", parameter="noise", deviation=True)
+    if device == INCLINOMETERS:
+        from truearm.jobs.plan_inclinometers import plan_inclinometers
+
+        beside = {"objective": objective, "accurate_at": accurate_at, "region": region, "tools": tools}
+        beside |= {"frames": frames, "candidates_from": candidates_from, "constraints": constraints}
+        refuse_beside(beside | {"model": None if model in ("geometric", "tilting") else model})
+        with progress() as say:
+            pairs = plan_inclinometers(
+                robot,
+                poses=even_poses(poses),
+                out=out,
+                pull=20.0 if pull is None else pull,
+                candidates=candidates,
+                noise=deviation,
+                seed=seed,
+                payload=payload,
+                gravity=read_gravity(gravity),
+                joints=joints,  # type: ignore[arg-type]
+                command=command_line(),
+                progress=say,
+            )
+        if json:
+            print_json(pairs.summary())
+        else:
+            print_record(pairs)
+            print_line(f"Written: {out}")
+        return
+    from truearm.jobs.plan import plan as run
+
+    refuse_pull(pull)
     with progress() as say:
         planned = run(
             robot,
@@ -103,7 +135,7 @@ def plan(
             candidates=candidates,
             device=device,
             constraints=constraints,
-            noise=sized_si(noise, "mm", parameter="noise", deviation=True),
+            noise=deviation,
             seed=seed,
             payload=payload,
             gravity=read_gravity(gravity),

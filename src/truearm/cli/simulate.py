@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
+from truearm.cli.inclinometers import INCLINOMETERS, Pull, refuse_beside, refuse_pull
 from truearm.cli.loading import GravityText, PayloadText, WrenchAtText, WrenchFrameText, WrenchText, read_gravity
 
 
@@ -18,7 +19,10 @@ def simulate(
             metavar="NAME|FILE", help="nominal, random, a truth of the robot file ('truearm show'), or a robot file."
         ),
     ],
-    poses: Annotated[int, typer.Option(metavar="N", min=1, help="Configurations, drawn evenly within the limits.")],
+    poses: Annotated[
+        str,
+        typer.Option(metavar="N|FILE.csv", help="Configurations, drawn evenly within the limits; or those of a file."),
+    ],
     out: Annotated[Path, typer.Option("--out", metavar="DATA.csv", help="File to write.")],
     noise: Annotated[
         float | None,
@@ -30,13 +34,14 @@ def simulate(
         str | None,
         typer.Option(
             metavar="NAME",
-            help="An instrument of 'truearm devices'.",
+            help="An instrument of 'truearm devices', or inclinometers.",
             show_default="one that sees every target everywhere",
         ),
     ] = None,
     seed: Annotated[int, typer.Option(metavar="S", min=0, help="Of configurations, noise and a random truth.")] = 0,
     payload: PayloadText = None,
     gravity: GravityText = None,
+    pull: Pull = None,
     wrench: WrenchText = None,
     wrench_frame: WrenchFrameText = None,
     wrench_at: WrenchAtText = None,
@@ -50,14 +55,35 @@ def simulate(
 ) -> None:
     """Measure a digital twin whose truth is known, with a simulated instrument."""
     from truearm.cli.output import print_record, progress
-    from truearm.jobs.simulate import simulate as run
     from truearm.units import sized_si
 
+    if device == INCLINOMETERS:
+        from truearm.jobs.simulate_inclinometers import simulate_inclinometers
+
+        refuse_beside({"noise": noise, "wrench": wrench, "wrench_frame": wrench_frame, "wrench_at": wrench_at})
+        with progress() as say:
+            read = simulate_inclinometers(
+                robot,
+                truth=truth,
+                poses=_poses(poses),
+                out=out,
+                pull=20.0 if pull is None else pull,
+                seed=seed,
+                payload=payload,
+                gravity=read_gravity(gravity),
+                joints=joints,  # type: ignore[arg-type]
+                progress=say,
+            )
+        print_record(read)
+        return
+    from truearm.jobs.simulate import simulate as run
+
+    refuse_pull(pull)
     with progress() as say:
         simulated = run(
             robot,
             truth=truth,
-            poses=poses,
+            poses=_poses(poses),
             out=out,
             noise=sized_si(noise, "mm", parameter="noise", deviation=True) if noise else noise,
             device=device,
@@ -71,3 +97,11 @@ def simulate(
             progress=say,
         )
     print_record(simulated)
+
+
+def _poses(text: str) -> Any:
+    """Return a number where the text is one, else the file of configurations."""
+    try:
+        return int(text)
+    except ValueError:
+        return text

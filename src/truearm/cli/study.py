@@ -22,7 +22,7 @@ HELP = "\n\n".join(
 
 def study(
     name: Annotated[str, typer.Argument(metavar="NAME", help="Which study; see above.")],
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for report.html and study.json.")],
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for report.html, study.json and more.")],
     data: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Folder of measured data, for a study that needs them.", show_default=False),
@@ -40,4 +40,4 @@ def study(
         print_json(finished.summary())
     else:
         print_record(finished)
-        print_line(f"Written to {out}: {', '.join(STUDY_FILES)}")
+        print_line(f"Written to {out}: {', '.join((*STUDY_FILES, *finished.files))}")

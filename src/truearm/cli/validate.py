@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -16,7 +17,8 @@ from truearm.cli.loading import (
     read_gravity,
     read_notes,
 )
-from truearm.cli.output import Json, end_on_error, print_json, print_record
+from truearm.cli.options import command_line
+from truearm.cli.output import Json, end_on_error, print_json, print_line, print_record
 
 
 def validate(
@@ -35,6 +37,10 @@ def validate(
             show_default=False,
         ),
     ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="DIR", help="Folder for report.html and result.json.", show_default=False),
+    ] = None,
     notes: NoteTexts = None,
     json: Json = False,
 ) -> None:
@@ -50,10 +56,14 @@ def validate(
         wrench_frame=wrench_frame,  # type: ignore[arg-type]
         wrench_at=wrench_at,
         refit=refit,
+        out=out,
         notes=read_notes(notes),
+        command=command_line(),
     )
     if json:
         print_json(validation.summary())
     else:
         print_record(validation)
+        if out is not None:
+            print_line(f"Written to {out}: result.json, report.html")
     end_on_error(validation.warnings)

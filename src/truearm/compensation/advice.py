@@ -298,7 +298,12 @@ def frame_words(result: CorrectedPrograms) -> list[str]:
         turned = math.degrees(float(np.linalg.norm(turns_between(np.eye(4)[None], shift[None])[0])))
         return f"{np.linalg.norm(shift[:3, 3]) * 1e3:.3f} mm and {turned:.4f} deg"
 
-    if frames.frames == "identified":
+    if frames.frames == "held":
+        said = [
+            "The calibration held the base, so it is known where the program's frames are: where the controller has "
+            "them. Targets are corrected in them, and may all move together."
+        ]
+    elif frames.frames == "identified":
         said = [
             "The program's frames are where `frames` places them; targets are corrected in them, and may all move "
             "together."
@@ -321,6 +326,10 @@ def frame_words(result: CorrectedPrograms) -> list[str]:
         ]
     if frames.tools == "identified":
         said.append("The program's tools are where `tools` places them, on the identified flange.")
+    elif frames.tools == "held":
+        said.append(
+            "The calibration held targets on the flange, so the program's tools are where the controller has them."
+        )
     else:
         given = "The tools were taught with this robot" if result.choice.was_taught("tools") else "`tools` is not given"
         said.append(

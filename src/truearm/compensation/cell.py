@@ -341,3 +341,64 @@ def _transform(place: _Place, units: _Units, where: str) -> Transform:
             numbers = given if name == "quaternion" else [sized_si(v, units.angle, f"{where}.{name}") for v in given]
             return Transform.from_matrix(orientation.matrices(np.array([numbers]))[0], np.array([x, y, z]))
     return Transform((x, y, z))
+
+
+@dataclass(frozen=True)
+class KnownPlace:
+    """Where something was found to be by whoever wrote the file.
+
+    Attributes
+    ----------
+    of
+        What the place is in: ``flange``, ``world`` or ``base``.
+    place
+        The place.
+    turned
+        Whether the entry says how it is turned; otherwise the rotation of `place` is none.
+    where
+        The entry, for messages.
+    """
+
+    of: str
+    place: Transform
+    turned: bool
+    where: str
+
+
+def read_known_places(robot: Robot, path: Path) -> tuple[dict[str, KnownPlace], dict[str, KnownPlace]]:
+    """Read where tools and frames really are, by their names as the file has them.
+
+    Parameters
+    ----------
+    robot
+        ``target`` refers to its targets.
+    path
+        File of the schema above.
+
+    Raises
+    ------
+    InputError
+        If the file is not of the schema. What the controller has is no place: such entries are refused.
+    """
+    content = read_yaml(path, CellFile)
+    tools: dict[str, KnownPlace] = {}
+    frames: dict[str, KnownPlace] = {}
+    for part, entries, found in (("tools", content.tools, tools), ("frames", content.frames, frames)):
+        for name, entry in entries.items():
+            where = f"{path}, {part}.{name}"
+            if entry.of == "controller":
+                raise InputError(
+                    "where the controller has it does not say where it is",
+                    where=where,
+                    came="of: controller",
+                    allowed="of: flange" if part == "tools" else "of: world, of: base",
+                    cure="Leave the entry out, or say where it was measured.",
+                )
+            turned = bool(entry.model_fields_set & {*_ORIENTATIONS})
+            if isinstance(entry, _Tool) and entry.target is not None:
+                with refusals_at(f"{where}.target"):
+                    place, turned = _of_target(robot, entry.target), robot.target(entry.target).quaternion is not None
+            else:
+                place = _transform(entry, content.units, where)
+            found[name] = KnownPlace(entry.of, place, turned, where)
+    return tools, frames

@@ -6,6 +6,9 @@ shift would move all of it. So unless somebody says where a program's tool and f
 is taken to be where it agrees best with the nominal one all over the workspace, and the base to be where the
 corrections of the program have no part that a motion of all targets together would make. A work object that was
 located by points with the uncorrected robot is in its place then.
+
+A calibration that held the base, or targets on the flange, knows them: then the identified base is the real one, and a
+held target stays where it is on the flange.
 """
 
 from __future__ import annotations
@@ -17,11 +20,15 @@ from typing import Final
 import numpy as np
 
 from truearm.compensation.fake_targets import matrices, nominal_robot
+from truearm.identification.solving.fit import Fit
 from truearm.modeling.chain import Array
 from truearm.modeling.inverse.kinematics import reach
+from truearm.modeling.proof import BASE, FLANGE
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import rotation_from_vector, rotation_vector
 
+#: Share of the largest below which a singular value is none.
+_RANK: Final = 1e-6
 #: Configurations on which flange and base are compared.
 _CONFIGURATIONS: Final = 300
 _ROUNDS: Final = 8
@@ -48,17 +55,63 @@ def best_agreement(robot: Robot) -> tuple[Array, Array]:
     base, flange
         ``T_base_nominalbase`` and ``T_flange_nominalflange``, ``(4, 4)`` each [m].
     """
-    base, flange, _ = _agreement(robot, nominal_robot(robot))
+    base, flange, _ = _agreement(robot, nominal_robot(robot), not base_is_held(robot), _flange_freedom(robot))
     return base, flange
+
+
+def base_is_held(robot: Robot) -> bool:
+    """Return whether the calibration of a robot held its base."""
+    return robot.proof is not None and BASE in robot.proof.held
+
+
+def flange_is_held(robot: Robot) -> bool:
+    """Return whether targets that the calibration of a robot held say where its flange is."""
+    return robot.proof is not None and not _flange_freedom(robot).shape[1]
+
+
+def held_by(fit: Fit) -> tuple[str, ...]:
+    """Return how a proof says what a fit has held."""
+    held = fit.held.names(fit.robot)
+    targets = [name for name in held if fit.robot.parameters[name].group == "target"]
+    found = [BASE] if fit.held.base is not None else []
+    if not _freedom_beside(fit.robot, targets).shape[1]:
+        found.append(FLANGE)
+    return (*found, *targets)
+
+
+def _flange_freedom(robot: Robot) -> Array:
+    """Return the motions of a flange that leave the targets held on it where they are, ``(6, k)``."""
+    held = () if robot.proof is None else robot.proof.held
+    return np.zeros((6, 0)) if FLANGE in held else _freedom_beside(robot, held)
+
+
+def _freedom_beside(robot: Robot, held: Sequence[str]) -> Array:
+    rows = [np.zeros((1, 6))]
+    for target in robot.targets:
+        if target.parameter("x") in held:
+            x, y, z = (robot.values[target.parameter(axis)] for axis in "xyz")
+            rows.append(np.column_stack([np.eye(3), [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]]))
+        if target.parameter("rx") in held:
+            rows.append(np.eye(3, 6, 3))
+    _, s, Vt = np.linalg.svd(np.concatenate(rows), full_matrices=True)
+    return np.asarray(Vt[int((s > _RANK).sum()) :].T)
 
 
 def disagreement(robot: Robot, nominal: Robot) -> float:
     """Return how far the flange of a nominal robot is from the identified one where both agree best [m], on average."""
-    return _agreement(robot, nominal)[2]
+    return _agreement(robot, nominal, True, np.eye(6))[2]
 
 
-def _agreement(robot: Robot, nominal: Robot) -> tuple[Array, Array, float]:
-    """Return where base and flange of a nominal robot agree best with the identified ones, and what is left [m]."""
+def _agreement(robot: Robot, nominal: Robot, base_moves: bool, freedom: Array) -> tuple[Array, Array, float]:
+    """Return where base and flange of a nominal robot agree best with the identified ones, and what is left [m].
+
+    Parameters
+    ----------
+    base_moves
+        Whether the base may differ.
+    freedom
+        Motions by which the flange may, ``(6, k)``.
+    """
     joints = robot.random_configurations(_CONFIGURATIONS, np.random.default_rng(0))
     nominal_poses, real_poses = matrices(nominal, joints), np.linalg.inv(robot.base.matrix) @ matrices(robot, joints)
     weight = np.repeat([1.0, reach(nominal, None)], 3)
@@ -68,9 +121,14 @@ def _agreement(robot: Robot, nominal: Robot) -> tuple[Array, Array, float]:
         missed = np.concatenate(
             [real_poses[:, :3, 3] - expected[:, :3, 3], turns_between(expected, real_poses)], axis=1
         )
-        rows = np.concatenate([_by_base(expected), _by_flange(expected)], axis=2)
-        step, *_ = np.linalg.lstsq((rows * weight[:, None]).reshape(-1, 12), (missed * weight).ravel(), rcond=None)
-        base, before_flange = _small(step[:6]) @ base, before_flange @ _small(step[6:])
+        rows = np.concatenate([_by_base(expected)[:, :, : 6 * base_moves], _by_flange(expected) @ freedom], axis=2)
+        if not rows.shape[2]:
+            break
+        rows = (rows * weight[:, None]).reshape(-1, rows.shape[2])
+        step, *_ = np.linalg.lstsq(rows, (missed * weight).ravel(), rcond=None)
+        if base_moves:
+            base = _small(step[:6]) @ base
+        before_flange = before_flange @ _small(freedom @ step[6 * base_moves :])
     left = real_poses[:, :3, 3] - (base @ nominal_poses @ before_flange)[:, :3, 3]
     return base, np.asarray(np.linalg.inv(before_flange)), float(np.linalg.norm(left, axis=1).mean())
 
@@ -93,10 +151,13 @@ def flange_rates(robot: Robot, names: Sequence[str]) -> Array:
     moved = np.concatenate(robot.jacobians(robot.forward_kinematics(joints), joints, names), axis=1)
     moved[[robot.parameters[name].group == "base" for name in names]] = 0.0
     weight = np.repeat([1.0, reach(nominal_robot(robot), None)], 3)
-    rows = np.concatenate([_by_base(poses), _by_flange(poses)], axis=2)
+    freedom, base_moves = _flange_freedom(robot), not base_is_held(robot)
+    if not freedom.shape[1]:
+        return np.zeros((6, len(names)))
+    rows = np.concatenate([_by_base(poses)[:, :, : 6 * base_moves], _by_flange(poses) @ freedom], axis=2)
     right = (np.moveaxis(moved, 2, 0) * weight).swapaxes(1, 2).reshape(-1, len(names))
-    explained, *_ = np.linalg.lstsq((rows * weight[:, None]).reshape(-1, 12), right, rcond=None)
-    return np.asarray(explained[6:])
+    explained, *_ = np.linalg.lstsq((rows * weight[:, None]).reshape(-1, rows.shape[2]), right, rcond=None)
+    return np.asarray(freedom @ explained[6 * base_moves :])
 
 
 def base_shift(corrected: Callable[[Array], tuple[Array, Array]], start: Array) -> Array:

@@ -19,7 +19,7 @@ from truearm.compensation.chosen_targets import EVERY_POSE, Choice, kept_by_choi
 from truearm.compensation.correction import Correction
 from truearm.compensation.expected_errors import expected_errors
 from truearm.compensation.fake_targets import nominal_robot
-from truearm.compensation.gauge import base_shift, best_agreement
+from truearm.compensation.gauge import base_is_held, base_shift, best_agreement, flange_is_held
 from truearm.compensation.program_places import Provenance, provenance
 from truearm.compensation.programs.program import Program
 from truearm.compensation.resolved_program import Between, ResolvedProgram
@@ -44,7 +44,7 @@ class Frames:
     Attributes
     ----------
     tools, frames
-        Whether the places of tools and frames were given, or assumed.
+        Whether the places of tools and frames were given, or assumed, or follow from a flange or base that were held.
     bases
         ``T_base_nominalbase``, ``(4, 4)`` [m], as assumed, by the name of the frame for whose targets it is: one for
         all, but where frames were taught. Where frames are identified, it is that of the first of them.
@@ -145,6 +145,10 @@ def corrected_programs(
     nominal = nominal_robot(robot)
     kept = kept_by_choice(programs, choice)
     tools, frames = provenance(programs, cell, "tool", kept), provenance(programs, cell, "frame", kept)
+    if frames == "assumed" and base_is_held(robot) and not (choice.was_taught("frames") or choice.was_taught("points")):
+        frames = "held"
+    if tools == "assumed" and flange_is_held(robot) and not choice.was_taught("tools"):
+        tools = "held"
     flange = np.eye(4)
     start, agreed = best_agreement(robot)
     if "assumed" in (tools, frames):
@@ -164,6 +168,8 @@ def corrected_programs(
         # What is given by joints stays where it is to the first frame that was measured.
         measured = next(one.measured_base for one in resolved if one.measured_base is not None)
         bases = dict.fromkeys(names, measured)
+    elif frames == "held":
+        bases = dict.fromkeys(names, np.eye(4))
     else:
         progress("finding where the base is")
         together = [(name,) for name in names] if choice.was_taught("frames") else [names]

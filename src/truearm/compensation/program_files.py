@@ -22,6 +22,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict
 
 from truearm.compensation.programs import LANGUAGES
 from truearm.compensation.programs.lines import replaced
+from truearm.compensation.programs.new_program import MARK
 from truearm.compensation.programs.program import Edit, Language, Program, Source
 from truearm.errors import InputError
 from truearm.files import exists, read_bytes
@@ -261,6 +262,13 @@ def _original(path: Path, again: bool) -> bytes:
     record = _record(path)
     if record is None:
         content = _text_bytes(path)
+        if MARK.encode() in content:
+            raise InputError(
+                "this program was written corrected",
+                where=str(path),
+                came=f"the comment '{MARK}'",
+                cure="Run it as it is. To correct another path, describe it anew with 'truearm path'.",
+            )
         _refuse_without_record(path, _hash(content))
         return content
     if not again:

@@ -16,8 +16,8 @@ from truearm.modeling.chain import Array
 from truearm.modeling.transform import IDENTITY
 
 Kind = Literal["tool", "frame"]
-#: Whether real places were given, or have to be assumed.
-Provenance = Literal["identified", "assumed"]
+#: Whether real places were given, or have to be assumed; or follow from base or flange, which the calibration held.
+Provenance = Literal["identified", "assumed", "held"]
 #: Where the nominal base, or flange, is in the identified one, ``(4, 4)``; or that for the targets in each frame.
 Shift = Array | Mapping[str, Array]
 

@@ -20,8 +20,11 @@ import numpy as np
 from truearm.errors import InputError
 from truearm.modeling.chain import Array
 from truearm.modeling.inverse.kinematics import NEAR_SINGULAR, reach
+from truearm.modeling.inverse.pose_solver import Orientation
+from truearm.modeling.inverse.redundancy_resolution import chosen_rows
 from truearm.modeling.inverse.turns import beyond_limits
 from truearm.modeling.robot import Robot
+from truearm.modeling.transform import rotation_vector
 from truearm.planning.paths.joint_motion import JointMotion
 from truearm.planning.poses.tip import Tip
 
@@ -78,7 +81,15 @@ def path_error(robot: Robot, motion: JointMotion, desired: Array, target: str | 
     return Tip(robot, target).positions(motion.postures()) - _desired(motion, desired)
 
 
-def corrected(robot: Robot, motion: JointMotion, desired: Array, target: str | None = None) -> JointCorrection:
+def corrected(
+    robot: Robot,
+    motion: JointMotion,
+    desired: Array,
+    target: str | None = None,
+    *,
+    orientation: Orientation = "free",
+    rotation: Array | None = None,
+) -> JointCorrection:
     """Return joint positions with which the calibrated robot keeps to the path.
 
     Parameters
@@ -91,6 +102,9 @@ def corrected(robot: Robot, motion: JointMotion, desired: Array, target: str | N
         The path in the base frame, ``(n, 3)`` [m].
     target
         Name of the target that follows the path; the flange if None.
+    orientation, rotation
+        How much of the tip's orientation is kept beside its position, and which, ``(3, 3)``. The document corrects the
+        position alone.
 
     Raises
     ------
@@ -99,6 +113,8 @@ def corrected(robot: Robot, motion: JointMotion, desired: Array, target: str | N
     """
     tip, wanted = Tip(robot, target), _desired(motion, desired)
     length = reach(robot, target)
+    kept = np.eye(3) if rotation is None else rotation
+    rows = chosen_rows(orientation, kept, length)
     joints = best = motion.joints
     before = after = np.zeros(0)
     rounds = 0
@@ -110,26 +126,37 @@ def corrected(robot: Robot, motion: JointMotion, desired: Array, target: str | N
             before = after = distance
         nearer = distance < after
         best, after = np.where(nearer[:, None], joints, best), np.where(nearer, distance, after)
-        if (distance <= AGREED).all() or rounds == _MOST_ROUNDS:
+        turned = _turned(orientation, kept, state.rotation)
+        missed = np.concatenate([error, turned], axis=1) @ rows.T
+        if (np.linalg.norm(missed, axis=1) * length <= AGREED).all() or rounds == _MOST_ROUNDS:
             break
-        joints = joints - _least_norm(state.jacobian[:, :3], error, length, motion)
+        joints = joints - _least_norm(rows @ state.jacobian, missed, motion)
         rounds += 1
         _check_change(joints - motion.joints, motion)
     _check_limits(robot, best, motion)
     return JointCorrection(best, best - motion.joints, before, after, rounds)
 
 
-def _least_norm(J: Array, error: Array, length: float, motion: JointMotion) -> Array:
-    """Return ``J^T (J J^T)^-1 error``, ``(n, joints)``."""
-    weak = np.linalg.svd(J, compute_uv=False)[:, -1] / length
+def _turned(orientation: Orientation, kept: Array, rotation: Array) -> Array:
+    """Return by how much tips ``(n, 3, 3)`` are turned from the orientation to keep, ``(n, 3)`` [rad]."""
+    if orientation == "full":
+        return rotation_vector(rotation @ kept.T)
+    if orientation == "axis":
+        return np.asarray(np.cross(np.broadcast_to(kept[:, 2], (len(rotation), 3)), rotation[:, :, 2]))
+    return np.zeros((len(rotation), 3))
+
+
+def _least_norm(A: Array, missed: Array, motion: JointMotion) -> Array:
+    """Return ``A^T (A A^T)^-1 missed``, ``(n, joints)``, for rows ``(n, rows, joints)`` in reach lengths."""
+    weak = np.linalg.svd(A, compute_uv=False)[:, -1]
     if (weak < NEAR_SINGULAR).any():
         raise InputError(
             "the arm is in a singular posture, where positions cannot be corrected",
             where=_place(motion, int(np.argmax(weak < NEAR_SINGULAR))),
             cure="Move the path.",
         )
-    normal = J @ J.swapaxes(1, 2)
-    return np.asarray((J * np.linalg.solve(normal, error[:, :, None])).sum(1))
+    normal = A @ A.swapaxes(1, 2)
+    return np.asarray((A * np.linalg.solve(normal, missed[:, :, None])).sum(1))
 
 
 def _check_change(change: Array, motion: JointMotion) -> None:

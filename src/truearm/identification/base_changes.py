@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.errors import InputError, did_you_mean
+from truearm.identification.held import NOTHING_HELD, Held
 from truearm.identification.judging.left_over import LeftOver
 from truearm.identification.solving.fit import identify
 from truearm.identification.solving.losses import Loss
@@ -87,7 +88,13 @@ def parts_of(data: Dataset, labels: Sequence[str]) -> NDArray[np.intp]:
 
 
 def with_one_base(
-    robot: Robot, data: Dataset, training: IntArray, labels: Sequence[str], model: Model, loss: Loss = "linear"
+    robot: Robot,
+    data: Dataset,
+    training: IntArray,
+    labels: Sequence[str],
+    model: Model,
+    loss: Loss = "linear",
+    held: Held = NOTHING_HELD,
 ) -> tuple[Dataset, list[Notice]]:
     """Return the data with all readings in the frame of the first part, and how far each part was moved.
 
@@ -101,6 +108,8 @@ def with_one_base(
         See :func:`parts_of`.
     model
         What is identified along with the motions.
+    held
+        Places that are known; the base is that of the first part, and found here all the same.
 
     Raises
     ------
@@ -120,23 +129,23 @@ def with_one_base(
                 allowed=f"{_LEAST_CONFIGURATIONS} or more",
                 cure="Raise `train`, measure more, or leave the part out.",
             )
-    moved = data
+    moved, tools = data, Held(targets=held.targets)
     bases = [
-        initial_frames(robot, data.of_configurations(training[part[training] == number])).base
+        initial_frames(robot, data.of_configurations(training[part[training] == number]), tools).base
         for number in range(int(part.max()) + 1)
     ]
     moved = _moved(moved, part, [_motion(bases[0], base) for base in bases])
     for _ in range(_ROUNDS):
-        motions = _steps(robot, moved.of_configurations(training), part[training], model, loss)
+        motions = _steps(robot, moved.of_configurations(training), part[training], model, loss, tools)
         moved = _moved(moved, part, motions)
         if max(max(float(np.abs(p).max()), float(np.abs(rotation_vector(R)).max())) for R, p in motions) < _LAST_STEP:
             break
     return moved, [_told(data, moved, part)]
 
 
-def _steps(robot: Robot, data: Dataset, part: NDArray[np.intp], model: Model, loss: Loss) -> list[Motion]:
+def _steps(robot: Robot, data: Dataset, part: NDArray[np.intp], model: Model, loss: Loss, held: Held) -> list[Motion]:
     """Return the motion that takes each part's readings nearer to the frame of the first, one step of Gauss-Newton."""
-    fit = identify(robot, data, model, loss=loss)
+    fit = identify(robot, data, model, loss=loss, held=held)
     left = LeftOver.of(fit, data)
     base = [i for i, p in enumerate(fit.free.parameters) if p.group == "base"]
     parts = int(part.max())

@@ -354,13 +354,13 @@ def choices_argument(values: object, parameter: str, known: Collection[str], wha
     return tuple(dict.fromkeys(named))
 
 
-def names_argument(values: object, parameter: str) -> tuple[str, ...]:
+def names_argument(values: object, parameter: str, allowed: str = "names of configurations") -> tuple[str, ...]:
     """Return names that only the data know, each once; numbers are names too."""
     if not _is_sequence(values):
-        raise wrong_kind("a sequence of names belongs here", values, parameter, "names of configurations")
+        raise wrong_kind("a sequence of names belongs here", values, parameter, allowed)
     for value in values:
         if isinstance(value, bool) or not isinstance(value, str | Integral):
-            raise wrong_kind("a name belongs here", value, parameter, "the name of a configuration")
+            raise wrong_kind("a name belongs here", value, parameter, allowed)
     return tuple(dict.fromkeys(str(value) for value in values))
 
 

@@ -6,15 +6,18 @@ import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Final, Literal, get_args
+from typing import Final, Literal, TypedDict, get_args
 
 import numpy as np
 
 from truearm.errors import InputError, refusals_of
 from truearm.files import path_argument, read_bytes
 from truearm.identification.base_changes import with_one_base
+from truearm.identification.choosing.balancer_loads import refuse_balancers_that_are_not_there, without_unseen_balancers
 from truearm.identification.choosing.selection import AUTO, select
+from truearm.identification.judging.held_places import check_held
 from truearm.identification.judging.judgement import judge
+from truearm.identification.solving.bootstrap import LEAST_FITS
 from truearm.identification.solving.bounds import Bounds, read_bounds
 from truearm.identification.solving.fit import identify, place
 from truearm.identification.solving.losses import LOSSES, Loss
@@ -24,6 +27,7 @@ from truearm.jobs.arguments import (
     choice_argument,
     choices_argument,
     command_argument,
+    count_argument,
     files_of,
     folder_for,
     gravity_argument,
@@ -38,6 +42,8 @@ from truearm.jobs.arguments import (
     whole_argument,
 )
 from truearm.jobs.check import notices_of
+from truearm.jobs.holding import held_argument
+from truearm.jobs.monte_carlo import simulate_calibrations, trials_argument
 from truearm.jobs.split import (
     check_copies,
     check_proof,
@@ -47,6 +53,7 @@ from truearm.jobs.split import (
     train_count,
     without_words,
 )
+from truearm.jobs.zones import choose_zones, zone_file_names, zones_argument
 from truearm.library import urdf_source
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.repeats import readings_digest
@@ -79,11 +86,16 @@ def calibrate(
     loss: Loss = "linear",
     redundancy: Redundant = "prior",
     bounds: Bounds | str | Path | None = None,
+    hold: Sequence[str] = (),
+    frames: str | Path | None = None,
+    bootstrap: int = 0,
     effects: Sequence[str] = (),
     payload: Payload | str | None = None,
     gravity: Sequence[float] | None = None,
     base_changes: Sequence[str] = (),
     without: Sequence[str] = (),
+    monte_carlo: int | None = None,
+    zones: int | str | Path | None = None,
     notes: Mapping[str, str] | None = None,
     command: str | None = None,
     progress: Callable[[str], None] = lambda _: None,
@@ -107,13 +119,24 @@ def calibrate(
         How many configurations to train on, drawn with `seed`; the rest is held out. None is 70 %; ``all`` holds
         nothing out.
     seed
-        Of the split: training is the first `train` of ``numpy.random.default_rng(seed).permutation(n)``.
+        Of the split: training is the first `train` of ``numpy.random.default_rng(seed).permutation(n)``; and of the
+        bootstrap.
     loss
-        ``linear``, ``huber``, ``cauchy`` or ``l1``.
+        ``linear``, ``huber``, ``cauchy``, ``l1`` (sum of the distances of the readings) or ``l1-components`` (sum of
+        the absolute values of their coordinates).
     redundancy
-        ``prior`` or ``drop``, see :func:`truearm.identification.solving.fit.identify`.
+        ``prior``, ``drop`` or ``none``, see :func:`truearm.identification.solving.fit.identify`. The last needs
+        `bounds` or `hold`.
     bounds
         Limits of parameter values, or a bounds file.
+    hold
+        What is known and not found: ``base``, ``targets``, ``fixtures``, or targets and fixtures by name. The
+        calibration is an absolute one then.
+    frames
+        File with the places of what is held, of the schema ``truearm-cell/1``: targets are its tools, base and fixtures
+        its frames. See :mod:`truearm.compensation.cell`.
+    bootstrap
+        How many fits to configurations drawn anew the deviations follow from; 0: from one fit's residuals.
     effects
         Joint effects to add to the model, of :data:`truearm.modeling.effects.EFFECTS` by name.
     payload, gravity
@@ -125,6 +148,14 @@ def calibrate(
         taken out of the readings; no deviation contains what is not known of it.
     without
         Configurations that are left out, by their labels: neither part of the split knows them.
+    monte_carlo
+        How many calibrations of the robot that is found are simulated (100 or more): their spread gives intervals of
+        the parameters and the predictions that need no linearity, beside the linear ones. With the linear loss and
+        without bounds; seeded by `seed`. None simulates none.
+    zones
+        Into how many zones the workspace is cut, 2 to 64, or a file of zones: each gets a model of its own, which is
+        kept if it is better on the held-out configurations there; it is written as ``zone-NAME.yaml``, and
+        ``zones.yaml`` says where they are.
     notes
         What to write on the report and into result.json, by its name: ``date``, ``serial``, ``operator``,
         ``instrument``, or any other.
@@ -154,6 +185,17 @@ def calibrate(
     choice_argument(loss, "loss", {name: name for name in LOSSES})
     choice_argument(redundancy, "redundancy", {name: name for name in get_args(Redundant)})
     seed = whole_argument(seed, "seed")
+    hold = names_argument(hold, "hold", "base, targets, fixtures, or names of these")
+    bootstrap = _fits_argument(bootstrap)
+    trials = trials_argument(monte_carlo, loss, bounds)
+    wanted_zones = zones_argument(zones, held_out=train != "all")
+    for given, name in ((trials, "monte_carlo"), (wanted_zones, "zones")):
+        if given is not None and hold:
+            raise InputError(
+                "this is not made with places that are held",
+                parameter=name,
+                cure="Leave it out, or leave out `hold`.",
+            )
     payload, fall = payload_argument(payload), gravity_argument(gravity)
     call = command_argument(command) or python_call(
         "calibrate",
@@ -165,22 +207,34 @@ def calibrate(
         loss=loss,
         redundancy=redundancy,
         bounds=bounds,
+        hold=list(hold) or None,
+        frames=frames,
+        bootstrap=bootstrap or None,
         effects=list(effects) or None,
         base_changes=list(base_changes) or None,
         without=list(without) or None,
+        monte_carlo=trials,
+        zones=zones,
         notes=notes or None,
         payload=payload,
         gravity=fall,
     )
     refuse_swapped(robot, data, "calibrate")
-    inputs = files_of(robot, data, bounds)
-    folder = None if out is None else folder_for(RESULT_FILES, out, robot, data, bounds, ours=True)
+    inputs = files_of(robot, data, bounds, zones, frames)
+    folder = (
+        None
+        if out is None
+        else folder_for(
+            (*RESULT_FILES, *zone_file_names(wanted_zones)), out, robot, data, bounds, zones, frames, ours=True
+        )
+    )
     progress("reading the robot")
     source = urdf_source(robot) if isinstance(robot, str | Path) else None
     urdf = None if source is None else read_bytes(source[0])
     nominal_robot = robot_argument(robot).with_payload(payload, fall)
     if effects and named is not None:
         with refusals_of("effects"):
+            refuse_balancers_that_are_not_there(nominal_robot, effects)
             asked = named.also(effects)
             asked.free(asked.prepared(nominal_robot))
     progress("reading the data")
@@ -189,6 +243,7 @@ def calibrate(
     if isinstance(data, str | Path):
         sha256 = hashlib.sha256(read_bytes(path_argument(data, "data"))).hexdigest()
     readings = left_out(readings, without)
+    held = held_argument(hold, frames, nominal_robot, readings)
     bounds_file = str(bounds) if isinstance(bounds, str | Path) else "bounds"
     if bounds is not None and not isinstance(bounds, Bounds):
         with refusals_of("bounds"):
@@ -214,7 +269,7 @@ def calibrate(
         if base_changes:
             progress("finding how the base moved")
             along = named_model("geometric") if named is None else named.also(effects)
-            steady, moved = with_one_base(nominal_robot, steady, training, base_changes, along, loss)
+            steady, moved = with_one_base(nominal_robot, steady, training, base_changes, along, loss, held)
         noticed = notices_of(readings, nominal_robot, steady=steady)
         readings = steady
         first = readings.of_configurations(training)
@@ -228,36 +283,56 @@ def calibrate(
                 redundancy=redundancy,
                 bounds=bounds,
                 bounds_file=bounds_file,
+                held=held,
                 seed=seed,
                 progress=progress,
             )
         chosen: Model = selection.model if named is None and selection is not None else named.also(effects)  # type: ignore[union-attr]
+        chosen, held_effects = without_unseen_balancers(chosen, first)
         progress("placing the nominal robot")
-        placed = place(nominal_robot, first, loss)
+        placed = place(nominal_robot, first, loss, held)
         progress(f"identifying the {chosen.name} model on {count} configurations")
+        how = _How(loss=loss, redundancy=redundancy, bounds=bounds, bounds_file=bounds_file)
         fit = identify(
-            nominal_robot, first, chosen, loss=loss, redundancy=redundancy, bounds=bounds, bounds_file=bounds_file
+            nominal_robot, first, chosen, **how, held=held, bootstrap=bootstrap, seed=seed, progress=progress
         )
+        contradicted = check_held(nominal_robot, fit, first, **how)
     progress("judging it")
     judges = first if second is None else second
     validation = None if second is None else errors_of(fit.robot, second)
     before = errors_of(placed, judges)
     train_errors = errors_of(fit.robot, first)
     of_split = (
+        *contradicted,
         *check_proof(before, validation),
         *check_copies(readings, training, held_out),
         *check_trained_before(nominal_robot, as_read, sha256, (count, n, seed), without_words(without)),
         *moved,
+        *held_effects,
     )
     judged = judge(
         fit, readings, first, validation or train_errors, noticed, of_split, loss, held_out=second is not None
     )
+    simulated, told = None, list[Notice]()
+    if trials is not None:
+        simulated, told = simulate_calibrations(
+            fit, first, second, trials, priors=redundancy == "prior", seed=seed, progress=progress
+        )
+    chosen_zones = None
+    if wanted_zones is not None and second is not None:
+        progress("identifying zones")
+        chosen_zones = choose_zones(
+            wanted_zones, nominal_robot, fit, (first, second), loss=loss, redundancy=redundancy, bounds=bounds
+        )
     digest = f" ({'' if sha256 is None else f'sha256 {sha256[:12]}, '}readings {readings_digest(as_read)[:12]})"
+    freed = " + ".join([chosen.name, *(name for name in effects if name in chosen.effects)])
     history = (
-        f"calibrated by truearm {__version__}: model {' + '.join([chosen.name, *effects])},"
+        f"calibrated by truearm {__version__}: model {freed},"
         f" {count} of {n} configurations of {Path(readings.source).name}{digest}, seed {seed}, loss {loss},"
         f"{without_words(without)}"
-        f" redundancy {redundancy}{f', another base from {listed(base_changes)} on' if base_changes else ''}"
+        f" redundancy {redundancy}{f', {listed(hold)} held' if hold else ''}"
+        f"{f', bootstrap {bootstrap}' if bootstrap else ''}"
+        f"{f', another base from {listed(base_changes)} on' if base_changes else ''}"
     )
     calibration = Calibration(
         fit=fit,
@@ -265,7 +340,7 @@ def calibrate(
         train=train_errors,
         validation=validation,
         expected=judged.expected,
-        warnings=judged.warnings,
+        warnings=(*judged.warnings, *told),
         next=judged.next,
         data=readings,
         training=training,
@@ -278,10 +353,28 @@ def calibrate(
         known_before=_known_before(nominal_robot),
         without=without,
         notes=notes,
+        monte_carlo=simulated,
+        zones=chosen_zones,
     )
     if folder is not None:
         calibration.save(folder, progress)
     return calibration
+
+
+def _fits_argument(bootstrap: object) -> int:
+    """Return how many fits the deviations shall follow from; none, or enough."""
+    if isinstance(bootstrap, int) and not isinstance(bootstrap, bool) and bootstrap == 0:
+        return 0
+    return count_argument(bootstrap, "bootstrap", LEAST_FITS)
+
+
+class _How(TypedDict):
+    """How parameters are identified, whatever is held."""
+
+    loss: Loss
+    redundancy: Redundant
+    bounds: Bounds | None
+    bounds_file: str
 
 
 def _known_before(robot: Robot) -> Proof | None:

@@ -97,7 +97,7 @@ def plan(
         How many configurations to draw, where none are given.
     device
         Name of the instrument, of ``truearm.devices()``, which finds configurations itself; None for one that reads
-        every target everywhere.
+        every target everywhere. For inclinometers there is :func:`truearm.plan_inclinometers`.
     constraints
         What a configuration must keep besides the robot's limits, or a constraints file.
     noise

@@ -23,12 +23,14 @@ from truearm.jobs.arguments import (
     payload_argument,
     progress_argument,
     pushed_at_argument,
+    readings_argument,
     robot_argument,
     whole_argument,
     wrench_argument,
 )
 from truearm.limits import refuse_beyond
 from truearm.measurement.controller_joints import in_controller_joints
+from truearm.measurement.dataset import Dataset
 from truearm.measurement.readers.canonical import csv_text
 from truearm.modeling.controller import JointsOf
 from truearm.modeling.parts import Payload
@@ -45,7 +47,7 @@ def simulate(
     robot: Robot | str | Path,
     *,
     truth: Robot | str | Path,
-    poses: int,
+    poses: int | Dataset | str | Path,
     out: str | Path | None = None,
     noise: float | None = None,
     device: str | None = None,
@@ -71,13 +73,15 @@ def simulate(
         ``nominal``; ``random``, geometry and joint zeros drawn from their priors; the name of a truth in the robot's
         file; or another robot or its file, with its own base and targets if it has targets.
     poses
-        How many configurations, drawn evenly within the limits.
+        How many configurations, drawn evenly within the limits; or a file or dataset whose configurations are measured,
+        such as :func:`truearm.poses` writes.
     out
         Canonical CSV file to write; None writes nothing.
     noise
         Standard deviation of a reading [m], 0 for none; None for the deviation of the device.
     device
-        Name of the instrument, of ``truearm.devices()``; None for one that sees every target everywhere.
+        Name of the instrument, of ``truearm.devices()``; None for one that sees every target everywhere. For
+        inclinometers there is :func:`truearm.simulate_inclinometers`.
     seed
         Of configurations, noise and a random truth.
     payload, gravity
@@ -105,15 +109,25 @@ def simulate(
     sigma = 0.0 if instrument is None else instrument.sigma
     if noise is not None:
         sigma = deviation_argument(noise, "noise") if finite_number(noise, "noise", lowest=0.0) else 0.0
-    count = count_argument(poses, "poses")
+    given = isinstance(poses, Dataset | str | Path)
+    count = 0 if given else count_argument(poses, "poses")
+    if given and instrument is not None:
+        raise InputError(
+            "a device finds its own configurations",
+            parameter="poses, device",
+            came=f"{device} and {poses if isinstance(poses, str | Path) else poses.source}",  # type: ignore[union-attr]
+            cure="Give a number of `poses`, or leave `device` out and give the `noise`.",
+        )
     if not isinstance(truth, Robot):
         if not isinstance(truth, str | Path):
             raise wrong_kind("a truth belongs here", truth, "truth", "nominal, random, a truth's name, or a robot")
         path_argument(truth, "truth")
-    file = None if out is None else file_for(out, robot, truth)
+    file = None if out is None else file_for(out, robot, truth, poses)
     rng = np.random.default_rng(whole_argument(seed, "seed"))
     nominal = robot_argument(robot)
     joints_are = joints_argument(choice_argument(joints, "joints", JOINTS_OF), nominal)
+    wanted = readings_argument(nominal, poses, "poses") if given else None
+    count = count if wanted is None else wanted.configurations
     with refusals_of("truth"):
         twin = truth_twin(nominal, truth, rng)
     twin = replace(twin, robot=twin.robot.with_payload(payload_argument(payload), gravity_argument(gravity)))
@@ -121,7 +135,9 @@ def simulate(
     seen = twin.robot if instrument is None else in_view_of(instrument, twin.robot)
     refuse_beyond("readings", count * len(seen.targets), parameter="poses")
     progress(f"measuring {count} configurations")
-    if instrument is None:
+    if wanted is not None:
+        data = replace(measure(twin, wanted.joints, sigma, rng), labels=wanted.labels)
+    elif instrument is None:
         data = measure(twin, nominal.random_configurations(count, rng), sigma, rng)
     else:
         data = measured_with(instrument, nominal, twin, count, rng, sigma)

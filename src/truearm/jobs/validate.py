@@ -13,6 +13,7 @@ from truearm.errors import InputError, refusals_of
 from truearm.files import path_argument, read_bytes
 from truearm.identification.judging.beyond_proof import check_proof
 from truearm.identification.judging.external_force import check_force
+from truearm.identification.judging.next_step import NextStep
 from truearm.identification.judging.payload import check_payload
 from truearm.identification.judging.same_frames import check_frames
 from truearm.identification.judging.target_names import check_names
@@ -20,25 +21,32 @@ from truearm.identification.refit import MOVED
 from truearm.identification.refit import refit as find_moved
 from truearm.jobs.arguments import (
     choice_argument,
+    command_argument,
     data_argument,
+    files_of,
     gravity_argument,
     notes_argument,
     payload_argument,
     pushed_at_argument,
+    python_call,
     readings_argument,
     refuse_swapped,
     robot_argument,
     wrench_argument,
 )
 from truearm.jobs.proof import changed_since
+from truearm.jobs.zones import zoned_robot
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.repeats import readings_digest
 from truearm.measurement.statistics import errors_of
 from truearm.modeling.parts import Payload
+from truearm.modeling.proof import BASE
 from truearm.modeling.robot import Robot
 from truearm.modeling.wrench import Wrench, WrenchFrame
-from truearm.notices import Notice
+from truearm.notices import Notice, has_error
 from truearm.results.validation import Validation
+from truearm.validation.orientation_errors import orientation_errors
+from truearm.validation.region_distances import RegionDistances, region_distances
 
 
 def validate(
@@ -51,14 +59,17 @@ def validate(
     wrench_frame: WrenchFrame | None = None,
     wrench_at: str | None = None,
     refit: str | None = None,
+    out: str | Path | None = None,
     notes: Mapping[str, str] | None = None,
+    command: str | None = None,
 ) -> Validation:
     """Judge a calibrated robot on new data taken in the same frames.
 
     Parameters
     ----------
     robot
-        A calibrated robot, or its file.
+        A calibrated robot, or its file; or the ``zones.yaml`` of a calibration by zones: each configuration is then
+        judged by the robot of its zone.
     data
         Readings, or a canonical CSV file.
     payload, gravity
@@ -73,8 +84,12 @@ def validate(
         What was moved since and is found anew from these readings, while everything else stays: ``base`` (the
         instrument, or the robot's base), ``targets`` (each by itself), or ``tool`` (all targets as one rigid body). The
         errors of each configuration are then those of what was found without it.
+    out
+        Folder for result.json and report.html; None writes nothing.
     notes
         What to write beside the figures, by its name: ``date``, ``serial``, ``operator``, ``instrument``, or any other.
+    command
+        How to run it again, for the report; None writes the call in Python.
 
     Raises
     ------
@@ -82,12 +97,36 @@ def validate(
         If the robot has no targets, the data name others, or there are too few of them for `refit`.
     """
     refuse_swapped(robot, data, "validate")
+    zoned = zoned_robot(robot)
     moved = None if refit is None else choice_argument(refit, "refit", {kind: kind for kind in MOVED})
     notes = notes_argument(notes)
+    call = command_argument(command) or python_call(
+        "validate",
+        robot,
+        data,
+        payload=payload,
+        gravity=gravity,
+        wrench=wrench,
+        wrench_frame=wrench_frame,
+        wrench_at=wrench_at,
+        refit=refit,
+        notes=notes or None,
+    )
+    inputs = files_of(robot, data)
+    folder = None if out is None else Validation.folder(out, inputs, "out")
     digest = None
     if isinstance(data, str | Path):
         with refusals_of("data"):
             digest = hashlib.sha256(read_bytes(path_argument(data, "data"))).hexdigest()
+    if zoned is not None:
+        if moved is not None:
+            raise InputError(
+                "what moved is found with one robot, not with zones",
+                parameter="refit",
+                came=moved,
+                cure=f"Give {zoned.file.name} instead of the zones.",
+            )
+        robot = zoned.file
     changed = changed_since(robot)
     pushed = wrench_argument(wrench, wrench_frame)
     as_calibrated = robot_argument(robot)
@@ -95,7 +134,8 @@ def validate(
     robot = _pushed(robot, data, pushed, wrench_at)
     as_calibrated = as_calibrated.with_wrench(robot.wrench)
     identified = {p.group for p in robot.parameters.values() if p.deviation is not None}
-    if moved != "base" and data.anchored and robot.fixtures and identified and "base" not in identified:
+    found_or_held = "base" in identified or (robot.proof is not None and BASE in robot.proof.held)
+    if moved != "base" and data.anchored and robot.fixtures and identified and not found_or_held:
         raise InputError(
             "the robot was calibrated without the frame of an instrument, so the place of this instrument is unknown",
             parameter="data",
@@ -119,6 +159,10 @@ def validate(
         or check_frames(judged, data, agreed, moved)
         or check_proof(as_calibrated, data, agreed)
     )
+    of_zones = None
+    if zoned is not None:
+        errors = zoned.errors(robot, data)
+        of_zones = zoned.means(data, errors)
     warnings = (
         *changed,
         *mistaken,
@@ -126,7 +170,39 @@ def validate(
         *check_force([(robot, data.postures)]),
         *_seen_in_training(robot, data, digest),
     )
-    return Validation(data.source, errors, warnings, found, notes)
+    distances = region_distances(judged, data, errors)
+    validation = Validation(
+        source=data.source,
+        errors=errors,
+        warnings=warnings,
+        refit=found,
+        notes=notes,
+        orientations=orientation_errors(judged, data, errors),
+        distances=distances,
+        next=() if has_error(warnings) else measure_farther(distances),
+        robot=judged,
+        data=data,
+        zones=of_zones,
+        command=call,
+        inputs=inputs,
+    )
+    if folder is not None:
+        validation.save(folder)
+    return validation
+
+
+def measure_farther(distances: RegionDistances | None) -> tuple[NextStep, ...]:
+    """Return the advice to measure where errors grow with the distance from where the robot was calibrated."""
+    growth = None if distances is None else distances.growth
+    if growth is None or not growth[2]:
+        return ()
+    near, far, _ = growth
+    message = (
+        f"Calibrate with configurations that reach farther: the third of the readings that is farthest from where the "
+        f"robot was calibrated ({far.low * 1e3:.0f} mm or more) is off by {far.mean * 1e3:.2g} mm on average, the "
+        f"nearest third by {near.mean * 1e3:.2g} mm."
+    )
+    return (NextStep("measure-more", message),)
 
 
 def _pushed(robot: Robot, data: Dataset, wrench: Wrench | None, at: str | None) -> Robot:

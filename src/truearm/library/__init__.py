@@ -64,6 +64,14 @@ def load_robot(robot: str | Path) -> Robot:
 
         return read_urdf(*source)
     path = path_argument(text, "robot")
+    if is_zones(path):
+        raise InputError(
+            "this file names the robots of zones, and one robot belongs here",
+            parameter="robot",
+            came=text,
+            cure="Give calibrated.yaml, or the file of the zone in which the flange stays; only 'truearm validate' "
+            "takes all zones together.",
+        )
     if exists(path) or path.suffix or len(path.parts) > 1:
         return read_robot(path)
     near = nearest_names(text, library())
@@ -80,6 +88,15 @@ def load_robot(robot: str | Path) -> Robot:
 def _of_library(name: str) -> Robot:
     """Return a robot of the library. Its file does not change and is read once: that takes longer than a small fit."""
     return read_robot(Path(str(files(__package__) / f"{name}.yaml")))
+
+
+def is_zones(name: str | Path) -> bool:
+    """Return whether a file begins as those do that name the robots of zones."""
+    path = Path(name)
+    if not exists(path) or not path.is_file():
+        return False
+    with path.open("rb") as stream:
+        return re.search(rb"^truearm: *truearm-zones/", stream.read(_BEGINNING), re.M) is not None
 
 
 def is_robot(name: str | Path) -> bool:

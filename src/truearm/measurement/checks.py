@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from truearm.errors import InputError, nearest_names
 from truearm.measurement.dataset import Dataset
+from truearm.measurement.inclinometer import Inclinations
 from truearm.measurement.places import constellation, places_of
 from truearm.measurement.repeats import check_duplicates, repeated_joints, repeated_joints_notices
 from truearm.measurement.rigid_tool import DEVIATIONS, OTHER_REFLECTOR, SAME_POINT, UNMOVED, Suspect, rigid_suspects
@@ -203,7 +204,7 @@ def _moved(data: Dataset) -> list[Notice]:
     ]
 
 
-def check_joints(robot: Robot, data: Dataset) -> None:
+def check_joints(robot: Robot, data: Dataset | Inclinations) -> None:
     """Refuse data whose joints are not the robot's.
 
     Raises

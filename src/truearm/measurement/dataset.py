@@ -77,6 +77,9 @@ class Dataset:
         declares none.
     sigma_rot
         Declared standard deviation per rotation axis [rad], ``(readings,)``; None if the file declares none.
+    scale_sigma
+        Standard deviation of how much longer than it reads the instrument's unit of length is, one number for all
+        readings; None if it is exact.
     visit
         Which visit of its configuration each reading was taken on, whole numbers, ``(readings,)``: the robot came anew
         for each. None if it came once.
@@ -112,6 +115,7 @@ class Dataset:
     setup: Dataset | None = None
     sigma: Array | None = None
     sigma_rot: Array | None = None
+    scale_sigma: float | None = None
     visit: IntArray | None = None
     approach: Array | None = None
     number: Array | None = None

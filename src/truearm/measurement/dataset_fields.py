@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truearm.arrays import LARGEST, axes, number_array, shape_text
+from truearm.arrays import LARGEST, axes, finite_number, number_array, shape_text
 from truearm.errors import InputError, wrong_kind
 from truearm.modeling.chain import Array
 from truearm.printable import is_one_line
@@ -37,6 +37,8 @@ _NO_CONFIGURATION: Final = ("",)
 NAMES: Final = "one line of text without control characters, not blank"
 #: What visits of a configuration are numbered with.
 VISITS: Final = "whole numbers, 0 or more"
+#: Highest standard deviation of an instrument's scale that is meant.
+LARGEST_SCALE: Final = 0.1
 #: Lowest and highest standard deviation that is meant [m, rad].
 _DEVIATIONS: Final = {
     "sigma": accepted_range("m", deviation=True),
@@ -82,6 +84,15 @@ def refuse_unsound(data: Dataset) -> None:
             low, high = _DEVIATIONS[field]
             off = (deviation < low) | (deviation > high)
             _refuse(off, deviation, field, "the standard deviation is not plausible", f"{low:g} to {high:g} {unit}")
+    if data.scale_sigma is not None:
+        finite_number(data.scale_sigma, "scale_sigma", lowest=0.0)
+        if not 0.0 < data.scale_sigma <= LARGEST_SCALE:
+            raise InputError(
+                "the standard deviation of a scale is not plausible",
+                parameter="scale_sigma",
+                came=f"{data.scale_sigma:g}",
+                allowed=f"above 0, up to {LARGEST_SCALE:g}",
+            )
     if data.visit is not None:
         visits = _array(data.visit, "visit", (m,))
         if visits.dtype.kind not in "iu":

@@ -1,9 +1,11 @@
-"""Inclinometers on the links: postures in pairs, and by how much readings change between them."""
+"""Inclinometers on the links: what they read, postures in pairs, and by how much readings change between them."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +13,7 @@ from numpy.typing import NDArray
 from truearm.errors import InputError
 from truearm.modeling.chain import Array
 from truearm.modeling.postures import Postures
+from truearm.modeling.robot import Robot
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,26 +50,175 @@ class Pairs:
 
 
 @dataclass(frozen=True, eq=False)
+class Instruments:
+    """Inclinometers, and on which links they sit.
+
+    Attributes
+    ----------
+    names
+        Of each, for messages.
+    links
+        Link that each sits on, from 0.
+    mounts
+        Rotation from the link's frame to the instrument's, ``(instruments, 3, 3)``, as far as it is known.
+    """
+
+    names: tuple[str, ...]
+    links: tuple[int, ...]
+    mounts: Array
+
+    @classmethod
+    def on_every_link(cls, count: int) -> Self:
+        """Return one on each of `count` links, aligned with the link's frame."""
+        names = tuple(f"link {number}" for number in range(1, count + 1))
+        return cls(names, tuple(range(count)), np.tile(np.eye(3), (count, 1, 1)))
+
+    def __len__(self) -> int:
+        return len(self.links)
+
+
+@dataclass(frozen=True, eq=False)
+class Inclinations:
+    """What inclinometers read, configuration by configuration, as a file has it.
+
+    Attributes
+    ----------
+    source
+        The file, for messages.
+    labels
+        Name of each configuration.
+    joints
+        Joint positions [rad; m for prismatic joints], ``(n, joints)``.
+    joint_kinds
+        ``revolute`` or ``prismatic`` for each joint.
+    instruments
+        That were read.
+    angle
+        Of the axes x, y and z of each instrument above the horizontal plane [rad], ``(n, instruments, 3)``, up is
+        positive; NaN where none was read.
+    sigma
+        Standard deviation of each reading [rad], ``(n, instruments)``; NaN where none was read.
+    order
+        Number of each configuration in the sequence of measurement, from 1, ``(n,)``.
+    wrench
+        External force [N] and moment [N m] on the flange, about its origin, in the axes of the base, ``(n, 6)``.
+    payload
+        Mass [kg] beside what the robot carries already and its centre of gravity in the flange's frame [m],
+        ``(n, 4)``.
+    joints_are
+        ``model``, or ``controller`` if it shows these joint positions.
+    """
+
+    source: str
+    labels: tuple[str, ...]
+    joints: Array
+    joint_kinds: tuple[str, ...]
+    instruments: Instruments
+    angle: Array
+    sigma: Array
+    order: NDArray[np.intp]
+    wrench: Array
+    payload: Array
+    joints_are: str = "model"
+
+    def __post_init__(self) -> None:
+        """Refuse fields that do not fit together, and angles that are none."""
+        n, count, joints = len(self.labels), len(self.instruments), len(self.joint_kinds)
+        shapes = {
+            "joints": (n, joints),
+            "angle": (n, count, 3),
+            "sigma": (n, count),
+            "order": (n,),
+            "wrench": (n, 6),
+            "payload": (n, 4),
+        }
+        for name, shape in shapes.items():
+            came = np.shape(getattr(self, name))
+            if came != shape:
+                raise InputError(
+                    f"wrong number of values: {name}", where=self.source, came=str(came), allowed=str(shape)
+                )
+        wrong = {
+            "a joint position is no number": not np.isfinite(self.joints).all(),
+            "a force or a moment is no number": not np.isfinite(self.wrench).all(),
+            "a payload is no mass": not (np.isfinite(self.payload).all() and (self.payload[:, 0] >= 0.0).all()),
+            "an angle is beyond the vertical": bool((np.abs(self.angle) > math.pi / 2).any()),
+            "a reading has no deviation above zero": not (self.sigma[np.isfinite(self.angle).any(axis=2)] > 0.0).all(),
+            "two configurations have the same place in the order": len(np.unique(self.order)) < n,
+            "there is no such link": not all(0 <= link < joints for link in self.instruments.links),
+        }
+        for what, is_so in wrong.items():
+            if is_so:
+                raise InputError(what, where=self.source)
+
+    @cached_property
+    def pairs(self) -> NDArray[np.intp]:
+        """Configurations that are compared, ``(pairs, 2)``: those of the orders 1 and 2, 3 and 4 and so on."""
+        place = {int(order): index for index, order in enumerate(self.order)}
+        return np.array(
+            [(place[n], place[n + 1]) for n in sorted(place) if n % 2 and n + 1 in place], dtype=np.intp
+        ).reshape(-1, 2)
+
+    @property
+    def unpaired(self) -> tuple[str, ...]:
+        """Labels of the configurations that have no partner."""
+        paired = set(self.pairs.reshape(-1).tolist())
+        return tuple(label for index, label in enumerate(self.labels) if index not in paired)
+
+    def postures(self, robot: Robot) -> Postures:
+        """Return how the arm stood; payloads are weights at the flange, whose directions are the nominal robot's."""
+        wrench = self.wrench.copy()
+        if self.payload[:, 0].any():
+            R = np.swapaxes(robot.base.rotation, -1, -2) @ robot.forward_kinematics(self.joints).matrix()
+            force = self.payload[:, :1] * np.array(robot.gravity)
+            wrench[:, :3] += force
+            wrench[:, 3:] += np.cross(np.einsum("nij,nj->ni", R, self.payload[:, 1:]), force)
+        return Postures(self.joints, wrench=wrench)
+
+    def changes(self, robot: Robot, mounts: Array | None = None) -> InclinometerReadings:
+        """Return by how much readings changed within pairs.
+
+        Parameters
+        ----------
+        mounts
+            Of the instruments, as they were found; as they are stated if None.
+        """
+        first, second = self.pairs.T
+        at = self.postures(robot)
+        stated = self.instruments
+        return InclinometerReadings(
+            Pairs(at.at(first), at.at(second)),
+            self.angle[second] - self.angle[first],
+            np.hypot(self.sigma[first], self.sigma[second])[..., None],
+            Instruments(stated.names, stated.links, stated.mounts if mounts is None else mounts),
+        )
+
+
+@dataclass(frozen=True, eq=False)
 class InclinometerReadings:
-    """By how much the readings of inclinometers on all links changed from one posture to another.
+    """By how much the readings of inclinometers changed from one posture to another.
 
     Attributes
     ----------
     pairs
         The postures.
     change
-        Second reading less first of each axis of each link ``(n, links, 3)`` [rad]; NaN where there is none. Axes and
-        readings are those of :func:`truearm.simulation.inclinometer.inclinations`.
+        Second reading less first of each axis of each instrument ``(n, instruments, 3)`` [rad]; NaN where there is
+        none. Axes and readings are those of :func:`truearm.simulation.inclinometer.inclinations`.
     sigma
-        Standard deviation of one change [rad]; :func:`deviation_of_change` finds it for an instrument.
+        Standard deviation of one change [rad], one for all or ``(n, instruments, 1)``; :func:`deviation_of_change`
+        finds it for an instrument.
+    instruments
+        That were read; None for one on each link, aligned with the link's frame.
     """
 
     pairs: Pairs
     change: Array
-    sigma: float
+    sigma: float | Array
+    instruments: Instruments | None = None
 
     def __post_init__(self) -> None:
-        shape = (len(self.pairs), self.pairs.first.joints.shape[1], 3)
+        shape = (len(self.pairs), len(self.mounted), 3)
         if self.change.shape != shape:
             raise InputError(
                 "inclinometers read three axes of every link in every pair of postures",
@@ -74,13 +226,24 @@ class InclinometerReadings:
                 came=f"an array of shape {self.change.shape}",
                 allowed=str(shape),
             )
-        if not self.sigma > 0.0:
+        sigma = np.broadcast_to(np.asarray(self.sigma, float), shape)[np.isfinite(self.change)]
+        if not np.all(sigma > 0.0):
             raise InputError(
                 "changes of inclination need a standard deviation",
                 where="inclinometer readings",
-                came=f"{self.sigma:g} rad",
+                came=f"{np.min(sigma):g} rad",
                 allowed="more than 0",
             )
+
+    @property
+    def mounted(self) -> Instruments:
+        """The instruments, and where they sit."""
+        return self.instruments or Instruments.on_every_link(self.pairs.first.joints.shape[1])
+
+    @property
+    def deviations(self) -> Array:
+        """Standard deviation of each change [rad], ``(n, instruments, 3)``; 1 where there is none."""
+        return np.where(np.isfinite(self.change), np.broadcast_to(np.asarray(self.sigma), self.change.shape), 1.0)
 
 
 def deviation_of_change(resolution: float, noise: float = 0.0) -> float:
@@ -88,4 +251,9 @@ def deviation_of_change(resolution: float, noise: float = 0.0) -> float:
 
     Rounding to multiples of the resolution spreads a reading evenly over one step (variance ``step^2 / 12``).
     """
-    return math.sqrt(2.0 * (resolution**2 / 12.0 + noise**2))
+    return math.sqrt(2.0) * deviation_of_reading(resolution, noise)
+
+
+def deviation_of_reading(resolution: float, noise: float = 0.0) -> float:
+    """Return the standard deviation of one reading [rad], see :func:`deviation_of_change`."""
+    return math.sqrt(resolution**2 / 12.0 + noise**2)

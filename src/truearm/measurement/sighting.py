@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.modeling.chain import Array, ForwardKinematics
+from truearm.modeling.parameters import SCALE
 from truearm.modeling.transform import cross
 
 
@@ -24,17 +25,21 @@ class Sighting:
         Which of them, in order; a slice costs no copy.
     fixture
         The chain to the fixture, at one configuration; None for the instrument, whose frame is the world.
+    scale
+        How much longer than it reads the unit of length is, a number or one for each trial ``(trials, 1)``: places are
+        seen so much smaller.
     """
 
     target: ForwardKinematics
     configurations: NDArray[np.intp] | slice
     fixture: ForwardKinematics | None = None
+    scale: float | Array = 0.0
 
     @cached_property
     def position(self) -> Array:
         """Where the target is [m], ``(3, ..., k)``."""
         at = self.target.position[..., self.configurations]
-        return at if self.fixture is None else self._turned(at - self.fixture.position)
+        return self._shrunk(at if self.fixture is None else self._turned(at - self.fixture.position))
 
     @cached_property
     def rotation(self) -> Array:
@@ -54,7 +59,7 @@ class Sighting:
         """
         moved = velocity[..., self.configurations]
         if self.fixture is None:
-            return moved
+            return self._by_scale(moved, names)
         arm = self.target.position[..., self.configurations] - self.fixture.position
         mine = [k for k, name in enumerate(names) if name in self.fixture.places]
         places = [self.fixture.places[names[k]] for k in mine]
@@ -63,7 +68,7 @@ class Sighting:
             mine, self.fixture.position_jacobian(places), self.fixture.orientation_jacobian(places), strict=True
         ):
             moved[k] -= slide + cross(*np.broadcast_arrays(turn, arm))
-        return self._turned(moved, at=1)
+        return self._by_scale(self._turned(moved, at=1), names)
 
     def orientation_jacobian(self, velocity: Array, names: tuple[str, ...]) -> Array:
         """Return how the target turns with parameters [rad per unit], as :meth:`position_jacobian`."""
@@ -77,6 +82,21 @@ class Sighting:
         ):
             moved[k] -= turn
         return self._turned(moved, at=1)
+
+    @property
+    def _scaled(self) -> bool:
+        return bool(np.any(self.scale))
+
+    def _shrunk(self, vector: Array) -> Array:
+        return vector / (1.0 + self.scale) if self._scaled else vector
+
+    def _by_scale(self, moved: Array, names: tuple[str, ...]) -> Array:
+        """Return a derivative of places as they are seen, with that by the scale."""
+        moved = self._shrunk(moved)
+        if SCALE in names:
+            moved = moved.copy()
+            moved[names.index(SCALE)] = -self._shrunk(self.position)
+        return moved
 
     def _turned(self, vector: Array, at: int = 0) -> Array:
         """Return vectors ``(3, ..., k)`` of the world in the axes of the fixture; `at` is where their 3 is."""

@@ -10,6 +10,7 @@ from truearm.measurement.dataset import Dataset
 from truearm.measurement.observations import compared
 from truearm.measurement.sighting import Sighting
 from truearm.modeling.chain import Array, ForwardKinematics
+from truearm.modeling.parameters import SCALE
 from truearm.modeling.robot import Robot
 
 
@@ -120,6 +121,7 @@ def errors_of(robot: Robot, data: Dataset) -> Errors:
         if target not in kinematics:
             kinematics[target] = robot.forward_kinematics(at, target)
         beside = None if fixture is None else robot.fixture_kinematics(fixture)
-        seen = Sighting(kinematics[target], data.configuration[readings], beside)
+        scale = robot.values.get(SCALE, 0.0) if data.scale_sigma is not None else 0.0
+        seen = Sighting(kinematics[target], data.configuration[readings], beside, scale)
         into[readings] = observation.residual(seen, data, readings)
     return Errors(data.configurations, position, orientation, None if length is None else length[:, 0])

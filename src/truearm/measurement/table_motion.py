@@ -2,15 +2,39 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truearm.measurement.checks import clean_references
 from truearm.measurement.dataset import Dataset
+from truearm.modeling.chain import Array
 from truearm.modeling.transform import quaternion_from_rotation, rigid_motion, rotation_from_quaternion
 
 _UNMOVED = 1e-4  # references that keep their distances better than this moved together [m]
+
+
+@dataclass(frozen=True)
+class TableMotion:
+    """What the table's motion did to the readings of the targets.
+
+    Attributes
+    ----------
+    removed
+        Root mean square by which it moved them [m].
+    left
+        Mean square of the error that the noise of the reference points leaves in readings from which the motion was
+        taken out [m^2].
+    freedom
+        Degrees of freedom behind that noise.
+    """
+
+    removed: float
+    left: float
+    freedom: int
 
 
 def without_table_motion(data: Dataset) -> Dataset:
@@ -19,27 +43,62 @@ def without_table_motion(data: Dataset) -> Dataset:
     At each configuration with three or more reference points that kept their distances, the rigid motion from
     there to their mean places (Kabsch 1976) is applied to the readings of the targets. Other configurations stay.
     """
+    position, oriented = data.position.copy(), data.has_orientation
+    quaternion = None if data.quaternion is None else data.quaternion.copy()
+    moved = False
+    for mine, R, shift, _, _ in _motions(data):
+        position[mine] = position[mine] @ R.T + shift
+        if quaternion is not None:
+            turned = mine[oriented[mine]]
+            quaternion[turned] = quaternion_from_rotation(R @ rotation_from_quaternion(quaternion[turned]))
+        moved = True
+    return replace(data, position=position, quaternion=quaternion) if moved else data
+
+
+def table_motion(data: Dataset) -> TableMotion | None:
+    """Return what the table's motion did, of readings from which it was taken out; None where it was not measured."""
+    moved, noise, freedom, spread, read = 0.0, 0.0, 0, 0.0, 0
+    for mine, R, shift, usual, misfit in _motions(data):
+        places = data.position[mine][data.has_position[mine]]
+        noise += float(misfit.ravel() @ misfit.ravel())
+        freedom += misfit.size - 6
+        if not len(places):
+            continue
+        moved += float(np.sum(((places - shift) @ R - places) ** 2))
+        arms = usual - usual.mean(axis=0)
+        inertia = np.eye(3) * np.sum(arms**2) - arms.T @ arms
+        away = places - usual.mean(axis=0)
+        # A place moves by the mean of the points' noise, and by the turn that their noise makes, times its arm.
+        turned = np.linalg.pinv(inertia, hermitian=True)
+        lever = np.sum(away**2) * np.trace(turned) - np.einsum("ni,ij,nj->", away, turned, away)
+        spread += 3.0 * len(places) / len(usual) + float(lever)
+        read += len(places)
+    if not read or freedom < 1:
+        return None
+    return TableMotion(math.sqrt(moved / read), noise / freedom * spread / read, freedom)
+
+
+def _motions(data: Dataset) -> Iterator[tuple[NDArray[np.intp], Array, Array, Array, Array]]:
+    """Go through the configurations at which the table's motion is known.
+
+    Yields
+    ------
+    Indices of the readings there; rotation and shift from there to where the reference points are on average; those
+    places ``(k, 3)``, and what the motion leaves of the points, ``(k, 3)``.
+    """
     points = clean_references(data)
     if points is None:
-        return data
+        return
     there = np.asarray(np.isfinite(points).all(axis=2))
     complete = np.asarray(there.all(axis=1))
     if points.shape[1] < 3 or not complete.any():
-        return data
+        return
     usual = points[complete].mean(axis=0)
-    position, oriented = data.position.copy(), data.has_orientation
-    quaternion = None if data.quaternion is None else data.quaternion.copy()
     order = np.argsort(data.configuration, kind="stable")
     first = np.searchsorted(data.configuration[order], np.arange(data.configurations + 1)).tolist()
     for c in np.flatnonzero(there.sum(axis=1) >= 3).tolist():
         seen = there[c]
         R, shift = rigid_motion(points[c, seen], usual[seen])
-        misfit = np.linalg.norm(points[c, seen] @ R.T + shift - usual[seen], axis=1).max()
-        if misfit > _UNMOVED:
-            continue
-        mine = order[first[c] : first[c + 1]]
-        position[mine] = position[mine] @ R.T + shift
-        if quaternion is not None:
-            turned = mine[oriented[mine]]
-            quaternion[turned] = quaternion_from_rotation(R @ rotation_from_quaternion(quaternion[turned]))
-    return replace(data, position=position, quaternion=quaternion)
+        misfit = points[c, seen] @ R.T + shift - usual[seen]
+        if np.linalg.norm(misfit, axis=1).max() <= _UNMOVED:
+            yield order[first[c] : first[c + 1]], R, shift, usual[seen], misfit

@@ -33,6 +33,8 @@ Motion = Literal["Rx", "Ry", "Rz", "Tx", "Ty", "Tz", "R", "T"]
 
 #: The same at all configurations, or one each.
 Number = float | Array
+#: A parameter, a factor and the parameter's nominal value: factor times what its value differs from the nominal one.
+Offset = tuple[str, float, float]
 #: Of a point in a frame, or of the frame itself in the world.
 Coordinates = tuple[Number, Number, Number]
 Axes = tuple[Array, Array, Array]
@@ -62,6 +64,8 @@ class Element:
         Index of the joint variable that is added to the value, if there is one.
     axis
         Unit vector in the moving frame, for ``R`` and ``T``.
+    offsets
+        What parameters of other elements add to the value.
 
     Attributes
     ----------
@@ -76,6 +80,7 @@ class Element:
     parameter: str | None = None
     variable: int | None = None
     axis: Direction | None = None
+    offsets: tuple[Offset, ...] = ()
     turns: bool = field(init=False, repr=False, compare=False)
     along: int = field(init=False, repr=False, compare=False)
 
@@ -273,6 +278,8 @@ class Chain:
                 amount = given.get(element.parameter, amount)
             if element.variable is not None:
                 amount = amount + variables[element.variable]
+            for name, factor, nominal in element.offsets:
+                amount = amount + factor * (given.get(name, nominal) - nominal)
             moves.append(_move(element, amount))
         if start is not None:
             return ForwardKinematics((*start.elements, *self.elements), (*start.moves, *moves), start.shape, start)

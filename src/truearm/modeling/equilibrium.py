@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.modeling.chain import Array
-from truearm.modeling.loads import joint_loads
+from truearm.modeling.loads import joint_loads, relief
 from truearm.modeling.postures import Postures
 
 if TYPE_CHECKING:
@@ -57,7 +57,11 @@ def postures_in_equilibrium(robot: Robot, at: Postures) -> Postures:
     straight = robot.without_deflections(at.joints.T)
     start = robot.variables(replace(at, loads=_loads(robot, at, straight)), robot.values)
     variables = settled(bent, start)
-    return replace(at, loads=_loads(robot, at, variables))
+    there = replace(at, loads=_loads(robot, at, variables))
+    factors = [f"balancer_{number}" for number in range(1, len(robot.balancers) + 1)]
+    if not factors or factors[0] not in robot.parameters:
+        return there
+    return replace(there, relief=(relief(robot, variables), tuple(robot.values[name] for name in factors)))
 
 
 def joint_efforts(robot: Robot, q: Array | Postures) -> Array:

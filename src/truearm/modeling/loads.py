@@ -14,16 +14,20 @@ the frame at hand. At rest that is one vector forward and two backward.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from itertools import accumulate
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from truearm.errors import InputError
+from truearm.modeling.balancers import Wrench, balancer_wrenches
 from truearm.modeling.chain import (
     Array,
     Coordinates,
     Direction,
+    Element,
+    Move,
     Number,
     across,
     axis_of,
@@ -41,8 +45,8 @@ _ZERO: Final[Coordinates] = (0.0, 0.0, 0.0)
 
 
 def has_weight(robot: Robot) -> bool:
-    """Return whether anything of a robot, or what it carries, has a mass, so that gravity loads its joints."""
-    return robot.payload.mass > 0.0 or any(link.mass > 0.0 for link in robot.masses)
+    """Return whether anything loads a robot's joints: a mass of its own or that it carries, or a balancer."""
+    return robot.payload.mass > 0.0 or bool(robot.balancers) or any(link.mass > 0.0 for link in robot.masses)
 
 
 def joint_loads(
@@ -53,11 +57,11 @@ def joint_loads(
     acceleration: Array | None = None,
     wrench: Array | None = None,
 ) -> Array:
-    """Return force [N] and moment [N m] of the load at every joint, about its origin and in its own axes.
+    """Return force [N] and moment [N m] of the load at every joint, about its bearing and in its own axes.
 
-    A joint's own axes are those of :func:`truearm.modeling.chain.across` and its axis as z, and its origin is that of
-    the frame right behind it: behind the turn, or the slide of a prismatic joint. The place of the base in the world
-    does not matter, because gravity is given in the base frame.
+    A joint's own axes are those of :func:`truearm.modeling.chain.across` and its axis as z. Its bearing lies on the
+    axis, see :mod:`truearm.modeling.bearings`; of a prismatic joint it is the origin of the frame behind the slide. The
+    place of the base in the world does not matter, because gravity is given in the base frame.
 
     Parameters
     ----------
@@ -99,7 +103,10 @@ def joint_loads(
         at_tool = wrench_on_flange(robot, robot.wrench, arm)
         wrench = at_tool if wrench is None else wrench + at_tool
     ends = [0, *accumulate(len(link) for link in robot.moved_links)]
-    bodies = [(ends[link.joint], link.mass, link.cog, link.inertia) for link in robot.masses]
+    stayed = robot.axial_slides.stayed
+    bodies = [
+        (ends[link.joint], link.mass, stayed(link.joint, link.cog, robot.values), link.inertia) for link in robot.masses
+    ]
     bodies.append((len(elements), robot.payload.mass, robot.payload.cog, POINT_MASS))
     bodies = [(end, mass, cog, inertia) for end, mass, cog, inertia in bodies if mass or any(inertia)]
     moving = velocity is not None or acceleration is not None
@@ -111,7 +118,7 @@ def joint_loads(
     omega = alpha = force = moment = _ZERO
     if wrench is not None:
         force, moment = (wrench[0], wrench[1], wrench[2]), (wrench[3], wrench[4], wrench[5])
-    applied: dict[int, list[tuple[Coordinates, Coordinates]]] = {}
+    applied: dict[int, list[Wrench]] = {}
     for place, (element, move) in enumerate(zip(elements, moves, strict=True), 1):
         if move and element.turns:
             fall = in_frame_behind(fall, element, move)
@@ -138,7 +145,37 @@ def joint_loads(
                     turn = _less(turn, _plus(_times(inertia, alpha), cross(omega, _times(inertia, omega))))
                 applied.setdefault(place, []).append((pull, turn))
 
+    for number, balancer in enumerate(robot.balancers, 1):
+        factor = robot.values.get(f"balancer_{number}", 1.0)
+        for place, (pull, turn) in balancer_wrenches(robot, balancer, elements, moves, ends, robot.values):
+            applied.setdefault(place, []).append((_scaled(pull, factor), _scaled(turn, factor)))
+    return _carried(robot, elements, moves, applied, (force, moment), size)
+
+
+def relief(robot: Robot, variables: Array) -> Array:
+    """Return what each balancer, at the factor 1, contributes to :func:`joint_loads`, ``(balancers, joints, 6, n)``."""
+    elements = robot.arm.elements
+    moves = robot.arm.forward_kinematics(variables, robot.values).moves
+    ends = [0, *accumulate(len(link) for link in robot.moved_links)]
+    found = []
+    for balancer in robot.balancers:
+        applied = {p: [w] for p, w in balancer_wrenches(robot, balancer, elements, moves, ends, robot.values)}
+        found.append(_carried(robot, elements, moves, applied, (_ZERO, _ZERO), np.shape(variables)[-1]))
+    return np.array(found)
+
+
+def _carried(
+    robot: Robot,
+    elements: Sequence[Element],
+    moves: Sequence[Move],
+    applied: Mapping[int, Sequence[Wrench]],
+    flange: Wrench,
+    size: int,
+) -> Array:
+    """Return the loads ``(joints, 6, size)`` of what is applied behind elements, and on the flange."""
+    (force, moment), count = flange, len(robot.joints)
     loads = np.empty((count, 6, size))
+    bearings = robot.bearings
     for place in range(len(elements), 0, -1):
         element, move = elements[place - 1], moves[place - 1]
         for pull, turn in applied.get(place, ()):
@@ -147,6 +184,11 @@ def joint_loads(
             for k, axis in enumerate((*across(element), axis_of(element))):
                 loads[element.variable, k] = _along(axis, force)
                 loads[element.variable, 3 + k] = _along(axis, moment)
+            away = bearings[element.variable]
+            if away:
+                x, y = loads[element.variable, :2]
+                loads[element.variable, 3] += away * y
+                loads[element.variable, 4] -= away * x
         if move and element.turns:
             force, moment = in_frame_before(force, element, move), in_frame_before(moment, element, move)
         elif move:

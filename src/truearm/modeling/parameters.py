@@ -22,6 +22,10 @@ Unit = Literal["m", "rad", "1", "rad/(N m)", "m/N", "rad/(N m)^2", "rad/(N m)^3"
 #: Where things stand: nobody measured them before, and every fit finds them anew.
 PLACES: Final[tuple[Group, ...]] = ("base", "target", "fixture")
 
+#: The parameter that says how much longer than it reads an instrument's unit of length is, and its group.
+SCALE: Final = "instrument_scale"
+SCALE_GROUP: Final = "scale"
+
 #: What a nominal value is believed to be good for (one standard deviation) unless the robot file says otherwise.
 #: Machined links and mastered joints are good to about 1 mm and 0.1 deg; where robot and reflectors stand is unknown.
 PRIOR: Final[Mapping[tuple[str, str], float]] = {

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -14,7 +13,7 @@ from truearm.errors import InputError, wrong_kind
 from truearm.modeling.chain import Chain, Element, Motion
 from truearm.modeling.conventions import JointKind
 from truearm.modeling.transform import fixed_rotation
-from truearm.units import as_number, sized_si
+from truearm.units import quantity_si
 
 #: Standard gravity, with the base's z upwards [m/s^2].
 GRAVITY: Final = (0.0, 0.0, -9.80665)
@@ -41,6 +40,10 @@ class Joint:
     transmission_periods
         How often the joint's gear errs in a turn of the joint, where known: for a strain wave gear twice the turns of
         its wave generator.
+    bearing
+        How far along the joint's axis its bearing lies [m], from the joint's origin at nominal values (the origin of
+        the frame right behind the joint's turn); None if that is not known, and zero is assumed. Joints that slide
+        have none.
     """
 
     name: str
@@ -48,6 +51,7 @@ class Joint:
     row: Mapping[str, float]
     limits: tuple[float, float] | None = None
     transmission_periods: int | None = None
+    bearing: float | None = None
 
     @property
     def range(self) -> tuple[float, float]:
@@ -128,10 +132,10 @@ class Payload:
                 "a mass and the three coordinates of its centre of gravity belong here",
                 parameter=parameter,
                 came=text,
-                allowed="2.7kg,50mm,25mm,100mm",
+                allowed=_WHOLE,
             )
         mass, x, y, z = (
-            _quantity(part, units, parameter)
+            quantity_si(part, units, parameter, "2.7" if units is _MASSES else "50", _WHOLE)
             for part, units in zip(parts, (_MASSES, _LENGTHS, _LENGTHS, _LENGTHS), strict=True)
         )
         if mass < 0.0:
@@ -141,20 +145,7 @@ class Payload:
 
 _MASSES: Final = ("kg", "g")
 _LENGTHS: Final = ("mm", "m")
-
-
-def _quantity(text: str, units: tuple[str, ...], parameter: str) -> float:
-    match = re.fullmatch(r"\s*(?P<number>[^a-zA-Z]*(?:[eE][-+0-9]+)?)\s*(?P<unit>[a-zA-Z]*)\s*", text)
-    number = None if match is None else as_number(match["number"].strip())
-    if match is None or number is None or match["unit"] not in units:
-        raise InputError(
-            "a number with its unit belongs here" if number is None else "no unit that fits is given",
-            parameter=parameter,
-            came=text,
-            allowed=" or ".join(f"{'2.7' if units is _MASSES else '50'}{unit}" for unit in units),
-            cure="Units are never guessed: write 2.7kg,50mm,25mm,100mm.",
-        )
-    return sized_si(number, match["unit"], parameter=parameter, came=text)
+_WHOLE: Final = "2.7kg,50mm,25mm,100mm"
 
 
 NO_PAYLOAD: Final = Payload()
@@ -219,11 +210,15 @@ class Truth:
         Parameter values [m, rad]; what is not named is nominal.
     compliance
         Deflection of a joint per moment about its axis [rad/(N m)], by joint number; only the twin knows it.
+    backlash, clearance
+        Whole play of a joint, and how far its shaft tilts from the middle [rad], likewise.
     """
 
     source: str
     values: Mapping[str, float]
     compliance: Mapping[int, float] = field(default_factory=dict)
+    backlash: Mapping[int, float] = field(default_factory=dict)
+    clearance: Mapping[int, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final
@@ -37,6 +38,9 @@ class Postures:
     loads
         Force and moment of everything beyond each joint, in the joint's own axes, ``(joints, 6, n)``, as
         :meth:`truearm.modeling.robot.Robot.loaded` finds them.
+    relief
+        What of the loads each balancer contributes at the factor 1, ``(balancers, joints, 6, n)``, and the factors that
+        the loads are of; None where no factor is a parameter.
     """
 
     joints: Array
@@ -47,6 +51,7 @@ class Postures:
     temperature: Array | None = None
     wrench: Array | None = None
     loads: Array | None = None
+    relief: tuple[Array, tuple[float, ...]] | None = None
 
     @classmethod
     def of(cls, q: Array | Postures) -> Postures:
@@ -59,6 +64,22 @@ class Postures:
         if self.loads is None:
             raise ValueError("the postures have no loads; ask Robot.loaded for them")
         return self.loads
+
+    def relieved(self, values: Mapping[str, float | Array]) -> Postures:
+        """Return them with the loads of other factors of the balancers; values may be ``(trials, 1)``.
+
+        The arm stands as it stood: loads are linear in the factors.
+        """
+        if self.relief is None:
+            return self
+        loads = self.joint_loads
+        for number, (unit, factor) in enumerate(zip(*self.relief, strict=True), 1):
+            more = np.asarray(values[f"balancer_{number}"]) - factor
+            if more.ndim and loads.ndim == 3:
+                loads = loads[:, :, None, :]
+            if more.any():
+                loads = loads + more * (unit[:, :, None, :] if more.ndim else unit)
+        return replace(self, loads=loads, relief=None)
 
     def __len__(self) -> int:
         return len(self.joints)
@@ -79,6 +100,7 @@ class Postures:
             temperature=part(self.temperature),
             wrench=part(self.wrench),
             loads=None,
+            relief=None,
         )
 
 

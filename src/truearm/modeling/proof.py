@@ -17,6 +17,13 @@ from truearm.units import SHOWN_AS, from_si, to_si
 #: own deviation.
 _DIGITS: Final = 9
 _DECIMALS: Final = 7
+#: How a proof says that the base was known, or by targets on it all of the flange's pose.
+BASE: Final = "base"
+FLANGE: Final = "flange"
+HELD: Final = (BASE, FLANGE)
+#: Measured joint positions that are kept, and their decimals in deg or mm.
+MOST_MEASURED: Final = 1000
+_POSITION_DECIMALS: Final = 3
 _LOAD_DECIMALS: Final = 6
 
 
@@ -48,8 +55,14 @@ class Proof:
         Notes of the calibration that whoever corrects programs should hear again.
     lower_bound
         Whether the error may be larger than covariance and joint error say, for a reason that is known.
+    held
+        What was known beforehand and not found: ``base``; ``flange``, where the places of targets on it say all of its
+        pose; and parameters of the targets that were held, by name.
     digest
         SHA-256 of the values that it is about; empty if it is about none yet.
+    measured
+        Joint positions at which it was measured [rad or m], to a thousandth of a degree or millimetre; a thousand of
+        them at most, evenly taken. Empty where only the region is known.
     loads
         Lowest and highest moment about each joint's axis, or force along it, while it was measured [N m or N]; empty
         if that is not known.
@@ -64,7 +77,9 @@ class Proof:
     factor: tuple[tuple[float, ...], ...]
     lower_bound: bool = False
     warnings: tuple[Notice, ...] = ()
+    held: tuple[str, ...] = ()
     digest: str = ""
+    measured: tuple[tuple[float, ...], ...] = ()
     loads: tuple[tuple[float, float], ...] = ()
 
     @classmethod
@@ -79,6 +94,9 @@ class Proof:
         *,
         warnings: Sequence[Notice] = (),
         lower_bound: bool = False,
+        held: Sequence[str] = (),
+        measured: Sequence[Sequence[float]] = (),
+        joint_units: Sequence[str] = (),
         loads: Sequence[tuple[float, float]] = (),
     ) -> Self:
         """Make the proof of a calibration, rounded to what a file holds of it.
@@ -89,6 +107,10 @@ class Proof:
             That were identified.
         covariance
             Of these parameters [SI], ``(parameters, parameters)``.
+        measured
+            Joint positions at which it was measured [rad or m].
+        joint_units
+            Units in which a file holds these, ``deg`` or ``mm``.
         """
         deviation = np.sqrt(np.diag(covariance))
         units = [SHOWN_AS[p.unit] for p in parameters]
@@ -108,6 +130,11 @@ class Proof:
             ),
             lower_bound,
             tuple(warnings),
+            held=tuple(held),
+            measured=tuple(
+                tuple(to_si(float(position_text(v, u)), u) for v, u in zip(row, joint_units, strict=True))
+                for row in _some(measured)
+            ),
             loads=tuple((round(low, _LOAD_DECIMALS) + 0.0, round(high, _LOAD_DECIMALS) + 0.0) for low, high in loads),
         )
 
@@ -128,6 +155,20 @@ class Proof:
         """Covariance of the parameters [SI], ``(parameters, parameters)``."""
         root = self.root
         return np.asarray(root @ root.T)
+
+
+def position_text(value: float, unit: str) -> str:
+    """Return a measured joint position [rad or m] as a file holds it, in deg or mm."""
+    text = f"{from_si(value, unit):.{_POSITION_DECIMALS}f}"
+    return text.removeprefix("-") if float(text) == 0.0 else text
+
+
+def _some(measured: Sequence[Sequence[float]]) -> list[Sequence[float]]:
+    """Return different joint positions in their order, as many as a file holds, evenly taken."""
+    rows = [*{tuple(row): row for row in measured}.values()]
+    if len(rows) <= MOST_MEASURED:
+        return rows
+    return [rows[i] for i in np.linspace(0, len(rows) - 1, MOST_MEASURED).round().astype(int).tolist()]
 
 
 def _factor(covariance: Array, deviation: Array) -> Array:

@@ -18,7 +18,7 @@ from truearm.modeling.equilibrium import joints_in_equilibrium, postures_in_equi
 from truearm.modeling.fixtures import FixtureKind
 from truearm.modeling.frames import Frame, forward, jacobian
 from truearm.modeling.loads import joint_loads
-from truearm.modeling.parameters import Parameter
+from truearm.modeling.parameters import SCALE, SCALE_GROUP, Parameter
 from truearm.modeling.parts import Payload, checked_gravity
 from truearm.modeling.placing import fixtures_placed, placed
 from truearm.modeling.postures import Postures
@@ -182,6 +182,23 @@ class Robot(RobotData):
         """
         return fixtures_placed(self, places)
 
+    def with_scale(self, deviation: float | None) -> Robot:
+        """Return the robot with the scale of an instrument beside it, or without any if that is exact.
+
+        Parameters
+        ----------
+        deviation
+            Standard deviation of how much longer than it reads the instrument's unit of length is; None for exact.
+        """
+        if deviation is None and SCALE not in self.known:
+            return self
+        kept = {name: p for name, p in self.known.items() if name != SCALE}
+        if deviation is not None:
+            kept[SCALE] = Parameter.plain(SCALE, "1", SCALE_GROUP, 0.0, deviation)
+        other = replace(self, known=kept)
+        self.share(other, STRUCTURE)
+        return other
+
     # -- kinematics ----------------------------------------------------------------------------------------
 
     def loaded(self, q: Array | Postures) -> Postures:
@@ -208,7 +225,7 @@ class Robot(RobotData):
 
         Those of the joints come first; the rest of :attr:`layout` is there if some effect tilts or stretches.
         """
-        at = self.loaded(q)
+        at = self.loaded(q).relieved(values)
         joints = np.ascontiguousarray(at.joints.T)
         moved: dict[int, Array] = {}
         for effect in self.effects:

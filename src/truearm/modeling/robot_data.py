@@ -11,7 +11,9 @@ from typing import Final, Self, TypeVar
 import numpy as np
 
 from truearm.errors import InputError, did_you_mean
-from truearm.modeling.chain import Chain, Element, across, turn_about
+from truearm.modeling.balancers import Balancer
+from truearm.modeling.bearings import AxialSlides, bearing_elements, carried_by
+from truearm.modeling.chain import Chain, Element, Offset, across, turn_about
 from truearm.modeling.controller import AS_THE_MODEL, Controller
 from truearm.modeling.conventions import Convention, convention
 from truearm.modeling.effects import EFFECTS, Effect, Layout
@@ -38,9 +40,9 @@ from truearm.shown import as_html, counted, listed, short_text
 Part = TypeVar("Part", Target, Fixture)
 
 #: What is cached of a robot and does not depend on where it stands, its targets and the values of its parameters.
-ARM: Final = ("link_elements", "flange_elements", "moved_links", "arm", "layout", "effects")
+ARM: Final = ("link_elements", "axial_slides", "flange_elements", "moved_links", "arm", "layout", "effects")
 #: What does not depend on the values of its parameters.
-STRUCTURE: Final = (*ARM, "base_elements", "trunk", "moving")
+STRUCTURE: Final = (*ARM, "base_elements", "trunk", "moving", "offset_elements")
 
 
 @dataclass(frozen=True, repr=False)
@@ -64,6 +66,8 @@ class RobotData:
         From the last link's frame to the flange.
     masses
         Link masses, where published.
+    balancers
+        Springs and gas cylinders that relieve joints.
     payload
         What hangs on the flange.
     gravity
@@ -119,6 +123,7 @@ class RobotData:
     maker: str = ""
     history: tuple[str, ...] = ()
     proof: Proof | None = None
+    balancers: tuple[Balancer, ...] = ()
 
     def __repr__(self) -> str:
         changed = sum(p.value != p.nominal for p in self.parameters.values())
@@ -198,13 +203,39 @@ class RobotData:
                 return (replace(element, variable=self.layout.length(next(slides))),)
             if tilts and element.variable is not None:
                 across_it = zip(across(element), self.layout.tilt(joint), strict=True)
-                return (element, *(turn_about(axis, variable) for axis, variable in across_it))
+                turns = tuple(turn_about(axis, variable) for axis, variable in across_it)
+                return (element, *_about_bearing(turns, bearing_elements(element, *self._bearing(joint))))
             return (element,)
 
         return tuple(
             tuple(part for element in link for part in moved(joint, element))
             for joint, link in enumerate(self.link_elements)
         )
+
+    @cached_property
+    def axial_slides(self) -> AxialSlides:
+        """How identified slides carry joints and links along the axes."""
+        return AxialSlides.of(self.link_elements)
+
+    def _bearing(self, joint: int) -> tuple[float, tuple[Offset, ...]]:
+        """Return where a joint's bearing (from 0) lies beyond its nominal origin [m], and what carries the origin."""
+        part = self.joints[joint]
+        return (part.bearing or 0.0, self.axial_slides.joints[joint]) if part.kind == "revolute" else (0.0, ())
+
+    @property
+    def bearings(self) -> tuple[float, ...]:
+        """How far along its axis each joint's bearing lies from the joint's origin as it is now [m]."""
+        found = (self._bearing(joint) for joint in range(len(self.joints)))
+        return tuple(bearing - carried_by(offsets, self.values) for bearing, offsets in found)
+
+    @cached_property
+    def offset_elements(self) -> Mapping[str, tuple[tuple[int, float], ...]]:
+        """The elements of the trunk that follow a parameter of another one, by its name, with their factors."""
+        found: dict[str, tuple[tuple[int, float], ...]] = {}
+        for place, element in enumerate(self.trunk.elements):
+            for name, factor, _ in element.offsets:
+                found[name] = (*found.get(name, ()), (place, factor))
+        return found
 
     @cached_property
     def layout(self) -> Layout:
@@ -214,6 +245,7 @@ class RobotData:
             tuple(joint.kind for joint in self.joints),
             tuple(lengths),
             tuple(joint.transmission_periods for joint in self.joints),
+            len(self.balancers),
         )
 
     @cached_property
@@ -265,6 +297,11 @@ class RobotData:
         places = {e.variable: i for i, e in enumerate(self.trunk.elements) if e.variable is not None}
         count = self.layout.variables if len(places) > len(self.joints) else len(self.joints)
         return [places.get(i, -1) for i in range(count)]
+
+
+def _about_bearing(turns: tuple[Element, ...], slides: tuple[Element, Element] | None) -> tuple[Element, ...]:
+    """Return turns about a joint's origin as turns about its bearing."""
+    return turns if slides is None else (slides[0], *turns, slides[1])
 
 
 def _has_length(element: Element) -> bool:

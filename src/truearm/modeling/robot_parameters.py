@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
 
 from truearm.errors import InputError
 from truearm.modeling.chain import Array, Element, ForwardKinematics
 from truearm.modeling.fixtures import Fixture
-from truearm.modeling.parameters import Group, Parameter, Unit, parameter
+from truearm.modeling.parameters import SCALE, Group, Parameter, Unit, parameter
 from truearm.modeling.parts import Target
 from truearm.modeling.postures import Postures
 
 if TYPE_CHECKING:
     from truearm.modeling.robot import Robot
     from truearm.modeling.robot_data import RobotData
+
+
+#: Of a balancer's factor, for differences: far below what a play takes up, far above rounding.
+_STEP: Final = 1e-6
 
 
 def all_parameters(robot: RobotData) -> Mapping[str, Parameter]:
@@ -54,6 +60,8 @@ def all_parameters(robot: RobotData) -> Mapping[str, Parameter]:
         for element in (element for part in parts for element in part.chain.elements):
             if element.parameter is not None:
                 add(element.parameter, _unit(element), group_of, element.value)
+    if SCALE in robot.known:
+        found[SCALE] = robot.known[SCALE]
     return found
 
 
@@ -66,7 +74,31 @@ def effect_rates(
     if not effects:
         return {}
     at = robot.loaded(q)
-    return {n: rate for effect in effects for n, rate in effect.derivative(at, values).items() if n in asked}
+    there = at.relieved(values)
+    rates = {n: rate for effect in effects for n, rate in effect.derivative(there, values).items() if n in asked}
+    return rates | (_balancer_rates(robot, at, asked, values) if at.relief else {})
+
+
+def _balancer_rates(
+    robot: Robot, at: Postures, asked: Collection[str], values: Mapping[str, float | Array]
+) -> dict[str, Mapping[int, Array]]:
+    """Return the derivative of the chain's variables by factors of balancers: of what joints do under loads."""
+
+    def under(name: str, more: float) -> dict[int, Array]:
+        there = at.relieved({**values, name: np.asarray(values[name]) + more})
+        moved: dict[int, Array] = {}
+        for effect in robot.effects:
+            if effect.loaded:
+                for variable, part in effect.deflection(there, values).items():
+                    moved[variable] = moved.get(variable, 0.0) + part
+        return moved
+
+    rates: dict[str, Mapping[int, Array]] = {}
+    for name in (f"balancer_{number}" for number in range(1, len(robot.balancers) + 1)):
+        if name in asked:
+            ahead, behind = under(name, _STEP), under(name, -_STEP)
+            rates[name] = {variable: (part - behind[variable]) / (2.0 * _STEP) for variable, part in ahead.items()}
+    return rates
 
 
 def by_parameters(
@@ -86,6 +118,9 @@ def by_parameters(
         From :func:`effect_rates`.
     """
     derivative = by_elements([kinematics.places.get(name) for name in names])
+    for i, name in enumerate(names):
+        for place, factor in robot.offset_elements.get(name, ()):
+            derivative[i] += factor * by_elements([place])[0]
     if rates:
         needed = sorted({variable for rate in rates.values() for variable in rate})
         by_variable = dict(zip(needed, by_elements([robot.moving[v] for v in needed]), strict=True))

@@ -16,8 +16,10 @@ from truearm.measurement.statistics import Errors
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import GRAVITY
 from truearm.notices import worst_first
+from truearm.reporting.budget_figure import budget_figure, budget_rows, workspace_budget_figure
 from truearm.reporting.drawing import Figure
 from truearm.reporting.figures import correlation_map, expected_error_map, histogram, residuals, workspace
+from truearm.reporting.monte_carlo_figure import coverage_figure, interval_rows
 from truearm.reporting.page import page
 from truearm.reporting.tables import (
     SpreadRow,
@@ -30,7 +32,9 @@ from truearm.reporting.tables import (
     spread_rows,
     strongest_pairs,
 )
+from truearm.reporting.zones_figure import zone_rows, zones_figure
 from truearm.results.calibration import Calibration
+from truearm.results.simulated import simulated_lines
 from truearm.results.summaries import expected_of
 
 _FRAMES: Final = ("base", "target", "fixture")
@@ -105,6 +109,10 @@ class Report:
             drawn["workspace"] = workspace(
                 self.judged_part, self._tips(self.judged_part), _millimetres(nominal), _millimetres(judged)
             )
+        if run.budget is not None:
+            drawn["limits-of-accuracy"] = budget_figure(run.budget)
+            if run.budget.workspace is not None:
+                drawn["limits-over-the-workspace"] = workspace_budget_figure(run.budget.workspace)
         drawn["expected-error"] = expected_error_map(
             *expected_map(replace(run.fit, joint_error=run.expected.joint_error), _MAPPED),
             self._tips(run.data.of_configurations(run.training)),
@@ -113,6 +121,10 @@ class Report:
         if run.validation is not None:
             parts.append(("held out", run.held_out, _millimetres(run.validation)))
         drawn["residuals"] = residuals(run.data, parts, self._down_weighted())
+        if run.monte_carlo is not None and run.monte_carlo.settled:
+            drawn["coverage"] = coverage_figure(run.monte_carlo, run.fit.robot)
+        if run.zones is not None and any(verdict.zone is not None for verdict in run.zones.verdicts):
+            drawn["zone-errors"] = zones_figure(run.zones)
         drawn["correlations"] = correlation_map(run.fit)
         return drawn
 
@@ -144,6 +156,13 @@ def report_html(calibration: Calibration) -> str:
         report=report,
         run=calibration,
         expected=calibration.expected,
+        budget=calibration.budget,
+        zone_lines=[] if calibration.zones is None else calibration.zones.lines(),
+        zone_rows=() if calibration.zones is None else zone_rows(calibration.zones),
+        simulated=calibration.monte_carlo,
+        simulated_line="".join(simulated_lines(calibration.monte_carlo, fit.robot)),
+        interval_rows=() if calibration.monte_carlo is None else interval_rows(calibration.monte_carlo, fit.robot),
+        budget_rows=() if calibration.budget is None else budget_rows(calibration.budget),
         expected_of=expected_of(calibration.expected),
         expected_rows=expected_rows(calibration.expected),
         notices=worst_first(calibration.warnings),

@@ -17,7 +17,7 @@ from truearm.measurement.dataset import IntArray
 from truearm.measurement.statistics import Errors, Spread
 from truearm.modeling.chain import Array
 from truearm.reporting.numbers import decimals_of, deserved, significant, student_975
-from truearm.results.summaries import joint_error_text
+from truearm.results.summaries import BOOTSTRAPPED, joint_error_text
 from truearm.units import SHOWN_AS, from_si
 
 #: Decimals of a parameter value: a micrometre, two micrometres at a metre, a millionth.
@@ -287,7 +287,9 @@ def noise_sentence(fit: Fit) -> str:
             f"All readings of a configuration share an error of the joints, of {shared} each: repeatability plus what "
             "the model leaves."
         )
-    if fit.scattered:
+    if fit.bootstrap:
+        sentences.append(f"The deviations of the parameters follow from {fit.bootstrap} {BOOTSTRAPPED}.")
+    elif fit.scattered:
         sentences.append("The deviations of the parameters follow from the scatter of the configurations.")
     return " ".join(sentences)
 
@@ -315,6 +317,10 @@ def parameter_sentence(rows: Sequence[ParameterRow]) -> str:
     found: dict[str, int] = {}
     for row in rows:
         found[row.status] = found.get(row.status, 0) + 1
-    words = {"at bound": "stopped at a bound", "held: redundant": "held because they are redundant"}
+    words = {
+        "at bound": "stopped at a bound",
+        "held: redundant": "held because they are redundant",
+        "held": "held at known places",
+    }
     sentence = ", ".join(f"{count} {words.get(status, status)}" for status, count in found.items())
     return f"{sentence}."

@@ -14,9 +14,13 @@ from numpy.typing import NDArray
 
 from truearm.errors import InputError, did_you_mean
 from truearm.identification.choosing.selection import Selection
-from truearm.identification.judging.expected_error import ExpectedError
+from truearm.identification.choosing.zone_boxes import flange_places
+from truearm.identification.choosing.zones import ZoneVerdict
+from truearm.identification.judging.error_budget import ErrorBudget, error_budget
+from truearm.identification.judging.expected_error import ExpectedError, expected_error
 from truearm.identification.judging.next_step import NextStep
 from truearm.identification.judging.repeatability import Repeatability, repeatability
+from truearm.identification.judging.simulated_calibrations import SimulatedCalibrations
 from truearm.identification.solving.fit import Fit, Status
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import Errors
@@ -24,9 +28,11 @@ from truearm.modeling.formats.robot_file import robot_text, sealed
 from truearm.modeling.proof import Proof
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice, has_error
+from truearm.results.budgets import budget_lines, budget_summary
 from truearm.results.calibration_proof import proof_of
 from truearm.results.record import Record, notice_lines, notice_summaries
 from truearm.results.residuals import Part, Residuals, residuals_of
+from truearm.results.simulated import simulated_lines, simulated_summary
 from truearm.results.summaries import (
     error_line,
     errors_summary,
@@ -36,6 +42,7 @@ from truearm.results.summaries import (
     noise_summary,
     selection_summary,
 )
+from truearm.results.zones import ZONES_FILE, ZoneChoice, robot_file_of, zone_files
 from truearm.shown import counted, listed
 from truearm.units import SHOWN_AS, from_si
 from truearm.writing import output_folder, write_files
@@ -85,6 +92,10 @@ class Calibration(Record):
         What the user noted, by its name.
     next
         What to do next, three steps at most, the most useful first.
+    monte_carlo
+        Calibrations that were simulated for intervals; None if none were asked for.
+    zones
+        What became of zones of the workspace; None if none were asked for.
     """
 
     fit: Fit
@@ -105,6 +116,8 @@ class Calibration(Record):
     without: tuple[str, ...] = ()
     notes: dict[str, str] = field(default_factory=dict)
     next: tuple[NextStep, ...] = ()
+    monte_carlo: SimulatedCalibrations | None = None
+    zones: ZoneChoice | None = None
 
     @cached_property
     def robot(self) -> Robot:
@@ -118,6 +131,13 @@ class Calibration(Record):
     def repeatability(self) -> Repeatability | None:
         """How well the robot comes back to a posture; None if too few were visited again."""
         return repeatability(self.data, self.fit.sigma.get("position", 0.0))
+
+    @cached_property
+    def budget(self) -> ErrorBudget | None:
+        """What limits the accuracy: the mean square of the errors by its sources; None if there is nothing to part."""
+        held_out = self.data.of_configurations(self.held_out) if len(self.held_out) else None
+        training = self.data.of_configurations(self.training)
+        return error_budget(self.fit, self.data, training, held_out, self.expected)
 
     @property
     def status(self) -> Status:
@@ -147,6 +167,7 @@ class Calibration(Record):
             "train": errors_summary(self.train),
             "validation": None if self.validation is None else errors_summary(self.validation),
             "expected_mm": expected_summary(self.expected),
+            **({"held": list(self.fit.held.words)} if self.fit.held else {}),
             **({"without": list(self.without)} if self.without else {}),
             **({"notes": self.notes} if self.notes else {}),
         }
@@ -160,7 +181,10 @@ class Calibration(Record):
             "history": self.history,
             "model": {"name": self.fit.model.name, "effects": list(self.fit.model.effects)},
             "noise": noise_summary(self.fit, self.repeatability),
+            "limits_of_accuracy": None if self.budget is None else budget_summary(self.budget),
             "parameters": list(self._parameters()),
+            **({} if self.monte_carlo is None else {"monte_carlo": simulated_summary(self.monte_carlo, self.robot)}),
+            **({} if self.zones is None else {"zones": self.zones.summary()}),
             **({} if self.selection is None else {"selection": selection_summary(self.selection)}),
         }
 
@@ -176,10 +200,15 @@ class Calibration(Record):
             text.append(f"Nothing was held out; on the {counted(self.train.configurations, 'training configuration')}:")
             text.append(f"  nominal     {error_line(self.nominal)}")
         text.append(f"  calibrated  {error_line(self.train)}")
+        if self.fit.held:
+            text.append(f"Held at known places: {listed(self.fit.held.words)}")
         if self.without:
             text.append(f"Left out: {counted(len(self.without), 'configuration')} ({listed(self.without)})")
         text += expected_lines(self.expected)
         text += noise_lines(self.fit, self.repeatability)
+        text += budget_lines(self.budget)
+        text += simulated_lines(self.monte_carlo, self.robot)
+        text += [] if self.zones is None else self.zones.lines()
         if self.selection is not None:
             text.append(f"Chosen model: {self.fit.model.summary}")
         if self.fit.model.name == "frames":
@@ -203,8 +232,9 @@ class Calibration(Record):
         Parameters
         ----------
         picture
-            ``residuals`` (configuration by configuration), ``expected-error``, ``workspace``, ``correlations``, and
-            ``position-histogram``, ``orientation-histogram`` or ``length-histogram`` where such readings were held out.
+            ``residuals`` (configuration by configuration), ``limits-of-accuracy``, ``expected-error``, ``workspace``,
+            ``correlations``, and ``position-histogram``, ``orientation-histogram`` or ``length-histogram`` where such
+            readings were held out.
 
         Raises
         ------
@@ -253,8 +283,34 @@ class Calibration(Record):
             )
         return rows
 
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Names of the files that are written: those of every calibration, and of the zones that are kept."""
+        kept = [] if self.zones is None else [robot_file_of(verdict.box.name) for verdict in self.zones.kept]
+        return (*RESULT_FILES, *([ZONES_FILE] if kept else []), *kept)
+
+    def zone_robot(self, verdict: ZoneVerdict) -> Robot:
+        """Return the calibrated robot of a zone, with what is known about it.
+
+        Raises
+        ------
+        InputError
+            If it has none.
+        """
+        fit = verdict.fit
+        if fit is None or self.zones is None:
+            raise InputError("this zone has no model of its own", parameter="verdict", came=verdict.box.name)
+        training = self.data.of_configurations(self.training)
+        mine = np.flatnonzero(verdict.box.holds(flange_places(self.fit.start, training.postures), self.zones.overlap))
+        part = training.of_configurations(mine)
+        proof = proof_of(fit, fit.status, self.warnings, expected_error(fit), part, self.known_before)
+        line = f"{self.history}, zone {verdict.box.name}"
+        return sealed(replace(fit.robot, history=(*fit.robot.history, line), tools={}, truths={}), proof)
+
     def save(self, folder: str | Path, progress: Callable[[str], None] = lambda _: None) -> tuple[Path, ...]:
         """Write ``calibrated.yaml``, ``result.json``, ``report.html`` and ``calibrated.urdf`` into a folder.
+
+        Zones that are kept add ``zones.yaml`` and ``zone-NAME.yaml`` of each.
 
         An earlier result stays until the new files are complete on disk; only then are they put in its place.
 
@@ -266,7 +322,7 @@ class Calibration(Record):
         from truearm.modeling.formats.urdf_writing import urdf_text
         from truearm.reporting.report import report_html
 
-        folder = output_folder(folder, RESULT_FILES, self.inputs, ours=True)
+        folder = output_folder(folder, self.files, self.inputs, ours=True)
         progress("drawing the report")
         urdf = calibrated_urdf(self.urdf, self.robot)[0] if self.urdf else urdf_text(self.robot)[0]
         files: dict[str, str | bytes] = {
@@ -274,6 +330,7 @@ class Calibration(Record):
             "result.json": json.dumps(self.result(), indent=2, allow_nan=False) + "\n",
             "report.html": report_html(self),
             "calibrated.urdf": urdf,
+            **zone_files(self.zones, self.robot, self.zone_robot),
         }
         progress("writing the files")
         write_files(folder, files, self.command)

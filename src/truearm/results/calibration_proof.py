@@ -7,13 +7,14 @@ from typing import Final
 
 import numpy as np
 
+from truearm.compensation.gauge import held_by
 from truearm.identification.judging.expected_error import ExpectedError, covariance_root, uncertain_names
 from truearm.identification.solving.fit import Fit, Status
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.equilibrium import joint_efforts
 from truearm.modeling.parameters import PLACES
 from truearm.modeling.postures import Postures
-from truearm.modeling.proof import Proof
+from truearm.modeling.proof import HELD, Proof
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 
@@ -52,9 +53,11 @@ def proof_of(
     errors = [notice for notice in warnings if notice.level == "error"]
     repeated = [notice for notice in warnings if notice.code == _REPEATED]
     lower_bound = expected.lower_bound
+    held = [*held_by(fit)]
     names, root = uncertain_names(fit), covariance_root(fit, fit.covariance)
     parameters, covariance = [fit.robot.parameters[name] for name in names], root @ root.T
     region = list(zip(training.joints.min(axis=0).tolist(), training.joints.max(axis=0).tolist(), strict=True))
+    measured = training.joints.tolist()
     loads = loads_of(fit.robot, training.postures)
     if before is not None:
         arm = {n: p for n, p in fit.robot.parameters.items() if p.group not in PLACES}
@@ -65,11 +68,13 @@ def proof_of(
             repeated += [warning for warning in before.warnings if not repeated]
             parameters += [arm[before.names[i]] for i in kept]
             region = [(min(a, c), max(b, d)) for (a, b), (c, d) in zip(region, before.region or region, strict=True)]
+            measured = [*before.measured, *measured] if before.measured else []
             # By older versions nothing is known of the loads before.
             pairs = zip(loads, before.loads, strict=True) if before.loads else ()
             loads = [(min(a, c), max(b, d)) for (a, b), (c, d) in pairs]
             joint_error = np.maximum(joint_error, before.joint_error or 0.0)
             lower_bound = lower_bound or before.lower_bound
+            held += [word for word in before.held if word in HELD and word not in held]
             beside = np.zeros((len(covariance), len(kept)))
             covariance = np.block([[covariance, beside], [beside.T, before.covariance[np.ix_(kept, kept)]]])
     return Proof.of(
@@ -81,6 +86,9 @@ def proof_of(
         covariance,
         warnings=repeated,
         lower_bound=lower_bound,
+        held=held,
+        measured=measured,
+        joint_units=["deg" if joint.kind == "revolute" else "mm" for joint in fit.robot.joints],
         loads=loads,
     )
 

@@ -317,7 +317,7 @@ class ProgramCorrection(Record):
     def relative(self) -> str:
         """What the errors to expect are relative to, in words; empty where frames were measured."""
         frames, choice = self.result.frames, self.result.choice
-        if frames.frames == "identified" or choice.was_taught("points"):
+        if frames.frames != "assumed" or choice.was_taught("points"):
             return ""
         each = "in each frame" if choice.was_taught("frames") else "of all programs together"
         return (

@@ -8,6 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from truearm.modeling.formats.balancer_entry import balancer_entry
 from truearm.modeling.formats.controller_entry import controller_entry
 from truearm.modeling.formats.robot_file import is_intact
 from truearm.modeling.parts import GRAVITY
@@ -48,7 +49,9 @@ class RobotDescription(Record):
             }
             unit = "deg" if joint.kind == "revolute" else "mm"
             limits = [from_si(v, unit) for v in joint.limits] if joint.limits else None
-            joints.append({"name": joint.name, "type": joint.kind, "values": values, "limits": limits})
+            bearing = None if joint.bearing is None else written(joint.bearing, "mm")
+            made = {"name": joint.name, "type": joint.kind, "values": values, "limits": limits, "bearing": bearing}
+            joints.append(made)
         return {
             "name": robot.name,
             "title": robot.title,
@@ -62,6 +65,7 @@ class RobotDescription(Record):
             ],
             "effects": list(robot.effect_names),
             "masses_kg": {f"link {m.joint}": m.mass for m in robot.masses},
+            "balancers": [balancer_entry(balancer) for balancer in robot.balancers],
             "payload": {
                 "mass_kg": robot.payload.mass,
                 "cog_mm": [written(v, "mm") for v in robot.payload.cog],
@@ -85,11 +89,16 @@ class RobotDescription(Record):
         for joint in content["joints"]:
             row = "  ".join(f"{name} {value:g}" for name, value in joint["values"].items())
             limits = "  limits {:g} to {:g}".format(*joint["limits"]) if joint["limits"] else ""
-            text.append(f"  {joint['name']} ({joint['type']})  {row}{limits}")
+            bearing = "" if joint["bearing"] is None else f"  bearing at {joint['bearing']:g}"
+            text.append(f"  {joint['name']} ({joint['type']})  {row}{limits}{bearing}")
         x, y, z = content["flange_at_zero_mm"]
         text.append(f"Flange at zero joint positions, from the base: x {x:.3f}  y {y:.3f}  z {z:.3f} mm")
         if content["masses_kg"]:
             text.append(f"Link masses: {', '.join(f'{k} {v:g} kg' for k, v in content['masses_kg'].items())}")
+        for b in content["balancers"]:
+            pull = f"{b['force']:g} N at {b['length']:g} mm" if "force" in b else f"free at {b['free_length']:g} mm"
+            ends = f"from link {b['fixed']['link']} to link {b['moving']['link']}"
+            text.append(f"Balancer {b['name']}: {ends}, {pull}, {b['stiffness']:g} N/mm")
         payload = content["payload"]
         if payload["mass_kg"]:
             x, y, z = payload["cog_mm"]
@@ -104,9 +113,12 @@ class RobotDescription(Record):
         for key, label in (("effects", "Joint effects"), ("truths", "Truths for simulation"), ("targets", "Targets")):
             if content[key]:
                 text.append(f"{label}: {', '.join(content[key])}")
-        if content["proof"]:
+        if self.robot.proof is not None:
             words = ", ".join(dict.fromkeys([content["proof"]["status"], *content["proof"]["errors"]]))
-            text.append(f"Calibration: {words}{'' if content['proof']['intact'] else '; values were changed since'}")
+            known = f"; held at known places: {', '.join(self.robot.proof.held)}" if self.robot.proof.held else ""
+            text.append(
+                f"Calibration: {words}{known}{'' if content['proof']['intact'] else '; values were changed since'}"
+            )
         text += [f"History: {line}" for line in robot.history]
         return text if self.at is None else [*text, *self.at.lines()]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, Final
 
 from truearm.identification.choosing.selection import Selection
 from truearm.identification.judging.expected_error import Expectation, ExpectedError
@@ -15,6 +15,9 @@ from truearm.measurement.statistics import Errors, Spread
 from truearm.modeling.parts import Payload
 from truearm.shown import counted, degrees, listed, millimetres
 from truearm.units import from_si
+
+#: What deviations of a bootstrap follow from, after their number.
+BOOTSTRAPPED: Final = "fits to configurations drawn anew (bootstrap)"
 
 
 def selection_summary(selection: Selection) -> dict[str, Any]:
@@ -109,6 +112,7 @@ def noise_summary(fit: Fit, again: Repeatability | None) -> dict[str, Any]:
             for kind, joints in of_kind.items()
         ],
         "scattered": fit.scattered,
+        **({"bootstrap": fit.bootstrap} if fit.bootstrap else {}),
         "repeatability": None
         if again is None
         else {"rp_mm": again.rp * 1e3, "postures": again.postures, "visits": again.visits},
@@ -124,6 +128,8 @@ def noise_lines(fit: Fit, again: Repeatability | None) -> list[str]:
             f"Shared by the readings of a configuration: errors of the joints of {shared}, repeatability plus what the "
             "model leaves"
         )
+    if fit.bootstrap:
+        lines.append(f"Deviations of the parameters: from {fit.bootstrap} {BOOTSTRAPPED}")
     if again is not None:
         lines.append(
             f"Repeatability at {counted(again.postures, 'posture')} visited again, as RP of ISO 9283 but pooled over "

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Unpack
 
 import numpy as np
 
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.inclinometer import InclinometerReadings, Pairs, deviation_of_change
+from truearm.measurement.inclinometer import (
+    Inclinations,
+    InclinometerReadings,
+    Instruments,
+    Pairs,
+    deviation_of_change,
+    deviation_of_reading,
+)
 from truearm.modeling.chain import Array
 from truearm.simulation.twin import Conditions, Twin, measure
 
@@ -49,6 +57,36 @@ def inclinations(
     read = np.arcsin(np.clip(-pulled, -1.0, 1.0))
     read = read + rng.normal(0.0, 1.0, read.shape) * noise
     return np.asarray(np.round(read / resolution) * resolution if resolution else read)
+
+
+def read_pairs(
+    twin: Twin, pairs: Pairs, resolution: float, rng: np.random.Generator, axes: Sequence[int] = (0, 1)
+) -> Inclinations:
+    """Return what inclinometers on all links of a twin read at the postures of pairs, in turn.
+
+    Parameters
+    ----------
+    resolution
+        Of each reading [rad].
+    axes
+        Which axes of the link each of them has: 0, 1 and 2 for x, y and z.
+    """
+    joints, wrench = pairs.joints_in_turn()
+    count, links = len(joints), len(twin.robot.joints)
+    angle = np.full((count, links, 3), np.nan)
+    angle[..., list(axes)] = inclinations(twin, joints, 0.0, rng, resolution, wrench=wrench)[..., list(axes)]
+    return Inclinations(
+        source="twin",
+        labels=tuple(str(number) for number in range(1, count + 1)),
+        joints=joints,
+        joint_kinds=tuple(joint.kind for joint in twin.robot.joints),
+        instruments=Instruments.on_every_link(links),
+        angle=angle,
+        sigma=np.full((count, links), deviation_of_reading(resolution)),
+        order=np.arange(1, count + 1),
+        wrench=wrench + 0.0,  # no negative zeros
+        payload=np.zeros((count, 4)),
+    )
 
 
 def compare(

@@ -58,8 +58,9 @@ def truth_twin(robot: Robot, truth: Robot | str | Path, rng: np.random.Generator
         published = robot.truths[str(truth)]
         true = robot.with_values(published.values)
         joints = joint_truths(true)
-        for number, compliance in published.compliance.items():
-            joints[number] = replace(joints.get(number, PERFECT), compliance=compliance)
+        for kind in ("compliance", "backlash", "clearance"):
+            for number, value in getattr(published, kind).items():
+                joints[number] = replace(joints.get(number, PERFECT), **{kind: value})
         return Twin(at_station(true, tool), joints, _contact(true))
     if truth == "nominal":
         return Twin(at_station(robot, tool), joint_truths(robot), _contact(robot))
@@ -110,6 +111,7 @@ def joint_truths(robot: Robot) -> dict[int, JointTruth]:
     known = {
         "warm_up_rate",
         *(f"gain_{number}" for number in range(1, len(robot.joints) + 1)),
+        *(f"balancer_{number}" for number in range(1, len(robot.balancers) + 1)),
     }  # read by the twin itself
 
     def of(name: str, number: int) -> float:

@@ -8,7 +8,7 @@ of the models, so a mistake there cannot hide by appearing on both sides.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Final, TypedDict, Unpack
@@ -18,6 +18,7 @@ import numpy as np
 from truearm.errors import InputError
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
+from truearm.modeling.parts import LinkMass
 from truearm.modeling.robot import Robot
 from truearm.simulation.twin_body import (
     Link,
@@ -31,6 +32,7 @@ from truearm.simulation.twin_body import (
     wrench_at,
 )
 from truearm.simulation.twin_joint import PERFECT, Contact, JointTruth
+from truearm.simulation.twin_slides import carried, directions_at
 
 #: Where every length is what its parameter says [degC].
 REFERENCE_TEMPERATURE: Final = 20.0
@@ -77,7 +79,7 @@ class Posture:
     loads
         Force [N] and moment [N m] ``(joints, 6)`` that everything beyond a joint puts on it: weight, inertia and the
         wrench on the flange. Its sign is the load's: a compliant joint gives way in its direction. It is taken about
-        the joint's origin in the joint's axes: z along the joint, x and y of the frame right behind its own element
+        the joint's bearing in the joint's axes: z along the joint, x and y of the frame right behind its own element
         (of Rz(theta) for DH), before the tilt; joints that are not about their frame's z have some x and y across it.
     deflection
         What each joint leans about x and y and turns about, or slides along, z beyond its joint position ``(joints,
@@ -211,9 +213,14 @@ class Twin:
         ):
             T = moved(T, link, q + gamma, qd, qdd)
             axes.append(T[0] @ link.axes)
-            T = T @ tilt(alpha, beta) @ link.after if alpha or beta else T @ link.after
+            if alpha or beta:
+                T = T @ link.axes @ tilt(alpha, beta) @ np.linalg.inv(link.axes)
+            T = T @ link.after
             frames.append(T[0])
             weights.append(weight(link.body, T, gravity))
+        for (lower, upper), pulls in self._balanced(frames):
+            weights[lower - 1] = weights[lower - 1] + pulls[0] if lower else weights[lower - 1]
+            weights[upper - 1] = weights[upper - 1] + pulls[1]
         flange = T @ self._flange
         pushed = forces_of(wrench, flange[0, :3, 3])
         if self.robot.wrench is not None:
@@ -232,6 +239,18 @@ class Twin:
             wrench=wrench_at(pushed, np.block([[np.eye(3), flange[0, :3, 3:]], [np.zeros((1, 3)), np.eye(1)]])),
         )
 
+    def _balanced(self, frames: Sequence[Array]) -> Iterator[tuple[tuple[int, int], tuple[Array, Array]]]:
+        """Give the links of each balancer, and what it does to both as sums of ``p f^T``."""
+        every = [np.eye(4), *frames]
+        for number, balancer in enumerate(self.robot.balancers, 1):
+            ends = (balancer.fixed, balancer.moving)
+            one, other = ((every[end.link] @ [*self._stayed(end.link, end.point), 1.0])[:3] for end in ends)
+            length = math.dist(one, other)
+            pull = balancer.force + balancer.stiffness * (length - balancer.length)
+            pull *= self.robot.values.get(f"balancer_{number}", 1.0)
+            towards = np.concatenate([pull / length * (one - other), np.zeros(3)])
+            yield (ends[0].link, ends[1].link), (forces_of(-towards, one), forces_of(towards, other))
+
     def _links(self, warmer: float, cold: float) -> tuple[Link, ...]:
         """Return the links of an arm some kelvin warmer than the reference, a share of whose warming up is to come."""
         growths = {number: truth.growth * warmer - truth.warm_up * cold for number, truth in self.joints.items()}
@@ -243,8 +262,34 @@ class Twin:
         )
 
     def _link(self, number: int, growth: float) -> Link:
-        masses = [mass for mass in self.robot.masses if mass.joint == number]
-        return Link.made_of(self.robot.link_elements[number - 1], self.robot.values, growth, masses)
+        bearing, masses = self._places[number - 1]
+        return Link.made_of(self.robot.link_elements[number - 1], self.robot.values, growth, masses, bearing)
+
+    @cached_property
+    def _places(self) -> tuple[tuple[float, tuple[LinkMass, ...]], ...]:
+        """How far along its axis each joint's bearing lies, and the masses of its link with nominal slides."""
+        links, found = self.robot.link_elements, []
+        every = [element for link in links for element in link]
+        for number, link in enumerate(links, 1):
+            own = next(i for i, element in enumerate(link) if element.variable is not None)
+            joint, bearing = link[own], 0.0
+            if joint.turns:
+                along = np.array(joint.axis) if joint.axis else np.eye(3)["xyz".index(joint.motion[1])]
+                passed = carried(every, sum(map(len, links[: number - 1])) + own, along, self.robot.values)
+                bearing = (self.robot.joints[number - 1].bearing or 0.0) - passed
+            masses = (replace(m, cog=self._stayed(number, m.cog)) for m in self.robot.masses if m.joint == number)
+            found.append((bearing, tuple(masses)))
+        return tuple(found)
+
+    def _stayed(self, number: int, point: tuple[float, float, float]) -> tuple[float, float, float]:
+        """Return a point of a link given with nominal slides, in the link's frame."""
+        links = self.robot.link_elements
+        every, end = [element for link in links for element in link], sum(len(link) for link in links[:number])
+        place = np.array(point)
+        for along in directions_at(every, end):
+            place = place - carried(every, end, along, self.robot.values) * along
+        x, y, z = (float(v) for v in place)
+        return x, y, z
 
     @cached_property
     def _plain(self) -> tuple[Link, ...]:

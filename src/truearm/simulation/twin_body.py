@@ -41,7 +41,7 @@ class Link:
     zero
         Value of the joint's own element [rad or m].
     axes
-        The joint's axes in the frame behind its element, z along the joint, as columns of ``(4, 4)``.
+        The joint's axes in the frame behind its element, z along the joint, at its bearing ``(4, 4)``.
     body
         Second moments of the link's masses in the link's frame ``(4, 4)``.
     """
@@ -56,9 +56,17 @@ class Link:
 
     @classmethod
     def made_of(
-        cls, elements: Sequence[Element], values: Mapping[str, float], growth: float, masses: Sequence[LinkMass]
+        cls,
+        elements: Sequence[Element],
+        values: Mapping[str, float],
+        growth: float,
+        masses: Sequence[LinkMass],
+        bearing: float,
     ) -> Link:
-        """Return the link of some elements, one of which is its joint, each nominal length longer by `growth`."""
+        """Return the link of some elements, one of which is its joint, each nominal length longer by `growth`.
+
+        The joint's bearing lies `bearing` [m] along its axis from the origin behind its element.
+        """
         place = next(i for i, element in enumerate(elements) if element.variable is not None)
         joint = elements[place]
         return cls(
@@ -66,7 +74,7 @@ class Link:
             generator=generator(joint),
             turns=joint.turns,
             zero=amount(joint, values, growth),
-            axes=_joint_axes(joint),
+            axes=_joint_axes(joint, bearing),
             after=product(elements[place + 1 :], values, growth),
             body=sum((second_moments(mass.mass, mass.cog, mass.inertia) for mass in masses), np.zeros((4, 4))),
         )
@@ -185,7 +193,7 @@ def _axis(element: Element) -> Array:
     return np.array(element.axis) if element.axis else np.eye(3)["xyz".index(element.motion[1])]
 
 
-def _joint_axes(element: Element) -> Array:
+def _joint_axes(element: Element, bearing: float) -> Array:
     """Return axes with z along the joint: those of the frame itself for a joint about z, else some across it."""
     z = _axis(element)
     least = np.eye(3)[np.argmin(np.abs(z))]
@@ -193,4 +201,5 @@ def _joint_axes(element: Element) -> Array:
     axes = np.eye(4)
     if z[2] != 1.0:
         axes[:3, :3] = np.column_stack([np.cross(y, z), y, z])
+    axes[:3, 3] = bearing * z
     return axes

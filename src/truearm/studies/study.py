@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from statistics import median
-from typing import Any, Literal
+from typing import Any
 
 from truearm.reporting.drawing import Figure
 from truearm.reporting.page import page
 from truearm.results.record import Record
+from truearm.studies.verdicts import SILENT, VERDICTS, Claim, Comparison, Verdict
 from truearm.writing import output_folder, write_files
 
 #: What a study writes into its folder.
 STUDY_FILES = ("report.html", "study.json")
-
-Verdict = Literal["agrees", "differs", "no figure published"]
 
 
 @dataclass(frozen=True)
@@ -29,66 +29,80 @@ class Row:
     what, unit
         What it is of.
     ours
-        One value a seed.
+        One value a seed; a single number is a figure that no chance enters.
     published
-        What the document prints; None where it prints nothing.
+        What the document prints, with all its digits ("0.50"); None where it prints nothing.
     source
         Where it prints it.
-    absolute, relative
-        How far our median may be from it: in `unit`, and as a share of it. The larger of both counts.
+    claim
+        What is said of the printed figure.
     explanation
         Why it differs, or what it means, in plain words.
+
+    Raises
+    ------
+    ValueError
+        If `published` is no number.
     """
 
     what: str
     unit: str
-    ours: Sequence[float]
-    published: float | None = None
+    ours: Sequence[float] | float
+    published: str | None = None
     source: str = ""
-    absolute: float = 0.0
-    relative: float = 0.0
+    claim: Claim = "equal"
     explanation: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse a published figure that is no number."""
+        _ = self.comparison
+
+    @cached_property
+    def comparison(self) -> Comparison | None:
+        """Ours beside the published figure; None where nothing is published."""
+        return None if self.published is None else Comparison(self.ours, self.published, self.claim)
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """Ours, one value a seed."""
+        return (float(self.ours),) if isinstance(self.ours, float | int) else tuple(map(float, self.ours))
 
     @property
     def median(self) -> float:
         """Median of ours."""
-        return float(median(self.ours))
+        return float(median(self.values))
 
     @property
     def lowest(self) -> float:
         """Lowest of ours."""
-        return float(min(self.ours))
+        return min(self.values)
 
     @property
     def highest(self) -> float:
         """Highest of ours."""
-        return float(max(self.ours))
+        return max(self.values)
 
     @property
-    def tolerance(self) -> float | None:
-        """How far our median may be from the published figure, in `unit`; None where nothing is published."""
-        return None if self.published is None else max(self.absolute, self.relative * abs(self.published))
-
-    @property
-    def verdict(self) -> Verdict:
-        """How our median stands to the published figure."""
-        if self.published is None or self.tolerance is None:
-            return "no figure published"
-        return "agrees" if abs(self.median - self.published) <= self.tolerance else "differs"
+    def verdict(self) -> Verdict | None:
+        """How our median stands to the published figure; None where nothing is published."""
+        return None if self.comparison is None else self.comparison.verdict
 
     def summary(self) -> dict[str, Any]:
         """Return the row as ``study.json`` holds it."""
+        shown = self.comparison
         return {
             "what": self.what,
             "unit": self.unit,
-            "ours": [float(value) for value in self.ours],
+            "ours": list(self.values),
             "median": self.median,
             "lowest": self.lowest,
             "highest": self.highest,
-            "published": self.published,
+            "published": None if shown is None else shown.value,
+            "printed": self.published,
             "source": self.source,
-            "tolerance": self.tolerance,
-            "verdict": self.verdict,
+            "claim": None if shown is None else self.claim,
+            "tolerance": None if shown is None else shown.tolerance,
+            "verdict": self.verdict or SILENT,
             "explanation": self.explanation,
         }
 
@@ -147,6 +161,8 @@ class Study(Record):
         What was found.
     notes
         How it was done, and what a reader must know, one thing each.
+    files
+        What else is written, by its name: robots and readings to try on one's own.
     command
         How to make it again, as whoever asked for it calls it; empty if that is not known.
     """
@@ -159,6 +175,7 @@ class Study(Record):
     tables: tuple[Table, ...]
     pictures: tuple[Picture, ...] = ()
     notes: tuple[str, ...] = ()
+    files: Mapping[str, str] = field(default_factory=dict)
     command: str = ""
 
     @property
@@ -166,19 +183,22 @@ class Study(Record):
         """All rows."""
         return tuple(row for table in self.tables for row in table.rows)
 
-    def count(self, verdict: Verdict) -> int:
-        """Return how many rows have this verdict."""
-        return sum(row.verdict == verdict for row in self.rows)
+    @property
+    def counts(self) -> dict[Verdict, int]:
+        """How many rows have each verdict, those that none has included."""
+        found = [row.verdict for row in self.rows]
+        return {verdict: found.count(verdict) for verdict in VERDICTS}
 
     def summary(self) -> dict[str, Any]:
         """Return what ``study.json`` holds."""
         return {
-            "truearm": "truearm-study/1",
+            "truearm": "truearm-study/2",
             "name": self.name,
             "title": self.title,
             "source": self.source,
             "answer": self.answer,
             "seeds": self.seeds,
+            "counts": self.counts,
             "tables": [
                 {"title": table.title, "words": table.words, "rows": [row.summary() for row in table.rows]}
                 for table in self.tables
@@ -188,25 +208,22 @@ class Study(Record):
         }
 
     def lines(self) -> list[str]:
-        """Return the title, and every figure that has a published one beside it."""
+        """Return the title, every figure that has a published one beside it, and how many have which verdict."""
         text = [self.title]
         for table in self.tables:
             if table.compares:
                 text.append(f"{table.title}:")
-            for row in table.rows:
-                if row.published is not None:
-                    allowed = "" if row.tolerance is None else f", may differ by {row.tolerance:.2g}"
-                    ours = f"{row.what}: {row.median:.3g}, published {row.published:g} {row.unit}{allowed}"
-                    text.append(f"  {row.verdict:8}{ours}")
-        return text
+            text += [line for row in table.rows if (line := _line(row))]
+        counted = ", ".join(f"{verdict} {count}" for verdict, count in self.counts.items())
+        return [*text, f"Verdicts: {counted}."]
 
     def html(self) -> str:
         """Return the report as one HTML page."""
         figures = {picture.name: picture.figure for picture in self.pictures}
-        return page("study.html.jinja", figures, study=self, number=number)
+        return page("study.html.jinja", figures, study=self, number=number, silent=SILENT)
 
     def save(self, folder: str | Path) -> tuple[Path, ...]:
-        """Write ``report.html`` and ``study.json`` into a folder.
+        """Write ``report.html``, ``study.json`` and the study's own files into a folder.
 
         Returns
         -------
@@ -214,8 +231,18 @@ class Study(Record):
         """
         folder = output_folder(folder)
         text = json.dumps(self.summary(), indent=2, allow_nan=False) + "\n"
-        write_files(folder, dict(zip(STUDY_FILES, (self.html(), text), strict=True)), self.command or None)
-        return tuple(folder / name for name in STUDY_FILES)
+        files = {**dict(zip(STUDY_FILES, (self.html(), text), strict=True)), **self.files}
+        write_files(folder, files, self.command or None)
+        return tuple(folder / name for name in files)
+
+
+def _line(row: Row) -> str:
+    """Return a row as one line; empty where nothing is published."""
+    if row.comparison is None:
+        return ""
+    allowed = row.comparison.tolerance
+    within = "" if allowed is None else f", within {allowed:.2g}"
+    return f"  {row.verdict:16}{row.what}: {row.median:.3g}, published {row.published} {row.unit}".rstrip() + within
 
 
 def number(value: float) -> str:

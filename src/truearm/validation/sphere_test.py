@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from truearm.errors import InputError
 from truearm.modeling.chain import Array
+from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
 
 _STEPS: Final = 50
@@ -53,7 +54,7 @@ class SphereTest:
 
 
 def sphere_test(
-    robot: Robot, joints: ArrayLike, lengths: ArrayLike, target: str, centre: ArrayLike | None = None
+    robot: Robot, joints: ArrayLike | Postures, lengths: ArrayLike, target: str, centre: ArrayLike | None = None
 ) -> SphereTest:
     """Compare lengths that a ballbar read with those that a model predicts.
 
@@ -62,7 +63,7 @@ def sphere_test(
     robot
         The model to judge.
     joints
-        Joint positions at which the bar was read [rad or m], ``(n, joints)``.
+        Joint positions at which the bar was read [rad or m], ``(n, joints)``, or postures.
     lengths
         What the bar read [m], ``(n,)``; NaN where it was beyond its range, which is left out.
     target
@@ -77,7 +78,8 @@ def sphere_test(
         If there are not as many lengths as configurations, fewer than two are left, or fewer than five to find the
         centre from; or if they lie so that it cannot be found.
     """
-    q, read = np.asarray(joints, float), np.asarray(lengths, float)
+    q = joints if isinstance(joints, Postures) else Postures(np.asarray(joints, float))
+    read = np.asarray(lengths, float)
     if read.shape != (len(q),):
         raise InputError(
             "every configuration needs one length",
@@ -95,7 +97,7 @@ def sphere_test(
             allowed=f"{needed} or more",
             cure="Send the tool to more points of the sphere." if inside.all() else "Calibrate the robot first.",
         )
-    points, _ = robot.world_poses(q[inside], target)
+    points, _ = robot.world_poses(q.at(np.flatnonzero(inside)), target)
     middle = _centre(points, read[inside]) if centre is None else np.asarray(centre, float)
     return SphereTest(read[inside] - np.linalg.norm(points - middle, axis=1), middle)
 

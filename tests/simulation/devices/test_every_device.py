@@ -88,7 +88,7 @@ def residuals(twin: Twin, data: Dataset) -> Array:
 
 
 def test_names_are_unlike_and_every_device_says_what_it_is() -> None:
-    assert len(set(NAMES)) == len(NAMES) == 18
+    assert len(set(NAMES)) == len(NAMES) == 19
     for device in DEVICES:
         assert device.summary
         assert device.source
@@ -280,8 +280,9 @@ def test_without_noise_everything_else_follows(name: str, robot: str) -> None:
     trusted = gauge_freedoms(data)
     if trusted:
         got = fitted(got, true, size="size" in trusted)
-    # a plane tells the most remote postures a hundred times less than those on it
-    assert np.abs(got - true).max() < (5e-7 if name == "plane" else 1e-9)
+    # a plane tells the most remote postures a hundred times less than those on it; what is known of the sockets'
+    # distance is weighed against the nominal lengths, whatever the readings
+    assert np.abs(got - true).max() < {"plane": 5e-7, "two-sockets": 1e-6}.get(name, 1e-9)
     flange = np.abs(
         fitted(before.world_poses(q)[0], twin.robot.world_poses(q)[0], size=True) - twin.robot.world_poses(q)[0]
     ).max()
@@ -319,6 +320,7 @@ def test_a_robot_of_three_joints_is_calibrated_or_refused(name: str) -> None:
             "sphere",
             "two-spheres",
             "point",
+            "two-sockets",
             "calibration-table",
             "touch-up",
             "drawn-circle",

@@ -11,12 +11,15 @@ import unicodedata
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal, NamedTuple, NoReturn
+from typing import TYPE_CHECKING, Literal, NamedTuple, NoReturn
 
 from truearm.errors import InputError
 from truearm.modeling.orientations import Orientation
 from truearm.modeling.parts import Payload
 from truearm.modeling.transform import Transform
+
+if TYPE_CHECKING:
+    from truearm.compensation.programs.new_program import NewProgram
 
 MoveKind = Literal["joint", "linear", "circular"]
 
@@ -340,6 +343,8 @@ class Language:
         Read the files of one program, given together.
     split
         Split moves; None if the language's programs cannot be split.
+    new
+        Write a program from scratch: texts of its files by their names.
     together
         Whether files that are given together are one program and share names; else each is one for itself.
     companions
@@ -354,6 +359,7 @@ class Language:
     is_one: Callable[[str], bool]
     read: Callable[[Sequence[Source]], Program]
     split: Callable[[Program, Sequence[Split]], SplitEdits] | None = None
+    new: Callable[[NewProgram], Mapping[str, str]] | None = None
     together: bool = False
     companions: tuple[tuple[str, str], ...] = ()
     calibration: MakersCalibration | None = None

@@ -130,7 +130,7 @@ class AxisAnalysis:
         tip = np.linalg.inv(base) @ flange
         made = replace(
             robot,
-            joints=tuple(replace(joint, row=row) for joint, row in zip(robot.joints, rows, strict=True)),
+            joints=tuple(replace(joint, row=row, bearing=None) for joint, row in zip(robot.joints, rows, strict=True)),
             flange=Transform.from_matrix(tip[:3, :3], tip[:3, 3]),
             known={},
         )

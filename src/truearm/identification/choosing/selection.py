@@ -17,6 +17,7 @@ from typing import Final
 import numpy as np
 
 from truearm.errors import InputError
+from truearm.identification.held import NOTHING_HELD, Held
 from truearm.identification.solving.bounds import Bounds
 from truearm.identification.solving.losses import Loss
 from truearm.identification.solving.models import MODELS, Model
@@ -89,6 +90,7 @@ def select(
     redundancy: Redundant = "prior",
     bounds: Bounds | None = None,
     bounds_file: str = "bounds",
+    held: Held = NOTHING_HELD,
     seed: int = 0,
     candidates: Sequence[str] = SELECTABLE,
     progress: Callable[[str], None] = lambda _: None,
@@ -97,7 +99,7 @@ def select(
 
     Parameters
     ----------
-    robot, data, loss, redundancy, bounds, bounds_file
+    robot, data, loss, redundancy, bounds, bounds_file, held
         As :func:`truearm.identification.solving.fit.identify` takes them.
     seed
         Of the folds.
@@ -137,6 +139,7 @@ def select(
                 redundancy=redundancy,
                 bounds=bounds,
                 bounds_file=bounds_file,
+                held=held,
                 small=_FOLD_TOLERANCE,
             )
             judged = errors_of(found.robot, held_out)

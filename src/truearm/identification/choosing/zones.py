@@ -7,17 +7,23 @@ the whole's, and a pose is predicted by the model of the box in which the nomina
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truearm.errors import InputError
+from truearm.identification.choosing.zone_boxes import Box, cut_boxes
+from truearm.identification.solving.bounds import Bounds
 from truearm.identification.solving.fit import Fit, identify
+from truearm.identification.solving.losses import Loss
 from truearm.identification.solving.models import Model
+from truearm.identification.solving.rounds import Redundant
 from truearm.measurement.dataset import Dataset, IntArray
+from truearm.measurement.statistics import Errors, errors_of
 from truearm.modeling.chain import Array
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
@@ -25,6 +31,9 @@ from truearm.modeling.transform import Transform
 
 #: Training configurations that a zone needs for a model of its own.
 LEAST_CONFIGURATIONS: Final = 12
+#: Held-out configurations that a zone is judged by at least, and standard errors by which it must gain.
+LEAST_HELD_OUT: Final = 5
+_SURE: Final = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,12 +48,15 @@ class Zone:
         Of its training configurations.
     configurations
         How many these were, with those of the overlap.
+    name
+        Of the zone.
     """
 
     low: Array
     high: Array
     fit: Fit
     configurations: int
+    name: str = ""
 
     def holds(self, places: Array) -> NDArray[np.bool_]:
         """Return which places in the base frame ``(n, 3)`` lie in it; the lower sides belong to it."""
@@ -140,17 +152,148 @@ def identify_zones(
         )
     whole = identify(robot, data, model)
     places = _flange(robot, data.postures)
-    cuts = [np.quantile(places[:, axis], np.linspace(0.0, 1.0, n + 1)[1:-1]) for axis, n in enumerate(divisions)]
-    edges = [np.concatenate([[-np.inf], cut, [np.inf]]) for cut in cuts]
     zones = []
-    for box in product(*(range(n) for n in divisions)):
-        low = np.array([edges[axis][k] for axis, k in enumerate(box)])
-        high = np.array([edges[axis][k + 1] for axis, k in enumerate(box)])
-        mine = np.flatnonzero(((places >= low - overlap) & (places < high + overlap)).all(axis=1))
+    for box in cut_boxes(places, divisions):
+        mine = np.flatnonzero(box.holds(places, overlap))
         if len(mine) >= least:
             fit = identify(whole.robot, data.of_configurations(mine), model)
-            zones.append(Zone(low, high, fit, len(mine)))
+            zones.append(Zone(box.low, box.high, fit, len(mine), box.name))
     return Zones(robot, whole, tuple(zones))
+
+
+@dataclass(frozen=True, eq=False)
+class ZoneVerdict:
+    """Whether a model of its own is better in a zone.
+
+    Attributes
+    ----------
+    box
+        Where it is.
+    training, held_out
+        Configurations that it was identified from, with those of the overlap, and judged by.
+    whole, zone
+        Mean error of its held-out readings by the model of the whole workspace, and by its own [m]; None where there
+        was nothing to judge by.
+    error
+        Standard error of their difference, by the scatter of the configurations [m].
+    kept
+        Whether it stays.
+    why
+        In words.
+    fit
+        Its own model; None where there were too few configurations for one.
+    """
+
+    box: Box
+    training: int
+    held_out: int
+    whole: float | None
+    zone: float | None
+    error: float | None
+    kept: bool
+    why: str
+    fit: Fit | None
+
+
+def judge_zones(
+    whole: Fit,
+    boxes: Sequence[Box],
+    overlap: float,
+    parts: tuple[Dataset, Dataset],
+    places: tuple[Array, Array],
+    *,
+    loss: Loss = "linear",
+    redundancy: Redundant = "prior",
+    bounds: Bounds | None = None,
+) -> tuple[ZoneVerdict, ...]:
+    """Identify a model for each box, and judge it on held-out readings there against the model of the whole.
+
+    A zone is kept if its mean error there is lower by more than two standard errors of the paired differences.
+
+    Parameters
+    ----------
+    overlap
+        How far beyond its box a zone takes training configurations [m].
+    parts
+        Training and held-out readings, in the instrument's own frame.
+    places
+        Where the flange is at each of their configurations, ``(n, 3)`` [m].
+    loss, redundancy, bounds
+        Of the fits.
+    """
+    training, held_out = parts
+    verdicts = []
+    for box in boxes:
+        mine, judges = (
+            np.flatnonzero(box.holds(places[0], overlap)),
+            np.flatnonzero(box.holds(places[1])),
+        )
+        fit = None
+        if len(mine) >= LEAST_CONFIGURATIONS and len(judges) >= LEAST_HELD_OUT:
+            part = training.of_configurations(mine)
+            fit = identify(whole.robot, part, whole.model, loss=loss, redundancy=redundancy, bounds=bounds)
+        verdicts.append(_verdict(whole, fit, box, len(mine), held_out, judges))
+    return tuple(verdicts)
+
+
+def _verdict(whole: Fit, fit: Fit | None, box: Box, training: int, held_out: Dataset, judges: IntArray) -> ZoneVerdict:
+    count = len(judges)
+    if fit is None:
+        few = (
+            f"{training} training configurations, and a model needs {LEAST_CONFIGURATIONS}"
+            if training < LEAST_CONFIGURATIONS
+            else f"{count} held-out configurations, and a judgement needs {LEAST_HELD_OUT}"
+        )
+        return ZoneVerdict(box, training, count, None, None, None, False, f"only {few}", None)
+    part = held_out.of_configurations(judges)
+    missing = {target.name for target in whole.robot.targets} - {target.name for target in fit.robot.targets}
+    if missing & set(part.targets):
+        return ZoneVerdict(box, training, count, None, None, None, False, "a target was not measured in it", fit)
+    before, after = (error_sizes(errors_of(one.robot, part)) for one in (whole, fit))
+    read = np.isfinite(before)
+    at = np.unique(part.configuration[read], return_inverse=True)[1].reshape(-1)
+    judged = int(at.max(initial=-1)) + 1
+    if judged < LEAST_HELD_OUT:
+        why = f"only {judged} held-out configurations with readings, and a judgement needs {LEAST_HELD_OUT}"
+        return ZoneVerdict(box, training, judged, None, None, None, False, why, fit)
+    gain = before[read] - after[read]
+    sums = np.bincount(at, gain - gain.mean())
+    error = math.sqrt(judged / (judged - 1) * float(sums @ sums)) / len(gain)
+    kept = bool(gain.mean() > _SURE * error)
+    why = (
+        "better by more than chance"
+        if kept
+        else "better, but not by more than chance"
+        if gain.mean() > 0.0
+        else "not better than the model of the whole"
+    )
+    old, new = float(before[read].mean()), float(after[read].mean())
+    return ZoneVerdict(box, training, judged, old, new, error, kept, why, fit)
+
+
+def zoned_mean(whole: Fit, verdicts: Sequence[ZoneVerdict], held_out: Dataset, places: Array) -> tuple[float, float]:
+    """Return the mean held-out error with one model, and with the zones that are kept [m].
+
+    Parameters
+    ----------
+    places
+        Where the flange is at the held-out configurations, ``(n, 3)`` [m].
+    """
+    errors = error_sizes(errors_of(whole.robot, held_out))
+    zoned = errors.copy()
+    for verdict in verdicts:
+        mine = np.flatnonzero(verdict.box.holds(places))
+        if verdict.kept and verdict.fit is not None and len(mine):
+            part = held_out.of_configurations(mine)
+            of_zone = np.isin(held_out.configuration, mine)
+            zoned[of_zone] = error_sizes(errors_of(verdict.fit.robot, part))
+    return float(np.nanmean(errors)), float(np.nanmean(zoned))
+
+
+def error_sizes(errors: Errors) -> Array:
+    """Return the size of the error of each position, distance or height [m], NaN where none was read."""
+    norms: Array = np.linalg.norm(errors.position_errors, axis=1)
+    return norms if errors.length_errors is None else np.where(np.isfinite(norms), norms, np.abs(errors.length_errors))
 
 
 def _flange(robot: Robot, q: Array | Postures) -> Array:

@@ -41,6 +41,9 @@ from truearm.modeling.robot import Robot
 
 #: What the first stage identifies.
 TILTING: Final = ("compliance", "backlash", "clearance")
+#: What the model leaves out of a change of inclination where all is well: what tilts do to the loads, one standard
+#: deviation [rad].
+_MODEL: Final = math.radians(1.5e-4)
 #: How well an instrument is aligned with its link, one standard deviation [rad].
 SEAT: Final = math.radians(0.5)
 
@@ -64,6 +67,10 @@ class TiltingFit:
         contains it.
     converged
         Whether the last step was too small to matter.
+    left
+        What is left of each change of inclination [rad], ``(n, instruments, 3)``; NaN where one was not used.
+    seats
+        Small turns from where each instrument is mounted to how it sits [rad], ``(instruments, 3)``.
     """
 
     robot: Robot
@@ -71,6 +78,8 @@ class TiltingFit:
     covariance: Array
     excess: float
     converged: bool
+    left: Array
+    seats: Array
 
     @property
     def with_priors(self) -> Robot:
@@ -102,6 +111,8 @@ def calibrate_tilting(robot: Robot, readings: InclinometerReadings, poses: Datas
     start = start.with_parameters(p.restarted() for p in start.parameters.values() if p.group in TILTING)
     if poses is not None:
         _check_pairs(poses)
+        if not poses.has_position.any():
+            raise InputError("there is no position reading", where=poses.source, cure="Fill in x, y and z.")
         start = initial_frames(start, poses)
     problem = _Problem(start, readings, poses)
     solution = solve(problem)
@@ -124,6 +135,8 @@ def calibrate_tilting(robot: Robot, readings: InclinometerReadings, poses: Datas
         covariance=covariance,
         excess=excess,
         converged=solution.converged,
+        left=np.where(problem.used, problem.at(solution.vector).left, np.nan),
+        seats=solution.vector[-3 * len(readings.mounted) :].reshape(-1, 3),
     )
 
 
@@ -144,22 +157,28 @@ class _Problem:
         """Effects, then joint zeros and twists, then three turns for the seat of each instrument."""
         effects, angles = tilting_parameters(self.robot)
         seats = [
-            Parameter.plain(f"seat_{link}_{axis}", "rad", "target", 0.0, SEAT)
-            for link in range(1, len(self.robot.joints) + 1)
+            Parameter.plain(f"seat_{number}_{axis}", "rad", "target", 0.0, SEAT)
+            for number in range(1, len(self.readings.mounted) + 1)
             for axis in "xyz"
         ]
         return FreeParameters((*effects, *angles, *seats))
 
     @cached_property
     def used(self) -> NDArray[np.bool_]:
-        used = np.isfinite(self.readings.change) & readable(self.robot, self.readings.pairs)
+        used = np.isfinite(self.readings.change) & readable(self.robot, self.readings.pairs, self.readings.mounted)
         if not used.any():
             raise InputError(
                 "no change of inclination can be used",
                 where="inclinometer readings",
+                came=f"{np.isfinite(self.readings.change).sum()} changes",
                 allowed=f"axes within {math.degrees(STEEPEST):g} deg of the horizontal, and {DECIDING_MOMENTS}",
             )
         return used
+
+    @cached_property
+    def deviations(self) -> Array:
+        """Standard deviation of each change, with what the model leaves out [rad]."""
+        return np.hypot(self.readings.deviations, _MODEL)
 
     @cached_property
     def pairs(self) -> dict[str, IntArray]:
@@ -199,21 +218,30 @@ class _Evaluation:
     @cached_property
     def residual(self) -> Array:
         p = self.problem
-        first, second = (inclinations_of(self._robot, q, self._seats) for q in (self._pairs.first, self._pairs.second))
-        change = np.where(p.used, second - first - p.readings.change, 0.0) / p.readings.sigma
+        change = np.where(p.used, self.left, 0.0) / p.deviations
         return np.concatenate([change.reshape(-1), *(r for r, _ in self._displacements)])
+
+    @cached_property
+    def left(self) -> Array:
+        """What is left of the changes of inclination [rad], ``(n, instruments, 3)``."""
+        mounted = self.problem.readings.mounted
+        first, second = (
+            inclinations_of(self._robot, q, self._seats, mounted) for q in (self._pairs.first, self._pairs.second)
+        )
+        return np.asarray(second - first - self.problem.readings.change)
 
     @cached_property
     def jacobian(self) -> Array:
         p = self.problem
-        change = change_derivatives(self._robot, self._pairs, self._names, self._seats) / p.readings.sigma
+        change = change_derivatives(self._robot, self._pairs, self._names, self._seats, p.readings.mounted)
+        change = change / p.deviations[..., None]
         change[~p.used] = 0.0
         points = [np.pad(J, ((0, 0), (0, self._seats.size))) for _, J in self._displacements]
         return np.concatenate([change.reshape(-1, len(self.vector)), *points])
 
     @cached_property
     def _names(self) -> tuple[str, ...]:
-        return self.problem.free.names[: -3 * len(self.problem.robot.joints)]
+        return self.problem.free.names[: -3 * len(self.problem.readings.mounted)]
 
     @cached_property
     def _robot(self) -> Robot:

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.measurement.inclinometer import Pairs
+from truearm.measurement.inclinometer import Instruments, Pairs
 from truearm.modeling.chain import Array
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
@@ -27,19 +27,28 @@ DECIDING_MOMENTS: Final = (
 _UPRIGHT: Final = 0.01  # sine of the angle between gravity and an axis
 
 
-def inclinations_of(robot: Robot, q: Array | Postures, seats: Array | None = None) -> Array:
-    """Return the angles of the links' axes above the horizontal, ``(n, links, 3)`` [rad].
+def inclinations_of(
+    robot: Robot, q: Array | Postures, seats: Array | None = None, instruments: Instruments | None = None
+) -> Array:
+    """Return the angles of the instruments' axes above the horizontal, ``(n, instruments, 3)`` [rad].
 
     Parameters
     ----------
     seats
-        Small turns about x, y and z from each link's frame to its instrument, ``(links, 3)`` [rad]; none if None.
+        Small turns about x, y and z from where each instrument is mounted to how it sits, ``(instruments, 3)`` [rad];
+        none if None.
+    instruments
+        One on each link, aligned with its frame, if None.
     """
-    return np.asarray(np.arcsin(np.clip(_axes(robot, q, seats) @ upwards(robot), -1.0, 1.0)))
+    return np.asarray(np.arcsin(np.clip(_axes(robot, q, seats, instruments) @ upwards(robot), -1.0, 1.0)))
 
 
 def inclination_derivatives(
-    robot: Robot, q: Array | Postures, names: Sequence[str], seats: Array | None = None
+    robot: Robot,
+    q: Array | Postures,
+    names: Sequence[str],
+    seats: Array | None = None,
+    instruments: Instruments | None = None,
 ) -> Array:
     """Return the derivative of :func:`inclinations_of` by parameters and then by seats.
 
@@ -49,39 +58,43 @@ def inclination_derivatives(
     Returns
     -------
     derivatives
-        ``(n, links, 3, len(names) + 3 * links)``, seats link by link.
+        ``(n, instruments, 3, len(names) + 3 * instruments)``, seats instrument by instrument.
     """
     at = robot.loaded(q)
-    axes, up = _axes(robot, at, seats), upwards(robot)
+    mounted = instruments or Instruments.on_every_link(len(robot.joints))
+    axes, up = _axes(robot, at, seats, mounted), upwards(robot)
     levers = np.cross(axes, up)
     cosine = np.linalg.norm(levers, axis=-1, keepdims=True)
-    levers = np.where(cosine > 1e-9, levers / np.maximum(cosine, 1e-9), 0.0)  # (n, links, 3, xyz)
+    levers = np.where(cosine > 1e-9, levers / np.maximum(cosine, 1e-9), 0.0)  # (n, instruments, 3, xyz)
     kinematics = robot.forward_kinematics(at)
-    ends = link_ends(robot)
-    n, links = len(at), len(ends)
-    found = np.zeros((n, links, 3, len(names) + 3 * links))
+    ends, links = link_ends(robot), np.array(mounted.links)
+    n, count = len(at), len(mounted)
+    found = np.zeros((n, count, 3, len(names) + 3 * count))
     for column, moved in enumerate(_moved_elements(robot, at, names)):
+        by_parameter = found[..., column]
         for element, rate in moved.items():
-            beyond = slice(bisect_right(ends, element), None)  # the links that the element turns
+            beyond = np.flatnonzero(links >= bisect_right(ends, element))  # on links that the element turns
             turning = kinematics.axis(element).T * np.broadcast_to(rate, n)[:, None]
-            found[:, beyond, :, column] += np.einsum("nlkx,nx->nlk", levers[:, beyond], turning)
-    for link, end in enumerate(ends):
-        first = len(names) + 3 * link
-        found[:, link, :, first : first + 3] = levers[:, link] @ kinematics.matrix(end)
+            by_parameter[:, beyond] += np.einsum("nlkx,nx->nlk", levers[:, beyond], turning)
+    for number, (link, mount) in enumerate(zip(mounted.links, mounted.mounts, strict=True)):
+        first = len(names) + 3 * number
+        found[:, number, :, first : first + 3] = levers[:, number] @ kinematics.matrix(ends[link]) @ mount
     return found
 
 
-def readable(robot: Robot, pairs: Pairs) -> NDArray[np.bool_]:
-    """Return which changes of inclination can be used, ``(n, links, 3)``.
+def readable(robot: Robot, pairs: Pairs, instruments: Instruments | None = None) -> NDArray[np.bool_]:
+    """Return which changes of inclination can be used, ``(n, instruments, 3)``.
 
     The axis stands within 60 deg of the horizontal in both postures, and the loads decide to which side every joint up
     to the link leans. A joint whose axis stands upright does not matter.
     """
-    usable = np.ones((len(pairs), len(robot.joints), 3), dtype=bool)
+    mounted = instruments or Instruments.on_every_link(len(robot.joints))
+    usable = np.ones((len(pairs), len(mounted), 3), dtype=bool)
     for posture in (pairs.first, pairs.second):
         at = robot.loaded(posture)
-        usable &= np.abs(inclinations_of(robot, at)) <= STEEPEST
-        usable &= np.logical_and.accumulate(decided(robot, at, upright=True), axis=1)[..., None]
+        usable &= np.abs(inclinations_of(robot, at, instruments=mounted)) <= STEEPEST
+        clear = np.logical_and.accumulate(decided(robot, at, upright=True), axis=1)
+        usable &= clear[:, np.array(mounted.links)][..., None]
     return usable
 
 
@@ -104,22 +117,27 @@ def decided(robot: Robot, posture: Postures, *, upright: bool) -> NDArray[np.boo
     return clear
 
 
-def change_derivatives(robot: Robot, pairs: Pairs, names: Sequence[str], seats: Array | None = None) -> Array:
+def change_derivatives(
+    robot: Robot,
+    pairs: Pairs,
+    names: Sequence[str],
+    seats: Array | None = None,
+    instruments: Instruments | None = None,
+) -> Array:
     """Return the derivative of changes of inclination by parameters and seats.
 
     Returns
     -------
     derivatives
-        ``(n, links, 3, len(names) + 3 * links)``.
+        ``(n, instruments, 3, len(names) + 3 * instruments)``.
     """
-    first, second = (inclination_derivatives(robot, p, names, seats) for p in (pairs.first, pairs.second))
+    first, second = (inclination_derivatives(robot, p, names, seats, instruments) for p in (pairs.first, pairs.second))
     return np.asarray(second - first)
 
 
 def link_ends(robot: Robot) -> list[int]:
     """Return the index of the element of the trunk right behind each link's frame."""
-    tilts = 2 if any(effect.tilts for effect in robot.effects) else 0
-    ends = accumulate((len(link) + tilts for link in robot.link_elements), initial=len(robot.base_elements))
+    ends = accumulate((len(link) for link in robot.moved_links), initial=len(robot.base_elements))
     return list(ends)[1:]
 
 
@@ -136,10 +154,13 @@ def _moved_elements(robot: Robot, at: Postures, names: Sequence[str]) -> list[di
     return moved
 
 
-def _axes(robot: Robot, q: Array | Postures, seats: Array | None) -> NDArray[np.float64]:
-    """Return the instruments' axes in the world, as rows ``(n, links, 3, xyz)``."""
-    kinematics = robot.forward_kinematics(q)
-    R = np.stack([kinematics.matrix(end) for end in link_ends(robot)], axis=1)
+def _axes(
+    robot: Robot, q: Array | Postures, seats: Array | None, instruments: Instruments | None
+) -> NDArray[np.float64]:
+    """Return the instruments' axes in the world, as rows ``(n, instruments, 3, xyz)``."""
+    mounted = instruments or Instruments.on_every_link(len(robot.joints))
+    kinematics, ends = robot.forward_kinematics(q), link_ends(robot)
+    R = np.stack([kinematics.matrix(ends[link]) for link in mounted.links], axis=1) @ mounted.mounts
     if seats is not None:
         R = R @ _turns(seats)
     return np.asarray(np.swapaxes(R, -1, -2))

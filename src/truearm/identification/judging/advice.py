@@ -187,6 +187,22 @@ def _check_effects(fit: Fit) -> list[Notice]:
                 "stay near zero.",
             )
         )
+    tilting = {p.name for effect in robot.effects if effect.tilts for p in effect.parameters}
+    assumed = [
+        joint.name
+        for number, joint in enumerate(robot.joints, 1)
+        if joint.bearing is None and any(name in tilting and name.endswith(f"_{number}") for name in own)
+    ]
+    if assumed:
+        found.append(
+            Notice(
+                "bearing-assumed",
+                f"The robot file does not say where on their axes the bearings of {listed(assumed)} lie. They are "
+                "taken at the joints' origins, and so are the moments that tilt them. If drawings tell, enter "
+                "the entry bearing of these joints in the robot file.",
+                "note",
+            )
+        )
     vague = [name for name in own if name not in unknown and (robot.parameters[name].informed or 1.0) < _LEAST_INFORMED]
     if len(vague) > _LARGEST_UNINFORMED_SHARE * len(own):
         found.append(

@@ -201,6 +201,25 @@ class PositionErrors:
         return np.stack([np.sqrt(np.einsum("dxn,dxn->dn", move, move)) for move in moves], axis=1)
 
 
+def moved_lengths(fit: Fit, joints: Array, errors: Mapping[str, Array]) -> Array:
+    """Return how far errors of parameters ``(draws,)`` move the targets, by the kinematics themselves.
+
+    Parameters
+    ----------
+    joints
+        Where, ``(n, joints)``.
+
+    Returns
+    -------
+    Lengths [m], ``(draws, targets, n)``.
+    """
+    at = fit.robot.loaded(joints)
+    moves: Iterable[Array] = _moves(fit, at, errors, exact=True)
+    if fit.gauge_freedoms:
+        moves = _without_gauge(fit, at, np.stack([*moves]))
+    return np.stack([np.sqrt(np.einsum("dxn,dxn->dn", move, move)) for move in moves], axis=1)
+
+
 def expected_error(fit: Fit, seed: int = 0, *, plausible: bool = True) -> ExpectedError:
     """Return the error of the targets' positions to expect over the workspace.
 

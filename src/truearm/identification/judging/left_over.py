@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,9 @@ from truearm.identification.solving.problem import Problem
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.observations import OBSERVATIONS
 from truearm.modeling.chain import Array
+
+#: Share of the squares of a residual that rounding leaves where parameters explain all of it.
+_ALL_EXPLAINED: Final = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +58,7 @@ class LeftOver:
         r, J = problem.linearised(np.array([fit.robot.values[name] for name in fit.free.names]))
         # Of the square triangle, which is small, instead of the whole Jacobian.
         Q, R = np.linalg.qr(J * fit.free.prior)
+        R = _without_size(R, Q.T @ r, float(r @ r)) if len(r) > len(fit.free.names) else R
         U, s, Vt = np.linalg.svd(R, full_matrices=False)
         kept = s > 1e-8 * s[0]
         return cls(fit, problem, r, J, Q @ U[:, kept], s[kept], Vt[kept])
@@ -91,6 +96,25 @@ class LeftOver:
                 for block in self.problem.blocks
             ]
         )
+
+
+def _without_size(R: Array, c: Array, square: float) -> Array:
+    """Return the triangle of a Jacobian without the direction that shrinks everything, where no length was measured.
+
+    Of a tip that is held at points the residual is then a length like any other: a robot without size would leave
+    nothing. That is no explanation.
+
+    Parameters
+    ----------
+    R, c
+        Triangle of the Jacobian per prior, and the part of the residual that its columns span.
+    square
+        Sum of the squares of the residual.
+    """
+    if square == 0.0 or square - float(c @ c) > _ALL_EXPLAINED * square:
+        return R
+    size = np.linalg.lstsq(R, c, rcond=1e-12)[0]
+    return np.asarray(R - np.outer(R @ size, size) / float(size @ size))
 
 
 def chi_squared_tail(x: float, freedom: int) -> float:

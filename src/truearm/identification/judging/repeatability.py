@@ -35,11 +35,18 @@ class Repeatability:
         How many were visited again.
     visits
         How many visits these had together.
+    square
+        Mean square of the visits' distances from where the posture is on average, without the instrument's noise [m^2];
+        negative where the visits scatter less than the noise lets expect.
+    deviation
+        Its standard deviation [m^2].
     """
 
     rp: float
     postures: int
     visits: int
+    square: float
+    deviation: float
 
 
 def repeatability(data: Dataset, sigma: float) -> Repeatability | None:
@@ -74,7 +81,13 @@ def repeatability(data: Dataset, sigma: float) -> Repeatability | None:
     mean = _mean_length(np.maximum(own, 0.0))
     spread = math.sqrt(max(float(np.maximum(own, 0.0).sum()) - mean**2, 0.0))
     visits = len(np.unique(np.stack([at, visit])[:, again], axis=1).T)
-    return Repeatability(mean + 3.0 * spread, len(np.unique(postures[at[again]])), visits)
+    square = float(own.sum())
+    posture = postures[at[again]]  # of which all targets scatter together
+    beyond = np.bincount(
+        posture, np.einsum("ni,ni->n", apart, apart) - (square + 3.0 * sigma**2) * freedom / len(apart)
+    )
+    deviation = math.sqrt(float(beyond @ beyond)) / freedom
+    return Repeatability(mean + 3.0 * spread, len(np.unique(posture)), visits, square, deviation)
 
 
 def _mean_length(variances: Array) -> float:

@@ -26,7 +26,7 @@ _LEAST_FREEDOM: Final = 1.0
 
 
 def cluster_covariance(
-    rows: Array, pull: Array, arrivals: Arrivals, uncertain: NDArray[np.bool_], priors: bool
+    rows: Array, pull: Array, arrivals: Arrivals, uncertain: NDArray[np.bool_], beforehand: Array
 ) -> tuple[Array, tuple[CovariancePart, ...]]:
     """Return the covariance of parameters scaled by their priors, zero for those that are not uncertain.
 
@@ -42,27 +42,26 @@ def cluster_covariance(
         derivative, per prior.
     uncertain
         Which parameters are, ``(parameters,)``.
-    priors
-        Whether they have any.
+    beforehand
+        What is known of each parameter before any reading: one by its deviation, in priors, ``(parameters,)``; 1 with
+        priors, 0 where nothing is known.
     """
-    count = int(uncertain.sum())
-    A = rows[:, uncertain]
+    A, root = rows[:, uncertain], np.diag(beforehand[uncertain])
     _, s, Vt = np.linalg.svd(
-        np.asarray(np.linalg.qr(np.concatenate([A, np.eye(count)]) if priors else A, mode="r"), dtype=np.float64),
-        full_matrices=False,
+        np.asarray(np.linalg.qr(np.concatenate([A, root]), mode="r"), dtype=np.float64), full_matrices=False
     )
     directions = Vt.T / np.maximum(s, 1e-12 * s[:1])
-    X = A @ directions
+    X, along = A @ directions, root @ directions
     pulls = arrivals.products(pull[:, uncertain] @ directions, np.ones((len(pull), 1)))[..., 0]
-    meat, freedom = _meat(X, pulls, arrivals, directions, priors)
-    known = directions.T @ directions if priors else np.zeros((count, count))
+    meat, freedom = _meat(X, pulls, arrivals, directions, bool(root.any()))
+    known = along.T @ along
     whole = CovariancePart(directions @ (widening(freedom) ** 2 * meat + known) @ directions.T, np.inf)
     scatter = CovariancePart(directions @ meat @ directions.T, freedom)
     rest = CovariancePart(directions @ known @ directions.T, np.inf)
     return whole.among(uncertain).covariance, (scatter.among(uncertain), rest.among(uncertain))
 
 
-def _meat(X: Array, pulls: Array, arrivals: Arrivals, directions: Array, priors: bool) -> tuple[Array, float]:
+def _meat(X: Array, pulls: Array, arrivals: Arrivals, directions: Array, known_before: bool) -> tuple[Array, float]:
     """Return the squared pulls in directions of unit information, and their degrees of freedom."""
     count = X.shape[1]
     made_up = np.empty_like(pulls)
@@ -90,7 +89,7 @@ def _meat(X: Array, pulls: Array, arrivals: Arrivals, directions: Array, priors:
     spent = np.einsum("apj,apj->j", shares, shares)
     freedom = (total - spent) ** 2 / np.maximum(squared, 1e-300)
     informed = np.ones(len(directions), dtype=bool)
-    if priors:
+    if known_before:
         informed = 1.0 - np.sum(directions**2, axis=1) > _INFORMED
         informed = informed if informed.any() else ~informed
     pooled = float(1.0 / np.mean(1.0 / np.maximum(freedom[informed], _LEAST_FREEDOM)))

@@ -7,11 +7,11 @@ lie. Each step is a linear program: with the linearised residual ``J s + r``, mi
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
-from truearm.identification.solving.solver import Solvable
+from truearm.identification.solving.solver import Evaluated, Solvable
 from truearm.modeling.chain import Array
 
 _STEPS: Final = 60
@@ -19,7 +19,7 @@ _LEAST_PROMISE: Final = 1e-9  # share of the objective that a step must promise
 _SMALLEST: Final = 1e-9  # longest step [priors] below which steps that fail are given up
 
 
-def least_absolute(problem: Solvable, bounds: tuple[Array, Array] | None = None) -> Array:
+def least_absolute(problem: Solvable, bounds: tuple[Array, Array] | None = None) -> tuple[Evaluated, bool, int]:
     """Minimise the sum of the absolute whitened residuals, without priors.
 
     Parameters
@@ -31,7 +31,8 @@ def least_absolute(problem: Solvable, bounds: tuple[Array, Array] | None = None)
 
     Returns
     -------
-    Parameter values ``(parameters,)``, in the order of the problem.
+    evaluated, converged, steps
+        The problem at the minimum, whether no step promised more, and how many linear programs it took.
 
     Raises
     ------
@@ -42,11 +43,14 @@ def least_absolute(problem: Solvable, bounds: tuple[Array, Array] | None = None)
     x, longest = np.clip(problem.free.start, low, high), np.inf
     prior = problem.free.prior
     here = problem.at(x)
-    for _ in range(_STEPS):
+    converged, steps = False, 0
+    while not converged and steps < _STEPS:
+        steps += 1
         cost = float(np.abs(here.residual).sum())
         room = np.stack([np.maximum((low - x) / prior, -longest), np.minimum((high - x) / prior, longest)], axis=1)
         step, promised = _linear_program(here.jacobian * prior, here.residual, room)
-        if cost - promised <= _LEAST_PROMISE * cost:
+        converged = cost - promised <= _LEAST_PROMISE * cost
+        if converged:
             break
         trial = problem.at(np.clip(x + step * prior, low, high))
         if float(np.abs(trial.residual).sum()) < cost:
@@ -54,21 +58,25 @@ def least_absolute(problem: Solvable, bounds: tuple[Array, Array] | None = None)
             longest = 2 * longest
         else:
             longest = 0.25 * float(np.abs(step).max())
-            if longest < _SMALLEST:
-                break
-    return x
+            converged = longest < _SMALLEST
+    return here, converged, steps
 
 
 def _linear_program(A: Array, r: Array, room: Array) -> tuple[Array, float]:
     """Return the step within its room ``(parameters, 2)`` that is best where `A` holds, and the sum it promises."""
     from scipy.optimize import linprog
+    from scipy.sparse import coo_array
 
     rows, count = A.shape
-    unit = np.eye(rows)
+    twice = np.arange(2 * rows)
+    row = np.concatenate([np.repeat(twice, count), twice])
+    column = np.concatenate([np.tile(np.arange(count), 2 * rows), count + twice % rows])
+    entries = np.concatenate([A.ravel(), -A.ravel(), -np.ones(2 * rows)])
     limits: list[tuple[float, float]] = [(a, b) for a, b in room.tolist()]
+    both_sides: Any = coo_array((entries, (row, column)), shape=(2 * rows, count + rows)).tocsc()
     found = linprog(
         np.concatenate([np.zeros(count), np.ones(rows)]),
-        A_ub=np.block([[A, -unit], [-A, -unit]]),
+        A_ub=both_sides,
         b_ub=np.concatenate([-r, r]),
         bounds=[*limits, *[(0.0, np.inf)] * rows],
         method="highs",

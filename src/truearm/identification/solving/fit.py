@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Final, Literal
 
 import numpy as np
 
+from truearm.identification.held import NOTHING_HELD, Held
 from truearm.identification.solving.arrivals import Arrivals
+from truearm.identification.solving.bootstrap import refit_draws
 from truearm.identification.solving.bounds import Bounds
 from truearm.identification.solving.cluster_covariance import cluster_covariance
-from truearm.identification.solving.losses import Loss, pulls
+from truearm.identification.solving.losses import ABSOLUTE, Loss, pulls
 from truearm.identification.solving.models import FRAMES, Model
 from truearm.identification.solving.problem import SETUP, Problem
 from truearm.identification.solving.redundancy import (
@@ -31,15 +34,18 @@ from truearm.identification.solving.rounds import (
     noise_found,
 )
 from truearm.identification.solving.solver import SMALL
-from truearm.identification.solving.variance_components import CovariancePart
+from truearm.identification.solving.variance_components import CovariancePart, widening
+from truearm.identification.start_values.from_readings import start_from_readings, unanchored
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
-from truearm.modeling.parameters import FreeParameters
+from truearm.modeling.parameters import SCALE, FreeParameters
 from truearm.modeling.robot import Robot
 
 #: ``uninformed``: the data removed less than 5 % of the prior variance, so the value is still a belief.
-ParameterStatus = Literal["identified", "uninformed", "at-bound", "not-determined", "dropped", "fixed"]
+ParameterStatus = Literal["identified", "uninformed", "at-bound", "not-determined", "dropped", "held", "fixed"]
 _UNINFORMED: Final = 0.05
+#: Share of the largest in a combination from which a parameter takes part in it.
+_LEAST_PART: Final = 0.02
 
 
 class Status(Enum):
@@ -117,9 +123,13 @@ class Fit:
         errors of the joints do not explain how the residuals of an arrival hang together.
     weight
         What the loss left of each reading, ``(readings,)``, in the order of the dataset; NaN where none was used.
-        For ``l1``, which has no full weight, relative to the median reading.
+        For sums of absolute values, which have no full weight, relative to the median reading.
     steps
         Steps of the solver, over all stages.
+    held
+        Places that were known, and not found.
+    bootstrap
+        How many fits to configurations drawn anew the covariance follows from; 0 if from none.
     """
 
     robot: Robot
@@ -142,6 +152,8 @@ class Fit:
     scattered: bool
     weight: Array
     steps: int
+    held: Held = NOTHING_HELD
+    bootstrap: int = 0
 
     def parameter_status(self, name: str) -> ParameterStatus:
         """Return how much the value of a parameter is worth."""
@@ -150,7 +162,7 @@ class Fit:
         if any(name == r.dropped for r in self.redundancies):
             return "dropped"
         if name not in self.free.names:
-            return "fixed"
+            return "held" if name in self.held.names(self.robot) else "fixed"
         if name in self.at_bound:
             return "at-bound"
         informed = self.robot.parameters[name].informed
@@ -173,7 +185,11 @@ def identify(
     redundancy: Redundant = "prior",
     bounds: Bounds | None = None,
     bounds_file: str = "bounds",
+    held: Held = NOTHING_HELD,
+    bootstrap: int = 0,
+    seed: int = 0,
     small: float = SMALL,
+    progress: Callable[[str], None] = lambda _: None,
 ) -> Fit:
     """Identify a robot from training data.
 
@@ -190,17 +206,26 @@ def identify(
         See :mod:`truearm.identification.solving.losses`.
     redundancy
         ``prior``: every parameter is kept near its nominal value as far as its prior says, so redundant ones
-        do no harm. ``drop``: no priors; redundant parameters are held at nominal and named.
+        do no harm. ``drop``: no priors; redundant parameters are held at nominal and named. ``none``: no priors, and
+        nothing is held; what neither bounds nor the readings determine ends in ``rank-loss``.
     bounds
         Limits of parameter values.
+    held
+        Places that are known: they are not found.
+    bootstrap
+        How many fits to configurations drawn anew the deviations follow from; 0: from the readings' own scatter.
+    seed
+        Of those draws.
     small
         Step of the solver that is the last, in priors.
+    progress
+        Called with a few words at each of those fits.
 
     Raises
     ------
     InputError
-        For data without positions, bounds on unknown parameters, bounds that a redundant parameter cannot keep, or
-        too few equations without priors.
+        For data without positions, bounds on unknown parameters, bounds that a redundant parameter cannot keep, too few
+        equations without priors, nothing to find, or too few configurations to draw from.
     """
     solved = find_parameters(
         robot,
@@ -210,20 +235,26 @@ def identify(
         redundancy=redundancy,
         bounds=bounds,
         bounds_file=bounds_file,
+        held=held,
         small=small,
     )
-    return _fit(solved, model, loss)
+    draws = refit_draws(solved, loss, bootstrap, seed, progress) if bootstrap else None
+    return _fit(solved, model, loss, draws)
 
 
-def place(robot: Robot, data: Dataset, loss: Loss = "linear") -> Robot:
+def place(robot: Robot, data: Dataset, loss: Loss = "linear", held: Held = NOTHING_HELD) -> Robot:
     """Return the uncalibrated robot in the frames of the data: only base, targets and fixtures are fitted.
 
     Readings are weighed one by one. What an uncalibrated robot leaves is no error of the joints at an arrival.
     """
-    return find_parameters(robot, data, FRAMES, loss=loss, shared=False).robot
+    if held:
+        start = start_from_readings(FRAMES.prepared(robot), data, held)
+        if not held.free_of(unanchored(FRAMES.free(start), data), start).names:
+            return start
+    return find_parameters(robot, data, FRAMES, loss=loss, held=held, shared=False).robot
 
 
-def _fit(solved: Solved, model: Model, loss: Loss) -> Fit:
+def _fit(solved: Solved, model: Model, loss: Loss, draws: Array | None = None) -> Fit:
     problem, solution, start, limits = solved.problem, solved.solution, solved.start, solved.limits
     free, x = problem.free, solution.vector
     at_bound = bound_by(solution, free, limits)
@@ -237,14 +268,21 @@ def _fit(solved: Solved, model: Model, loss: Loss) -> Fit:
     else:
         excess, joint_error = problem.widened, np.sqrt(components.likeliest.joints)
         joint_freedom = components.likeliest.freedom
+    open_ = _left_open(problem, x, limits) if not problem.priors and not solved.redundancies else []
     scattered = components is None or not components.holds
-    if components is not None and not scattered:
+    if components is not None and not scattered and draws is None:
         covariance, parts = components.covariance, components.parts
     else:
         pull, rows = pulls(loss, solution.residual, solution.jacobian, problem.components)
         covariance, parts = cluster_covariance(
-            rows * free.prior, pull * free.prior, Arrivals(problem.arrivals), ~at_bound, problem.priors
+            rows * free.prior,
+            pull * free.prior,
+            Arrivals(problem.arrivals),
+            ~at_bound,
+            _beforehand(problem, limits, open_),
         )
+    if draws is not None:
+        covariance, parts = _of_draws(draws / free.prior, parts)
     covariance = covariance * np.outer(free.prior, free.prior)
     deviation = np.sqrt(np.diag(covariance))
     share = (deviation / free.prior) ** 2
@@ -258,9 +296,10 @@ def _fit(solved: Solved, model: Model, loss: Loss) -> Fit:
     robot = start.with_parameters(identified)
     held = tuple(robot.parameters[r.dropped] for r in solved.redundancies)
     looked_at = FreeParameters((*(robot.parameters[n] for n in free.names), *held))
-    unobservable = unobservable_parameters(robot, problem.data, looked_at)
-    gauge = gauge_freedoms(problem.data)
-    used = solution.weight / np.median(solution.weight) if loss == "l1" else solution.weight
+    unobservable = unobservable_parameters(robot, problem.data, looked_at, held=solved.held)
+    unobservable = tuple(dict.fromkeys((*unobservable, *open_)))
+    gauge = gauge_freedoms(problem.data, solved.held)
+    used = solution.weight / np.median(solution.weight) if loss in ABSOLUTE else solution.weight
     weight = np.full(len(problem.data.target), np.nan)
     first = 0
     for block in problem.blocks:
@@ -268,7 +307,9 @@ def _fit(solved: Solved, model: Model, loss: Loss) -> Fit:
         if block.data is problem.data:
             weight[block.readings] = np.fmin(weight[block.readings], part)
         first += len(block.readings)
-    if not solution.converged:
+    if open_:  # along them the solver has no reason to stop
+        status = Status.RANK_LOSS
+    elif not solution.converged:
         status = Status.NOT_CONVERGED
     elif unobservable:
         status = Status.RANK_LOSS
@@ -306,11 +347,54 @@ def _fit(solved: Solved, model: Model, loss: Loss) -> Fit:
         scattered=scattered,
         weight=weight,
         steps=solution.steps,
+        held=solved.held,
+        bootstrap=0 if draws is None else len(draws),
     )
+
+
+def _beforehand(problem: Problem, limits: tuple[Array, Array] | None, left_open: Sequence[str]) -> Array:
+    """Return one by the deviation of what is known of each parameter before any reading, in priors, 0 for nothing.
+
+    Without priors a value may be anywhere between its bounds, and its deviation is that of an even distribution. What
+    neither readings nor bounds determine is off by what its prior says, although the fit did not know that.
+    """
+    free = problem.free
+    known = np.array([problem.priors or name in left_open for name in free.names], dtype=float)
+    if limits is None or problem.priors:
+        return known
+    width = np.maximum(limits[1] - limits[0], 1e-12 * free.prior)
+    return np.asarray(np.maximum(known, free.prior * np.sqrt(12.0) / width))
+
+
+def _of_draws(draws: Array, parts: tuple[CovariancePart, ...]) -> tuple[Array, tuple[CovariancePart, ...]]:
+    """Return the covariance of draws ``(draws, parameters)``, per prior, and its parts.
+
+    What is known beforehand holds every draw in the same place: as for the readings' own scatter, that part is added.
+    """
+    scatter = CovariancePart(np.atleast_2d(np.cov(draws, rowvar=False)), float(len(draws) - 1))
+    rest = parts[-1]
+    return widening(scatter.freedom) ** 2 * scatter.covariance + rest.covariance, (scatter, rest)
+
+
+def _left_open(problem: Problem, vector: Array, limits: tuple[Array, Array] | None) -> list[str]:
+    """Return parameters that neither the readings nor bounds determine, where nothing is held at nominal."""
+    low, high = (np.full(len(vector), side) for side in (-np.inf, np.inf)) if limits is None else limits
+    bounded = {name for name, a, b in zip(problem.free.names, low, high, strict=True) if np.isfinite(b - a)}
+    size = dict(zip(problem.free.names, problem.free.prior.tolist(), strict=True))
+    found = []
+    for redundancy in find_redundancies(problem, vector):
+        along = {name: abs(c) / size[name] for name, c in redundancy.members.items()}
+        taking = [name for name, share in along.items() if share > _LEAST_PART * max(along.values())]
+        if not bounded.intersection(taking):
+            found += taking
+    return found
 
 
 def _unobservable_combinations(problem: Problem, vector: Array) -> tuple[str, ...]:
     """Return the combinations of the robot's own parameters that the readings do not observe."""
+    if SCALE in problem.free.names:
+        vector = np.delete(vector, problem.free.names.index(SCALE))
+        problem = replace(problem, free=problem.free.without([SCALE]))
     beside = {p.name for p in problem.free.parameters if p.group in ("target", "fixture")}
     own = [
         {n: c for n, c in redundancy.members.items() if n not in beside}

@@ -26,7 +26,7 @@ _ROUNDING: Final = 1e-13  # m: what rounding moves
 
 @dataclass(frozen=True, eq=False)
 class Influence:
-    """What parameters do to the position of the tip.
+    """What parameters do to the pose of the tip.
 
     Attributes
     ----------
@@ -36,11 +36,14 @@ class Influence:
         How far each of them was moved [m, rad or its own unit], ``(parameters,)``.
     size
         How far the tip then moved [m], ``(parameters, n)``.
+    turn
+        By how much it turned [rad], ``(parameters, n)``; None if that was not computed.
     """
 
     names: tuple[str, ...]
     perturbation: Array
     size: Array
+    turn: Array | None = None
 
     @property
     def mean(self) -> Array:
@@ -110,11 +113,14 @@ def influence(
         raise InputError("there is no configuration", where=robot.name, cure="Give at least one.")
     moved = np.diag(perturbation)[:, :, None]
     values = {**robot.values, **{n: robot.values[n] + steps for n, steps in zip(names, moved, strict=True)}}
-    apart = (
-        robot.forward_kinematics(at, target, values).position
-        - robot.forward_kinematics(at, target).position[:, None, :]
+    after, before = robot.forward_kinematics(at, target, values), robot.forward_kinematics(at, target)
+    apart = np.linalg.norm(after.position - before.position[:, None, :], axis=0)
+    turned = np.swapaxes(before.matrix(), -1, -2) @ after.matrix()  # (parameters, n, 3, 3)
+    sine = 0.5 * np.linalg.norm(
+        [turned[..., (i + 2) % 3, (i + 1) % 3] - turned[..., (i + 1) % 3, (i + 2) % 3] for i in range(3)], axis=0
     )
-    return Influence(tuple(names), perturbation, np.asarray(np.linalg.norm(apart, axis=0)))
+    cosine = 0.5 * (np.trace(turned, axis1=-2, axis2=-1) - 1.0)
+    return Influence(tuple(names), perturbation, np.asarray(apart), np.arctan2(sine, cosine))
 
 
 def sizes_of(

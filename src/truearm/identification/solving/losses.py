@@ -1,7 +1,8 @@
 """How much a reading counts, by how far off it is.
 
 A loss acts on whole readings (the norm of their whitened residuals), not on single coordinates: a target caught
-by mistake is wrong in all of them. Each is solved by iterated reweighting (Holland and Welsch 1977).
+by mistake is wrong in all of them. Only ``l1-components`` adds up single coordinates, and so depends on how the axes of
+the instrument lie. Each is solved by iterated reweighting (Holland and Welsch 1977).
 """
 
 from __future__ import annotations
@@ -13,8 +14,10 @@ from numpy.typing import NDArray
 
 from truearm.modeling.chain import Array
 
-Loss = Literal["linear", "huber", "cauchy", "l1"]
-LOSSES: Final[tuple[Loss, ...]] = ("linear", "huber", "cauchy", "l1")
+Loss = Literal["linear", "huber", "cauchy", "l1", "l1-components"]
+LOSSES: Final[tuple[Loss, ...]] = ("linear", "huber", "cauchy", "l1", "l1-components")
+#: Those that are sums of absolute values.
+ABSOLUTE: Final[tuple[Loss, ...]] = ("l1", "l1-components")
 
 #: Median norm of three independent standard normal components.
 MEDIAN_NORM: Final = 1.5382
@@ -28,6 +31,11 @@ _L1_MET: Final = 1e-4
 # norm of three normal components for Huber, at its root mean square and a bit for Cauchy.
 _HUBER: Final = 2.80
 _CAUCHY: Final = 3.0
+
+
+def weighed_together(loss: Loss, components: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return how many consecutive rows a loss weighs as one: those of a reading, or each alone."""
+    return np.ones(int(components.sum()), dtype=np.intp) if loss == "l1-components" else components
 
 
 def norms_of(residual: Array, components: NDArray[np.intp]) -> Array:
@@ -54,6 +62,28 @@ def robust_scale(norms: Array, components: NDArray[np.intp]) -> float:
     return float(np.median(norms / np.where(components == 1, _MEDIAN_OF_ONE, MEDIAN_NORM)))
 
 
+def meets_exactly(loss: Loss, components: NDArray[np.intp]) -> bool:
+    """Return whether a fit meets as many numbers exactly as it has parameters: sums of absolute single numbers."""
+    return loss in ABSOLUTE and bool(np.all(components == 1))
+
+
+def scale_of(loss: Loss, norms: Array, components: NDArray[np.intp], spent: float) -> float:
+    """Return the deviation of one coordinate that a fit leaves.
+
+    Parameters
+    ----------
+    norms
+        As from :func:`norms_of`, of what the loss weighs together.
+    spent
+        How many coordinates the parameters used up: a sum of absolute single numbers leaves so many at zero, and those
+        say nothing of the noise.
+    """
+    if meets_exactly(loss, components):
+        smallest = np.argsort(norms)[min(int(spent), len(norms) - 1) :]
+        return robust_scale(norms[smallest], components[smallest])
+    return robust_scale(norms, components)
+
+
 def weights(loss: Loss, norms: Array, scale: float) -> Array:
     """Return the weight of each reading's squared residual, ``(readings,)``.
 
@@ -62,13 +92,13 @@ def weights(loss: Loss, norms: Array, scale: float) -> Array:
     norms
         Norm of each whitened reading.
     scale
-        Robust deviation of one coordinate; for ``l1`` the norm below which a reading counts as met.
+        Robust deviation of one coordinate; for sums of absolute values the norm below which a reading counts as met.
     """
     if loss == "huber":
         return np.minimum(1.0, _HUBER * scale / np.maximum(norms, 1e-300))
     if loss == "cauchy":
         return 1.0 / (1.0 + (norms / (_CAUCHY * scale)) ** 2)
-    if loss == "l1":
+    if loss in ABSOLUTE:
         return 1.0 / np.maximum(norms, scale)
     return np.ones_like(norms)
 
@@ -78,9 +108,9 @@ def pulls(loss: Loss, residual: Array, jacobian: Array, components: NDArray[np.i
 
     The first is its residual times its weight times its derivative. The second squared is the derivative of that
     by the parameters: a reading that a loss holds back follows the parameters across the line to its prediction, and
-    along it less or not at all. Where a loss pushes a reading away (Cauchy), it counts as not following. For ``l1`` and
-    readings of one number, whose pull only jumps, it is the density of the residuals at zero, of a normal distribution
-    with their median.
+    along it less or not at all. Where a loss pushes a reading away (Cauchy), it counts as not following. For sums of
+    absolute values of single numbers, whose pull only jumps, it is the density of the residuals at zero, of a normal
+    distribution with their median.
 
     Parameters
     ----------
@@ -96,9 +126,10 @@ def pulls(loss: Loss, residual: Array, jacobian: Array, components: NDArray[np.i
     """
     if loss == "linear":
         return residual[:, None] * jacobian, jacobian
+    components = weighed_together(loss, components)
     norms = norms_of(residual, components)
-    scale = max(robust_scale(norms, components), 1e-300)
-    across = weights(loss, norms, scale if loss != "l1" else _L1_MET * float(np.median(norms)) + 1e-300)
+    scale = max(scale_of(loss, norms, components, jacobian.shape[1]), 1e-300)
+    across = weights(loss, norms, scale if loss not in ABSOLUTE else _L1_MET * float(np.median(norms)) + 1e-300)
     if loss == "huber":
         along = np.where(norms < _HUBER * scale, 1.0, 0.0)
     elif loss == "cauchy":

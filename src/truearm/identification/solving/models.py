@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from truearm.errors import InputError, did_you_mean
-from truearm.modeling.parameters import FreeParameters, Group
+from truearm.modeling.parameters import SCALE_GROUP, FreeParameters, Group
 from truearm.modeling.robot import Robot
 
 
@@ -49,7 +49,7 @@ class Model:
 
     def free(self, robot: Robot) -> FreeParameters:
         """Return the free parameters of a robot, base first, targets and fixtures last."""
-        groups = ("base", "target", "fixture", *self.groups, *self.effects)
+        groups = ("base", "target", "fixture", SCALE_GROUP, *self.groups, *self.effects)
         return FreeParameters(tuple(p for p in robot.parameters.values() if p.group in groups))
 
 

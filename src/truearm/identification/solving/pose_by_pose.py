@@ -222,27 +222,36 @@ def _poses(
     if not (np.isfinite(tolerance) and tolerance > 0):
         raise InputError("the tolerance is no size", came=tolerance, allowed="above 0 m")
     index = data.targets.index(target) if target in data.targets else -1
-    kept = (data.target == index) & data.has_position
-    if not kept.any():
+    if not ((data.target == index) & data.has_position).any():
         raise InputError(
             "there is no position reading of this target",
             where=data.source,
             came=target,
             allowed=", ".join(data.targets),
         )
-    of_target = replace(
+    return _Poses(robot, positions_of(data, target), tuple(names), target, unit)
+
+
+def positions_of(data: Dataset, target: str) -> Dataset:
+    """Return the position readings of one target alone, those in the instrument's own frame."""
+    kept = (data.target == data.targets.index(target)) & data.has_position
+    return replace(
         data,
         targets=(target,),
         configuration=data.configuration[kept],
         target=np.zeros(int(kept.sum()), dtype=np.intp),
         position=data.position[kept],
         quaternion=None,
+        distance=None,
+        height=None,
+        fixtures=(),
+        fixture=None,
+        setup=None,
         sigma=None if data.sigma is None else data.sigma[kept],
         sigma_rot=None,
         visit=None,
         references=None,
     )
-    return _Poses(robot, of_target, tuple(names), target, unit)
 
 
 def _result(

@@ -21,7 +21,7 @@ from truearm.measurement.dataset import Dataset
 from truearm.measurement.observations import Observation, compared
 from truearm.measurement.sighting import Sighting
 from truearm.modeling.chain import Array, ForwardKinematics
-from truearm.modeling.parameters import FreeParameters
+from truearm.modeling.parameters import SCALE, FreeParameters
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
 from truearm.modeling.robot_parameters import by_parameters, effect_rates
@@ -265,9 +265,15 @@ class Evaluation:
                 self._kinematics[block.target] if block.data is self.problem.data else self._fixtures[block.target],
                 block.configurations,
                 None if block.fixture is None else self._fixtures[block.fixture],
+                self._scale if block.data is self.problem.data else 0.0,
             )
             for block, rows in self._rows()
         }
+
+    @cached_property
+    def _scale(self) -> float | Array:
+        """How much longer than it reads the instrument's unit of length is, where that is not known exactly."""
+        return self._values.get(SCALE, 0.0) if self.problem.data.scale_sigma is not None else 0.0
 
     @cached_property
     def _kinematics(self) -> dict[str, ForwardKinematics]:

@@ -17,11 +17,12 @@ from typing import Final, Protocol
 
 import numpy as np
 
+from truearm.identification.held import NOTHING_HELD, Held
 from truearm.identification.solving.problem import Problem
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.observations import OBSERVATIONS
 from truearm.modeling.chain import Array, ForwardKinematics
-from truearm.modeling.parameters import FreeParameters, Parameter
+from truearm.modeling.parameters import SCALE, FreeParameters, Parameter
 from truearm.modeling.robot import Robot
 
 _ORDER: Final = ("base", "fixture", "target", "", "joint zero", "geometry")  # "" is every joint effect
@@ -168,7 +169,9 @@ def in_words(members: dict[str, float], free: FreeParameters) -> str:
     return words
 
 
-def unobservable_parameters(robot: Robot, data: Dataset, free: FreeParameters, seed: int = 0) -> tuple[str, ...]:
+def unobservable_parameters(
+    robot: Robot, data: Dataset, free: FreeParameters, seed: int = 0, held: Held = NOTHING_HELD
+) -> tuple[str, ...]:
     """Return parameters in directions that the data do not observe although poses elsewhere depend on them.
 
     The unobserved directions are tried on configurations drawn from the robot's limits. A direction that changes
@@ -182,7 +185,12 @@ def unobservable_parameters(robot: Robot, data: Dataset, free: FreeParameters, s
     ----------
     free
         The parameters to look at; all others are held.
+    held
+        Places that are known. A fixture among them locates the robot.
     """
+    free = free.without([SCALE])  # as much as is known of it beforehand is enough
+    if not free.names:
+        return ()
     noise = {observation.name: 1.0 for observation in OBSERVATIONS}
     plain = Problem(robot, _unit_noise(data), free, noise, priors=False)
     A = plain.linearised(free.start)[1] * free.prior
@@ -190,7 +198,7 @@ def unobservable_parameters(robot: Robot, data: Dataset, free: FreeParameters, s
     unobserved = Vt[int((s > _UNOBSERVED * s[0]).sum()) :]
     if len(unobserved) == 0:
         return ()
-    gauge = gauge_freedoms(data)
+    gauge = gauge_freedoms(data, held)
     q = robot.loaded(robot.random_configurations(40, np.random.default_rng(seed)))
     effects = np.zeros((0, len(free.names)))
     for target in robot.targets:
@@ -213,9 +221,9 @@ def unobservable_parameters(robot: Robot, data: Dataset, free: FreeParameters, s
     return tuple(name for name, is_in in zip(free.names, involved.tolist(), strict=True) if is_in)
 
 
-def gauge_freedoms(data: Dataset) -> tuple[str, ...]:
+def gauge_freedoms(data: Dataset, held: Held = NOTHING_HELD) -> tuple[str, ...]:
     """Return the motions of everything that no reading observes: of the ``base``, and a change of ``size``."""
-    if data.anchored:
+    if data.anchored or held.locates(data):
         return ()
     if data.distance is not None or (data.setup is not None and data.setup.distance is not None):
         return ("base",)

@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.errors import InputError
+from truearm.identification.held import NOTHING_HELD, Held
 from truearm.identification.solving.arrivals import Arrivals, WhitenedProblem, Whitening
 from truearm.identification.solving.bounds import Bounds, bound_vectors
 from truearm.identification.solving.likelihood import Linearised
-from truearm.identification.solving.losses import Loss, norms_of, robust_scale
+from truearm.identification.solving.losses import Loss, meets_exactly, norms_of, scale_of, weighed_together
 from truearm.identification.solving.models import Model
 from truearm.identification.solving.problem import SETUP, Problem, check_circumstances, check_solvable
 from truearm.identification.solving.redundancy import Redundancy, find_redundancies
@@ -31,14 +32,16 @@ from truearm.identification.start_values.from_readings import start_from_reading
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.observations import OBSERVATIONS
 from truearm.modeling.chain import Array
-from truearm.modeling.parameters import FreeParameters
+from truearm.modeling.parameters import SCALE, FreeParameters
 from truearm.modeling.robot import Robot
 
-Redundant = Literal["prior", "drop"]
+Redundant = Literal["prior", "drop", "none"]
 
 #: Noise assumed for readings that declare none, until their own residuals say better [m, rad].
 _FIRST_NOISE: Final = {observation.name: 1e-4 for observation in OBSERVATIONS}
 _NOISE_FLOOR: Final = 1e-9
+#: Share of the equations that parameters may use up, for what a sum of absolute numbers leaves to tell the noise.
+_LARGEST_SHARE_SPENT: Final = 0.8
 _LEAST_WIDENED: Final = 1e-12
 #: What the variances of readings with declared deviations are counted under.
 DECLARED: Final = "declared"
@@ -66,6 +69,8 @@ class Solved:
         Lowest and highest value of every free parameter [SI], where there are bounds.
     components
         Variances of the readings and of the joints' errors at the solution; None for losses other than the linear one.
+    held
+        Places that were known.
     """
 
     start: Robot
@@ -74,6 +79,7 @@ class Solved:
     redundancies: tuple[Redundancy, ...]
     limits: tuple[Array, Array] | None
     components: Components | None
+    held: Held = NOTHING_HELD
 
     @property
     def robot(self) -> Robot:
@@ -90,6 +96,7 @@ def find_parameters(
     redundancy: Redundant = "prior",
     bounds: Bounds | None = None,
     bounds_file: str = "bounds",
+    held: Held = NOTHING_HELD,
     small: float = SMALL,
     shared: bool = True,
 ) -> Solved:
@@ -102,13 +109,39 @@ def find_parameters(
     shared
         Whether errors of the joints that the readings of an arrival share are looked for, with the linear loss.
     """
-    start = start_from_readings(model.prepared(robot), data)
+    start = start_from_readings(model.prepared(robot), data, held)
     check_circumstances(start, data)
-    free = unanchored(model.free(start), data)
+    free = held.free_of(unanchored(model.free(start), data), start)
+    if redundancy != "prior":  # what is known of an instrument's scale is a prior: without any it is exact
+        free = free.without([SCALE])
     check_bounds = None
+    if not free.names:
+        raise InputError(
+            "everything that this model frees is held, so there is nothing to find",
+            parameter="hold",
+            where=data.source,
+            came=f"model {model.name}",
+            cure="Hold less, or name a model that frees the robot's own parameters.",
+        )
     if bounds is not None:
+        for name in (*bounds.within, *bounds.between):
+            if name in held.names(start):
+                raise InputError(
+                    "the parameter has bounds, and it is held",
+                    parameter="bounds",
+                    where=bounds_file,
+                    came=name,
+                    cure="Remove its bounds, or do not hold it.",
+                )
         tried = start.with_effects(model.tried).parameters.values()
         check_bounds = bound_vectors(bounds, free, bounds_file, tried)
+    if redundancy == "none" and bounds is None and not held:
+        raise InputError(
+            "without priors, bounds and places that are held nothing tells base and joints apart",
+            parameter="redundancy",
+            came="none",
+            cure="Give `bounds`, `hold` what is known, or use `redundancy=drop`, which holds what is redundant.",
+        )
     problem = Problem(start, data, free, dict(_FIRST_NOISE), priors=redundancy == "prior")
     check_solvable(problem)
     dropped: tuple[Redundancy, ...] = ()
@@ -116,33 +149,33 @@ def find_parameters(
         dropped = find_redundancies(problem, free.start)
     steps = 0
     for _ in range(6):
-        held = [r.dropped for r in dropped]
+        out = [r.dropped for r in dropped]
         if check_bounds is not None:
-            _check_held(held, free, check_bounds, bounds_file)
-        kept = problem.free.without(held)
+            _check_dropped(out, free, check_bounds, bounds_file)
+        kept = problem.free.without(out)
         limits = None if check_bounds is None else _limits_of(check_bounds, free, kept)
         solution, reduced, components = _solve_with_noise(
-            replace(problem, free=kept), loss, limits, small, shared=shared
+            replace(problem, free=kept), loss, limits, small, shared=shared and redundancy != "none"
         )
         steps += solution.steps
-        if redundancy == "prior":
+        if redundancy != "drop":
             break
         # What is redundant at the nominal robot need not be at the real one: look again there.
         found = dict(zip(kept.names, solution.vector, strict=True))
         there = FreeParameters(tuple(replace(p, value=float(found.get(p.name, p.nominal))) for p in free.parameters))
         problem = replace(problem, free=there, noise=reduced.noise)
-        dropped = find_redundancies(problem, there.start, held)
-        if [r.dropped for r in dropped] == held:
+        dropped = find_redundancies(problem, there.start, out)
+        if [r.dropped for r in dropped] == out:
             break
     else:
         solution = replace(solution, converged=False)
-        dropped = tuple(r for r in dropped if r.dropped in held)
-    return Solved(start, reduced, replace(solution, steps=steps), dropped, limits, components)
+        dropped = tuple(r for r in dropped if r.dropped in out)
+    return Solved(start, reduced, replace(solution, steps=steps), dropped, limits, components, held)
 
 
-def _check_held(held: list[str], free: FreeParameters, limits: tuple[Array, Array], where: str) -> None:
+def _check_dropped(dropped: list[str], free: FreeParameters, limits: tuple[Array, Array], where: str) -> None:
     for name, p, low, high in zip(free.names, free.parameters, *limits, strict=True):
-        if name in held and not low <= p.nominal <= high:
+        if name in dropped and not low <= p.nominal <= high:
             raise InputError(
                 "the bounds exclude the nominal value of a redundant parameter, at which `redundancy=drop` holds it",
                 where=f"{where}, {name}",
@@ -180,12 +213,14 @@ def _solve_with_noise(
         if change < _SETTLED and _load_shift(problem, there) < _LOADS_AGREE * small:
             break
         problem = there
-        solution = _solved(problem, joints, loss, limits, small)
+        solution = solve_with_joints(problem, joints, loss, limits, small)
         steps += solution.steps
     return replace(solution, steps=steps), problem, components
 
 
-def _solved(problem: Problem, joints: Array, loss: Loss, limits: tuple[Array, Array] | None, small: float) -> Solution:
+def solve_with_joints(
+    problem: Problem, joints: Array, loss: Loss, limits: tuple[Array, Array] | None, small: float
+) -> Solution:
     """Solve with the variances of the joints' errors as they are; residual and Jacobian are the readings' own."""
     if not joints.any():
         return solve(problem, loss, limits, small)
@@ -302,8 +337,9 @@ def _load_shift(before: Problem, after: Problem) -> float:
 def noise_found(problem: Problem, solution: Solution, loss: Loss) -> dict[str, tuple[float, float]]:
     """Return for each observation the deviation of its whitened residuals, and the degrees of freedom behind it."""
     kinds = np.concatenate([[problem.kind(b)] * b.rows for b in problem.blocks])
-    of_readings = np.concatenate([[problem.kind(b)] * len(b.readings) for b in problem.blocks])
-    norms = norms_of(solution.residual, problem.components)
+    components = weighed_together(loss, problem.components)
+    of_norms = kinds[np.cumsum(components) - 1]
+    norms = norms_of(solution.residual, components)
     spent = _informed_rows(problem, solution)
     found = {}
     for name in dict.fromkeys(kinds.tolist()):
@@ -314,8 +350,11 @@ def noise_found(problem: Problem, solution: Solution, loss: Loss) -> dict[str, t
         if loss == "linear":
             found[name] = (float(np.sqrt(np.sum(mine**2) / freedom)), freedom)
         else:
-            of_name = of_readings == name
-            found[name] = (robust_scale(norms[of_name], problem.components[of_name]), freedom)
+            of_name = of_norms == name
+            scale = scale_of(loss, norms[of_name], components[of_name], spent * float(of_name.mean()))
+            if meets_exactly(loss, components) and spent > _LARGEST_SHARE_SPENT * problem.rows:
+                scale = max(scale, 1.0)  # nearly all are met whatever the noise: it stays as it was assumed
+            found[name] = (scale, freedom)
     return found
 
 

@@ -13,7 +13,7 @@ from typing import Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.identification.solving.losses import Loss, norms_of, robust_scale, weights
+from truearm.identification.solving.losses import ABSOLUTE, Loss, norms_of, robust_scale, weighed_together, weights
 from truearm.modeling.chain import Array
 from truearm.modeling.parameters import FreeParameters
 
@@ -21,7 +21,9 @@ from truearm.modeling.parameters import FreeParameters
 SMALL: Final = 1e-6
 #: Size of a step that counts as one, where the prior is no scale (base and targets) [m or rad].
 _GEOMETRIC: Final = 1e-3
-_STEPS: Final = {"linear": 60, "huber": 100, "cauchy": 100, "l1": 300}
+_STEPS: Final = {"linear": 60, "huber": 100, "cauchy": 100, "l1": 300, "l1-components": 300}
+#: Share of the cost that a step must promise where coordinates pull alone: the way to their vertex never ends.
+_CREEPING: Final = 1e-7
 #: How much larger the last step may be where single numbers pull with one strength however near they are.
 _CREEPING_FACTOR: Final = 10.0
 
@@ -83,7 +85,7 @@ class Solution:
     residual, jacobian
         Whitened residual ``(rows,)`` and Jacobian of the readings there, not weighted by a loss.
     weight
-        What the loss left of each reading, ``(readings,)``.
+        What the loss left of each reading, ``(readings,)``; where coordinates count alone, of their mean.
     """
 
     vector: Array
@@ -104,23 +106,26 @@ def solve(
     problem
         What is minimised; starts at its free parameters' values, moved inside the bounds.
     loss
-        ``linear`` is least squares; ``l1`` the sum of the norms of the readings (Li et al. 2016, with
-        "|X - X'|" read as each point's distance).
+        ``linear`` is least squares; ``l1`` the sum of the norms of the readings (Li et al. 2016, equation 4, with
+        "|X - X'|" read as each point's distance); ``l1-components`` that of the absolute values of their coordinates.
     bounds
         Lowest and highest value of every parameter [SI], infinite where there is none.
     small
         Step that is the last, in priors.
     """
+    if loss == "l1-components" and not problem.priors:
+        return _by_linear_programs(problem, bounds)
     start = problem.free.start
     here = problem.at(start if bounds is None else np.clip(start, *bounds))
     prior = problem.free.prior
     damping = 0.0
     scale: float | None = None
+    components = weighed_together(loss, problem.components)
     steps, converged = 0, False
     for steps in range(1, _STEPS[loss] + 1):
         norms = _norms(here, loss)
-        scale = _next_scale(loss, norms, problem.components, scale, steps)
-        w = np.repeat(weights(loss, norms, scale), problem.components)
+        scale = _next_scale(loss, norms, components, scale, steps)
+        w = np.repeat(weights(loss, norms, scale), components)
         R, c = _triangle(here, w)
         cost = _cost(here, w)
         accepted = False
@@ -138,14 +143,35 @@ def solve(
             break
         here = trial
         last = float(np.abs(step / np.minimum(prior, _GEOMETRIC)).max()) < small * (
-            _CREEPING_FACTOR if loss == "l1" else 1.0
+            _CREEPING_FACTOR if loss in ABSOLUTE else 1.0
         )
-        if last or predicted <= 1e-24 * max(cost, 1.0):
-            converged = loss != "l1" or scale <= _L1_FLOOR * float(np.median(_norms(here, loss)) + 1e-300)
+        ended = last or predicted <= (_CREEPING if loss == "l1-components" else 1e-24) * max(cost, 1.0)
+        if ended:
+            converged = loss not in ABSOLUTE or scale <= _L1_FLOOR * float(np.median(_norms(here, loss)) + 1e-300)
             if converged:
                 break
     final = weights(loss, _norms(here, loss), scale or 1.0)
+    if loss == "l1-components":
+        final = _of_readings(final, problem.components)
     return Solution(here.vector, converged, steps, here.residual, here.jacobian, final)
+
+
+def _by_linear_programs(problem: Solvable, bounds: tuple[Array, Array] | None) -> Solution:
+    """Minimise the sum of absolute coordinates without priors: a vertex, which reweighting does not reach."""
+    from truearm.identification.solving.componentwise import least_absolute
+
+    here, converged, steps = least_absolute(problem, bounds)
+    norms = _norms(here, "l1-components")
+    weight = weights("l1-components", norms, 0.3 * _L1_FLOOR * float(np.median(norms)) + 1e-300)
+    return Solution(
+        here.vector, converged, steps, here.residual, here.jacobian, _of_readings(weight, problem.components)
+    )
+
+
+def _of_readings(weight: Array, components: NDArray[np.intp]) -> Array:
+    """Return the weight of each reading whose coordinates weigh alone: that of their mean size, ``(readings,)``."""
+    first = np.concatenate([[0], np.cumsum(components)[:-1]])
+    return np.asarray(components / np.add.reduceat(1.0 / weight, first))
 
 
 _L1_FLOOR: Final = 1e-4  # an l1 reading closer than this share of the median counts as met
@@ -154,7 +180,7 @@ _L1_FLOOR: Final = 1e-4  # an l1 reading closer than this share of the median co
 def _next_scale(loss: Loss, norms: Array, components: NDArray[np.intp], scale: float | None, step: int) -> float:
     if loss == "linear":
         return 1.0
-    if loss == "l1":
+    if loss in ABSOLUTE:
         floor = 0.3 * _L1_FLOOR * float(np.median(norms)) + 1e-300
         return max(floor, float(np.median(norms)) if scale is None else 0.5 * scale)
     if scale is None or step <= 10:  # then held, so that the weights can settle
@@ -164,7 +190,7 @@ def _next_scale(loss: Loss, norms: Array, components: NDArray[np.intp], scale: f
 
 def _norms(here: Evaluated, loss: Loss) -> Array:
     """Return the norm of each whitened reading; ones for the linear loss, which does not ask."""
-    components = here.problem.components
+    components = weighed_together(loss, here.problem.components)
     return np.ones(len(components)) if loss == "linear" else norms_of(here.residual, components)
 
 

@@ -285,7 +285,8 @@ def _with_and_without(
         if not waiting:
             break
         squares, traces, information = best.slopes([*waiting])
-        steps = 0.5 * (squares - traces) / np.maximum(np.diag(information), 1e-300)
+        with np.errstate(over="ignore"):  # where nothing is left over, no step is finite
+            steps = 0.5 * (squares - traces) / np.maximum(np.diag(information), 1e-300)
         most = _MOST * float(best.factors.max()) / max(_effect(moments), 1e-300)  # beyond, the readings say nothing
         rising = [(kind, step) for kind, step in zip(waiting, steps.tolist(), strict=True) if 0.0 < step < most]
         if not rising:

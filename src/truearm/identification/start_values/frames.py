@@ -16,6 +16,7 @@ from functools import cache
 import numpy as np
 
 from truearm.errors import InputError
+from truearm.identification.held import NOTHING_HELD, Held
 from truearm.limits import refuse_beyond
 from truearm.measurement.dataset import Dataset, IntArray
 from truearm.modeling.chain import Array
@@ -26,7 +27,7 @@ from truearm.modeling.transform import Transform, rotation_from_quaternion
 _ARM = 0.3
 
 
-def initial_frames(robot: Robot, data: Dataset) -> Robot:
+def initial_frames(robot: Robot, data: Dataset, held: Held = NOTHING_HELD) -> Robot:
     """Return the robot placed where the data say it stands, with the data's targets on its flange.
 
     Parameters
@@ -35,6 +36,8 @@ def initial_frames(robot: Robot, data: Dataset) -> Robot:
         Its kinematic parameters are used as they are; its own base and targets are left out of account.
     data
         At least one position reading; orientations are used where present.
+    held
+        Places that are known: those are not found, and the others agree with them.
 
     Raises
     ------
@@ -55,8 +58,14 @@ def initial_frames(robot: Robot, data: Dataset) -> Robot:
     y = data.position[readings] - centre
 
     # R' y - p_c = R_c t + u: left side linear in the nine entries of R, right side in the targets and u.
-    blocks = np.zeros((len(readings), 3, 3 * len(seen) + 3))
-    for column, t in enumerate(seen):
+    left = p[where]
+    given = {t: held.targets[data.targets[t]] for t in seen if data.targets[t] in held.targets}
+    for t, place in given.items():
+        mine = what == t
+        left[mine] += R[where[mine]] @ np.array(place.translation)
+    found = [t for t in seen if t not in given]
+    blocks = np.zeros((len(readings), 3, 3 * len(found) + 3))
+    for column, t in enumerate(found):
         mine = what == t
         blocks[mine, :, 3 * column : 3 * column + 3] = R[where[mine]]
     blocks[:, :, -3:] = np.eye(3)
@@ -65,13 +74,17 @@ def initial_frames(robot: Robot, data: Dataset) -> Robot:
     for i in range(3):
         entries[:, i, i::3] = y  # (R' y)_i = sum_j R_ji y_j with vec(R) row by row
     turned = entries.reshape(-1, 9)
-    left = p[where].reshape(-1)
+    left = left.reshape(-1)
     basis = _column_space(known)
     M = turned - basis @ (basis.T @ turned)
     m = left - basis @ (basis.T @ left)
 
     rotations = {t: _orientations(data, t) for t in seen}
-    for where_t, Y in rotations.values():
+    for t, (where_t, Y) in rotations.items():
+        if t in given:  # R' Y = R_c Q with Q known
+            M = np.concatenate([M, _ARM * _turned_back(Y)])
+            m = np.concatenate([m, _ARM * (R[where_t] @ given[t].rotation).reshape(-1)])
+            continue
         before, after = _turn_axes(R[where_t]), _turn_axes(Y)
         rows = np.zeros((len(before), 3, 9))
         for i in range(3):
@@ -79,10 +92,18 @@ def initial_frames(robot: Robot, data: Dataset) -> Robot:
         M = np.concatenate([M, _ARM * rows.reshape(-1, 9)])
         m = np.concatenate([m, _ARM * after.reshape(-1)])
 
-    base = _nearest_rotation(M.T @ M, M.T @ m)
-    solution = np.asarray(np.linalg.lstsq(known, turned @ base.reshape(-1) - left, rcond=1e-10)[0], dtype=np.float64)
+    base = _nearest_rotation(M.T @ M, M.T @ m) if held.base is None else held.base.rotation
+    right = turned @ base.reshape(-1) - left
+    if held.base is not None:  # u = R' (p - centre) with p known: it goes to the right side
+        right -= np.tile(base.T @ (np.array(held.base.translation) - centre), len(readings))
+        known = known[:, :-3]
+    solution = np.zeros(0)
+    if known.shape[1]:
+        solution = np.asarray(np.linalg.lstsq(known, right, rcond=1e-10)[0], dtype=np.float64)
     places: dict[str, Transform | Array] = {}
-    for column, t in enumerate(seen):
+    for t, place in given.items():
+        places[data.targets[t]] = place if len(rotations[t][0]) else np.array(place.translation)
+    for column, t in enumerate(found):
         point = solution[3 * column : 3 * column + 3]
         where_t, Y = rotations[t]
         if len(where_t):
@@ -91,8 +112,17 @@ def initial_frames(robot: Robot, data: Dataset) -> Robot:
             places[data.targets[t]] = Transform.from_matrix(U @ np.diag([1, 1, np.linalg.det(U @ Vt)]) @ Vt, point)
         else:
             places[data.targets[t]] = point
-    origin = base @ solution[-3:] + centre
-    return robot.with_frames(Transform.from_matrix(base, origin), places)  # type: ignore[arg-type]
+    places = {name: places[name] for name in (data.targets[t] for t in seen)}
+    stands = held.base or Transform.from_matrix(base, base @ solution[-3:] + centre)
+    return robot.with_frames(stands, places)  # type: ignore[arg-type]
+
+
+def _turned_back(Y: Array) -> Array:
+    """Return the rows that the nine entries of R are multiplied by in R' Y, for rotations Y ``(n, 3, 3)``."""
+    rows = np.zeros((len(Y), 3, 3, 9))  # (R' Y)_ik = sum_j R_ji Y_jk with vec(R) row by row
+    for i in range(3):
+        rows[:, i, :, i::3] = np.swapaxes(Y, 1, 2)
+    return rows.reshape(-1, 9)
 
 
 def _column_space(A: Array) -> Array:

@@ -15,6 +15,7 @@ from typing import Final
 import numpy as np
 
 from truearm.errors import InputError, nearest_names
+from truearm.identification.held import NOTHING_HELD, Held
 from truearm.identification.solving.problem import Problem
 from truearm.identification.solving.solver import solve
 from truearm.identification.start_values.frames import initial_frames
@@ -46,7 +47,7 @@ _LEAST_OF_A_FIXTURE: Final = 12
 _LEAST_SINGULAR_VALUE: Final = 1e-5
 
 
-def start_from_readings(robot: Robot, data: Dataset) -> Robot:
+def start_from_readings(robot: Robot, data: Dataset, held: Held = NOTHING_HELD) -> Robot:
     """Return the robot placed where the data say it stands, with the data's targets and fixtures.
 
     Parameters
@@ -54,6 +55,8 @@ def start_from_readings(robot: Robot, data: Dataset) -> Robot:
     robot
         Its kinematic parameters are used as they are. Its own base and targets are left out of account where the data
         place them.
+    held
+        Places that are known: the robot, its targets and the fixtures are there.
 
     Raises
     ------
@@ -62,17 +65,17 @@ def start_from_readings(robot: Robot, data: Dataset) -> Robot:
         and fixture.
     """
     if data.fixture is None:
-        return initial_frames(robot, data)
+        return initial_frames(robot, data, held).with_scale(data.scale_sigma)
     kinds = _kinds(data)
-    _refuse_few(data, kinds)
-    placed = _placed(robot, data, kinds)
+    _refuse_few(data, kinds, held)
+    placed = _placed(robot, data, kinds, held)
     have = {target.name for target in placed.targets}
     for target in dict.fromkeys(data.target[data.has_reading & (data.against >= 0)].tolist()):
         if data.targets[target] not in have:
-            placed = _with_target(placed, data, target, kinds)
-    placed = placed.with_fixtures(_fixture_places(placed, data, kinds))
-    _refuse_alike(placed, data)
-    return placed
+            placed = _with_target(placed, data, target, kinds, held)
+    placed = placed.with_fixtures(_fixture_places(placed, data, kinds, held))
+    _refuse_alike(placed, data, held)
+    return placed.with_scale(data.scale_sigma)
 
 
 def with_fixtures_of(robot: Robot, data: Dataset) -> Robot:
@@ -124,20 +127,25 @@ def _kinds(data: Dataset) -> dict[str, FixtureKind]:
     return found
 
 
-def _placed(robot: Robot, data: Dataset, kinds: Mapping[str, FixtureKind]) -> Robot:
-    """Return the robot with its base and with those targets that positions give."""
+def _placed(robot: Robot, data: Dataset, kinds: Mapping[str, FixtureKind], held: Held) -> Robot:
+    """Return the robot with its base and with those targets that are known, or that positions give."""
     setup = data.setup
     if data.has_position.any():
-        placed = initial_frames(robot, data)
+        placed = initial_frames(robot, data, held)
+    elif held.base is not None:
+        placed = robot.with_frames(held.base, {})
     elif setup is not None and setup.has_position.any():
-        sides = [initial_frames(robot, seen) for seen in _triangulated(data, setup)]
+        sides = [initial_frames(robot, seen, held) for seen in _triangulated(data, setup)]
         placed = min(sides, key=lambda found: _misfit(found, data, setup))
     else:
         placed = robot.with_frames(robot.base, {})
     for index, name in enumerate(data.fixtures):
         if kinds[name] == "frame":
-            placed = _also(placed, {**_targets(initial_frames(robot, _as_instrument(data, index))), **_targets(placed)})
-    return _at_points(placed, data, kinds)
+            seen = initial_frames(robot, _as_instrument(data, index), held.seen_from(name))
+            placed = _also(placed, {**_targets(seen), **_targets(placed)})
+    have = {target.name for target in placed.targets}
+    known = {n: np.array(p.translation) for n, p in held.targets.items() if n in data.targets and n not in have}
+    return _at_points(_also(placed, known) if known else placed, data, kinds)
 
 
 def _targets(robot: Robot) -> dict[str, Transform | Array]:
@@ -222,7 +230,7 @@ def _also(robot: Robot, found: Mapping[str, Transform | Array]) -> Robot:
     return robot.with_frames(robot.base, {**_targets(robot), **found})  # type: ignore[dict-item]
 
 
-def _with_target(robot: Robot, data: Dataset, target: int, kinds: Mapping[str, FixtureKind]) -> Robot:
+def _with_target(robot: Robot, data: Dataset, target: int, kinds: Mapping[str, FixtureKind], held: Held) -> Robot:
     """Return the robot with a target whose place follows from distances and heights alone."""
     mine = data.of_readings(data.has_reading & (data.target == target) & (data.against >= 0))
     mine = _some_of_each_fixture(mine)
@@ -259,9 +267,10 @@ def _with_target(robot: Robot, data: Dataset, target: int, kinds: Mapping[str, F
     found = []
     for start in np.argsort(cost)[:_PLACES_KEPT].tolist():
         tried = _also(robot, {name: grid[start]})
-        tried = tried.with_fixtures(_fixture_places(tried, mine, kinds))
+        tried = tried.with_fixtures(_fixture_places(tried, mine, kinds, held))
         own = tried.target(name).chain.parameters
         free = FreeParameters(tuple(q for q in tried.parameters.values() if q.group == "fixture" or q.name in own))
+        free = free.without(Held(fixtures=held.fixtures).names(tried))
         problem = Problem(tried, mine, free, dict.fromkeys(_names(), _SEARCH_DEVIATION))
         solution = solve(problem, small=_SEARCH_SMALL)
         there = solution.vector[[free.names.index(tried.target(name).parameter(axis)) for axis in "xyz"]]
@@ -282,9 +291,9 @@ def _some_of_each_fixture(data: Dataset) -> Dataset:
     return data.of_readings(some)
 
 
-def _refuse_few(data: Dataset, kinds: Mapping[str, FixtureKind]) -> None:
+def _refuse_few(data: Dataset, kinds: Mapping[str, FixtureKind], held: Held) -> None:
     """Refuse fixtures that stand nowhere, for want of readings."""
-    known = {} if data.setup is None else _known(data.setup)
+    known = {*held.fixtures, *({} if data.setup is None else _known(data.setup))}
     least = {"point": 4, "plane": 3, "frame": 1}
     for index, name in enumerate(data.fixtures):
         mine = (data.against == index) & data.has_reading
@@ -303,7 +312,9 @@ def _refuse_few(data: Dataset, kinds: Mapping[str, FixtureKind]) -> None:
             )
 
 
-def _fixture_places(robot: Robot, data: Dataset, kinds: Mapping[str, FixtureKind]) -> dict[str, Place]:
+def _fixture_places(
+    robot: Robot, data: Dataset, kinds: Mapping[str, FixtureKind], held: Held = NOTHING_HELD
+) -> dict[str, Place]:
     """Return where the fixtures stand, from the places of the targets; known places as they are known."""
     at = robot.loaded(data.postures)
     tips = {t.name: robot.world_poses(at, t.name)[0] for t in robot.targets if t.name in data.targets}
@@ -313,8 +324,10 @@ def _fixture_places(robot: Robot, data: Dataset, kinds: Mapping[str, FixtureKind
     for index, name in enumerate(data.fixtures):
         read = np.flatnonzero((data.against == index) & data.has_reading)
         points = np.array([tips[data.targets[data.target[r]]][data.configuration[r]] for r in read.tolist()])
-        if kinds[name] == "frame":
-            place = _frame(robot, data, index)
+        if name in held.fixtures:
+            place = held.fixtures[name]
+        elif kinds[name] == "frame":
+            place = _frame(robot, data, index, held)
             place = Transform(known[name], place.quaternion) if name in known else place
         elif name in known:
             place = Transform(known[name])
@@ -336,9 +349,9 @@ def _known(setup: Dataset) -> dict[str, tuple[float, float, float]]:
     return found
 
 
-def _frame(robot: Robot, data: Dataset, index: int) -> Transform:
+def _frame(robot: Robot, data: Dataset, index: int, held: Held) -> Transform:
     """Return where a frame stands: the robot's base, seen from it, the other way round."""
-    from_it = initial_frames(robot, _as_instrument(data, index)).base
+    from_it = initial_frames(robot, _as_instrument(data, index), Held(targets=held.targets)).base
     turned = robot.base.rotation @ from_it.rotation.T
     return Transform.from_matrix(turned, np.array(robot.base.translation) - turned @ np.array(from_it.translation))
 
@@ -377,9 +390,11 @@ def _names() -> tuple[str, ...]:
     return tuple(observation.name for observation in OBSERVATIONS)
 
 
-def _refuse_alike(robot: Robot, data: Dataset) -> None:
+def _refuse_alike(robot: Robot, data: Dataset, held: Held) -> None:
     """Refuse readings that do not even determine where base, targets and fixtures are."""
-    free = _start_parameters(robot, data, ("base", "target", "fixture"))
+    free = held.free_of(_start_parameters(robot, data, ("base", "target", "fixture")), robot)
+    if not free.names:
+        return
     noise = dict.fromkeys(_names(), _SEARCH_DEVIATION)
     J = Problem(robot, data, free, noise, priors=False).linearised(free.start)[1]
     s = np.linalg.svd(np.linalg.qr(J, mode="r"), compute_uv=False)

@@ -33,7 +33,7 @@ _FORCE: Final = ("force_x", "force_y", "force_z")
 _MOMENT: Final = ("moment_x", "moment_y", "moment_z")
 _UNITS: Final[dict[str, tuple[str, ...]]] = (
     dict.fromkeys((*_POSITION, *_LENGTHS, "sigma"), LENGTH_UNITS)
-    | {"sigma_rot": SMALL_ANGLE_UNITS, "temperature": ("degC",)}
+    | {"sigma_rot": SMALL_ANGLE_UNITS, "scale_sigma": ("ppm",), "temperature": ("degC",)}
     | dict.fromkeys(_FORCE, ("N",))
     | dict.fromkeys(_MOMENT, ("N m",))
 )
@@ -50,7 +50,8 @@ _SHOWN: Final = (
     | {"visit": "visit", "fixture": "fixture", "distance": "distance [mm]", "height": "height [mm]"}
     | {axis: f"{axis} [mm]" for axis in _POSITION}
     | {part: part for part in _QUATERNION}
-    | {"sigma": "sigma [mm]", "sigma_rot": "sigma_rot [mrad]", "temperature": "temperature [degC]"}
+    | {"sigma": "sigma [mm]", "sigma_rot": "sigma_rot [mrad]"}
+    | {"scale_sigma": "scale_sigma [ppm]", "temperature": "temperature [degC]"}
     | {name: f"{name} [N]" for name in _FORCE}
     | {name: f"{name} [N m]" for name in _MOMENT}
 )
@@ -134,6 +135,7 @@ def read_csv(path: Path) -> Dataset:
     return replace(
         dataset,
         setup=None if setup is None else read_setup(setup, places, dataset),
+        scale_sigma=_scale_sigma(cells, columns) if "scale_sigma" in columns else None,
         temperature=circumstance("temperature") if "temperature" in columns else None,
         wrench=wrench,
     )
@@ -249,6 +251,21 @@ def _roles(cells: Cells, columns: dict[str, _Column]) -> tuple[str, ...]:
     return roles
 
 
+def _scale_sigma(cells: Cells, columns: dict[str, _Column]) -> float:
+    """Return the one deviation of the scale, which every row repeats."""
+    place = columns["scale_sigma"].place
+    found = cells.numbers(place, columns["scale_sigma"].unit, deviation=True)
+    other = np.flatnonzero(found != found[0])
+    if len(other):
+        raise InputError(
+            "the scale is of the instrument, and there is one of it",
+            where=cells.place(int(other[0]), place),
+            came=cells.columns[place][int(other[0])],
+            allowed=f"{cells.columns[place][0]}, as on line {cells.lines[0]}",
+        )
+    return float(found[0])
+
+
 def _visits(cells: Cells, place: int) -> IntArray:
     """Return the number of the visit that each row was read on."""
     for line, text in enumerate(texts := cells.texts(place)):
@@ -298,6 +315,7 @@ def csv_text(dataset: Dataset, length_unit: str = "mm", angle_unit: str = "deg")
         *(f"{name} [{length_unit}]" for name in lengths),
         *([f"sigma [{length_unit}]"] if with_sigma else []),
         *(["sigma_rot [mrad]"] if with_sigma_rot else []),
+        *([_SHOWN["scale_sigma"]] if dataset.scale_sigma is not None else []),
         *(_SHOWN[name] for name in circumstances),
     ]
     joints = [[_shown(v, unit) for v, unit in zip(row, units, strict=True)] for row in dataset.joints.tolist()]
@@ -321,6 +339,8 @@ def csv_text(dataset: Dataset, length_unit: str = "mm", angle_unit: str = "deg")
             row += _cells(part.sigma, reading, length_unit, 1)
         if with_sigma_rot:
             row += _cells(part.sigma_rot, reading, "mrad", 1)
+        if dataset.scale_sigma is not None:
+            row.append("" if role == "fixture" else _shown(dataset.scale_sigma, "ppm"))
         return row
 
     for part, role in zip(parts, _ROLES, strict=False):

@@ -15,6 +15,7 @@ from typing import Final
 import numpy as np
 
 from truearm.errors import InputError, did_you_mean
+from truearm.modeling.balancers import Anchor, Balancer
 from truearm.modeling.chain import Array
 from truearm.modeling.controller import ControllerKinematics
 from truearm.modeling.conventions import convention
@@ -23,8 +24,8 @@ from truearm.modeling.conversion.common_normals import dh, hayati, s_model
 from truearm.modeling.conversion.directions import cpc, joint_errors, mcpc, translations
 from truearm.modeling.conversion.links import Links
 from truearm.modeling.conversion.origins import origins
-from truearm.modeling.lines import at_zero, base_and_flange
-from truearm.modeling.parts import Inertia, LinkMass
+from truearm.modeling.lines import at_zero, base_and_flange, joint_axes
+from truearm.modeling.parts import Inertia, Joint, LinkMass
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 
@@ -119,7 +120,11 @@ def converted(robot: Robot, convention_name: str) -> Robot:
         *([f"left out: {' and '.join(lost)}"] if lost else []),
     ]
     return replace(
-        made, masses=_moved_masses(robot, made) if upright else (), history=(*robot.history, "; ".join(said))
+        made,
+        joints=_with_bearings(robot, made),
+        masses=_moved_masses(robot, made) if upright else (),
+        balancers=tuple(_moved_balancer(balancer, robot, made) for balancer in robot.balancers),
+        history=(*robot.history, "; ".join(said)),
     )
 
 
@@ -146,17 +151,49 @@ def _tidy(row: Mapping[str, float], units: Mapping[str, str]) -> dict[str, float
     return {column: tidy(row[column], unit) for column, unit in units.items() if column in row}
 
 
+def _with_bearings(before: Robot, after: Robot) -> tuple[Joint, ...]:
+    """Return the joints with their bearings where they were; origins of joints are elsewhere now.
+
+    Bearings that nobody has stated stay unknown in a robot none of whose effects asks where they are.
+    """
+    tilts = any(effect.tilts for effect in before.effects)
+    rows = zip(after.joints, before.bearings, joint_axes(before), joint_axes(after), strict=True)
+    made = []
+    for joint, bearing, old, new in rows:
+        if joint.kind == "revolute" and (tilts or joint.bearing is not None):
+            along = float((old.point - new.point) @ new.along)
+            made.append(replace(joint, bearing=round(bearing + along, _DECIMALS) + 0.0))
+        else:
+            made.append(joint)
+    return tuple(made)
+
+
 def _moved_masses(before: Robot, after: Robot) -> tuple[LinkMass, ...]:
     masses = []
     for mass in before.masses:
-        old, new = (
-            at_zero(r, [*r.base_elements, *(e for link in r.link_elements[: mass.joint] for e in link)])
-            for r in (before, after)
-        )
-        place = np.linalg.inv(new) @ old
-        x, y, z, _ = (round(float(v), _DECIMALS) + 0.0 for v in place @ [*mass.cog, 1.0])
+        place = _link_frames(before, after, mass.joint)
+        centre = before.axial_slides.stayed(mass.joint, mass.cog, before.values)
+        x, y, z, _ = (round(float(v), _DECIMALS) + 0.0 for v in place @ [*centre, 1.0])
         masses.append(replace(mass, cog=(x, y, z), inertia=_turned(mass.inertia, place[:3, :3])))
     return tuple(masses)
+
+
+def _moved_balancer(balancer: Balancer, before: Robot, after: Robot) -> Balancer:
+    def moved(anchor: Anchor) -> Anchor:
+        point = before.axial_slides.stayed(anchor.link, anchor.point, before.values)
+        there = _link_frames(before, after, anchor.link) @ [*point, 1.0]
+        x, y, z, _ = (round(float(v), _DECIMALS) + 0.0 for v in there)
+        return replace(anchor, point=(x, y, z))
+
+    return replace(balancer, fixed=moved(balancer.fixed), moving=moved(balancer.moving))
+
+
+def _link_frames(before: Robot, after: Robot, link: int) -> Array:
+    """Return the frame of a link (0 is the base) of one robot seen from that of the other, joints at zero."""
+    old, new = (
+        at_zero(r, [*r.base_elements, *(e for each in r.link_elements[:link] for e in each)]) for r in (before, after)
+    )
+    return np.asarray(np.linalg.inv(new) @ old)
 
 
 def _turned(inertia: Inertia, R: Array) -> Inertia:

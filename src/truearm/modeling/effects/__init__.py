@@ -12,6 +12,7 @@ from typing import Final
 from truearm.errors import InputError, did_you_mean, wrong_kind
 from truearm.modeling.effects.approach import Approach
 from truearm.modeling.effects.backlash import Backlash
+from truearm.modeling.effects.balancing import Balancing
 from truearm.modeling.effects.bearing import BearingCompliance
 from truearm.modeling.effects.clearance import Clearance
 from truearm.modeling.effects.compliance import Compliance
@@ -34,6 +35,7 @@ EFFECTS: Final[tuple[type[Effect], ...]] = (
     BearingCompliance,
     Clearance,
     LinearContactClearance,
+    Balancing,
     Approach,
     ThermalGrowth,
     WarmUp,

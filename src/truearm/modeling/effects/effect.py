@@ -31,11 +31,14 @@ class Layout:
         Joint (from 0) and nominal value [m] of each slide of fixed length along the links.
     transmission_periods
         How often each joint's gear errs in a turn, None where that is not known; may be left out.
+    balancers
+        How many springs and gas cylinders relieve the joints.
     """
 
     kinds: tuple[JointKind, ...]
     lengths: tuple[tuple[int, float], ...] = ()
     transmission_periods: tuple[int | None, ...] = ()
+    balancers: int = 0
 
     @property
     def joints(self) -> range:

@@ -10,6 +10,7 @@ from typing import Final
 
 from truearm.errors import InputError, did_you_mean
 from truearm.modeling.conversion import converted
+from truearm.modeling.effects.balancing import Balancing
 from truearm.modeling.formats.dh_csv import complete_dh_csv
 from truearm.modeling.formats.dh_table import DHRow, DHTable, TableConvention
 from truearm.modeling.formats.model_json import model_json
@@ -102,7 +103,7 @@ def _json(robot: Robot) -> Export:
 
 
 def _python(robot: Robot) -> Export:
-    held = [effect.name for effect in robot.effects if effect.exportable]
+    held = [*(effect.name for effect in robot.effects if effect.exportable), Balancing.name]
     left = tuple(left_out(robot, "A Python file", held))
     return Export(python_text(_in_base(robot), comments(robot, frames(robot), left)), frames(robot), left)
 

@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterable
 from typing import Any, Final
 
+from truearm.modeling.balancers import Balancer
 from truearm.modeling.chain import Element
 from truearm.modeling.parameters import Parameter
 from truearm.modeling.robot import Robot
@@ -36,6 +37,7 @@ def model_json(robot: Robot, frames: str, left_out: Iterable[str]) -> str:
                 "kind": joint.kind,
                 "limits": None if joint.limits is None else list(joint.limits),
                 "transmission_periods": joint.transmission_periods,
+                "bearing": joint.bearing,
                 "elements": _elements(robot, link),
             }
             for joint, link in zip(robot.joints, robot.link_elements, strict=True)
@@ -49,12 +51,18 @@ def model_json(robot: Robot, frames: str, left_out: Iterable[str]) -> str:
         "masses": [
             {"link": m.joint, "mass": m.mass, "cog": list(m.cog), "inertia": list(m.inertia)} for m in robot.masses
         ],
+        "balancers": [_balancer(b) for b in robot.balancers],
         "payload": {"mass": robot.payload.mass, "cog": list(robot.payload.cog)},
         "gravity": list(robot.gravity),
         "parameters": [_parameter(p) for p in robot.parameters.values()],
         "history": list(robot.history),
     }
     return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _balancer(b: Balancer) -> dict[str, Any]:
+    anchors = {name: {"link": a.link, "point": list(a.point)} for name, a in (("fixed", b.fixed), ("moving", b.moving))}
+    return {"name": b.name, **anchors, "length": b.length, "force": b.force, "stiffness": b.stiffness}
 
 
 def _elements(robot: Robot, elements: Iterable[Element]) -> list[dict[str, Any]]:

@@ -78,7 +78,7 @@ def _constants(robot: Robot) -> dict[str, str]:
         (joint.transmission_periods or 0) if f"transmission_sin_{i}" in values else 0
         for i, joint in enumerate(robot.joints, 1)
     ]
-    places, masses = _bodies(robot)
+    places, masses, balancers = _bodies(robot)
     q = np.round(robot.random_configurations(_STORED, np.random.default_rng(0)), 4)
     position, rotation = robot.world_poses(q)
     return {
@@ -88,6 +88,7 @@ def _constants(robot: Robot) -> dict[str, str]:
         "PLACES": _rows(places, [*names, "flange"]),
         "GRAVITY": repr(robot.gravity),
         "MASSES": _rows(masses, [names[joint] for joint, _, _ in masses]),
+        "BALANCERS": _rows(balancers, [balancer.name for balancer in robot.balancers]) if balancers else "()",
         "PAYLOAD": repr((robot.payload.mass, robot.payload.cog)),
         "GAIN": _rows(by_joint("gain", 1.0), names),
         "FOURIER": _rows(list(series), names),
@@ -105,25 +106,38 @@ def _constants(robot: Robot) -> dict[str, str]:
     }
 
 
-def _bodies(robot: Robot) -> tuple[list[tuple[Row, Row]], list[tuple[int, float, Row]]]:
-    """Return the places of joints and flange, every joint along z, and the masses of the links in these frames."""
+def _bodies(
+    robot: Robot,
+) -> tuple[list[tuple[Row, Row]], list[tuple[int, float, Row]], list[tuple[object, ...]]]:
+    """Return places of joints and flange, every joint along z from its bearing, and masses and balancers in them."""
     origins, behind = collapsed(robot)
-    turned = []  # from the axis and its own x and y to those of the convention
-    for link in robot.link_elements:
+    turned = []  # from the axis and its own x and y, at the bearing, to those of the convention
+    for link, bearing in zip(robot.link_elements, robot.bearings, strict=True):
         moving = next(element for element in link if element.variable is not None)
         axes = np.eye(4)
         axes[:3, :3] = np.transpose([*across(moving), axis_of(moving)])
+        axes[:3, 3] = bearing * np.array(axis_of(moving))
         turned.append(axes)
-    before = [np.eye(4), *(axes.T for axes in turned)]
+    inverses = [np.linalg.inv(axes) for axes in turned]
+    before = [np.eye(4), *inverses]
     places = [
         _place(start @ origin @ end) for start, origin, end in zip(before, origins, [*turned, np.eye(4)], strict=True)
     ]
-    masses = []
-    for mass in robot.masses:
-        if mass.mass:
-            cog = turned[mass.joint - 1].T @ behind[mass.joint - 1] @ [*mass.cog, 1.0]
-            masses.append((mass.joint - 1, mass.mass, _tidy(cog[:3])))
-    return places, masses
+
+    def seen(link: int, point: Row) -> Row:
+        """Return a point of a link in the frame behind its joint, or of the base."""
+        if link == 0:
+            return point
+        there = robot.axial_slides.stayed(link, (point[0], point[1], point[2]), robot.values)
+        return _tidy((inverses[link - 1] @ behind[link - 1] @ [*there, 1.0])[:3])
+
+    masses = [(mass.joint - 1, mass.mass, seen(mass.joint, mass.cog)) for mass in robot.masses if mass.mass]
+    balancers: list[tuple[object, ...]] = []
+    for number, b in enumerate(robot.balancers, 1):
+        factor = robot.values.get(f"balancer_{number}", 1.0)
+        ends = tuple((end.link, seen(end.link, end.point)) for end in (b.fixed, b.moving))
+        balancers.append((*ends, factor * b.force, b.length, factor * b.stiffness))
+    return places, masses, balancers
 
 
 def _place(frame: Array) -> tuple[Row, Row]:

@@ -33,6 +33,11 @@ GRAVITY: tuple[float, float, float] = (0.0, 0.0, -9.80665)
 MASSES: tuple[tuple[int, float, tuple[float, float, float]], ...] = ((0, 2.0, (0.2, 0.0, 0.0)),)
 #: What the flange carries: mass, and centre of gravity in the flange frame.
 PAYLOAD: tuple[float, tuple[float, float, float]] = (1.0, (0.0, 0.0, 0.0))
+#: Springs and gas cylinders between two links (0 is the base, joint i carries link i + 1): link and point of both
+#: anchors, pull at a distance of the anchors, that distance, and growth of the pull.
+BALANCERS: tuple[
+    tuple[tuple[int, tuple[float, float, float]], tuple[int, tuple[float, float, float]], float, float, float], ...
+] = ()
 #: Joint effects, one entry a joint. By joint positions: how far a joint turns per unit read; its Fourier series (sine
 #: and cosine of the reading, then of twice the reading); the error of its gear (periods in a turn, sine, cosine).
 GAIN: tuple[float, ...] = (1.0,) * 2
@@ -129,7 +134,7 @@ def _rotation(axis: int, angle: float | Array) -> Array:
 
 
 def _loads(turned: Array, tilted: Array) -> tuple[Array, Array]:
-    """Return force and moment of the weights beyond each joint, in its own frame, ``(n, joints, 3)``."""
+    """Return force and moment of weights and balancers beyond each joint, in its own frame, ``(n, joints, 3)``."""
     joints, links, flange = _frames(turned, tilted)
     bodies = [(joint, mass, links[joint], cog) for joint, mass, cog in MASSES]
     bodies.append((len(JOINTS) - 1, PAYLOAD[0], flange, PAYLOAD[1]))
@@ -140,6 +145,14 @@ def _loads(turned: Array, tilted: Array) -> tuple[Array, Array]:
                 weight = mass * np.array(GRAVITY)
                 force[:, i] += weight @ R
                 moment[:, i] += (np.cross(origin + axes @ cog - p, weight)[:, None, :] @ R)[:, 0]
+    for (lower, fixed), (upper, moving), pull, length, growth in BALANCERS:
+        held = np.array(fixed) if lower == 0 else links[lower - 1][0] + links[lower - 1][1] @ fixed
+        moved = links[upper - 1][0] + links[upper - 1][1] @ moving
+        away = np.linalg.norm(held - moved, axis=1)
+        drawn = (held - moved) * ((pull + growth * (away - length)) / away)[:, None]
+        for i, (p, R) in enumerate(joints[lower:upper], lower):
+            force[:, i] += (drawn[:, None, :] @ R)[:, 0]
+            moment[:, i] += (np.cross(moved - p, drawn)[:, None, :] @ R)[:, 0]
     return force, moment
 
 

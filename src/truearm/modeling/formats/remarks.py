@@ -6,6 +6,7 @@ import math
 from collections.abc import Collection, Sequence
 from typing import Final
 
+from truearm.modeling.effects.balancing import Balancing
 from truearm.modeling.parts import NO_PAYLOAD
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
@@ -15,20 +16,23 @@ _SAME_FRAME: Final = 1e-9
 
 
 def left_out(robot: Robot, format_: str, held: Collection[str] = ()) -> list[str]:
-    """Say what of a robot a file cannot hold: joint effects, the place of the base, targets.
+    """Say what of a robot a file cannot hold: joint effects, balancers, the place of the base, targets.
 
     Parameters
     ----------
     format_
         What the file is, as a sentence begins: ``A URDF``.
     held
-        Names of the joint effects that it holds after all.
+        Names of the joint effects that it holds after all; with that of balancers the balancers themselves.
     """
     said = []
     for effect in robot.effects:
         names = [plain.name for plain in effect.parameters if robot.values[plain.name] != plain.value]
         if names and effect.name not in held:
             said.append(f"{format_} cannot hold the joint effect {effect.name}; left out: {', '.join(names)}.")
+    if robot.balancers and Balancing.name not in held:
+        names = [balancer.name for balancer in robot.balancers]
+        said.append(f"{format_} cannot hold balancers; left out: {', '.join(names)}.")
     base = [name for name, p in robot.parameters.items() if p.group == "base" and p.value != 0.0]
     if base or robot.base_quaternion != Transform().quaternion:
         names = [*(["base_quaternion"] if robot.base_quaternion != Transform().quaternion else []), *base]

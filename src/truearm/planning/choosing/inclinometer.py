@@ -26,7 +26,8 @@ from truearm.modeling.robot import Robot
 from truearm.planning.choosing.exchange import most_informative
 from truearm.planning.choosing.observability import OfInterest
 
-_CANDIDATES: Final = 1500
+#: Pairs of postures that are drawn.
+CANDIDATES: Final = 1500
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +57,8 @@ def plan_tilting(
     posed: int = 8,
     force: float = 20.0,
     move: float = 0.0,
+    axes: Sequence[int] = (0, 1, 2),
+    candidates: int = CANDIDATES,
     deviation: float,
     pose_deviation: float = 1e-5,
 ) -> TiltingPlan:
@@ -72,6 +75,10 @@ def plan_tilting(
     move
         How far joints move within a pair at most [rad]; 0 keeps the joint positions and changes the load only. Poses
         are always compared at the same joint positions.
+    axes
+        Which axes of each link its inclinometer has: 0, 1 and 2 for x, y and z.
+    candidates
+        Pairs to draw and to choose from.
     deviation
         Standard deviation of a change of inclination [rad].
     pose_deviation
@@ -103,18 +110,18 @@ def plan_tilting(
     prior = np.concatenate([[p.prior for p in (*effects, *nuisance)], np.full(3 * len(robot.joints), SEAT)])
     known = np.eye(len(prior))
 
-    candidates = _candidates(model, rng, force, move)
-    rows = change_derivatives(model, candidates, names) / deviation
-    rows = np.where(readable(model, candidates)[..., None], rows, 0.0).reshape(len(candidates), -1, len(prior))
-    by_inclination, known = _chosen(candidates, rows * prior, inclined, known, len(effects))
-    by_pose = candidates.at(np.arange(0))
+    pairs = _candidates(model, rng, candidates, force, move)
+    rows = change_derivatives(model, pairs, names) / deviation
+    rows = np.where(readable(model, pairs)[..., None], rows, 0.0)[:, :, list(axes)].reshape(len(pairs), -1, len(prior))
+    by_inclination, known = _chosen(pairs, rows * prior, inclined, known, len(effects))
+    by_pose = pairs.at(np.arange(0))
     if posed:
-        candidates = _candidates(model, rng, force, 0.0)
-        rows = _displacement_derivatives(model, candidates, names) / (math.sqrt(2.0) * pose_deviation)
-        for posture in (candidates.first, candidates.second):
+        pairs = _candidates(model, rng, candidates, force, 0.0)
+        rows = _displacement_derivatives(model, pairs, names) / (math.sqrt(2.0) * pose_deviation)
+        for posture in (pairs.first, pairs.second):
             rows[~decided(model, posture, upright=False).all(axis=1)] = 0.0
         rows = np.pad(rows, ((0, 0), (0, 0), (0, len(prior) - len(names))))
-        by_pose, known = _chosen(candidates, rows * prior, posed, known, len(effects))
+        by_pose, known = _chosen(pairs, rows * prior, posed, known, len(effects))
     spread = prior * np.sqrt(np.diag(np.linalg.inv(known)))
     return TiltingPlan(by_inclination, by_pose, {p.name: float(s) for p, s in zip(effects, spread, strict=False)})
 
@@ -135,13 +142,13 @@ def _chosen(candidates: Pairs, rows: Array, count: int, known: Array, interest: 
     return candidates.at(chosen), known + measured.T @ measured
 
 
-def _candidates(robot: Robot, rng: np.random.Generator, force: float, move: float) -> Pairs:
+def _candidates(robot: Robot, rng: np.random.Generator, count: int, force: float, move: float) -> Pairs:
     """Return pairs of postures under two different pulls."""
     low, high = np.array([joint.limits or (-np.inf, np.inf) for joint in robot.joints]).T
-    joints = robot.random_configurations(_CANDIDATES, rng)
+    joints = robot.random_configurations(count, rng)
     moved = np.clip(joints + move * rng.uniform(-1.0, 1.0, joints.shape), low, high)
-    ways = rng.permuted(np.tile(np.arange(6), (_CANDIDATES, 1)), axis=1)  # the first two differ
-    pulls = np.zeros((2, _CANDIDATES, 6))
+    ways = rng.permuted(np.tile(np.arange(6), (count, 1)), axis=1)  # the first two differ
+    pulls = np.zeros((2, count, 6))
     pulls[..., :3] = force * np.concatenate([np.eye(3), -np.eye(3)])[ways[:, :2].T]
     return Pairs(*(robot.loaded(Postures(q, wrench=p)) for q, p in zip((joints, moved), pulls, strict=True)))
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from truearm.errors import InputError
@@ -107,26 +108,81 @@ def plan_poses(
     points = np.concatenate([plane.spread(share) for plane, share in zip(cube.planes, shares, strict=True)])
     names = np.repeat([plane.name for plane in cube.planes], shares)
     rng = np.random.default_rng(seed)
-    joints = _joints_at(robot, points, target, rng)
-    for _ in range(_ORDERS):
-        order = all_moving_order(joints, least_move)
-        stuck = order[1:][smallest_moves(joints[order]) < least_move]
-        if not len(stuck):
-            break
-        joints[stuck] = _joints_at(robot, points[stuck], target, rng)
-    else:
-        raise InputError(
-            "no order of the poses was found in which all joints move",
-            where=robot.name,
-            came=f"{len(stuck)} of {count - 1} moves too small for {math.degrees(least_move):.3g} deg in every joint",
-            cure="Ask for a smaller least move or fewer poses.",
-        )
+    joints = _joints_at_all(robot, points, target, rng)
+    order = moving_order(robot, joints, points, target, least_move, rng)
     approach = Tip(robot, target).at(joints[order]).rotation[:, :, 2]
     return PosePlan(cube, points[order], approach, tuple(names[order].tolist()), joints[order], target)
 
 
-def _joints_at(robot: Robot, points: Array, target: str | None, rng: np.random.Generator) -> Array:
-    """Return joint positions within the limits that reach points, well away from singular postures where possible."""
+def moving_order(
+    robot: Robot,
+    joints: Array,
+    points: Array,
+    target: str | None,
+    least_move: float,
+    rng: np.random.Generator,
+    *,
+    again: bool = True,
+) -> NDArray[np.intp]:
+    """Return an order of poses in which all joints move from one to the next, ``(n,)``.
+
+    Parameters
+    ----------
+    joints
+        Joint positions at the poses ``(n, joints)``. Where no order was found they are changed, if `again` allows it.
+    points
+        Where the tip goes [m], ``(n, 3)``.
+    target
+        Name of the target that goes there; the flange if None.
+    least_move
+        What every joint moves at least [rad; m for sliding joints].
+    again
+        Whether poses may be reached anew, in other orientations.
+
+    Raises
+    ------
+    InputError
+        If no such order was found.
+    """
+    stuck = np.zeros(0, dtype=np.intp)
+    for _ in range(_ORDERS):
+        order = all_moving_order(joints, least_move)
+        stuck = order[1:][smallest_moves(joints[order]) < least_move]
+        if not len(stuck):
+            return order
+        if not again:
+            break
+        anew, reached = joints_at(robot, points[stuck], target, rng)
+        joints[stuck[reached]] = anew[reached]
+    raise InputError(
+        "no order of the poses was found in which all joints move",
+        where=robot.name,
+        came=f"{len(stuck)} of {len(joints) - 1} moves too small for {math.degrees(least_move):.3g} deg in every joint",
+        cure="Ask for a smaller least move or fewer poses." if again else "Leave the orientation free.",
+    )
+
+
+def joints_at(
+    robot: Robot, points: Array, target: str | None, rng: np.random.Generator
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Return joint positions that bring a tip to points in any orientation, away from singular postures if possible.
+
+    Each point is reached from the nearest of many random configurations.
+
+    Parameters
+    ----------
+    points
+        In the base frame [m], ``(n, 3)``.
+    target
+        Name of the target that goes there; the flange if None.
+
+    Returns
+    -------
+    joints
+        Joint positions within the limits ``(n, joints)`` [rad or m]; of no meaning where a point is not reached.
+    reached
+        ``(n,)``.
+    """
     joints = np.zeros((len(points), len(robot.joints)))
     regular, reached = np.zeros((2, len(points)), dtype=bool)
     turning = [joint.kind == "revolute" for joint in robot.joints]
@@ -143,6 +199,11 @@ def _joints_at(robot: Robot, points: Array, target: str | None, rng: np.random.G
         joints[left[usable]] = found.joints[usable]
         reached[left[usable]] = True
         regular[left] = [status is PoseStatus.REACHED for status in found.status]
+    return joints, reached
+
+
+def _joints_at_all(robot: Robot, points: Array, target: str | None, rng: np.random.Generator) -> Array:
+    joints, reached = joints_at(robot, points, target, rng)
     if not reached.all():
         missed = points[~reached]
         raise InputError(

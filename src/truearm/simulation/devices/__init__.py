@@ -12,7 +12,7 @@ from truearm.simulation.devices.known_points import CALIBRATION_TABLE, TOUCH_UP
 from truearm.simulation.devices.lengths import BALLBAR, STRINGS
 from truearm.simulation.devices.pencil import DRAWN_CIRCLE
 from truearm.simulation.devices.small_volumes import FIVE_LASERS, GAUGES, STEREO
-from truearm.simulation.devices.touching import PLANE, POINT, SPHERE, TWO_SPHERES
+from truearm.simulation.devices.touching import PLANE, POINT, SPHERE, TWO_SOCKETS, TWO_SPHERES
 from truearm.simulation.devices.tracker import MEASUREMENT_ARM, TRACKER
 
 __all__ = ["DEVICES", "Arm", "Device", "in_view_of", "measured_with", "named_device"]
@@ -33,6 +33,7 @@ DEVICES: Final[tuple[Device, ...]] = (
     SPHERE,
     TWO_SPHERES,
     POINT,
+    TWO_SOCKETS,
     CALIBRATION_TABLE,
     TOUCH_UP,
     DRAWN_CIRCLE,

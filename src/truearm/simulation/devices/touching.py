@@ -1,4 +1,4 @@
-"""Closed loops: a probe that touches a plane or a sphere, a tip held at a point (Nubiola, section 1.2)."""
+"""Closed loops: a probe on a plane or a sphere, a tip held at a point (Nubiola, section 1.2), a ball in sockets."""
 
 from __future__ import annotations
 
@@ -117,22 +117,8 @@ class SphereProbe(Device):
             distance=np.full(count, self.radius),
             fixtures=fixtures,
             fixture=of.astype(np.intp),
-            setup=None if self.apart is None else self._between(nominal, fixtures, sigma, rng),
+            setup=None if self.apart is None else _between(self, nominal, fixtures, self.apart, self.known, sigma, rng),
             sigma=sigma,
-        )
-
-    def _between(self, nominal: Robot, fixtures: tuple[str, ...], sigma: float, rng: np.random.Generator) -> Dataset:
-        exact = self.apart or 0.0
-        return recorded(
-            nominal,
-            self.name,
-            np.zeros((1, len(nominal.joints))),
-            [0],
-            [fixtures[1]],
-            distance=np.array([exact + (self.known if sigma > 0 else 0.0) * rng.standard_normal()]),
-            fixtures=fixtures,
-            fixture=np.zeros(1, dtype=np.intp),
-            sigma=self.known,
         )
 
 
@@ -159,6 +145,73 @@ class HeldAtPoint(Device):
             fixture=np.zeros(count, dtype=np.intp),
             sigma=sigma,
         )
+
+
+@dataclass(frozen=True)
+class TwoSockets(Device):
+    """A ball that is put into two sockets by hand, in ever other postures; joint positions are all that is read.
+
+    Attributes
+    ----------
+    apart
+        Distance of the sockets' centres [m].
+    known
+        How well [m].
+    within
+        How far the flange's z may lean from straight down: the ball's stem meets the socket beyond [rad].
+    """
+
+    apart: float = 0.2
+    known: float = 2e-5
+    within: float = np.deg2rad(75.0)
+
+    def campaign(self, nominal: Robot, arm: Arm, count: int, sigma: float, rng: np.random.Generator) -> Dataset:
+        """Return postures with the ball in the sockets, in turns, so that no posture follows from the one before."""
+        turned, middle = nominal.base.rotation, site(nominal)
+        centres = np.array([middle + turned @ np.array([0.0, s * self.apart / 2, 0.0]) for s in (-1, 1)])
+        of = np.arange(SPARE * count) % len(centres)
+        name = nominal.targets[0].name
+        down = np.tile(-turned[:, 2], (len(of), 1))
+        kept, joints = postures_at(nominal, name, centres[of], count, rng, self.name, facing=down, within=self.within)
+        of = of[kept]
+        wanted = centres[of] + sigma * rng.standard_normal((count, 3))
+        joints = jogged(nominal, arm, name, joints, lambda place: wanted - place)
+        fixtures = ("socket_1", "socket_2")
+        return recorded(
+            nominal,
+            self.name,
+            joints,
+            range(count),
+            [name] * count,
+            position=np.zeros((count, 3)),
+            fixtures=fixtures,
+            fixture=of.astype(np.intp),
+            setup=_between(self, nominal, fixtures, self.apart, self.known, sigma, rng),
+            sigma=sigma,
+        )
+
+
+def _between(
+    device: Device,
+    nominal: Robot,
+    fixtures: tuple[str, ...],
+    apart: float,
+    known: float,
+    sigma: float,
+    rng: np.random.Generator,
+) -> Dataset:
+    """Return what is known of two fixtures: their distance [m], read with the deviation `known` unless `sigma` is 0."""
+    return recorded(
+        nominal,
+        device.name,
+        np.zeros((1, len(nominal.joints))),
+        [0],
+        [fixtures[1]],
+        distance=np.array([apart + (known if sigma > 0 else 0.0) * rng.standard_normal()]),
+        fixtures=fixtures,
+        fixture=np.zeros(1, dtype=np.intp),
+        sigma=known,
+    )
 
 
 PLANE: Final = PlaneProbe(
@@ -189,4 +242,11 @@ POINT: Final = HeldAtPoint(
     "Nubiola, section 1.2: point constraint; deviation ours",
     sigma=5e-5,
     tool=Tool({"tip": (0.02, 0.01, 0.15)}),
+)
+TWO_SOCKETS: Final = TwoSockets(
+    "two-sockets",
+    "ball on the flange put into two sockets 200 mm apart, known to 0.02 mm; nothing but joint positions is read",
+    "Franzese et al. 2025 (MUKCa): two sockets a known distance apart; distance and deviations ours",
+    sigma=2e-5,
+    tool=Tool({"ball": (0.02, 0.01, 0.15)}),
 )

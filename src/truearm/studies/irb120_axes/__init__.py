@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from truearm.studies import Progress
 from truearm.studies.irb120_axes.pictures import errors_picture
-from truearm.studies.irb120_axes.run import NOISE, run
+from truearm.studies.irb120_axes.run import BETWEEN, NOISE, run
 from truearm.studies.irb120_axes.tables import (
+    allowed_table,
     compliance_table,
     matched_table,
     noiseless_table,
@@ -29,6 +30,7 @@ def study(seeds: int, progress: Progress, coarser: int = 1) -> Study:
     """
     found = run(seeds, progress, coarser)
     sines = [chosen.amplitude for chosen in found.run_out.values()]
+    least = [chosen.amplitude for chosen in found.allowed[BETWEEN].values()]
     return Study(
         name="irb120-axes",
         title="Single joints of an ABB IRB 120",
@@ -37,13 +39,15 @@ def study(seeds: int, progress: Progress, coarser: int = 1) -> Study:
         answer="Compliance alone, with the values that the document identified elsewhere, gives the printed errors of"
         " joints 3, 4 and 5 within three tenths, two thirds of what joint 2 shows, too much for joint 6 and nothing"
         " for joint 1. What is missing there, and the backlash, must be in gears and bearings: sines of"
-        f" {min(sines):.3f} to {max(sines):.3f} deg a turn would do.",
+        f" {min(sines):.3f} to {max(sines):.3f} deg a turn would do, and of {min(least):.3f} to {max(least):.3f} deg if"
+        " the compliances are others of the document's own.",
         seeds=seeds,
         tables=(
             radii_table(found),
             compliance_table(found),
             noiseless_table(found),
             shares_table(found),
+            allowed_table(found),
             matched_table(found),
         ),
         pictures=(errors_picture(found.tests, found.outcomes[0]),),

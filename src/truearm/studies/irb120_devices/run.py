@@ -13,10 +13,13 @@ from truearm.identification.solving.models import named_model
 from truearm.measurement.statistics import Spread
 from truearm.modeling.chain import Array
 from truearm.simulation.devices import Device
+from truearm.simulation.devices.artefacts import Artefact
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import Twin, measure
 from truearm.studies import Progress
+from truearm.studies.irb120_devices.identified import deviations
 from truearm.studies.irb120_devices.instruments import Accuracy, ToolErrors, accuracy, tool_alone
+from truearm.studies.irb120_devices.nests import nest_errors
 from truearm.studies.irb120_devices.setups import (
     SETUPS,
     Calibrated,
@@ -51,19 +54,19 @@ class Sphere:
     setup: str
     nest: str
     points: int
-    mean: float
-    std: float
-    max: float
+    mean: str
+    std: str
+    max: str
     table: str
 
 
 SPHERES: Final = (
-    Sphere("tracker", "1", 123, -0.105, 0.091, 0.327, "2.12"),
-    Sphere("planar artefact", "1", 123, 0.022, 0.110, 0.250, "2.12"),
-    Sphere("tracker", "2", 95, -0.148, 0.118, 0.437, "2.12"),
-    Sphere("planar artefact", "2", 95, -0.048, 0.135, 0.363, "2.12"),
-    Sphere("spatial artefact", "1", 108, 0.091, 0.126, 0.328, "2.13"),
-    Sphere("spatial artefact", "3", 90, 0.146, 0.130, 0.385, "2.13"),
+    Sphere("tracker", "1", 123, "-0.105", "0.091", "0.327", "2.12"),
+    Sphere("planar artefact", "1", 123, "0.022", "0.110", "0.250", "2.12"),
+    Sphere("tracker", "2", 95, "-0.148", "0.118", "0.437", "2.12"),
+    Sphere("planar artefact", "2", 95, "-0.048", "0.135", "0.363", "2.12"),
+    Sphere("spatial artefact", "1", 108, "0.091", "0.126", "0.328", "2.13"),
+    Sphere("spatial artefact", "3", 90, "0.146", "0.130", "0.385", "2.13"),
 )
 
 
@@ -108,6 +111,9 @@ class SetupOutcome:
         Of the nominal robot.
     after, by_chance
         Of the document's model from configurations chosen by O1, and drawn by chance.
+    least
+        The same from configurations chosen by O1, of a twin whose gears run out no more than the test of single joints
+        allows.
     rigid
         Of a model without compliance, where it is tried.
     all_reflectors
@@ -120,11 +126,14 @@ class SetupOutcome:
         All errors that `after` sums up [mm].
     places
         Where the robot says nest 1 was measured [m], ``(n, 3)``.
+    identified
+        Deviations from nominal, by the document's names and in its units.
     """
 
     before: Spread
     after: Spread
     by_chance: Spread
+    least: Spread
     rigid: Spread | None
     all_reflectors: Spread | None
     number_tool_known: int
@@ -132,6 +141,7 @@ class SetupOutcome:
     shares: Shares
     errors: Array
     places: Array
+    identified: Mapping[str, float]
 
 
 @dataclass(frozen=True)
@@ -194,12 +204,15 @@ class Outcome:
         The document's set-ups, by name.
     crossed
         Errors of one set-up's calibration where another one sees, by both names [m].
+    nests
+        Errors of the nests against a measuring machine [m], by artefact and instrument, ``(4,)`` each.
     further
         What is looked at for few seeds only.
     """
 
     setups: Mapping[str, SetupOutcome]
     crossed: Mapping[tuple[str, str], Spread]
+    nests: Mapping[tuple[str, str], Array]
     further: Further | None
 
 
@@ -230,14 +243,15 @@ def _one(seed: Seed, settings: Settings) -> Outcome:
         if further:
             spheres |= _spheres("2.13", twin, {setup.name: robot}, settings, rng)
     twin, alike, crossed = _crossed(settings, rng)
+    nests = _nests(rng)
     if not further:
-        return Outcome(setups, crossed, None)
+        return Outcome(setups, crossed, nests, None)
     seed.step("ballbar")
     spheres |= _spheres("2.12", twin, alike, settings, rng)
     seed.step("every instrument")
     instruments, tool = _instruments(settings, rng)
     seed.step("zones")
-    return Outcome(setups, crossed, Further(spheres, instruments, tool, _zones(settings, rng)))
+    return Outcome(setups, crossed, nests, Further(spheres, instruments, tool, _zones(settings, rng)))
 
 
 def _one_setup(
@@ -255,7 +269,10 @@ def _one_setup(
         # Cones that are open all round: every reflector at every configuration.
         open_cones = replace(setup, device=replace(setup.device, within=np.pi))
         everywhere = Spread.of(calibrate(open_cones, twin, candidates, rng).errors(truth))
+    quiet = twin_of(setup, setup.truth, least=True)
+    least = calibrate(setup, quiet, candidates, rng).errors(Truth.of(quiet, truth.joints))
     return robot, SetupOutcome(
+        least=Spread.of(least),
         before=Spread.of(uncalibrated(setup, truth)),
         after=Spread.of(errors),
         by_chance=Spread.of(by_chance),
@@ -266,7 +283,19 @@ def _one_setup(
         shares=shares(setup, _SHOWN, rng),
         errors=1e3 * errors,
         places=robot.places(robot.joints, "1"),
+        identified=deviations(robot.robot),
     )
+
+
+def _nests(rng: np.random.Generator) -> dict[tuple[str, str], Array]:
+    tracker, planar, spatial = SETUPS
+    found = {}
+    for artefact, setup in (("triangular", planar), ("spatial", spatial)):
+        device = setup.device
+        size = device.size if isinstance(device, Artefact) else None
+        found[artefact, "laser tracker"] = nest_errors(setup, tracker.device.sigma, None, rng)
+        found[artefact, "C-Track"] = nest_errors(setup, device.sigma, size, rng)
+    return found
 
 
 def _crossed(

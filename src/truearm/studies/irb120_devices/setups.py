@@ -65,8 +65,8 @@ class Setup:
     payload: Payload
     nests: dict[str, Point]
     configurations: int
-    before: float
-    after: float
+    before: str
+    after: str
 
 
 SETUPS: Final = (
@@ -77,8 +77,8 @@ SETUPS: Final = (
         Payload(_TRIANGULAR.mass, _TRIANGULAR.cog),
         dict(_TRIANGULAR.targets),
         38,
-        3.168,
-        0.146,
+        "3.168",
+        "0.146",
     ),
     Setup(
         "planar artefact",
@@ -87,8 +87,8 @@ SETUPS: Final = (
         Payload(_TRIANGULAR.mass, _TRIANGULAR.cog),
         dict(_TRIANGULAR.targets),
         36,
-        4.639,
-        0.176,
+        "4.639",
+        "0.176",
     ),
     Setup(
         "spatial artefact",
@@ -97,8 +97,8 @@ SETUPS: Final = (
         Payload(2.6, (-0.023, 0.0, 0.1)),
         _SPATIAL,
         35,
-        2.913,
-        0.149,
+        "2.913",
+        "0.149",
     ),
 )
 
@@ -149,9 +149,9 @@ class Shares:
     back: float | None
 
 
-def twin_of(setup: Setup, truth: str) -> Twin:
+def twin_of(setup: Setup, truth: str, *, least: bool = False) -> Twin:
     """Return the twin with one of the robot file's truths and gears that run out, carrying what the set-up does."""
-    twin = running_out(truth_twin(driven(), truth, np.random.default_rng(0)))
+    twin = running_out(truth_twin(driven(), truth, np.random.default_rng(0)), least=least)
     robot = twin.robot.with_frames(twin.robot.base, setup.nests).with_payload(setup.payload)
     return replace(twin, robot=robot)
 

@@ -43,7 +43,7 @@ def instrument_table(found: Run) -> Table:
         Row(
             "tracker noise: deviation of a coordinate",
             "mm",
-            [noise],
+            noise,
             explanation="From those distances, equal in all directions. The mean length of such an error is 1.6 times"
             " as much. A slow error of the tracker that moves all reflectors alike does not show here.",
         ),
@@ -52,8 +52,8 @@ def instrument_table(found: Run) -> Table:
     if references is not None:
         away = np.linalg.norm(references - np.nanmedian(references, axis=0), axis=2) * 1e3
         rows += [
-            Row("table: mean distance of its reflectors from their usual place", "mm", [float(np.nanmean(away))]),
-            Row("table: largest", "mm", [float(np.nanmax(away))]),
+            Row("table: mean distance of its reflectors from their usual place", "mm", float(np.nanmean(away))),
+            Row("table: largest", "mm", float(np.nanmax(away))),
         ]
     left_in = np.array([one.table_motion_left_in.mean for one in found.outcomes])
     out = np.array([one.many[PLAIN].mean for one in found.outcomes])
@@ -71,7 +71,7 @@ def instrument_table(found: Run) -> Table:
         Row(
             "two configurations nearest to each other: largest difference of a joint",
             "deg",
-            [float(nearest.min())],
+            float(nearest.min()),
             explanation="No configuration was measured twice, or nearly so: these data cannot tell the robot's"
             " repeatability.",
         )

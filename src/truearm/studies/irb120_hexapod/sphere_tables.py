@@ -22,9 +22,8 @@ def sphere_tables(outcomes: Sequence[Spheres]) -> tuple[Table, Table]:
                 f"{words}: size of the mean, {count} readings",
                 "mm",
                 [1e3 * abs(test.mean) for test in tests],
-                abs(mean),
+                mean.removeprefix("-"),
                 table,
-                absolute=0.1,
                 explanation="A ball that was taught by hand too high or too low makes all distances too long or too"
                 " short, by chance. Here it was taught to 0.1 mm a coordinate, which is invented; about the centre that"
                 " fits best nothing is left of the mean."
@@ -37,13 +36,12 @@ def sphere_tables(outcomes: Sequence[Spheres]) -> tuple[Table, Table]:
                 [1e3 * test.deviation for test in tests],
                 deviation,
                 table,
-                relative=0.4,
                 explanation="Gears and lag of the twin were chosen so that calibration by tracker leaves what the"
                 " document has; here they are met by another way."
                 if first
                 else "",
             ),
-            Row(f"{words}: maximum", "mm", [1e3 * test.largest for test in tests], largest, table, relative=0.4),
+            Row(f"{words}: maximum", "mm", [1e3 * test.largest for test in tests], largest, table),
         ]
         free = [one.found[key] for one in outcomes]
         about.append(Row(f"{words}: size of the mean", "mm", [1e3 * abs(test.mean) for test in free]))

@@ -29,13 +29,13 @@ C_TRACK: Final = 0.040e-3
 #: Configurations that tracker, C-Track and C-Track with the spatial artefact calibrate from.
 _TRAINING: Final = {"laser tracker": 38, "C-Track": 36, "C-Track, spatial": 35}
 #: Tables 2.12 and 2.13: readings, mean, deviation and largest [mm], by nest and model.
-PRINTED: Final[Mapping[tuple[str, str], tuple[int, float, float, float]]] = {
-    ("1", "laser tracker"): (123, -0.105, 0.091, 0.327),
-    ("1", "C-Track"): (123, 0.022, 0.110, 0.250),
-    ("2", "laser tracker"): (95, -0.148, 0.118, 0.437),
-    ("2", "C-Track"): (95, -0.048, 0.135, 0.363),
-    ("1", "C-Track, spatial"): (108, 0.091, 0.126, 0.328),
-    ("3", "C-Track, spatial"): (90, 0.146, 0.130, 0.385),
+PRINTED: Final[Mapping[tuple[str, str], tuple[int, str, str, str]]] = {
+    ("1", "laser tracker"): (123, "-0.105", "0.091", "0.327"),
+    ("1", "C-Track"): (123, "0.022", "0.110", "0.250"),
+    ("2", "laser tracker"): (95, "-0.148", "0.118", "0.437"),
+    ("2", "C-Track"): (95, "-0.048", "0.135", "0.363"),
+    ("1", "C-Track, spatial"): (108, "0.091", "0.126", "0.328"),
+    ("3", "C-Track, spatial"): (90, "0.146", "0.130", "0.385"),
 }
 #: Where the ball is, in the robot's base frame: invented [m].
 _CENTRE: Final = (0.36, 0.0, 0.18)

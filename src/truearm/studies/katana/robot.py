@@ -72,3 +72,18 @@ def published(table: Published, beyond: float = 0.0) -> Robot:
 def workspace_cube() -> Cube:
     """Return the largest cube in front of the Katana with its attachment."""
     return largest_cube(katana(), target=TIP)
+
+
+def deviations(values: Mapping[str, float]) -> dict[str, float]:
+    """Return how far the 17 parameters are from nominal by the document's names [deg, mm].
+
+    The tip's y stands for a turn of the tool link, alpha 5 in the document.
+    """
+    nominal = katana().values
+    found = {}
+    for name, called in zip(NAMES, DOCUMENT_NAMES, strict=True):
+        off = values[name] - nominal[name]
+        if name == "target_tip_y":
+            off = -off / TOOL
+        found[called] = 1e3 * off if called[0] in "ad" and not called.startswith("alpha") else math.degrees(off)
+    return found

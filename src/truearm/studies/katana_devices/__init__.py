@@ -38,7 +38,7 @@ def study(seeds: int, progress: Progress, counts: Counts | None = None) -> Study
     return Study(
         name="katana-devices",
         title="A Katana 450 measured with every instrument",
-        source="D. Patel, doctoral thesis on the Katana 450, sections 3.3, 3.7, 4.5 and 5.5, Tables 4.5 and 4.6;"
+        source="D. A. Patel, thesis on the Katana 450, sections 3.3, 3.7, 4.5 and 5.5, Tables 4.5 and 4.6;"
         " geometry of Table 3.2",
         answer=_answer(outcomes),
         seeds=seeds,

@@ -15,6 +15,7 @@ from truearm.studies.katana_influence.tables import (
     errors_table,
     influences_table,
     methods_table,
+    parameters_tables,
 )
 from truearm.studies.seeds import median_of
 from truearm.studies.study import Study
@@ -51,7 +52,7 @@ def study(seeds: int, progress: Progress, count: int = POSES, unseen: int = _UNS
     return Study(
         name="katana-influence",
         title="Influence-based identification of a Katana 450",
-        source="D. Patel, doctoral thesis on the Katana 450, sections 3.5 to 3.7, Figure 3.8, Tables 3.2 to 3.4",
+        source="D. A. Patel, thesis on the Katana 450, sections 3.5 to 3.7, Figure 3.8, Tables 3.2 to 3.4",
         answer=f"{verdict}: on unseen poses of a geometric robot (Table 3.2) it leaves"
         f" {left('table 3.2', 'influence'):.3f} mm, minimum norm {left('table 3.2', 'minimum norm'):.3f} mm, joint"
         f" least squares {left('table 3.2', 'least squares'):.4f} mm; where joints tilt as well"
@@ -66,6 +67,7 @@ def study(seeds: int, progress: Progress, count: int = POSES, unseen: int = _UNS
             errors_table(outcomes, "After simultaneous identification", 1, "least squares"),
             errors_table(outcomes, "After influence-based identification", 2, "influence"),
             methods_table(outcomes),
+            *parameters_tables(outcomes),
             combinations_table(outcomes),
             contradictions_table(outcomes),
         ),

@@ -25,6 +25,7 @@ from truearm.studies.katana.robot import (
     PERTURBATIONS,
     TIP,
     UNITS,
+    deviations,
     katana,
     published,
     workspace_cube,
@@ -41,6 +42,13 @@ ONE_POSE_METHODS: Final[tuple[OnePoseMethod, ...]] = ("minimum norm", "influence
 METHODS: Final[tuple[Method, ...]] = ("nominal", *ONE_POSE_METHODS, "least squares")
 COMBINATIONS: Final[tuple[Combination, ...]] = ("mean", "scaled-mean", "best-pose")
 AngleUnit = Literal["rad", "deg"]
+#: Whose parameters the document prints, and which of our methods stand beside them: Tables 3.2 and 3.3.
+PRINTED: Final[Mapping[tuple[Truth, Method], str]] = {
+    ("table 3.2", "least squares"): "Table 3.2",
+    ("table 3.2", "minimum norm"): "Table 3.2",
+    ("table 3.3", "least squares"): "Table 3.3",
+    ("table 3.3", "influence"): "Table 3.3",
+}
 
 _LENGTHS: Final = ("a_3", "a_4", "d_5", "target_tip_z")
 _ANGLES: Final[Mapping[AngleUnit, float]] = {"rad": 1.0, "deg": math.radians(1.0)}
@@ -78,6 +86,8 @@ class Outcome:
         Mean distance between the predictions of Tables 3.2 and 3.3 [mm].
     lengths
         Largest change of a length by minimum norm [mm], by the unit of angles.
+    identified
+        Deviations from nominal that a method finds of a robot of Table 3.2 or 3.3, by the document's names [deg, mm].
     """
 
     influence: Influence
@@ -86,6 +96,7 @@ class Outcome:
     combined: Mapping[tuple[OnePoseMethod, Combination], float]
     apart: float
     lengths: Mapping[AngleUnit, float]
+    identified: Mapping[tuple[Truth, Method], Mapping[str, float]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,6 +151,7 @@ def _one(seed: Seed, cube: Cube, count: int, unseen: int) -> Outcome:
         "table 3.2": twin(published("standard"), {}),
     }
     left: dict[tuple[Truth, Method], Left] = {}
+    identified: dict[tuple[Truth, Method], Mapping[str, float]] = {}
     for name, truth in truths.items():
         data = measure(truth, joints, NOISE, rng)
         true, elsewhere = true_poses(truth, joints), true_poses(truth, others)
@@ -151,6 +163,8 @@ def _one(seed: Seed, cube: Cube, count: int, unseen: int) -> Outcome:
         }
         for method, robot in found.items():
             errors = pose_errors(tip_poses(robot, joints), true)
+            if (name, method) in PRINTED:
+                identified[name, method] = deviations(robot.values)
             left[name, method] = Left(
                 poses={quantity: float(values.mean()) for quantity, values in errors.items()},
                 unseen=float(pose_errors(tip_poses(robot, others), elsewhere)["dP"].mean()),
@@ -170,6 +184,7 @@ def _one(seed: Seed, cube: Cube, count: int, unseen: int) -> Outcome:
         left=left,
         combined=combined,
         apart=1e3 * float(np.linalg.norm(standard - other, axis=1).mean()),
+        identified=identified,
         lengths={unit: _length_change(nominal, data, size) for unit, size in _ANGLES.items()},
     )
 

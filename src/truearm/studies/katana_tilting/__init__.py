@@ -16,6 +16,7 @@ from truearm.studies.katana_tilting.tables import (
     errors_table,
     methods_table,
     shares_table,
+    ten_points_table,
     unseen_table,
 )
 from truearm.studies.seeds import median_of
@@ -47,8 +48,7 @@ def study(seeds: int, progress: Progress, count: int = POSES, unseen: int = _UNS
     return Study(
         name="katana-tilting",
         title="A Katana 450 whose joints tilt",
-        source="D. Patel, doctoral thesis on the Katana 450, chapter 4, Figure 4.8, Tables 4.3 to 4.6; geometry of"
-        " Table 3.2",
+        source="D. A. Patel, thesis on the Katana 450, chapter 4, Figure 4.8, Tables 4.3 to 4.6; geometry of Table 3.2",
         answer=f"On unseen poses the conventional calibration leaves {conventional:.3f} mm on average, and"
         f" {tilting:.3f} mm are left if clearance, backlash and stiffness are found by inclinometers first:"
         f" {share:.1f} % (asked: at most {ASKED:g} %, the document has"
@@ -59,6 +59,7 @@ def study(seeds: int, progress: Progress, count: int = POSES, unseen: int = _UNS
             shares_table(outcomes),
             *(errors_table(outcomes, column) for column in range(3)),
             unseen_table(outcomes),
+            ten_points_table(outcomes),
             methods_table(outcomes),
             constants_table(outcomes),
             contradictions_table(),

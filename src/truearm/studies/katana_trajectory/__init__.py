@@ -15,6 +15,7 @@ from truearm.studies.katana_trajectory.pictures import (
     followed_picture,
     joints_picture,
     predicted_picture,
+    robot_picture,
 )
 from truearm.studies.katana_trajectory.run import MODELS, run
 from truearm.studies.katana_trajectory.tables import causes_table, corrected_table, moments_table, rest_table
@@ -49,8 +50,7 @@ def study(seeds: int, progress: Progress, step: float = _STEP, poses: int = POSE
     return Study(
         name="katana-trajectory",
         title="A Katana 450 on a circle",
-        source="D. Patel, doctoral thesis on the Katana 450, chapter 5, Figures 5.7 to 5.10 and 5.12; geometry of"
-        " Table 3.2",
+        source="D. A. Patel, thesis on the Katana 450, chapter 5, Figures 5.7 to 5.10 and 5.12; geometry of Table 3.2",
         answer=f"Tilting alone takes the tip {np.median(alone):.2f} mm beside the circle, {min(alone):.2f} to"
         f" {max(alone):.2f} mm by the posture in which the arm goes round, which the document does not print; stiffness"
         f" alone takes it {stiff:.3f} mm. With geometry from {poses} poses the"
@@ -67,6 +67,7 @@ def study(seeds: int, progress: Progress, step: float = _STEP, poses: int = POSE
             moments_table(outcomes),
         ),
         pictures=(
+            robot_picture(outcomes[0]),
             joints_picture(outcomes[0]),
             about_picture(outcomes[0]),
             across_picture(outcomes[0]),

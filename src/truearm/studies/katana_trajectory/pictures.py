@@ -5,15 +5,50 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
+import numpy as np
+
 from truearm.modeling.chain import Array
-from truearm.reporting.drawing import AFTER, BEFORE, COLOURS, Figure, axis, figure
+from truearm.planning.constraints.clearance import skeleton
+from truearm.reporting.drawing import AFTER, BEFORE, COLOURS, Figure, axis, figure, scene_axis
 from truearm.reporting.numbers import rounded
 from truearm.reporting.planning_figures import joint_trajectories
-from truearm.studies.katana.robot import katana
+from truearm.studies.katana.circle import PENCIL
+from truearm.studies.katana.robot import TIP, katana
 from truearm.studies.katana_trajectory.run import MODELS, SOURCES, Cause, Outcome
 from truearm.studies.study import Picture
 
 _JOINT_COLOURS: Final = (*COLOURS, "#8a6d1d", "#5b3a8c")
+
+
+def robot_picture(first: Outcome) -> Picture:
+    """Draw arm and circle, as in Figure 5.6."""
+    robot = katana(PENCIL)
+    circle = robot.world_poses(first.motion.joints, TIP)[0]
+    start = first.motion.joints[:1]
+    arm = np.concatenate([*skeleton(robot, start), robot.world_poses(start, TIP)[0]])
+    traces: list[Figure] = [
+        {
+            "type": "scatter3d",
+            "mode": mode,
+            "name": name,
+            **{letter: rounded(1e3 * points[:, k], 5) for k, letter in enumerate("xyz")},
+            "line": {"color": colour, "width": width},
+            "marker": {"color": colour, "size": 4},
+        }
+        for name, points, colour, mode, width in (
+            ("circle", circle, "#b3261e", "lines", 4),
+            ("arm", arm, AFTER, "lines+markers", 7),
+        )
+    ]
+    scene: Figure = {f"{letter}axis": scene_axis(f"{letter} [mm]") for letter in "xyz"}
+    scene |= {"aspectmode": "data", "camera": {"eye": {"x": 1.9, "y": 2.3, "z": 1.3}, "center": {"z": -0.2}}}
+    return Picture(
+        "robot",
+        "The arm at the beginning of the circle, as in Figure 5.6",
+        "First seed, nominal, from the base to the pencil's tip. The circle lies on a diagonal plane of a cube of ISO"
+        " 9283.",
+        figure(traces, 460, scene=scene),
+    )
 
 
 def joints_picture(first: Outcome) -> Picture:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from truearm.planning.poses.seven_lines import DIRECTIONS
 from truearm.studies import Progress
-from truearm.studies.kr5_gdt.pictures import lines_picture
+from truearm.studies.kr5_gdt.pictures import circles_picture, lines_picture, model_picture
 from truearm.studies.kr5_gdt.run import NOISE, REPEATS, run
 from truearm.studies.kr5_gdt.tables import (
     before_table,
@@ -54,7 +54,7 @@ def study(seeds: int, progress: Progress, repetitions: int = 1000) -> Study:
             reductions_table(found.outcomes),
             models_table(found.outcomes),
         ),
-        pictures=(lines_picture(found.outcomes[0]),),
+        pictures=(circles_picture(found), model_picture(found.outcomes[0]), lines_picture(found.outcomes[0])),
         notes=(
             "The twin has the errors of Table 3, and its joints otherwise do what they read. Each joint runs over the"
             " interval of Table 2, forward and back, a reflector on the tool is measured, and the instrument's frame is"

@@ -51,6 +51,8 @@ NOISE: Final = 0.02e-3
 _CENTRE: Final = (0.85, 0.0, 0.6)
 _SIZE: Final = (0.6, 0.8, 0.4)
 REPEATS: Final = 30
+#: How much larger errors are drawn.
+LARGER: Final = 50
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,6 +89,9 @@ class Run:
         Of the seeds.
     inside
         In how many repetitions each error found lies within its interval [%], ``(errors,)``.
+    circles
+        Where the reflector is while joint 2 turns [m], ``(n, 3)`` each: by the nominal robot, and by the twin with
+        errors :data:`LARGER` times as large.
     """
 
     exact: AxisFit
@@ -94,6 +99,7 @@ class Run:
     from_positions: int
     outcomes: tuple[Outcome, ...]
     inside: Array
+    circles: tuple[Array, Array]
 
 
 def run(seeds: int, progress: Progress, repetitions: int) -> Run:
@@ -119,7 +125,7 @@ def run(seeds: int, progress: Progress, repetitions: int) -> Run:
     outcomes = over_seeds(seeds, progress, lambda seed: _one(nominal, twin, perfect, lines, joints, seed))
     progress(f"measuring {repetitions} times")
     inside = 100.0 * _inside(nominal, perfect, exact, repetitions).mean(axis=0)
-    return Run(exact, *_determined(nominal), outcomes, inside)
+    return Run(exact, *_determined(nominal), outcomes, inside, _circles(nominal))
 
 
 def _determined(nominal: Robot) -> tuple[int, int]:
@@ -150,6 +156,16 @@ def _configurations() -> Array:
         run[:, number - 1] = np.concatenate([forward, forward[::-1]])
         rows.append(run)
     return np.asarray(np.radians(np.concatenate(rows)))
+
+
+def _circles(nominal: Robot) -> tuple[Array, Array]:
+    low, high, _, posture = _RUNS[2]
+    joints = np.tile(np.radians(posture), (60, 1))
+    joints[:, 1] = np.radians(np.linspace(low, high, 60))
+    errors = {name: LARGER * value for name, value in true_errors().items()}
+    robot = nominal.with_frames(IDENTITY, {"reflector": _REFLECTOR})
+    there, off = (one.world_poses(joints, "reflector")[0] for one in (robot, robot.with_values(errors)))
+    return there, off
 
 
 def _found(

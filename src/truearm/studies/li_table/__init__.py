@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Final
 
 from truearm.studies import Progress
-from truearm.studies.li_table.pictures import trajectory_picture
+from truearm.studies.li_table.pictures import paths_pictures, trajectory_picture
 from truearm.studies.li_table.run import Method, Surface, run
+from truearm.studies.li_table.session import session_files
 from truearm.studies.li_table.tables import (
     alone_table,
     geometry_table,
@@ -70,7 +71,8 @@ def study(seeds: int, progress: Progress, unseen: int = _UNSEEN) -> Study:
             alone_table(outcomes),
             mistakes_table(outcomes),
         ),
-        pictures=(trajectory_picture(outcomes[0]),),
+        pictures=(*paths_pictures(outcomes[0]), trajectory_picture(outcomes[0])),
+        files=session_files(outcomes[0]),
         notes=(
             "INVENTED, because the document's Tables 2 to 6 and its figures are lost: all dimensions of the arm, the"
             " size and place of the table, the verification points and the trajectory.",

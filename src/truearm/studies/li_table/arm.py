@@ -118,7 +118,7 @@ def fit(nominal: Robot, data: Dataset, objective: Objective, bounded: bool) -> R
     limits = bound_vectors(BOUNDS, free, "bounds of the document") if bounded else None
     problem = Problem(nominal, data, free, {"position": CAMERA}, priors=False)
     if objective == "components":
-        found = least_absolute(problem, limits)
+        found = least_absolute(problem, limits)[0].vector
     else:
         found = solve(problem, "l1" if objective == "distances" else "linear", limits).vector
     return nominal.with_values(dict(zip(free.names, map(float, found), strict=True)))
@@ -147,8 +147,13 @@ def following_errors(fitted: Robot, twin: Twin, points: Array) -> Array:
 
     As the document verifies: the joints are those at which the fitted robot is on each point.
     """
+    return np.asarray(1e3 * np.linalg.norm(followed_places(fitted, twin, points) - points, axis=1))
+
+
+def followed_places(fitted: Robot, twin: Twin, points: Array) -> Array:
+    """Return where the true tip is when a robot is sent to points in turn [m], ``(n, 3)``."""
     joints = _joints_at(fitted, points)
-    return np.asarray(1e3 * np.linalg.norm(_tip_of(twin, joints, directions(joints)) - points, axis=1))
+    return _tip_of(twin, joints, directions(joints))
 
 
 def _joints_at(robot: Robot, points: Array) -> Array:
@@ -180,7 +185,12 @@ def other_waypoints() -> Array:
 
 def library_arm() -> Robot:
     """Return the library's arm, beta included, with priors of the size of the document's bounds."""
-    return replace(load_robot("li3"), priors=_SIZE)
+    return believed(load_robot("li3"))
+
+
+def believed(robot: Robot) -> Robot:
+    """Return an arm whose nominal values are believed to be as good as the document's bounds say."""
+    return replace(robot, priors=_SIZE)
 
 
 def with_mistakes(data: Dataset, rng: np.random.Generator) -> Dataset:

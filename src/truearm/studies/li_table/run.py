@@ -29,6 +29,7 @@ from truearm.studies.li_table.arm import (
     at_bounds,
     board,
     fit,
+    followed_places,
     following_errors,
     library_arm,
     other_waypoints,
@@ -157,6 +158,13 @@ class Outcome:
         Equation 4 per hole of the level table [mm]: by measure, and by the measure that was fitted by.
     without_camera
         By table, and by what was found.
+    paths
+        Where the nominal arm should go and where the twin goes [m], ``(n, 3)`` each: through the verification points,
+        and along the other trajectory; with play.
+    touched
+        Readings of each table, and of all, joints having no play.
+    unseen
+        Where the tip truly is at the unseen points then.
     """
 
     play: Left
@@ -167,6 +175,9 @@ class Outcome:
     at_bounds: Mapping[Tilt, int]
     sums: Mapping[tuple[Measure, Measure], float]
     without_camera: Mapping[tuple[Tilt, Alone], WithoutCamera]
+    paths: tuple[tuple[Array, Array], tuple[Array, Array]]
+    touched: Mapping[Surface, Dataset]
+    unseen: Dataset
 
 
 def run(seeds: int, progress: Progress, unseen: int) -> tuple[Outcome, ...]:
@@ -198,6 +209,7 @@ def _one(seed: Seed, unseen: int) -> Outcome:
 
     data = _measured(touched, exact, rng)
     there = true_positions(exact, judged, rng)
+    without_play, unseen_points = data, _as_read(data["normal"], judged, there)
     perfect = {(surface, method): _fit(nominal, data[surface], method) for surface in SURFACES for method in METHODS}
     mistaken = with_mistakes(data["roll"], rng)
     alone = {
@@ -217,6 +229,24 @@ def _one(seed: Seed, unseen: int) -> Outcome:
         at_bounds={tilt: at_bounds(nominal, fitted[tilt, "distances"]) for tilt in TILTS},
         sums=sums,
         without_camera=alone,
+        paths=(_path(nominal, twin, verification()), _path(nominal, twin, other_waypoints())),
+        touched=without_play,
+        unseen=unseen_points,
+    )
+
+
+def _as_read(like: Dataset, joints: Array, positions: Array) -> Dataset:
+    """Return where the tip is at joint positions, as readings without noise."""
+    count = len(joints)
+    return Dataset(
+        source="unseen points",
+        labels=tuple(str(number + 1) for number in range(count)),
+        joints=joints,
+        joint_kinds=like.joint_kinds,
+        targets=like.targets,
+        configuration=np.arange(count),
+        target=np.zeros(count, dtype=np.intp),
+        position=positions,
     )
 
 
@@ -245,6 +275,11 @@ def _following(nominal: Robot, robots: Mapping[Surface, Robot], twin: Twin) -> F
         return Followed(following_errors(robot, twin, points), following_errors(robot, twin, path))
 
     return Following(followed(nominal), {surface: followed(robot) for surface, robot in robots.items()})
+
+
+def _path(nominal: Robot, twin: Twin, waypoints: Array) -> tuple[Array, Array]:
+    path = trajectory(waypoints)
+    return path, followed_places(nominal, twin, path)
 
 
 def _sums(by: Measure, robot: Robot, data: Dataset) -> dict[tuple[Measure, Measure], float]:

@@ -24,7 +24,7 @@ from truearm.planning.hexapod.reachable import Reachable, reachable
 from truearm.simulation.hexapod.simulated import ballbar
 from truearm.simulation.twin import Twin, measure
 from truearm.studies import Progress
-from truearm.studies.lrmate_hexapod.identification import Cups, identified_as_printed, rebased
+from truearm.studies.lrmate_hexapod.identification import Cups, identified_following, identified_holding, rebased
 from truearm.studies.lrmate_hexapod.judgement import (
     HeldOut,
     Judgement,
@@ -52,8 +52,20 @@ _NOISE: Final = 0.02e-3
 #: Beyond this the cup is away from the reference point [m].
 _AWAY: Final = 0.4
 
-#: As the document has them, base by three cups; with base and cups found together with the robot; and by a tracker.
-Model = Literal["nominal", "preliminary", "final", "preliminary found", "final found", "tracker"]
+#: The document's words in two readings, base by three cups: held by the model before, or following the model that is
+#: identified; with base and cups found together with the robot; and by a tracker.
+Model = Literal[
+    "nominal",
+    "preliminary held",
+    "final held",
+    "preliminary following",
+    "final following",
+    "preliminary found",
+    "final found",
+    "tracker",
+]
+#: The final models whose base three cups give.
+FinalByCups = Literal["final held", "final following"]
 #: The models that look for the fixture's frame by its cups.
 FrameModel = Literal["nominal", "final found"]
 
@@ -94,9 +106,9 @@ class Outcome:
     front_up
         Which of them are front/up, ``(n,)``.
     uncorrected
-        Mean error of the final model without the correction of the frame by distances [m].
+        Mean error of the final models, held and following, without the correction of the frame by distances [m].
     repeated
-        Mean error of the final model after ten more rounds of touching and identifying [m].
+        Mean error of the final model, held, after ten more rounds of touching and identifying [m].
     frames
         Error of the fixture's frame by models.
     """
@@ -106,7 +118,7 @@ class Outcome:
     judgements: Mapping[Model, Judgement]
     away: Array
     front_up: NDArray[np.bool_]
-    uncorrected: float
+    uncorrected: Mapping[FinalByCups, float]
     repeated: float
     frames: Mapping[FrameModel, FrameError]
 
@@ -114,10 +126,9 @@ class Outcome:
         """Return the mean position error beyond 400 mm from the reference point [m]."""
         return float(self.judgements[model].position[self.away > _AWAY].mean())
 
-    @property
-    def gain(self) -> float:
-        """By how much the correction of the frame reduces the mean error of the final model [%]."""
-        return 100.0 * (1.0 - self.judgements["final"].mean / self.uncorrected)
+    def gain(self, model: FinalByCups) -> float:
+        """Return by how much the correction of the frame reduces the mean error of a final model [%]."""
+        return 100.0 * (1.0 - self.judgements[model].mean / self.uncorrected[model])
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,20 +204,23 @@ def _campaign(station: Station, twin: Twin, truth: HeldOut, seed: Seed) -> Outco
     truth = truth.seen_from(frame)
     first = campaign.data.of_configurations(range(len(campaign.first)))
 
-    def as_printed(cups: Cups) -> tuple[Robot, Robot]:
-        preliminary = identified_as_printed(robot, robot, first, cups)
-        return preliminary, identified_as_printed(robot, preliminary, campaign.data, cups)
+    def held(cups: Cups) -> tuple[Robot, Robot]:
+        preliminary = identified_holding(robot, robot, first, cups)
+        return preliminary, identified_holding(robot, preliminary, campaign.data, cups)
 
     cups = Cups(campaign.touches, campaign.sides)
-    preliminary, final = as_printed(cups)
+    plain = replace(cups, corrected=False)
+    preliminary, final = held(cups)
     again = final
     for _ in range(10):
-        again = identified_as_printed(robot, again, campaign.data, cups)
+        again = identified_holding(robot, again, campaign.data, cups)
     placed = rebased(robot, frame)
     models: dict[Model, Robot] = {
         "nominal": placed,
-        "preliminary": preliminary,
-        "final": final,
+        "preliminary held": preliminary,
+        "final held": final,
+        "preliminary following": identified_following(robot, first, cups),
+        "final following": identified_following(robot, campaign.data, cups),
         "preliminary found": campaign.preliminary.robot,
         "final found": campaign.final.robot,
         "tracker": _tracked(station, twin, frame, rng),
@@ -220,7 +234,10 @@ def _campaign(station: Station, twin: Twin, truth: HeldOut, seed: Seed) -> Outco
         judgements={name: judged(model, truth) for name, model in models.items()},
         away=truth.away,
         front_up=truth.front_up,
-        uncorrected=mean_position_error(as_printed(replace(cups, corrected=False))[1], truth),
+        uncorrected={
+            "final held": mean_position_error(held(plain)[1], truth),
+            "final following": mean_position_error(identified_following(robot, campaign.data, plain), truth),
+        },
         repeated=mean_position_error(again, truth),
         frames={
             name: FrameError(float(np.linalg.norm(of.translation)), float(np.linalg.norm(rotation_vector(of.rotation))))

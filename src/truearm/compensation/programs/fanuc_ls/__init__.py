@@ -20,20 +20,20 @@ hand: its sections are those that a public repository's notes on it name, and th
 
 from __future__ import annotations
 
-import math
 import re
 from collections import Counter
 from collections.abc import Sequence
 from typing import Final
 
 from truearm.compensation.programs.fanuc_ls.configuration import configuration
+from truearm.compensation.programs.fanuc_ls.forms import JOINTS, POSE
 from truearm.compensation.programs.fanuc_ls.instructions import Instructions
+from truearm.compensation.programs.fanuc_ls.new import new_program
 from truearm.compensation.programs.fanuc_ls.split import split_moves
 from truearm.compensation.programs.fanuc_ls.text import LsFile, Position, is_one
 from truearm.compensation.programs.numbers import LARGEST
 from truearm.compensation.programs.program import (
     ANY_POSTURE,
-    Form,
     Language,
     MakersCalibration,
     Move,
@@ -43,11 +43,8 @@ from truearm.compensation.programs.program import (
     Source,
 )
 from truearm.errors import InputError
-from truearm.modeling.orientations import FIXED_XYZ_ANGLES
 
 _NAME: Final = "FANUC LS"
-_POSE: Final = Form("XYZWPR", "pose", angle=math.pi / 180, orientation=FIXED_XYZ_ANGLES)
-_JOINTS: Final = Form("joints", "joints", angle=math.pi / 180)
 _TRACKED: Final = re.compile(r"\bLINE_TRACK_SCHEDULE_NUMBER\s*:\s*0*[1-9]", re.IGNORECASE)
 
 
@@ -90,7 +87,7 @@ class _Positions:
             self._source,
             self._file.line(position.start),
             f"P[{position.number}:{position.comment}]" if position.comment else f"P[{position.number}]",
-            _POSE if is_pose else _JOINTS,
+            POSE if is_pose else JOINTS,
             values,
             tuple(position.places),
             tool or "",
@@ -175,5 +172,6 @@ FANUC_LS: Final = Language(
     is_one,
     read,
     split_moves,
+    new_program,
     calibration=MakersCalibration("FANUC", "robot calibration (mechanism error parameters)"),
 )

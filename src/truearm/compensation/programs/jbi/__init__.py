@@ -20,14 +20,15 @@ from functools import cache
 from math import radians
 from typing import Final
 
+from truearm.compensation.programs.jbi.forms import ANGLES, POSE, PULSES
 from truearm.compensation.programs.jbi.job import JOB, Job, Key, Position, jobs_of
+from truearm.compensation.programs.jbi.new import new_program
 from truearm.compensation.programs.jbi.split import split_moves
 from truearm.compensation.programs.jbi.steps import KINDS, NOWHERE, Step, Steps, arcs_of, steps_of
 from truearm.compensation.programs.lines import Lines
 from truearm.compensation.programs.program import (
     ANY_POSTURE,
     Configuration,
-    Form,
     Language,
     MakersCalibration,
     Move,
@@ -36,12 +37,8 @@ from truearm.compensation.programs.program import (
     Skipped,
     Source,
 )
-from truearm.modeling.orientations import FIXED_XYZ_ANGLES
 
-_PULSES: Final = Form("pulses", "pulses", decimals=(0, 0))
-_ANGLES: Final = Form("joint angles", "joints", angle=radians(1.0))
-_POSE: Final = Form("rectangular position", "pose", angle=radians(1.0), orientation=FIXED_XYZ_ANGLES)
-_FORMS: Final = {"PULSE": _PULSES, "ANGLE": _ANGLES}
+_FORMS: Final = {"PULSE": PULSES, "ANGLE": ANGLES}
 _AXES: Final = 6
 
 #: Openings of the intervals that the manual leaves open below and closes above [rad].
@@ -109,7 +106,7 @@ def read(sources: Sequence[Source]) -> Program:
 
 def _target(source: int, position: Position) -> ProgramTarget:
     state = position.state
-    form = _FORMS.get(state.postype, _POSE)
+    form = _FORMS.get(state.postype, POSE)
     return ProgramTarget(
         source,
         position.line,
@@ -119,7 +116,7 @@ def _target(source: int, position: Position) -> ProgramTarget:
         position.places[:_AXES],
         tool=state.tool,
         frame=state.user if state.postype == "USER" else "",
-        configuration=_configuration(state.rconf) if form is _POSE else ANY_POSTURE,
+        configuration=_configuration(state.rconf) if form is POSE else ANY_POSTURE,
     )
 
 
@@ -210,5 +207,6 @@ JBI: Final = Language(
     is_one,
     read,
     split_moves,
+    new_program,
     calibration=MakersCalibration("Yaskawa", "absolute accuracy"),
 )

@@ -24,6 +24,7 @@ from truearm.compensation.programs.lines import BYTE_ORDER_MARK
 from truearm.compensation.programs.program import Language, MakersCalibration, Program, Source
 from truearm.compensation.programs.rapid.monitoring import with_postures_left_free
 from truearm.compensation.programs.rapid.moves import MOTIONS, QUIET
+from truearm.compensation.programs.rapid.new import new_program
 from truearm.compensation.programs.rapid.split import split_moves
 from truearm.compensation.programs.rapid.syntax import listing_of
 from truearm.compensation.programs.rapid.targets import Finder
@@ -47,6 +48,7 @@ RAPID: Final = Language(
     is_one=_is_one,
     read=_read,
     split=split_moves,
+    new=new_program,
     together=True,
     calibration=MakersCalibration("ABB", "Absolute Accuracy"),
 )

@@ -6,17 +6,19 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Final
 
 from truearm.errors import InputError, did_you_mean, name_place
 from truearm.files import read_yaml
 from truearm.modeling.conventions import convention
 from truearm.modeling.effects import EFFECTS, NON_NEGATIVE
 from truearm.modeling.fixtures import Fixture
+from truearm.modeling.formats.balancer_entry import check_anchors
 from truearm.modeling.formats.controller_entry import STATED
 from truearm.modeling.formats.robot_file.schema import JointEntry, ProofEntry, RobotFile
-from truearm.modeling.parameters import Parameter
+from truearm.modeling.parameters import SCALE, SCALE_GROUP, Parameter
 from truearm.modeling.parts import NO_PAYLOAD, Inertia, Joint, LinkMass, Payload, Target, Tool, Truth
-from truearm.modeling.proof import Proof
+from truearm.modeling.proof import HELD, Proof
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.schemas import shown_entry
@@ -63,7 +65,8 @@ def _robot(content: RobotFile, where: str) -> Robot:
             )
     numbered = [("link", "masses", mass.link) for mass in content.masses]
     for name, truth in content.truths.items():
-        numbered += [("joint", f"truths.{name}.compliance", joint) for joint in truth.compliance]
+        for kind in ("compliance", "backlash", "clearance"):
+            numbered += [("joint", f"truths.{name}.{kind}", joint) for joint in getattr(truth, kind)]
     for kind, part, number in numbered:
         if not 1 <= number <= len(joints):
             raise InputError(
@@ -86,6 +89,9 @@ def _robot(content: RobotFile, where: str) -> Robot:
                 _inertia(m.inertia, f"{where}, masses[{i}].inertia"),
             )
             for i, m in enumerate(content.masses, 1)
+        ),
+        balancers=tuple(
+            b.balancer(i, len(joints), length, f"{where}, balancers[{i}]") for i, b in enumerate(content.balancers, 1)
         ),
         payload=NO_PAYLOAD
         if content.payload is None
@@ -114,6 +120,7 @@ def _robot(content: RobotFile, where: str) -> Robot:
         },
         history=tuple(content.history),
     )
+    check_anchors(robot, where)
     return _with_values(_with_controller(robot, content, where), content, where)
 
 
@@ -144,6 +151,8 @@ def _with_values(robot: Robot, content: RobotFile, where: str) -> Robot:
     def known(name: str, entry: str) -> Parameter:
         if name in robot.parameters:
             return robot.parameters[name]
+        if name == SCALE:
+            return Parameter.plain(SCALE, "1", SCALE_GROUP, 0.0, 1.0)
         cure = did_you_mean(name, robot.parameters)
         for effect in EFFECTS:
             if name in [p.name for p in effect(robot.layout).parameters]:
@@ -164,6 +173,8 @@ def _with_values(robot: Robot, content: RobotFile, where: str) -> Robot:
                 for n, v in truth.values.items()
             },
             {n: si(v, "1", f"truths.{truth_name}.compliance.{n}") for n, v in truth.compliance.items()},
+            {n: si(v, shown["rad"], f"truths.{truth_name}.backlash.{n}") for n, v in truth.backlash.items()},
+            {n: si(v, shown["rad"], f"truths.{truth_name}.clearance.{n}") for n, v in truth.clearance.items()},
         )
         for truth_name, truth in content.truths.items()
     }
@@ -218,6 +229,15 @@ def _proof(robot: Robot, entry: ProofEntry, shown: Mapping[str, str], where: str
     unknown = next((name for name in entry.deviations if name not in robot.parameters), None)
     if unknown is not None:
         raise InputError("the robot has no such parameter", where=f"{where}, proof.deviations", came=unknown, cure=cure)
+    strange = next((name for name in entry.held if name not in (*HELD, *robot.parameters)), None)
+    if strange is not None:
+        raise InputError(
+            "nothing of this name can be held",
+            where=f"{where}, proof.held",
+            came=strange,
+            allowed=f"{', '.join(HELD)}, or parameters of targets",
+            cure=cure,
+        )
     if len(entry.correlations) != len(entry.deviations):
         raise InputError(
             "one row belongs here for each of the deviations",
@@ -239,9 +259,30 @@ def _proof(robot: Robot, entry: ProofEntry, shown: Mapping[str, str], where: str
         ),
         lower_bound=entry.lower_bound,
         warnings=tuple(Notice(warning.code, warning.message, "note") for warning in entry.warnings),
+        held=tuple(entry.held),
         digest=entry.sha256,
+        measured=tuple(
+            _position(row, robot, f"{where}, proof.measured[{number}]", cure)
+            for number, row in enumerate(entry.measured, 1)
+        ),
         loads=tuple(entry.loads),
     )
+
+
+def _position(text: str, robot: Robot, where: str, cure: str) -> tuple[float, ...]:
+    """Return joint positions of a measured configuration in SI units."""
+    numbers = [as_number(word) for word in text.split()]
+    known = tuple(number for number in numbers if number is not None and math.isfinite(number))
+    if len(known) != len(robot.joints) or len(numbers) != len(known):
+        raise InputError(
+            "one number belongs here for each joint, in deg or mm",
+            where=where,
+            came=text,
+            allowed=counted(len(robot.joints), "number"),
+            cure=cure,
+        )
+    units = ["deg" if joint.kind == "revolute" else "mm" for joint in robot.joints]
+    return tuple(to_si(value, unit) for value, unit in zip(known, units, strict=True))
 
 
 def _row(text: str, count: int, where: str, cure: str) -> tuple[float, ...]:
@@ -256,6 +297,10 @@ def _row(text: str, count: int, where: str, cure: str) -> tuple[float, ...]:
             cure=cure,
         )
     return known
+
+
+#: Entries of a joint in every convention.
+_OF_ANY_JOINT: Final = ("name", "type", "limits", "transmission_periods", "bearing")
 
 
 def _joint(content: RobotFile, number: int, entry: JointEntry, where: str) -> Joint:
@@ -275,8 +320,8 @@ def _joint(content: RobotFile, number: int, entry: JointEntry, where: str) -> Jo
                 f"a joint of convention {content.convention} has no such entry",
                 where=where,
                 came=column,
-                allowed=", ".join(["name", "type", "limits", "transmission_periods", *allowed]),
-                cure=did_you_mean(column, ["name", "type", "limits", "transmission_periods", *allowed]),
+                allowed=", ".join([*_OF_ANY_JOINT, *allowed]),
+                cure=did_you_mean(column, [*_OF_ANY_JOINT, *allowed]),
             )
         row[column] = sized_si(_number(value, f"{where}.{column}"), shown[units[column]], f"{where}.{column}")
     fault = table.fault(row, entry.type)
@@ -296,7 +341,17 @@ def _joint(content: RobotFile, number: int, entry: JointEntry, where: str) -> Jo
             allowed=f"limits: [LOWEST, HIGHEST] in {unit}",
             cure="Give what the controller allows.",
         )
-    return Joint(entry.name or f"joint_{number}", entry.type, row, limits, entry.transmission_periods)
+    bearing = None
+    if entry.bearing is not None:
+        if entry.type == "prismatic":
+            raise InputError(
+                "a joint that slides has no bearing on its axis",
+                where=f"{where}.bearing",
+                came=entry.bearing,
+                cure="Take the entry out: moments across a slide are taken where it stands.",
+            )
+        bearing = sized_si(entry.bearing, content.units.length, f"{where}.bearing")
+    return Joint(entry.name or f"joint_{number}", entry.type, row, limits, entry.transmission_periods, bearing)
 
 
 def _vector(name: str, value: object, unit: str, where: str, *, direction: bool) -> dict[str, float]:

@@ -11,6 +11,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstra
 from truearm.errors import InputError, did_you_mean
 from truearm.modeling.effects import EFFECTS
 from truearm.modeling.fixtures import FixtureKind
+from truearm.modeling.formats.balancer_entry import BalancerEntry
 from truearm.modeling.formats.controller_entry import ControllerEntry
 from truearm.modeling.formats.entries import STRICT, Name, NotNegative, Number, Place, Positive, Quaternion, Triple
 from truearm.modeling.parts import GRAVITY, POINT_MASS, Inertia
@@ -78,6 +79,7 @@ class JointEntry(BaseModel):
     type: Literal["revolute", "prismatic"] = "revolute"
     limits: tuple[Number, Number] | None = None
     transmission_periods: Annotated[int, Field(strict=True, ge=1, le=10_000)] | None = None
+    bearing: Number | None = None
 
 
 class MassEntry(_Entry):
@@ -118,6 +120,8 @@ class TruthEntry(_Entry):
     source: str
     values: dict[str, Number]
     compliance: dict[Annotated[int, Field(strict=True)], NotNegative] = {}
+    backlash: dict[Annotated[int, Field(strict=True)], NotNegative] = {}
+    clearance: dict[Annotated[int, Field(strict=True)], NotNegative] = {}
 
 
 class TargetEntry(_Entry):
@@ -161,7 +165,10 @@ class NoticeEntry(_Entry):
 
 
 class ProofEntry(_Entry):
-    """What the calibration knew about its result; `correlations` are the rows of a lower triangular factor."""
+    """What the calibration knew about its result; `correlations` are the rows of a lower triangular factor.
+
+    `measured` are joint positions in deg and mm, whatever the units of the file.
+    """
 
     status: Literal["converged", "at-bound", "rank-loss", "not-converged", "implausible"]
     errors: list[NoticeEntry] = []
@@ -169,9 +176,11 @@ class ProofEntry(_Entry):
     lower_bound: Annotated[bool, Field(strict=True)] = False
     region: list[tuple[Number, Number]] = []
     joint_error: list[NotNegative] = []
+    held: list[TargetName] = []
     loads: list[tuple[Number, Number]] = []
     deviations: dict[str, NotNegative] = {}
     correlations: list[Annotated[str, StringConstraints(strict=True)]] = []
+    measured: list[Annotated[str, StringConstraints(strict=True)]] = []
     sha256: Annotated[str, StringConstraints(strict=True, pattern="^[0-9a-f]{64}$")]
 
 
@@ -202,6 +211,7 @@ class RobotFile(_Entry):
     flange: Place = Place()
     controller: ControllerEntry = ControllerEntry()
     masses: list[MassEntry] = []
+    balancers: list[BalancerEntry] = Field([], max_length=20)
     payload: PayloadEntry | None = None
     rated_load: Positive | None = None
     gravity: Annotated[Triple, AfterValidator(_falls)] = GRAVITY

@@ -8,12 +8,13 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from truearm.modeling.controller import AS_THE_MODEL
+from truearm.modeling.formats.balancer_entry import balancer_entry
 from truearm.modeling.formats.controller_entry import controller_entry
 from truearm.modeling.formats.entries import NAME, place_entry
 from truearm.modeling.formats.robot_file.schema import SCHEMA
 from truearm.modeling.parameters import Parameter
 from truearm.modeling.parts import GRAVITY, NO_PAYLOAD, Joint
-from truearm.modeling.proof import Proof
+from truearm.modeling.proof import Proof, position_text
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 from truearm.modeling.wrench import refuse_pushed
@@ -80,6 +81,8 @@ def file_content(robot: Robot) -> dict[str, Any]:
             row["limits"] = listed([written(v, "deg" if j.kind == "revolute" else "mm") for v in j.limits])
         if j.transmission_periods:
             row["transmission_periods"] = j.transmission_periods
+        if j.bearing is not None:
+            row["bearing"] = written(j.bearing, "mm")
         return flow(row)
 
     content: dict[str, Any] = {
@@ -104,6 +107,8 @@ def file_content(robot: Robot) -> dict[str, Any]:
             )
             for m in robot.masses
         ]
+    if robot.balancers:
+        content["balancers"] = [flow(_flowing(balancer_entry(b), flow, listed)) for b in robot.balancers]
     if robot.payload != NO_PAYLOAD:
         content["payload"] = flow({"mass": robot.payload.mass, "cog": mm(robot.payload.cog)})
     if robot.rated_load is not None:
@@ -121,6 +126,11 @@ def file_content(robot: Robot) -> dict[str, Any]:
                 "source": truth.source,
                 "values": {n: written(v, shown[robot.parameters[n].unit]) for n, v in truth.values.items()},
                 "compliance": dict(truth.compliance),
+                **{
+                    kind: {n: written(v, shown["rad"]) for n, v in angles.items()}
+                    for kind, angles in (("backlash", truth.backlash), ("clearance", truth.clearance))
+                    if angles
+                },
             }
             for name, truth in robot.truths.items()
         }
@@ -155,6 +165,20 @@ def file_content(robot: Robot) -> dict[str, Any]:
     return content
 
 
+def _flowing(
+    entry: Mapping[str, Any], flow: Callable[[Mapping[str, Any]], Any], listed: Callable[[list[Any]], Any]
+) -> dict[str, Any]:
+    """Return an entry whose tables and lists are written on its own line."""
+    return {
+        name: flow(_flowing(part, flow, listed))
+        if isinstance(part, dict)
+        else listed(part)
+        if isinstance(part, list)
+        else part
+        for name, part in entry.items()
+    }
+
+
 def _parameter(p: Parameter, shown: Mapping[str, str]) -> dict[str, Any]:
     unit = shown[p.unit]
     made: dict[str, Any] = {
@@ -185,6 +209,8 @@ def _proof(
         made["warnings"] = [{"code": warning.code, "message": text(warning.message)} for warning in proof.warnings]
     if proof.lower_bound:
         made["lower_bound"] = True
+    if proof.held:
+        made["held"] = listed([text(name) for name in proof.held])
     if len(proof.region) == len(robot.joints) and all(name in robot.parameters for name in proof.names):
         units = ["deg" if joint.kind == "revolute" else "mm" for joint in robot.joints]
         made["region"] = [listed([written(v, u) for v in one]) for one, u in zip(proof.region, units, strict=True)]
@@ -198,5 +224,9 @@ def _proof(
             }
         )
         made["correlations"] = [text(" ".join(f"{v:.7g}" for v in row)) for row in proof.factor]
+        if proof.measured:
+            made["measured"] = [
+                text(" ".join(position_text(v, u) for v, u in zip(row, units, strict=True))) for row in proof.measured
+            ]
     made["sha256"] = proof.digest
     return made

@@ -1,0 +1,81 @@
+"""New VAL3 applications."""
+
+from __future__ import annotations
+
+from math import radians
+from typing import Final
+
+from truearm.compensation.programs.new_program import NewProgram
+from truearm.compensation.programs.program import Form
+from truearm.modeling.orientations import MOVING_XYZ_ANGLES
+
+_JOINT: Final = Form("jointRx", "joints", angle=radians(1.0))
+_POINT: Final = Form("pointRx", "pose", angle=radians(1.0), orientation=MOVING_XYZ_ANGLES)
+
+_DATA = 'xmlns="http://www.staubli.com/robotics/VAL3/Data/2"'
+_CODE = 'xmlns="http://www.staubli.com/robotics/VAL3/Program/2"'
+_PROJECT = 'xmlns="http://www.staubli.com/robotics/VAL3/Project/3"'
+_NAMES = ("x", "y", "z", "rx", "ry", "rz")
+#: On its way the arm stays in the posture in which it began.
+_SAME = 'shoulder="ssame" elbow="esame" wrist="wsame" fatherId="world[0]"'
+_MOTION = '<Value key="0" accel="100" vel="10" decel="100" blend="joint" leave="1" reach="1" />'
+_HEAD = '<?xml version="1.0" encoding="utf-8"?>'
+
+
+def new_program(program: NewProgram) -> dict[str, str]:
+    """Return data, program and project: straight moves have their speed (tvel), for joint motions no time can be said.
+
+    All targets of a kind are one array, in the order of the moves.
+    """
+    name, count = program.name, len(program)
+    straight = program.poses is not None
+    by_joints = range(1 if straight else count)
+    joints = [_element(k, zip("123456", program.axes(k, _JOINT), strict=False), "j") for k in by_joints]
+    data = [_variable("jPath", "jointRx", joints), _variable("mPath", "mdesc", [_MOTION])]
+    steps = [f"  // {line}" for line in program.comments]
+    steps += ["  movej(jPath[0],flange,mPath)", "  waitEndMove()"]
+    if straight:
+        points = [
+            _element(k - 1, zip(_NAMES, program.pose(k, _POINT), strict=True), "", _SAME) for k in range(1, count)
+        ]
+        data.append(_variable("pPath", "pointRx", points))
+    said = ""
+    for row in range(1, count):
+        if not straight:
+            steps.append(f"  movej(jPath[{row}],flange,mPath)")
+            continue
+        speed = f"{program.speed(row) * 1e3:.3f}"
+        if speed != said:
+            steps.append(f"  mPath.tvel={speed}")
+            said = speed
+        steps.append(f"  movel(pPath[{row - 1}],flange,mPath)")
+    code = "\n".join(["begin", *steps, "  waitEndMove()", "end"])
+    files = {
+        f"{name}.dtx": [f"<Database {_DATA}>", "<Datas>", *data, "</Datas>", "</Database>"],
+        "start.pgx": [
+            f"<Programs {_CODE}>",
+            '<Program name="start">',
+            f"<Code><![CDATA[\n{code}\n]]></Code>",
+            "</Program>",
+            "</Programs>",
+        ],
+        f"{name}.pjx": [
+            f"<Project {_PROJECT}>",
+            '<Parameters version="s7.5.3" stackSize="5000" millimeterUnit="true" />',
+            '<Programs><Program file="start.pgx" /></Programs>',
+            f'<Database><Data file="{name}.dtx" /></Database>',
+            "<Libraries />",
+            "</Project>",
+        ],
+    }
+    return {f"{name}/{file}": "\n".join([_HEAD, *lines, ""]) for file, lines in files.items()}
+
+
+def _element(key: int, numbers: zip[tuple[str, str]], before: str, more: str = "") -> str:
+    values = " ".join(f'{before}{name}="{value}"' for name, value in numbers)
+    return f'<Value key="{key}" {values}{" " + more if more else ""} />'
+
+
+def _variable(name: str, kind: str, values: list[str]) -> str:
+    rows = "\n".join(values)
+    return f'<Data name="{name}" access="public" type="{kind}" size="{len(values)}">\n{rows}\n</Data>'

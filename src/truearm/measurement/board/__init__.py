@@ -1,0 +1,1 @@
+"""A ChArUco board that a camera sees: pictures, the lens, and where the board is."""

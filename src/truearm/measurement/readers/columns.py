@@ -1,0 +1,96 @@
+"""Columns of a CSV by their names: what small tables check in the same way."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Final
+
+from truearm.errors import InputError, nearest_names
+from truearm.files import read_text
+from truearm.measurement.readers.canonical import refuse_other_separators
+from truearm.measurement.readers.cells import Cells, Layout, lines_of, read_cells
+from truearm.measurement.readers.rows import Configurations, found_configurations
+from truearm.modeling.formats.joint_columns import JOINT_COLUMN, joint_names
+from truearm.units import ANGLE_UNITS, LENGTH_UNITS, checked_unit
+
+_HEADING: Final = re.compile(r"(?P<name>[^\[]*?)\s*(?:\[(?P<unit>[^\]]*)\])?")
+_JOINTS: Final = "joint_1 [deg] .. or axis_1 [deg] .."
+
+Columns = dict[str, tuple[int, str]]
+
+
+def read_named(path: Path) -> Cells:
+    """Return the cells of a CSV with a header."""
+    text = read_text(path)
+    header = 1 + next(number for number, line in enumerate(lines_of(text)) if line.strip())
+    refuse_other_separators(text, f"{path}, line {header}")
+    return read_cells(text, str(path), Layout(header=header))
+
+
+def columns_beside_joints(
+    cells: Cells, shown: Mapping[str, str], units: Mapping[str, tuple[str, ...]], optional: Sequence[str] = ()
+) -> Columns:
+    """Return place and unit of every column by its name, joint positions among them, or refuse the header.
+
+    Parameters
+    ----------
+    shown
+        The columns besides joint positions, as one writes them.
+    units
+        The units of those that need one.
+    optional
+        Those that may be left out.
+    """
+    columns: Columns = {}
+    header = f"{cells.source}, line {cells.header}"
+    allowed = ", ".join([*shown.values(), _JOINTS])
+    for place, heading in enumerate(cells.names):
+        where = f"{header}, column {place + 1}"
+        match = _HEADING.fullmatch(heading)
+        name, unit = (match["name"], match["unit"]) if match else (heading, None)
+        fitting = (*ANGLE_UNITS, *LENGTH_UNITS) if JOINT_COLUMN.fullmatch(name) else units.get(name)
+        if fitting is None and name not in shown:
+            near = nearest_names(name, shown, 1)
+            raise InputError(
+                "the column is not known" if heading else "the column has no name",
+                where=where,
+                came=heading or None,
+                allowed=allowed,
+                cure=f"Did you mean {shown[near[0]]}?" if near else "Rename it, or leave it out.",
+            )
+        if name in columns:
+            raise InputError(f"the column {name} appears twice", where=where, came=heading, cure="Remove one of them.")
+        if fitting is not None:
+            unit = checked_unit(unit, fitting, f"{where}, {heading}")
+        elif unit is not None:
+            raise InputError(
+                "this column takes no unit", where=where, came=heading, allowed=name, cure="Remove the unit."
+            )
+        columns[name] = (place, unit or "1")
+    joint_names(columns, header)
+    for name in shown:
+        if name not in columns and name not in optional:
+            raise InputError(f"the column {name} is missing", where=header, allowed=allowed, cure=f"Add {shown[name]}.")
+    return columns
+
+
+def configurations_of(cells: Cells, columns: Columns) -> Configurations:
+    """Return the configurations of a table whose column ``configuration`` names them."""
+    joints_are, names = joint_names(columns, f"{cells.source}, line {cells.header}")
+    joints = [columns[name] for name in names]
+    labels = cells.texts(columns["configuration"][0])
+    return found_configurations(cells, labels, [place for place, _ in joints], [unit for _, unit in joints], joints_are)
+
+
+def refuse_repeated(cells: Cells, configurations: Configurations, cure: str) -> None:
+    """Refuse a configuration that has more rows than one."""
+    first: dict[int, int] = {}
+    for row, of in enumerate(configurations.of_row.tolist()):
+        if (before := first.setdefault(of, row)) != row:
+            raise InputError(
+                f"the configuration {configurations.labels[of]!r} appears twice",
+                where=f"{cells.source}, lines {cells.lines[before]} and {cells.lines[row]}",
+                cure=cure,
+            )

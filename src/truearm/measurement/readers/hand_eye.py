@@ -1,0 +1,173 @@
+"""A camera and a board, one of them on the flange: poses of the board in the camera, or pictures of it.
+
+Either way a table has a row for each configuration: joint positions, and the pose or the picture.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final, Literal
+
+import numpy as np
+
+from truearm.errors import InputError
+from truearm.measurement.board.charuco import Charuco
+from truearm.measurement.board.views import Views, of_deviations
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.readers.cells import Cells
+from truearm.measurement.readers.columns import (
+    Columns,
+    columns_beside_joints,
+    configurations_of,
+    read_named,
+    refuse_repeated,
+)
+from truearm.measurement.readers.rows import Configurations, in_order, unit_quaternions
+from truearm.modeling.transform import quaternion_from_rotation, rotation_from_quaternion
+from truearm.units import LENGTH_UNITS, SMALL_ANGLE_UNITS
+
+#: What is on the flange, and what the target is called then.
+ON_FLANGE: Final = {"camera": "camera", "board": "board"}
+OnFlange = Literal["camera", "board"]
+
+_POSITION: Final = ("x", "y", "z")
+_QUATERNION: Final = ("qw", "qx", "qy", "qz")
+_DEVIATIONS: Final = ("sigma", "sigma_rot")
+_OF_POSES: Final = (
+    {"configuration": "configuration"}
+    | {axis: f"{axis} [mm]" for axis in _POSITION}
+    | {part: part for part in _QUATERNION}
+    | {"sigma": "sigma [mm]", "sigma_rot": "sigma_rot [mrad]"}
+)
+_OF_PICTURES: Final = {"configuration": "configuration", "picture": "picture"}
+_UNITS: Final = dict.fromkeys((*_POSITION, "sigma"), LENGTH_UNITS) | {"sigma_rot": SMALL_ANGLE_UNITS}
+
+
+@dataclass(frozen=True, eq=False)
+class HandEyeReadings:
+    """What a camera saw of a board, as readings of what is on the flange.
+
+    Attributes
+    ----------
+    data
+        Poses of the target ``camera`` in the board's frame, or of the target ``board`` in the camera's.
+    views
+        The poses as they came, with the lens if pictures were read.
+    ahead
+        How far before the camera the target is [m]: a point of its axis; zero for a board on the flange.
+    """
+
+    data: Dataset
+    views: Views
+    ahead: float
+
+
+def pictures_named(path: Path) -> tuple[Path, ...]:
+    """Return the pictures that a table names, none if it holds poses; their names count from its folder."""
+    cells = read_named(path)
+    if "picture" not in cells.names:
+        return ()
+    return tuple(path.parent / name for name in cells.texts(cells.names.index("picture")))
+
+
+def read_hand_eye(path: Path, on_flange: OnFlange, board: Charuco | None) -> HandEyeReadings:
+    """Read a table of poses of a board in a camera, or of pictures of it.
+
+    Parameters
+    ----------
+    on_flange
+        What moves with the robot; the other one stands beside it.
+    board
+        What the pictures show; None for a table of poses.
+
+    Raises
+    ------
+    InputError
+        If a column, a unit or a picture is missing, or a picture does not show the board.
+    """
+    cells = read_named(path)
+    if board is None:
+        columns = columns_beside_joints(cells, _OF_POSES, _UNITS, _DEVIATIONS)
+        found = configurations_of(cells, columns)
+        refuse_repeated(cells, found, "Each row is a pose of the board: give it a label of its own.")
+        views = _poses(cells, columns)
+    else:
+        from truearm.measurement.board.pictures import seen_in_pictures
+
+        columns = columns_beside_joints(cells, _OF_PICTURES, {})
+        found = configurations_of(cells, columns)
+        refuse_repeated(cells, found, "Each row is a picture of the board: give it a label of its own.")
+        views = seen_in_pictures([path.parent / name for name in cells.texts(columns["picture"][0])], board)
+    ahead = views.point_ahead() if on_flange == "camera" else 0.0
+    if on_flange == "camera":
+        places, turns, sigma, sigma_rot = views.camera_in_board(ahead)
+    else:
+        places, turns, sigma, sigma_rot = views.board_in_camera()
+    data = _dataset(str(path), found, ON_FLANGE[on_flange])
+    quaternion = quaternion_from_rotation(turns)
+    return HandEyeReadings(
+        replace(data, position=places, quaternion=quaternion, sigma=sigma, sigma_rot=sigma_rot), views, ahead
+    )
+
+
+def _poses(cells: Cells, columns: Columns) -> Views:
+    there = [name for name in _DEVIATIONS if name in columns]
+    if len(there) == 1:
+        missing = next(name for name in _DEVIATIONS if name not in there)
+        raise InputError(
+            f"the column {missing} is missing",
+            where=f"{cells.source}, line {cells.header}",
+            came=there[0],
+            allowed="sigma and sigma_rot, or none of them",
+            cure=f"Add {_OF_POSES[missing]}, or leave {there[0]} out.",
+        )
+    position = np.column_stack([cells.numbers(*columns[axis]) for axis in _POSITION])
+    parts = np.column_stack([cells.numbers(*columns[part]) for part in _QUATERNION])
+    rotation = rotation_from_quaternion(unit_quaternions(parts, cells.source, cells.lines))
+    behind = np.flatnonzero(position[:, 2] <= 0.0)
+    if len(behind):
+        raise InputError(
+            "the board is behind the camera",
+            where=cells.place(int(behind[0]), columns["z"][0]),
+            came=cells.columns[columns["z"][0]][int(behind[0])],
+            allowed="above 0: z points from the camera to what it sees",
+            cure="Give poses of the board in the camera, T_camera_board, and not of the camera in the board.",
+        )
+    deviations = [cells.numbers(*columns[name], deviation=True) for name in there]
+    return of_deviations(rotation, position, *(deviations or (None, None)))
+
+
+def _dataset(source: str, found: Configurations, target: str) -> Dataset:
+    """Return the configurations, and a reading of one target at each, still empty."""
+    n = len(found.labels)
+    empty = Dataset(
+        source=source,
+        labels=found.labels,
+        joints=found.joints,
+        joint_kinds=found.kinds,
+        joints_are=found.joints_are,
+        targets=(target,),
+        configuration=np.arange(n),
+        target=np.zeros(n, dtype=np.intp),
+        position=np.full((n, 3), np.nan),
+    )
+    return in_order(empty)
+
+
+def refuse_wrong_place(pictures: Sequence[Path], board: object) -> None:
+    """Refuse a board that is named where there are no pictures, and pictures of a board that is not."""
+    if pictures and board is None:
+        raise InputError(
+            "no board is named, and the table names pictures",
+            parameter="board",
+            allowed="its squares, their side, that of a marker, and the dictionary: 14x10,25mm,18mm,5X5_250",
+        )
+    if not pictures and board is not None:
+        raise InputError(
+            "a board is named, and the table names no pictures",
+            parameter="board",
+            came=board,
+            cure="Leave it out, or give a table with the column picture.",
+        )

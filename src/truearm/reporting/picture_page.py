@@ -1,0 +1,87 @@
+"""A page of a few sentences, tables and pictures: what results have that need no page of their own kind."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from truearm.notices import Notice, worst_first
+from truearm.reporting.drawing import Figure
+from truearm.reporting.page import page
+
+
+@dataclass(frozen=True, eq=False)
+class Drawing:
+    """A picture on a page.
+
+    Attributes
+    ----------
+    name
+        Of its place on the page.
+    title, words
+        Above it.
+    figure
+        What is drawn.
+    """
+
+    name: str
+    title: str
+    words: str
+    figure: Figure
+
+
+@dataclass(frozen=True)
+class Figures:
+    """A table on a page.
+
+    Attributes
+    ----------
+    title
+        Above it.
+    heading
+        Names of the columns; those after the first are numbers.
+    rows
+        Its cells, row by row.
+    """
+
+    title: str
+    heading: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+def picture_page(
+    title: str,
+    subtitle: str,
+    words: Sequence[str],
+    command: str,
+    *,
+    pictures: Sequence[Drawing],
+    tables: Sequence[Figures] = (),
+    notices: Sequence[Notice] = (),
+) -> str:
+    """Return the page.
+
+    Parameters
+    ----------
+    title, subtitle
+        At its head.
+    words
+        What was found, a sentence each.
+    command
+        How to run it again.
+    pictures, tables
+        What is shown.
+    notices
+        What to know about the result.
+    """
+    return page(
+        "pictures.html.jinja",
+        {picture.name: picture.figure for picture in pictures},
+        title=title,
+        subtitle=subtitle,
+        words=words,
+        command=command,
+        pictures=pictures,
+        tables=tables,
+        notices=worst_first(notices),
+    )

@@ -1,0 +1,57 @@
+"""What the importers of sockets and of a camera say on the command line."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from tests.cli.conftest import Truearm
+from tests.jobs.examples import EXAMPLES
+
+
+def test_sockets(truearm: Truearm, tmp_path: Path) -> None:
+    file, out = EXAMPLES["import_sockets"](tmp_path)["file"], tmp_path / "data.csv"
+    made = truearm(
+        "import", "sockets", file, "--apart", "200mm,0.02mm", "--ball", "25mm", "--sigma", "0.02", "--out", out
+    )
+    assert made.out == f"3 configurations, targets ball: {out}\n"
+    assert ",right,fixture,left,,,,200.0,0.02\n" in out.read_text()
+
+
+@pytest.mark.parametrize(
+    ("apart", "ball", "words"),
+    [
+        ("200,0.02", "25mm", "--apart: no unit that fits is given; got '200'"),
+        ("20mm,0.02mm", "25mm", "--apart: the sockets are closer than the ball is large"),
+        ("200mm,0.02mm", "25", "--ball: no unit that fits is given; got '25'"),
+    ],
+)
+def test_sockets_that_cannot_be(truearm: Truearm, tmp_path: Path, apart: str, ball: str, words: str) -> None:
+    file = EXAMPLES["import_sockets"](tmp_path)["file"]
+    refused = truearm("import", "sockets", file, "--apart", apart, "--ball", ball, "--out", tmp_path / "data.csv")
+    assert refused.code == 2
+    assert words in refused.err
+    assert not (tmp_path / "data.csv").exists()
+
+
+def test_hand_eye(truearm: Truearm, tmp_path: Path) -> None:
+    file, out = EXAMPLES["import_hand_eye"](tmp_path)["file"], tmp_path / "data.csv"
+    words = ("import", "hand-eye", file, "--on-flange", "camera", "--scale-sigma", "200", "--out", out)
+    made = json.loads(truearm(*words, "--json").out)
+    assert (made["configurations"], made["on_flange"], made["scale_sigma_ppm"]) == (2, "camera", 200.0)
+    assert made["ahead_mm"] == pytest.approx(425.0)
+    assert "the board's size is known to 200 ppm" in truearm(*words).out
+    assert out.read_text().splitlines()[0].endswith("sigma [mm],sigma_rot [mrad],scale_sigma [ppm]")
+
+
+def test_hand_eye_that_cannot_be(truearm: Truearm, tmp_path: Path) -> None:
+    file, out = EXAMPLES["import_hand_eye"](tmp_path)["file"], tmp_path / "data.csv"
+    other = truearm("import", "hand-eye", file, "--on-flange", "cam", "--out", out)
+    assert (other.code, "--on-flange" in other.err, "camera, board" in other.err) == (2, True, True)
+    named = truearm(
+        "import", "hand-eye", file, "--on-flange", "camera", "--board", "14x10,25mm,18mm,5X5_250", "--out", out
+    )
+    assert (named.code, "--board: a board is named" in named.err) == (2, True)
+    scale = truearm("import", "hand-eye", file, "--on-flange", "camera", "--scale-sigma", "0", "--out", out)
+    assert (scale.code, "--scale-sigma: the standard deviation of a scale" in scale.err) == (2, True)

@@ -1,0 +1,200 @@
+"""New programs of a path: every language's own reader finds the targets again."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from truearm.compensation.cell import Cell, read_tools
+from truearm.compensation.corrected_path import CorrectedPath, correct_path
+from truearm.compensation.path_program import BY_NAME, path_program
+from truearm.compensation.program_correction import commanded
+from truearm.compensation.program_files import program_files
+from truearm.compensation.programs.new_program import MARK, NewProgram
+from truearm.compensation.programs.program import Program, Source
+from truearm.errors import InputError
+from truearm.library import load_robot
+from truearm.modeling.robot import Robot
+from truearm.planning.paths.path_file import read_path
+
+PATH = """\
+truearm: truearm-path/1
+units: {length: mm, angle: deg, time: s}
+tip: [0, 0, 100]
+orientation: {quaternion: [0, 1, 0, 0]}
+speed: 100
+acceleration: 500
+step: 0.05
+start: [350, 0, 250]
+sections:
+  - line: [350, 100, 250]
+  - {circle: [[400, 150, 250], [350, 200, 250]], speed: 50}
+"""
+CELL = (
+    "truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\n"
+    'tools: {"0": {of: flange, controller: {}}, tcp: {of: flange, controller: {}}}\n'
+)
+POSTURES = {
+    "front-up": [0.0, 10.0, 10.0, 0.0, 60.0, 0.0],
+    "turned": [0.0, 10.0, 10.0, 150.0, -60.0, -150.0],
+    "flipped": [0.0, 15.0, 23.0, 180.0, -52.0, 0.0],
+}
+
+
+def calibrated(name: str = "irb120") -> Robot:
+    robot = load_robot(name)
+    rng = np.random.default_rng(2)
+    drawn = {
+        p.name: p.value + 0.5 * p.prior * rng.standard_normal()
+        for p in robot.parameters.values()
+        if p.group == "geometry"
+    }
+    return robot.with_values(drawn)
+
+
+@pytest.fixture(scope="module")
+def paths(tmp_path_factory: pytest.TempPathFactory) -> dict[str, CorrectedPath]:
+    file = tmp_path_factory.mktemp("new") / "path.yaml"
+    file.write_text(PATH)
+    return {name: correct_path(calibrated(), read_path(file), np.radians(near)) for name, near in POSTURES.items()}
+
+
+def read_again(name: str, program: NewProgram) -> Program:
+    language = BY_NAME[name]
+    assert language.new is not None
+    sources = [Source(Path(file), text) for file, text in language.new(program).items()]
+    assert all(source.text.isascii() for source in sources)
+    assert all(language.is_one(source.text) for source in sources)
+    return language.read(sources)
+
+
+@pytest.mark.parametrize("kind", ["joints", "poses"])
+@pytest.mark.parametrize("name", BY_NAME)
+def test_the_own_reader_finds_every_target_again(name: str, kind: str, paths: dict[str, CorrectedPath]) -> None:
+    program = path_program(paths["front-up"], calibrated(), "weld_1", targets=kind, spacing=0.3)  # type: ignore[arg-type]
+    found = read_again(name, program)
+    assert found.skipped == ()
+    assert len(found.targets) == len(found.moves) == len(program)
+    assert [move.target for move in found.moves] == [*range(len(program))]
+    straight = ["joint", *[{"joints": "joint", "poses": "linear"}[kind]] * (len(program) - 1)]
+    assert [move.kind for move in found.moves] == straight
+    for row, target in enumerate(found.targets):
+        form, values = target.form, np.array(target.values)
+        if form.kind == "joints":
+            assert values * form.angle == pytest.approx(program.joints[row], abs=1e-6)
+            continue
+        assert program.poses is not None
+        assert form.orientation is not None
+        assert values[:3] * form.length == pytest.approx(program.poses[row, :3, 3], abs=1e-6)
+        numbers = values[None, 3:] * (1.0 if form.orientation.count == 4 else form.angle)
+        assert form.orientation.matrices(numbers)[0] == pytest.approx(program.poses[row, :3, :3], abs=2e-6)
+
+
+@pytest.mark.parametrize("posture", POSTURES)
+@pytest.mark.parametrize("name", BY_NAME)
+def test_the_controller_takes_the_posture_that_was_meant(
+    name: str, posture: str, paths: dict[str, CorrectedPath], tmp_path: Path
+) -> None:
+    robot = calibrated()
+    program = path_program(paths[posture], robot, "weld", targets="poses", spacing=0.5)
+    file = tmp_path / "cell.yaml"
+    file.write_text(CELL)
+    cell = Cell(read_tools(robot, file), {})
+    went = commanded(robot, read_again(name, program), cell)
+    assert robot.controller.from_model(went) == pytest.approx(program.joints, abs=2e-5)
+
+
+@pytest.mark.parametrize("name", BY_NAME)
+def test_an_arm_of_five_joints_has_programs_of_joint_positions(name: str, tmp_path: Path) -> None:
+    katana = load_robot("katana450")
+    file = tmp_path / "path.yaml"
+    file.write_text(
+        "truearm: truearm-path/1\nunits: {length: mm, angle: deg, time: s}\ntip: [0, 0, 130]\nspeed: 100\n"
+        "acceleration: 500\nstep: 0.1\nstart: [0, -370, 210]\nsections:\n  - line: [50, -370, 210]\n"
+    )
+    program = path_program(correct_path(katana, read_path(file)), katana, "weld", targets="joints", spacing=0.2)
+    found = read_again(name, program)
+    assert len(found.targets) == len(program)
+    for row, target in enumerate(found.targets):
+        assert np.array(target.values)[:5] * target.form.angle == pytest.approx(program.joints[row], abs=1e-6)
+        assert not any(target.values[5:])
+
+
+def test_targets_are_some_time_apart_and_ends_of_sections_are_among_them(paths: dict[str, CorrectedPath]) -> None:
+    path = paths["front-up"]
+    program = path_program(path, calibrated(), "weld", targets="joints", spacing=0.25)
+    assert program.durations[1:] == pytest.approx(0.25, abs=0.06)
+    assert program.durations.sum() == pytest.approx(path.motion.time[-1])
+    ends = [int(np.flatnonzero(path.planned.section == number)[-1]) for number in (1, 2)]
+    for end in ends:
+        assert (
+            np.abs(program.joints - calibrated().controller.from_model(path.joints["geometry"][end : end + 1]))
+            .max(axis=1)
+            .min()
+            < 1e-12
+        )
+    assert program.blend(0) == program.blend(len(program) - 1) == 0.0
+    assert 0.0 < program.blend(3) <= 1e-3
+
+
+def test_speed_or_time_stands_in_the_program(paths: dict[str, CorrectedPath]) -> None:
+    def text(name: str, kind: str) -> str:
+        program = path_program(paths["front-up"], calibrated(), "weld", targets=kind, spacing=0.2)  # type: ignore[arg-type]
+        language = BY_NAME[name]
+        assert language.new is not None
+        return "\n".join(language.new(program).values())
+
+    assert "\\T:=0.2" in text("rapid", "joints")
+    assert "\\T:=0.2" in text("rapid", "poses")
+    assert "200msec" in text("fanuc-ls", "joints")
+    assert "100.0mm/sec" in text("fanuc-ls", "poses")
+    assert "t=0.2" in text("urscript", "joints")
+    assert "$VEL.CP = 0.1000" in text("krl", "poses")
+    assert "V=100.0" in text("inform", "poses")
+    assert "mPath.tvel=100.0" in text("val3", "poses")
+
+
+@pytest.mark.parametrize("name", BY_NAME)
+def test_a_corrected_program_is_not_corrected_again(name: str, paths: dict[str, CorrectedPath], tmp_path: Path) -> None:
+    program = path_program(paths["front-up"], calibrated(), "weld", targets="joints", spacing=0.5)
+    language = BY_NAME[name]
+    assert language.new is not None
+    marked = []
+    for file, text in language.new(program).items():
+        (tmp_path / Path(file).name).write_text(text)
+        marked += [tmp_path / Path(file).name] if MARK in text else []
+    assert marked
+    with pytest.raises(InputError, match="was written corrected"):
+        program_files(marked)
+    plain = language.new(replace(program, corrected=False))
+    assert MARK not in "".join(plain.values())
+
+
+def test_what_cannot_be_a_program_is_refused(paths: dict[str, CorrectedPath]) -> None:
+    path = paths["front-up"]
+    with pytest.raises(InputError, match="cannot be called so in every language; got '2nd'"):
+        path_program(path, calibrated(), "2nd", targets="joints", spacing=0.2)
+    katana = load_robot("katana450")
+    with pytest.raises(InputError, match="arms of six joints"):
+        path_program(path, katana, "weld", targets="poses", spacing=0.2)
+    nameless = replace(path_program(path, calibrated(), "weld", targets="poses", spacing=0.5), branches=None)
+    for name in ("fanuc-ls", "inform"):
+        with pytest.raises(InputError, match="the postures of this arm have no names"):
+            read_again(name, nameless)
+    assert len(read_again("rapid", nameless).targets) == len(nameless)
+
+
+def test_how_far_a_program_leaves_a_circle_between_its_targets_is_known(paths: dict[str, CorrectedPath]) -> None:
+    wide = path_program(paths["front-up"], calibrated(), "weld", targets="poses", spacing=0.4)
+    speed, radius = 0.05, 0.05
+    assert wide.beside == pytest.approx((0.4 * speed) ** 2 / (8 * radius), rel=0.3)  # targets are samples
+    narrow = path_program(paths["front-up"], calibrated(), "weld", targets="poses", spacing=0.1)
+    assert narrow.beside < 0.15 * wide.beside
+    every = path_program(paths["front-up"], calibrated(), "weld", targets="poses", spacing=0.05)
+    assert every.beside < 1e-9
+    assert len(every) == len(paths["front-up"].motion.time)
+    turning = path_program(paths["front-up"], calibrated(), "weld", targets="joints", spacing=0.4)
+    assert 0.0 < turning.beside < 2.0 * wide.beside

@@ -1,0 +1,240 @@
+"""The error budget adds up, and each of its shares is what the twin's truth says."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.simulated import campaign
+
+from truearm.identification.judging.error_budget import ErrorBudget, error_budget
+from truearm.identification.judging.expected_error import expected_error
+from truearm.identification.solving.fit import Fit, identify
+from truearm.identification.solving.models import MODELS
+from truearm.library import load_robot
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.table_motion import table_motion, without_table_motion
+from truearm.modeling.chain import Array
+from truearm.modeling.transform import rotation_from_vector
+from truearm.results.budgets import budget_lines, budget_summary
+from truearm.simulation.devices import measured_with, named_device
+from truearm.simulation.truths import truth_twin
+from truearm.simulation.twin import Twin, measure
+
+MODEL = {model.name: model for model in MODELS}
+ROBOT = load_robot("irb120")
+HELD_OUT = 60
+
+
+def read(twin: Twin, joints: Array, noise: float, rng: np.random.Generator, repeat: float = 0.0) -> Dataset:
+    """Return readings at joint positions that the robot misses by its repeatability."""
+    return replace(measure(twin, joints + repeat * rng.standard_normal(joints.shape), noise, rng), joints=joints)
+
+
+def judged(
+    truth: str,
+    poses: int,
+    noise: float,
+    seed: int,
+    *,
+    repeat: float = 0.0,
+    visits: int = 1,
+    declared: float | None = 1.0,
+) -> tuple[ErrorBudget, Fit, Twin, Dataset]:
+    """Return the budget of a geometric calibration of a twin, and the held-out readings."""
+    rng = np.random.default_rng(seed)
+    twin = truth_twin(ROBOT, truth, rng)
+    joints = np.repeat(ROBOT.random_configurations(poses + HELD_OUT, rng), visits, axis=0)
+    data = read(twin, joints, noise, rng, repeat)
+    if data.sigma is not None:
+        data = replace(data, sigma=None if declared is None else declared * data.sigma)
+    first, rest = (data.of_configurations(part) for part in np.split(np.arange(len(joints)), [poses * visits]))
+    fit = identify(ROBOT, first, MODEL["geometric"])
+    budget = error_budget(fit, data, first, rest)
+    assert budget is not None
+    return budget, fit, twin, rest
+
+
+def square(budget: ErrorBudget, source: str) -> float:
+    share = next(share for share in budget.shares if share.source == source)
+    assert share.square is not None
+    return share.square
+
+
+def of_the_model(fit: Fit, twin: Twin, data: Dataset) -> float:
+    """Return the true mean square error of what the robot predicts."""
+    true = measure(twin, data.joints, 0.0, np.random.default_rng(0)).position.reshape(len(data.joints), -1, 3)
+    found = np.stack([fit.robot.world_poses(data.joints, name)[0] for name in data.targets], axis=1)
+    return float(np.mean(np.sum((found - true) ** 2, axis=2)))
+
+
+def test_the_shares_add_up_to_the_held_out_square() -> None:
+    budget, *_ = judged("tracker-triangular", 40, 0.02e-3, 1)
+    shares = [share.square for share in budget.shares if share.square is not None]
+    assert sum(shares) == pytest.approx(budget.square, rel=1e-12)
+    summary = budget_summary(budget)
+    assert sum(s["square_mm2"] or 0.0 for s in summary["shares"]) == pytest.approx(summary["rms_mm"] ** 2, rel=1e-9)
+    (line,) = budget_lines(budget)
+    parts = line.split("; ")[0].split(": ")[1].split(", ")
+    assert parts[0].startswith("what the model cannot express ")
+    assert parts[-1] == "instrument noise 0.035 mm"
+    assert line.endswith(f"the held-out rms of {summary['rms_mm']:.3f} mm, within their uncertainty")
+
+
+def test_noise_alone_is_the_instruments() -> None:
+    budgets = [judged("random", 60, 0.05e-3, seed)[0] for seed in range(5)]
+    for budget in budgets:
+        assert square(budget, "instrument") == pytest.approx(3 * 0.05e-3**2)
+        assert budget.share("instrument").deviation == 0.0
+        assert abs(square(budget, "model")) < 3 * budget.share("model").deviation
+        assert budget.remainder_is_chance
+    assert np.mean([square(b, "model") for b in budgets]) < 0.1 * square(budgets[0], "instrument")
+
+
+def test_the_share_of_the_parameters_is_what_they_do_at_unseen_poses() -> None:
+    made = [judged("random", 14, 0.05e-3, seed) for seed in range(6)]
+    true = [of_the_model(fit, twin, rest) for _, fit, twin, rest in made]
+    shares = [square(budget, "parameters") for budget, *_ in made]
+    doubt = np.linalg.norm([budget.share("parameters").deviation for budget, *_ in made]) / len(made)
+    assert abs(np.mean(shares) - np.mean(true)) < 2.5 * doubt < 0.7 * np.mean(true)
+    for (budget, *_), is_so in zip(made, true, strict=True):
+        assert abs(square(budget, "parameters") - is_so) < 3 * budget.share("parameters").deviation
+
+
+@pytest.mark.parametrize("declared", [1.0, None])
+def test_what_the_model_lacks_is_found(declared: float | None) -> None:
+    made = [judged("tracker-triangular", 80, 0.02e-3, seed, declared=declared) for seed in range(3)]
+    for budget, fit, twin, rest in made:
+        true = of_the_model(fit, twin, rest)
+        found = square(budget, "model") + square(budget, "parameters")
+        doubt = np.hypot(budget.share("model").deviation, budget.share("parameters").deviation)
+        assert abs(found - true) < 3 * np.hypot(doubt, budget.deviation)
+        assert square(budget, "model") > 0.6 * true
+        assert "how well the robot comes back" in budget.share("model").words
+        assert square(budget, "instrument") == pytest.approx(3 * 0.02e-3**2, rel=0.3)
+
+
+def test_repeatability_is_told_from_the_model_where_postures_were_visited_again() -> None:
+    repeat = np.radians(0.01)
+    budget, _, twin, rest = judged("random", 30, 0.02e-3, 1, repeat=repeat, visits=3)
+    at = measure(twin, rest.joints, 0.0, np.random.default_rng(0)).position
+    moved = 0.0
+    for joint in range(6):
+        there = measure(twin, rest.joints + 1e-6 * np.eye(6)[joint], 0.0, np.random.default_rng(0)).position
+        moved += float(np.mean(np.sum(((there - at) / 1e-6) ** 2, axis=1)))
+    share = budget.share("repeatability")
+    assert share.square == pytest.approx(moved * repeat**2, abs=3 * share.deviation)
+    assert share.deviation < 0.2 * moved * repeat**2
+    assert abs(square(budget, "model")) < 3 * budget.share("model").deviation
+    assert "270 visits to 90 postures" in share.words
+
+
+def test_declared_deviations_that_are_too_large_show_as_a_negative_share() -> None:
+    budget, *_ = judged("random", 60, 0.05e-3, 2, declared=2.0)
+    share = budget.share("model")
+    assert share.square is not None
+    assert share.square < -3 * share.deviation
+    assert share.words.startswith("negative: the training residuals are smaller than the declared deviations")
+    assert "; what the model cannot express takes 0." in budget_lines(budget)[0]
+
+
+def test_an_effect_outside_the_training_part_is_a_remainder_that_is_not_explained() -> None:
+    rng = np.random.default_rng(3)
+    twin, data = campaign("irb120", 60, 0.02e-3, 3)
+    rest = read(twin, ROBOT.random_configurations(40, rng), 0.02e-3, rng)
+    rest = replace(rest, position=rest.position + np.array([0.5e-3, 0.0, 0.0]))
+    fit = identify(ROBOT, data, MODEL["geometric"])
+    budget = error_budget(fit, data, data, rest)
+    assert budget is not None
+    assert not budget.remainder_is_chance
+    assert square(budget, "remainder") == pytest.approx(0.5e-3**2, rel=0.1)
+    assert budget.share("remainder").words.startswith("not explained: the robot errs more")
+    assert budget_lines(budget)[0].endswith("mm more than they explain")
+
+
+def test_nothing_held_out_leaves_no_remainder() -> None:
+    _, data = campaign("irb120", 40, 0.02e-3, 4)
+    fit = identify(ROBOT, data, MODEL["geometric"])
+    budget = error_budget(fit, data, data, None, expected_error(fit))
+    assert budget is not None
+    assert not budget.held_out
+    assert {share.source for share in budget.shares} == {"instrument", "table", "repeatability", "model", "parameters"}
+    assert budget.square == pytest.approx(sum(share.square or 0.0 for share in budget.shares))
+    assert "rms to expect at configurations like these" in budget_lines(budget)[0]
+    assert budget.workspace is not None
+    expected = expected_error(fit).overall
+    assert sum(share.square or 0.0 for share in budget.workspace) == pytest.approx(expected.mean**2, rel=0.6)
+
+
+def test_lengths_have_a_budget_too() -> None:
+    rng = np.random.default_rng(5)
+    twin = truth_twin(ROBOT, "random", rng)
+    data = measured_with(named_device("ballbar"), ROBOT, twin, 120, rng)
+    first, rest = data.of_configurations(range(90)), data.of_configurations(range(90, 120))
+    budget = error_budget(identify(ROBOT, first, MODEL["geometric"]), data, first, rest)
+    assert budget is not None
+    assert budget.kind == "length"
+    assert data.sigma is not None
+    assert square(budget, "instrument") == pytest.approx(data.sigma[0] ** 2)
+    assert budget.remainder_is_chance
+    assert budget.share("table").square is None
+
+
+def test_positions_before_a_fixture_have_a_budget() -> None:
+    rng = np.random.default_rng(5)
+    data = measured_with(named_device("point"), ROBOT, truth_twin(ROBOT, "random", rng), 60, rng)
+    first, rest = data.of_configurations(range(45)), data.of_configurations(range(45, 60))
+    budget = error_budget(identify(ROBOT, first, MODEL["geometric"]), data, first, rest)
+    assert budget is not None
+    assert budget.kind == "position"
+    assert square(budget, "instrument") == pytest.approx(3 * 0.05e-3**2)
+    assert budget.remainder_is_chance
+
+
+def on_a_moving_table(noise: float) -> tuple[Dataset, Array]:
+    """Return readings on a table that moves, with four noisy reference points, and where the targets truly are."""
+    rng = np.random.default_rng(6)
+    twin = truth_twin(ROBOT, "random", rng)
+    data = measure(twin, ROBOT.random_configurations(80, rng), 0.0, rng)
+    points = np.array([[0.6, 0.4, 0.1], [0.5, -0.4, 0.1], [-0.5, 0.3, 0.1], [-0.3, -0.5, 0.3]])
+    turns = rotation_from_vector(1e-4 * rng.standard_normal((80, 3)))
+    shifts = 0.2e-3 * rng.standard_normal((80, 3))
+    seen = points @ np.swapaxes(turns, 1, 2) + shifts[:, None] + noise * rng.standard_normal((80, 4, 3))
+    mine = data.configuration
+    position = np.einsum("nij,nj->ni", turns[mine], data.position) + shifts[mine]
+    beside = replace(
+        data,
+        targets=("a", "b", "c", "d"),
+        configuration=np.repeat(np.arange(80), 4),
+        target=np.tile(np.arange(4), 80),
+        position=seen.reshape(-1, 3),
+    )
+    return replace(data, position=position, references=beside), data.position
+
+
+def test_what_is_left_of_the_tables_motion() -> None:
+    moving, true = on_a_moving_table(0.01e-3)
+    still = without_table_motion(moving)
+    motion = table_motion(still)
+    assert motion is not None
+    off = still.position - true
+    off -= off.mean(axis=0)  # where the points are on average is not known better than their mean
+    assert motion.left == pytest.approx(float(np.mean(np.sum(off**2, axis=1))), rel=0.2)
+    assert motion.removed == pytest.approx(
+        float(np.sqrt(np.mean(np.sum((moving.position - still.position) ** 2, axis=1)))), rel=1e-6
+    )
+    assert table_motion(replace(still, references=None)) is None
+
+
+def test_the_tables_motion_has_a_share() -> None:
+    moving, _ = on_a_moving_table(0.01e-3)
+    still = without_table_motion(replace(moving, sigma=np.full(len(moving.target), 1e-6)))
+    first, rest = still.of_configurations(range(50)), still.of_configurations(range(50, 80))
+    budget = error_budget(identify(ROBOT, first, MODEL["geometric"]), still, first, rest)
+    assert budget is not None
+    share = budget.share("table")
+    assert share.square is not None
+    assert share.square > 10 * abs(square(budget, "instrument"))
+    assert "after a motion of 0.51 mm" in share.words
+    assert budget.removed is not None

@@ -1,0 +1,164 @@
+"""Monte Carlo repeats a calibration: where all is linear it agrees with the covariance, and where not it says so."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from tests.simulated import campaign
+
+from truearm.errors import InputError
+from truearm.identification.judging.simulated_calibrations import (
+    SimulatedCalibrations,
+    check_linear,
+    simulated_calibrations,
+)
+from truearm.identification.solving.bounds import Bounds
+from truearm.identification.solving.fit import Fit, identify
+from truearm.identification.solving.models import MODELS
+from truearm.identification.solving.rounds import Redundant
+from truearm.jobs.calibrate import calibrate
+from truearm.library import load_robot
+from truearm.measurement.dataset import Dataset
+from truearm.modeling.parameters import PLACES
+from truearm.results.simulated import simulated_lines
+from truearm.simulation.devices import measured_with, named_device
+from truearm.simulation.truths import truth_twin
+from truearm.simulation.twin import Twin, measure
+
+ROBOT = load_robot("irb120")
+MODEL = {model.name: model for model in MODELS}
+
+
+def read(repeat: float = 0.0, poses: int = 40, seed: int = 1) -> tuple[Twin, Dataset]:
+    rng = np.random.default_rng(seed)
+    twin = truth_twin(ROBOT, "random", rng)
+    joints = ROBOT.random_configurations(poses, rng)
+    there = joints + repeat * rng.standard_normal(joints.shape)
+    return twin, replace(measure(twin, there, 0.05e-3, rng), joints=joints)
+
+
+def informed(fit: Fit, names: Sequence[str]) -> NDArray[np.bool_]:
+    found = [fit.robot.parameters[name] for name in names]
+    return np.array([p.group not in PLACES and (p.informed or 0.0) > 0.5 for p in found])
+
+
+@pytest.mark.parametrize(("repeat", "redundancy"), [(0.0, "prior"), (1.5e-4, "prior"), (0.0, "drop")])
+def test_where_all_is_linear_it_agrees_with_the_covariance(repeat: float, redundancy: Redundant) -> None:
+    _, data = read(repeat)
+    fit = identify(ROBOT, data, MODEL["geometric"], redundancy=redundancy)
+    assert fit.joint_error.any() == bool(repeat)
+    found = simulated_calibrations(fit, data, data, 400, priors=redundancy == "prior")
+    assert found.settled == 400
+    own = informed(fit, found.names)
+    assert own.sum() > 15
+    ratio = (found.deviation / found.linear_deviation)[own]
+    assert 0.85 < ratio.min() < ratio.max() < 1.15
+    assert 0.935 < found.coverage[own].mean() < 0.965
+    assert found.held_out is not None
+    assert found.held_out.mean == pytest.approx(found.held_out.linear_mean, rel=0.06)
+    assert (found.workspace is None) == (redundancy == "drop")
+    assert check_linear(fit, found) == []
+
+
+def test_its_intervals_hold_the_truth() -> None:
+    held, count = 0, 0
+    for seed in range(4):
+        twin, data = read(seed=seed)
+        fit = identify(ROBOT, data, MODEL["geometric"])
+        found = simulated_calibrations(fit, data, data, 200, priors=True, seed=seed)
+        own = informed(fit, found.names)
+        truth = np.array([twin.robot.values.get(name, np.nan) for name in found.names])
+        low, high = found.interval_95.T
+        known = own & np.isfinite(truth)
+        held += int(((low <= truth) & (truth <= high))[known].sum())
+        count += int(known.sum())
+    assert count > 40
+    assert 0.85 < held / count <= 1.0
+
+
+def test_residuals_that_joints_do_not_explain_are_drawn_as_they_are() -> None:
+    _, data = campaign("irb120", 60, 0.02e-3, 1, truth="tracker-triangular")
+    fit = identify(ROBOT, data, MODEL["geometric"])
+    assert fit.scattered
+    found = simulated_calibrations(fit, data, data, 200, priors=True)
+    ratio = (found.deviation / found.linear_deviation)[informed(fit, found.names)]
+    assert 0.6 < ratio.min() < ratio.max() < 1.3
+
+
+def test_lengths_alone_are_simulated_too() -> None:
+    rng = np.random.default_rng(5)
+    twin = truth_twin(ROBOT, "random", rng)
+    data = measured_with(named_device("ballbar"), ROBOT, twin, 80, rng)
+    fit = identify(ROBOT, data, MODEL["geometric"])
+    found = simulated_calibrations(fit, data, data, 100, priors=True)
+    assert found.settled == 100
+    assert found.held_out is not None
+    assert found.held_out.mean == pytest.approx(found.held_out.linear_mean, rel=0.3)
+
+
+def lost(fit: Fit, data: Dataset, factor: float, settled: int) -> SimulatedCalibrations:
+    found = simulated_calibrations(fit, data, data, 100, priors=True)
+    return replace(found, error=factor * found.error[:settled], stated=found.stated[:settled])
+
+
+def test_intervals_that_are_too_narrow_and_lost_trials_are_told() -> None:
+    _, data = read()
+    fit = identify(ROBOT, data, MODEL["geometric"])
+    codes = [(n.code, n.level) for n in check_linear(fit, lost(fit, data, 2.5, 100))]
+    assert codes == [("intervals-too-narrow", "warning")]
+    assert [n.code for n in check_linear(fit, lost(fit, data, 1.0, 90))] == ["trials-lost"]
+    nothing = lost(fit, data, 1.0, 0)
+    assert [n.code for n in check_linear(fit, nothing)] == ["trials-lost"]
+    assert "none of 100 simulated calibrations" in simulated_lines(nothing, fit.robot)[0]
+
+
+def test_the_job_puts_both_intervals_side_by_side(tmp_path: Path) -> None:
+    _, data = read()
+    said: list[str] = []
+    run = calibrate(ROBOT, data, monte_carlo=100, out=tmp_path / "out", progress=said.append)
+    found = run.result()["monte_carlo"]
+    assert (found["trials"], found["settled"], found["seed"]) == (100, 100, 0)
+    row = next(row for row in found["parameters"] if row["name"] == "a_3")
+    low, high = row["interval_95"]
+    assert low < run.robot.values["a_3"] * 1e3 < high
+    assert row["linear_interval_95"][1] - row["linear_interval_95"][0] == pytest.approx(
+        3.919928 * row["linear_deviation"]
+    )
+    assert high - low == pytest.approx(3.92 * row["linear_deviation"], rel=0.3)
+    assert 0.8 < found["coverage"] <= 1.0
+    assert [words for words in said if words.endswith("100 of 100") and "[####################]" in words]
+    assert any(line.startswith("Monte Carlo: in 100 simulated") for line in run.lines())
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert 'id="coverage"' in page
+    assert 'id="intervals"' in page
+    assert "monte_carlo=100" in run.command
+    again = calibrate(ROBOT, data, monte_carlo=100).result()["monte_carlo"]
+    assert again == found
+    assert "monte_carlo" not in calibrate(ROBOT, data).result()
+
+
+def test_what_cannot_be_simulated_is_refused() -> None:
+    _, data = read()
+    with pytest.raises(InputError, match="out of range; got 99; allowed: 100 to 100000"):
+        calibrate(ROBOT, data, monte_carlo=99)
+    with pytest.raises(InputError, match=r"other losses are for noise that is not normal.*the loss l1.*`loss`"):
+        calibrate(ROBOT, data, monte_carlo=100, loss="l1")
+    limits = {"truearm": "truearm-bounds/1", "units": {"length": "mm", "angle": "deg"}, "within": {"a_3": 1.0}}
+    with pytest.raises(InputError, match=r"simulated without bounds.*Leave `bounds` out"):
+        calibrate(ROBOT, data, monte_carlo=100, bounds=Bounds.model_validate(limits))
+    with pytest.raises(InputError, match="a whole number belongs here"):
+        calibrate(ROBOT, data, monte_carlo=1e3)  # type: ignore[arg-type]
+
+
+def test_nothing_is_simulated_of_a_fit_that_leaves_things_open() -> None:
+    _, data = read()
+    run = calibrate(ROBOT, data.of_configurations(range(3)), monte_carlo=100)
+    assert run.status.value == "rank-loss"
+    assert run.monte_carlo is None
+    assert ("not-simulated", "note") in {(notice.code, notice.level) for notice in run.warnings}
+    assert "monte_carlo" not in run.result()

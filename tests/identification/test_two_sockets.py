@@ -1,0 +1,122 @@
+"""A ball in two sockets: nothing but joint positions, and what they tell of an arm with seven joints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from truearm.identification.judging.left_over import LeftOver
+from truearm.identification.solving.fit import Status, identify
+from truearm.identification.solving.models import named_model
+from truearm.identification.solving.redundancy import gauge_freedoms
+from truearm.library import load_robot
+from truearm.measurement.dataset import Dataset
+from truearm.modeling.chain import Array
+from truearm.modeling.robot import Robot
+from truearm.modeling.transform import rigid_motion
+from truearm.simulation.devices import in_view_of, measured_with, named_device
+from truearm.simulation.devices.device import Arm
+from truearm.simulation.devices.touching import TwoSockets
+from truearm.simulation.truths import truth_twin
+from truearm.simulation.twin import Twin
+from truearm.simulation.twin_joint import JointTruth
+
+TOOL = "0.5kg,0mm,0mm,60mm"
+#: About what strain wave gears with a torque sensor give way [rad/(N m)].
+SOFT = dict(zip(range(1, 8), np.array([5, 5, 6, 6, 10, 10, 10]) * 1e-5, strict=True))
+NOMINAL = load_robot("fr3").with_payload(TOOL)
+DEVICE = named_device("two-sockets")
+
+
+@dataclass(frozen=True)
+class Pressed:
+    """An arm whose ball is pushed into its socket by hand, each time otherwise; nobody measures how."""
+
+    twin: Twin
+    force: Array
+
+    @property
+    def robot(self) -> Robot:
+        return self.twin.robot
+
+    def frames(self, joints: Array) -> Mapping[str, Array]:
+        wrench = np.concatenate([self.force[: len(joints)], np.zeros((len(joints), 3))], axis=1)
+        return self.twin.frames(joints, wrench=wrench)
+
+
+def campaign(seed: int, sigma: float, newton: float = 5.0, count: int = 120) -> tuple[Twin, Dataset]:
+    """Return a robot drawn from its priors, elastic, and what its ball in the sockets tells."""
+    rng = np.random.default_rng(seed)
+    drawn = truth_twin(NOMINAL, "random", rng)
+    twin = replace(
+        drawn,
+        robot=in_view_of(DEVICE, drawn.robot).with_payload(TOOL),
+        joints={number: JointTruth(compliance=value) for number, value in SOFT.items()},
+    )
+    pressed: Arm = Pressed(twin, newton / np.sqrt(3) * rng.standard_normal((count, 3)))
+    placed = NOMINAL.with_frames(twin.robot.base, {"ball": (0.02, 0.01, 0.15)})
+    return twin, DEVICE.campaign(placed, pressed, count, sigma, rng)
+
+
+def error(robot: Robot, twin: Twin) -> float:
+    """Return the mean error of the ball all over the limits of the joints, behind the best rigid motion [m]."""
+    q = NOMINAL.random_configurations(100, np.random.default_rng(99))
+    true, found = twin.frames(q)["ball"][:, :3, 3], robot.world_poses(q, "ball")[0]
+    R, t = rigid_motion(found, true)
+    return float(np.linalg.norm(found @ R.T + t - true, axis=1).mean())
+
+
+@pytest.mark.parametrize(("seed", "sigma", "most"), [(0, 2e-5, 0.1), (1, 1e-4, 0.25)])
+def test_the_error_elsewhere_falls_to_a_tenth_of_the_nominal_robots(seed: int, sigma: float, most: float) -> None:
+    twin, data = campaign(seed, sigma)
+    fit = identify(NOMINAL, data, named_model("elastic"))
+    assert fit.status is Status.CONVERGED
+    assert error(fit.robot, twin) < most * error(fit.start, twin)
+    seen = " ".join(fit.unobservable_combinations)
+    assert fit.gauge_freedoms == ("base",)
+    assert all(name in seen for name in ("theta_offset_1", "d_1", "theta_offset_7", "d_7"))  # base and flange zero
+
+
+def test_the_distance_of_the_sockets_is_the_only_scale() -> None:
+    _, data = campaign(2, 2e-5, 0.0)
+    assert data.setup is not None
+    assert gauge_freedoms(data) == ("base",)
+    assert gauge_freedoms(replace(data, setup=None)) == ("base", "size")
+    assert data.setup.distance is not None
+    longer = replace(data, setup=replace(data.setup, distance=1.001 * data.setup.distance))
+    sure, wrong = (identify(NOMINAL, d, named_model("elastic")).robot for d in (data, longer))
+    lengths = ["d_3", "d_5", "a_4"]
+    grown = [wrong.values[n] / sure.values[n] - 1.0 for n in lengths]
+    # nominal lengths, each good to 1 mm, hold a little against a distance that is good to 0.02 mm
+    np.testing.assert_allclose(grown, 0.001, rtol=0.15)
+    unsure = replace(data, setup=replace(data.setup, sigma=np.array([1e-3])))
+    loose = identify(NOMINAL, unsure, named_model("elastic")).robot
+    for name in lengths:
+        spread, tight = loose.parameters[name].deviation, sure.parameters[name].deviation
+        assert spread is not None
+        assert tight is not None
+        assert spread > 1.5 * tight
+
+
+def test_a_size_that_no_reading_holds_does_not_explain_what_a_fit_leaves() -> None:
+    _, data = campaign(3, 2e-5, 0.0, 60)
+    left = LeftOver.of(identify(NOMINAL, data, named_model("geometric")), data)
+    rest = left.without_parameters(left.residual)
+    assert float(rest @ rest) > 0.5 * float(left.residual @ left.residual)
+
+
+def test_the_device_puts_the_ball_into_both_sockets_from_above() -> None:
+    twin = truth_twin(NOMINAL, "nominal", np.random.default_rng(0))
+    data = measured_with(DEVICE, NOMINAL, twin, 20, np.random.default_rng(1), 0.0)
+    seen = twin.robot.with_frames(twin.robot.base, {"ball": (0.02, 0.01, 0.15)})
+    places, turned = seen.world_poses(data.joints, "ball")
+    for socket in (0, 1):
+        assert np.ptp(places[data.against == socket], axis=0).max() < 1e-8
+    assert isinstance(DEVICE, TwoSockets)
+    apart = np.linalg.norm(places[data.against == 0][0] - places[data.against == 1][0])
+    assert apart == pytest.approx(DEVICE.apart, abs=1e-8)
+    assert (seen.world_poses(data.joints)[1][:, :, 2] @ -seen.base.rotation[:, 2]).min() > np.cos(DEVICE.within + 1e-9)
+    assert turned.shape == (20, 3, 3)

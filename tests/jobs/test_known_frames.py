@@ -1,0 +1,345 @@
+"""Known frames are held: absolute calibration, what it says of itself, and what cannot be held."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.known_frames import frames_of
+from tests.simulated import campaign
+from typer.testing import CliRunner
+
+from truearm.cli import app
+from truearm.compensation.cell import EMPTY_CELL
+from truearm.compensation.chosen_targets import Choice
+from truearm.compensation.fake_targets import matrices
+from truearm.compensation.gauge import best_agreement
+from truearm.compensation.program_correction import corrected_programs
+from truearm.compensation.programs.program import Program, Source
+from truearm.compensation.programs.rapid import RAPID
+from truearm.errors import InputError
+from truearm.identification.solving.fit import identify
+from truearm.identification.solving.models import FRAMES
+from truearm.identification.solving.redundancy import gauge_freedoms
+from truearm.jobs.calibrate import calibrate
+from truearm.jobs.load_robot import load_robot
+from truearm.jobs.simulate import simulate
+from truearm.jobs.validate import validate
+from truearm.library import load_robot as library_robot
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.readers.canonical import csv_text
+from truearm.modeling.robot import Robot
+from truearm.results.calibration import Calibration
+from truearm.simulation.twin import Twin
+
+
+@cache
+def exact(robot: str = "irb120") -> tuple[Twin, Dataset]:
+    return campaign(robot, 30, 0.0, 11)
+
+
+@cache
+def noisy() -> tuple[Twin, Dataset]:
+    return campaign("irb120", 30, 0.05e-3, 11)
+
+
+def apart(one: Robot, other: Robot, target: str | None = None) -> float:
+    """Return how far two robots are from each other in the instrument's frame, at most [m]."""
+    q = one.random_configurations(60, np.random.default_rng(5))
+    return float(np.abs(one.world_poses(q, target)[0] - other.world_poses(q, target)[0]).max())
+
+
+def held(hold: list[str], folder: Path, robot: str = "irb120", **more: Any) -> Calibration:
+    twin, data = exact(robot)
+    return calibrate(robot, data, hold=hold, frames=frames_of(twin.robot, folder / "frames.yaml"), **more)
+
+
+@pytest.mark.parametrize(("robot", "redundancy"), [("irb120", "prior"), ("irb120", "drop"), ("katana450", "prior")])
+def test_with_true_frames_the_flange_is_where_it_is(robot: str, redundancy: str, tmp_path: Path) -> None:
+    """Base and tool known: not only the targets, the flange itself stands right in the base."""
+    found = held(["base", "targets"], tmp_path, robot, redundancy=redundancy)
+    twin = exact(robot)[0].robot
+    assert found.warnings == () or {n.code for n in found.warnings} <= {"redundant", "parallel-axes"}
+    assert all(apart(found.robot, twin, target.name) < 1e-9 for target in twin.targets)
+    assert apart(found.robot, twin) < 1e-9
+    free = calibrate(robot, exact(robot)[1], redundancy=redundancy)  # type: ignore[arg-type]
+    assert all(apart(free.robot, twin, target.name) < 1e-9 for target in twin.targets)
+    assert apart(free.robot, twin) > 1e-4  # shifts of base and flange are arbitrary there
+
+
+@pytest.mark.parametrize("hold", [["base"], ["targets"], ["1"], ["base", "2"]])
+def test_what_is_held_stays_and_the_rest_is_found(hold: list[str], tmp_path: Path) -> None:
+    found = held(hold, tmp_path)
+    twin = exact()[0].robot
+    assert found.nominal.position is not None
+    assert all(apart(found.robot, twin, target.name) < 1e-9 for target in twin.targets)
+    names = found.fit.held.names(found.robot)
+    assert names
+    for name in names:
+        if not name.startswith("base_r"):
+            assert found.robot.values[name] == pytest.approx(twin.values[name], abs=1e-12)
+        assert found.fit.parameter_status(name) == "held"
+        assert found.robot.parameters[name].deviation is None
+
+
+def test_the_height_of_the_base_is_no_longer_redundant_with_the_first_joint(tmp_path: Path) -> None:
+    free = calibrate("irb120", exact()[1], redundancy="drop")
+    absolute = held(["base", "targets"], tmp_path, redundancy="drop")
+    dropped, still = ({r.dropped for r in one.fit.redundancies} for one in (free, absolute))
+    gauge = {name for name in dropped if name.rsplit("_", 1)[-1] in ("1", "6")}
+    assert gauge
+    assert not still & gauge
+    assert {"d_1", "theta_offset_1"} <= set(absolute.fit.free.names)
+
+
+def test_what_was_held_is_said_everywhere(tmp_path: Path) -> None:
+    found = held(["base", "1", "2", "3"], tmp_path, out=tmp_path / "out")
+    assert "Held at known places: base, target 1, target 2, target 3" in found.lines()
+    written = json.loads((tmp_path / "out" / "result.json").read_text())
+    assert written["held"] == ["base", "target 1", "target 2", "target 3"]
+    assert {p["status"] for p in written["parameters"] if p["name"].startswith("base_")} == {"held"}
+    assert "held at known places" in (tmp_path / "out" / "report.html").read_text()
+    assert ", base, 1, 2 and 3 held" in found.history or "base, 1, 2, 3 held" in found.history
+    assert "hold=['base', '1', '2', '3']" in found.command
+    again = load_robot(tmp_path / "out" / "calibrated.yaml")
+    assert again.proof is not None
+    assert again.proof.held[:2] == ("base", "flange")
+    assert "target_1_x" in again.proof.held
+    shown = CliRunner().invoke(app, ["show", str(tmp_path / "out" / "calibrated.yaml")]).output
+    assert "held at known places: base, flange" in " ".join(shown.split())
+    assert found.expected.frame == "the instrument's frame"
+
+
+def test_a_file_that_holds_a_stranger_is_refused(tmp_path: Path) -> None:
+    held(["base"], tmp_path, out=tmp_path / "out")
+    path = tmp_path / "out" / "calibrated.yaml"
+    path.write_text(path.read_text().replace("held: [base]", "held: [bass]"))
+    with pytest.raises(
+        InputError, match=r"proof\.held: nothing of this name can be held; got 'bass'; allowed: base, f"
+    ):
+        load_robot(path)
+
+
+def test_the_base_stays_known_when_the_robot_is_placed_anew(tmp_path: Path) -> None:
+    first = held(["base", "targets"], tmp_path)
+    elsewhere = calibrate(first.robot, exact()[1], model="frames")
+    assert elsewhere.robot.proof is not None
+    assert elsewhere.robot.proof.held == ("base", "flange")
+    assert calibrate(first.robot, exact()[1]).robot.proof.held == ()  # type: ignore[union-attr]
+
+
+def plate() -> Program:
+    from importlib.resources import files
+
+    return RAPID.read([Source(Path("plate.mod"), (files("truearm.examples") / "plate.mod").read_text())])
+
+
+def test_no_base_and_no_flange_is_assumed_in_programs_where_they_were_held(tmp_path: Path) -> None:
+    found = held(["base", "targets"], tmp_path)
+    made = corrected_programs(found.robot, [plate()], EMPTY_CELL, choice=Choice(taught=frozenset()))
+    assert (made.frames.tools, made.frames.frames) == ("held", "held")
+    np.testing.assert_allclose(made.frames.base, np.eye(4), atol=0)
+    np.testing.assert_allclose(made.frames.flange, np.eye(4), atol=0)
+    one, twin = made.corrections[0], exact()[0].robot
+    rows = np.flatnonzero(one.corrected)
+    tool = next(iter(one.program.tools.values())).matrix
+    # Sent there, the twin is in its own base where the program means it, which a shift of the base would spoil.
+    reached = np.linalg.inv(twin.base.matrix) @ matrices(twin, one.joints[rows]) @ tool
+    np.testing.assert_allclose(reached, one.tips[rows], atol=1e-7)
+    assert one.moved[rows].mean() > 1e-4
+    free = calibrate("irb120", exact()[1])
+    other = corrected_programs(free.robot, [plate()], EMPTY_CELL, choice=Choice(taught=frozenset()))
+    assert (other.frames.tools, other.frames.frames) == ("assumed", "assumed")
+    assert not np.allclose(other.frames.base, np.eye(4), atol=1e-6)
+
+
+def test_a_tool_point_that_was_held_stays_on_the_flange_in_programs(tmp_path: Path) -> None:
+    robot = held(["base", "1"], tmp_path).robot
+    base, flange = best_agreement(robot)
+    np.testing.assert_allclose(base, np.eye(4), atol=0)
+    point = np.array([robot.values[f"target_1_{axis}"] for axis in "xyz"])
+    np.testing.assert_allclose((flange @ [*point, 1.0])[:3], point, atol=2e-6)
+    assert not np.allclose(flange[:3, :3], np.eye(3), atol=1e-6)
+
+
+@pytest.mark.parametrize("redundancy", ["prior", "drop"])
+def test_a_base_that_is_elsewhere_contradicts_the_readings(redundancy: str, tmp_path: Path) -> None:
+    twin, data = noisy()
+    right = calibrate("irb120", data, hold=["base"], frames=frames_of(twin.robot, tmp_path / "a.yaml"))
+    assert "hold-contradicts" not in {n.code for n in right.warnings}
+    wrong = frames_of(twin.robot, tmp_path / "b.yaml", base=(2.0, 0.0, 0.0))
+    found = calibrate("irb120", data, hold=["base", "targets"], frames=wrong, redundancy=redundancy)  # type: ignore[arg-type]
+    (notice,) = [n for n in found.warnings if n.code == "hold-contradicts"]
+    assert notice.level == "error"
+    assert re.search(r"with them the fit leaves \S+ mm .* with all of them found 0\.08\d* mm", notice.message)
+    assert not found.finished
+
+
+def test_a_height_that_only_another_robot_could_have_contradicts_too(tmp_path: Path) -> None:
+    """It goes whole into d_1, and no reading is off."""
+    twin, data = noisy()
+    wrong = frames_of(twin.robot, tmp_path / "b.yaml", base=(0.0, 0.0, 12.0))
+    found = calibrate("irb120", data, hold=["base"], frames=wrong)
+    (notice,) = [n for n in found.warnings if n.code == "hold-contradicts"]
+    assert re.search(r"found from the readings, the base is 1\d\.\d mm", notice.message)
+
+
+def test_a_moved_base_and_held_targets_go_together(tmp_path: Path) -> None:
+    twin, data = noisy()
+    numbered = replace(data, number=np.arange(30.0))
+    position = numbered.position.copy()
+    position[numbered.configuration >= 15] += [2e-3, 0.0, 1e-3]
+    frames = frames_of(twin.robot, tmp_path / "frames.yaml")
+    found = calibrate(
+        "irb120", replace(numbered, position=position), hold=["base", "targets"], frames=frames, base_changes=["16"]
+    )
+    assert apart(found.robot, twin.robot) < 0.3e-3
+
+
+# -- fixtures ------------------------------------------------------------------------------------------------------
+
+
+@cache
+def touched(device: str = "plane") -> tuple[Robot, Dataset]:
+    data = simulate("irb120", truth="nominal", device=device, poses=30, noise=0.0, seed=1).data
+    return identify(library_robot("irb120"), data, FRAMES).robot, data
+
+
+def cell_file(path: Path, tools: dict[str, Any], frames: dict[str, Any]) -> Path:
+    units = {"length": "mm", "angle": "deg"}
+    path.write_text(json.dumps({"truearm": "truearm-cell/1", "units": units, "tools": tools, "frames": frames}))
+    return path
+
+
+def fixture_entries(robot: Robot) -> dict[str, Any]:
+    entries = {}
+    for fixture in robot.fixtures:
+        kinematics = robot.fixture_kinematics(fixture.name)
+        from truearm.modeling.transform import Transform
+
+        place = Transform.from_matrix(kinematics.matrix()[0], kinematics.position[:, 0])
+        entries[fixture.name] = {
+            "of": "base",
+            "translation": [1e3 * v for v in place.translation],
+            "quaternion": list(place.quaternion),
+        }
+    return entries
+
+
+def test_fixtures_that_are_held_locate_the_robot(tmp_path: Path) -> None:
+    robot, data = touched()
+    frames = cell_file(tmp_path / "cell.yaml", {}, fixture_entries(robot))
+    found = calibrate("irb120", data, model="offsets", train="all", hold=["fixtures"], frames=frames)
+    assert found.fit.gauge_freedoms == ()
+    assert "closed-loop" not in {n.code for n in found.warnings}
+    assert all(
+        found.fit.parameter_status(p.name) == "held" for p in found.robot.parameters.values() if p.group == "fixture"
+    )
+    assert gauge_freedoms(data)
+    assert apart(found.robot, robot, found.robot.targets[0].name) < 1e-6
+
+
+# -- refusals ------------------------------------------------------------------------------------------------------
+
+TOOL = {"of": "flange", "translation": [0, 0, 100]}
+BASE = {"of": "world", "translation": [0, 0, 0], "quaternion": [1, 0, 0, 0]}
+
+
+@pytest.mark.parametrize(
+    ("hold", "tools", "frames", "said"),
+    [
+        (["bse"], {}, {"base": BASE}, r"nothing of this name to hold; got 'bse'.*Did you mean base"),
+        (["base", "base", "1", "targets"], {}, {}, r"this is held twice; got 'targets \(1\)'"),
+        (["fixtures"], {}, {"base": BASE}, r"the readings have no fixture"),
+        (["base"], {"1": TOOL}, {}, r"frames\.yaml, frames: base is held, and the file does not say where"),
+        (["targets"], {"1": TOOL}, {}, r"frames\.yaml, tools: 2 is held, .* got '1'"),
+        (
+            ["base"],
+            {},
+            {"base": {**BASE, "of": "controller"}},
+            r"frames\.base: where the controller has it does not say",
+        ),
+        (["base"], {}, {"base": {**BASE, "of": "base"}}, r"frames\.base: where the base stands has to be said in the"),
+        (["base"], {}, {"base": {"of": "world"}}, r"frames\.base: the base has an orientation, .*quaternion: \[1, 0"),
+    ],
+)
+def test_contradicting_holds_are_refused(
+    hold: list[str], tools: dict[str, Any], frames: dict[str, Any], said: str, tmp_path: Path
+) -> None:
+    path = cell_file(tmp_path / "frames.yaml", tools, frames)
+    with pytest.raises(InputError, match=said):
+        calibrate("irb120", exact()[1], hold=hold, frames=path)
+
+
+def test_holds_without_numbers_and_numbers_without_holds_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"what is held has no numbers; got 'base, targets'"):
+        calibrate("irb120", exact()[1], hold=["base", "targets"])
+    with pytest.raises(InputError, match=r"frames are given, and nothing is held at them"):
+        calibrate("irb120", exact()[1], frames=frames_of(exact()[0].robot, tmp_path / "f.yaml"))
+    with pytest.raises(InputError, match=r"a sequence of names belongs here"):
+        calibrate("irb120", exact()[1], hold="base", frames=tmp_path / "f.yaml")
+
+
+def test_a_hold_that_leaves_nothing_to_find_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"there is nothing to find; got 'model frames'"):
+        held(["base", "targets"], tmp_path, model="frames")
+    tool = held(["base"], tmp_path, model="frames")  # a tool alone, in a base that is known
+    assert set(tool.fit.free.names) == {f"target_{n}_{a}" for n in "123" for a in "xyz"}
+
+
+def test_bounds_on_what_is_held_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "bounds.yaml"
+    path.write_text("truearm: truearm-bounds/1\nunits: {length: mm, angle: deg}\nwithin: {base_x: 1}\n")
+    with pytest.raises(InputError, match=r"bounds\.yaml: the parameter has bounds, and it is held; got 'base_x'"):
+        held(["base"], tmp_path, bounds=path)
+
+
+def test_what_readings_of_fixtures_cannot_hold_is_refused(tmp_path: Path) -> None:
+    robot, data = touched()
+    entries = fixture_entries(robot)
+    name = next(iter(entries))
+    only_base = cell_file(tmp_path / "b.yaml", {}, {"base": BASE})
+    with pytest.raises(InputError, match=r"no reading says where the base stands"):
+        calibrate("irb120", data, hold=["base"], frames=only_base)
+    in_world = cell_file(tmp_path / "w.yaml", {}, {**entries, name: {**entries[name], "of": "world"}})
+    with pytest.raises(InputError, match=r"the world is the robot's base; got 'of: world'; allowed: of: base"):
+        calibrate("irb120", data, hold=["fixtures"], frames=in_world)
+    flat = cell_file(tmp_path / "f.yaml", {}, {**entries, name: {"of": "base", "translation": [0, 0, 0]}})
+    with pytest.raises(InputError, match=rf"fixture {name} has an orientation"):
+        calibrate("irb120", data, hold=["fixtures"], frames=flat)
+
+
+def test_a_robot_in_its_own_frame_takes_the_place_of_a_target_from_its_file(tmp_path: Path) -> None:
+    tool = held(["base"], tmp_path, model="frames")
+    path = cell_file(tmp_path / "t.yaml", {n: {"of": "flange", "target": n} for n in "123"}, {})
+    found = calibrate(tool.robot, exact()[1], hold=["targets"], frames=path)
+    for name in ("target_1_x", "target_2_y", "target_3_z"):
+        assert found.robot.values[name] == tool.robot.values[name]
+
+
+def test_the_command_holds_as_the_job_does(tmp_path: Path) -> None:
+    twin, data = exact()
+    (tmp_path / "data.csv").write_text(csv_text(data))
+    frames_of(twin.robot, tmp_path / "frames.yaml")
+    words = ["calibrate", "irb120", str(tmp_path / "data.csv"), "--hold", "base, 1", "--hold", "2"]
+    done = CliRunner().invoke(app, [*words, "--frames", str(tmp_path / "frames.yaml"), "--out", str(tmp_path / "out")])
+    assert done.exit_code == 0, done.output
+    assert "Held at known places: base, target 1, target 2" in done.output
+    lacking = CliRunner().invoke(app, [*words, "--out", str(tmp_path / "out")])
+    assert str(lacking.exception).startswith("--hold: what is held has no numbers")
+    assert str(lacking.exception).endswith("in a file with --frames.")
+    validated = validate(tmp_path / "out" / "calibrated.yaml", data)
+    assert validated.errors.position is not None
+    assert validated.errors.position.mean < 1e-9
+
+
+@pytest.mark.parametrize("more", [{"zones": 2}, {"monte_carlo": 100}])
+def test_zones_and_simulated_calibrations_are_refused_with_places_that_are_held(more: Any, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"this is not made with places that are held"):
+        held(["base"], tmp_path, **more)

@@ -1,0 +1,232 @@
+"""Zones win where the model lacks something, lose where it lacks nothing, and are refused where they cannot be."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.simulated import campaign, more_of
+from typer.testing import CliRunner
+
+from truearm.cli import app
+from truearm.errors import InputError
+from truearm.identification.choosing.zone_boxes import boxes_of, cut_boxes, divisions_for, flange_places, read_zones
+from truearm.jobs.calibrate import calibrate
+from truearm.jobs.inverse import inverse
+from truearm.jobs.validate import validate
+from truearm.library import load_robot
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.readers.canonical import csv_text
+from truearm.modeling.formats.robot_file import is_intact
+from truearm.results.calibration import Calibration
+from truearm.simulation.devices import measured_with, named_device
+from truearm.simulation.twin import Twin
+
+HEAD = "truearm: truearm-zones/1\nunits: {length: mm}\n"
+
+
+@pytest.fixture(scope="module")
+def bending() -> tuple[Twin, Dataset]:
+    """An arm that gives way, which the geometric model lacks."""
+    return campaign("irb120", 200, 0.02e-3, 7, truth="tracker-triangular")
+
+
+@pytest.fixture(scope="module")
+def cut(bending: tuple[Twin, Dataset], tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Calibration]:
+    folder = tmp_path_factory.mktemp("zones")
+    (folder / "data.csv").write_text(csv_text(bending[1]))
+    return folder, calibrate("irb120", folder / "data.csv", zones=4, out=folder / "out")
+
+
+def test_zones_win_where_the_model_lacks_something(
+    bending: tuple[Twin, Dataset], cut: tuple[Path, Calibration]
+) -> None:
+    folder, run = cut
+    assert run.zones is not None
+    assert len(run.zones.verdicts) == 4
+    assert len(run.zones.kept) >= 2
+    assert run.zones.zoned < 0.9 * run.zones.whole
+    assert run.validation is not None
+    assert run.validation.position is not None
+    assert run.zones.whole == pytest.approx(run.validation.position.mean)
+    new = more_of(bending[0], 80, 0.02e-3, 8)
+    by_zones, by_one = (validate(folder / "out" / name, new) for name in ("zones.yaml", "calibrated.yaml"))
+    assert by_zones.position is not None
+    assert by_one.position is not None
+    assert by_zones.position.mean < 0.92 * by_one.position.mean
+    assert by_zones.zones is not None
+    assert sum(count for count, _ in by_zones.zones.values()) == 80
+    rows = by_zones.summary()["zones"]
+    total = sum(row["mean_mm"] * row["configurations"] for row in rows) / 80
+    assert total == pytest.approx(by_zones.position.mean * 1e3)
+    assert any(line.startswith("  zone ") for line in by_zones.lines())
+    assert "zones" not in by_one.summary()
+
+
+def test_what_is_kept_is_written_and_read(cut: tuple[Path, Calibration]) -> None:
+    folder, run = cut
+    assert run.zones is not None
+    names = {path.name for path in (folder / "out").iterdir()}
+    kept = [verdict.box.name for verdict in run.zones.kept]
+    assert names == {*run.files, "truearm.manifest.json"}
+    assert {f"zone-{name}.yaml" for name in kept} < names
+    found = json.loads((folder / "out" / "result.json").read_text())["zones"]
+    assert found["kept"] == kept
+    assert [zone["kept"] for zone in found["zones"]].count(True) == len(kept)
+    content = read_zones(folder / "out" / "zones.yaml")
+    boxes, overlap = boxes_of(content, "zones.yaml")
+    assert overlap == pytest.approx(0.05)
+    for box, verdict in zip(boxes, run.zones.kept, strict=True):
+        assert box.low == pytest.approx(verdict.box.low, abs=1e-6)
+        assert box.high == pytest.approx(verdict.box.high, abs=1e-6)
+    robot = load_robot(folder / "out" / f"zone-{kept[0]}.yaml")
+    assert is_intact(robot)
+    assert robot.proof is not None
+    assert len(robot.proof.measured) == run.zones.kept[0].training
+    assert robot.history[-1].endswith(f"zone {kept[0]}")
+    page = (folder / "out" / "report.html").read_text()
+    assert 'id="zone-errors"' in page
+    assert any(line.startswith("Zones: ") for line in run.lines())
+
+
+def test_zones_lose_where_the_model_lacks_nothing(tmp_path: Path) -> None:
+    _, data = campaign("irb120", 160, 0.02e-3, 7)
+    run = calibrate("irb120", data, zones=4, out=tmp_path / "out")
+    assert run.zones is not None
+    assert run.zones.kept == ()
+    assert run.zones.zoned == run.zones.whole
+    assert not (tmp_path / "out" / "zones.yaml").exists()
+    assert any(line.startswith("Zones: none of 4 zones is kept; one model is as good") for line in run.lines())
+    assert {verdict.why for verdict in run.zones.verdicts} <= {
+        "not better than the model of the whole",
+        "better, but not by more than chance",
+    }
+
+
+def test_zones_of_a_file(bending: tuple[Twin, Dataset], tmp_path: Path) -> None:
+    file = tmp_path / "zones.yaml"
+    file.write_text(HEAD + "overlap: 20\nzones:\n  left: {y: [0, null]}\n  corner: {x: [300, 310], y: [-500, 0]}\n")
+    run = calibrate("irb120", bending[1], zones=file, out=tmp_path / "out")
+    assert run.zones is not None
+    left, corner = run.zones.verdicts
+    assert left.kept
+    assert corner.fit is None
+    assert corner.why.startswith("only ")
+    assert "held-out configurations, and a judgement needs 5" in corner.why or "a model needs 12" in corner.why
+    assert run.files[-2:] == ("zones.yaml", "zone-left.yaml")
+    assert run.summary()["validation"] is not None
+    again = calibrate("irb120", bending[1], zones=tmp_path / "out" / "zones.yaml").zones
+    assert again is not None
+    assert again.verdicts[0].zone == left.zone
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("zones: {}\n", "too few entries"),
+        ("zones: {a: {}}\n", "a zone without limits is the whole workspace"),
+        ("zones: {a: {x: [null, null]}}\n", "a zone without limits is the whole workspace"),
+        ("zones: {a: {x: [3, 1]}}\n", r"zones\.a\.x: a zone ends where it begins, or before"),
+        ("zones: {a: {x: [1, 1]}}\n", "a zone ends where it begins"),
+        (
+            "zones: {a: {x: [0, 9]}, b: {x: [8, 20], y: [0, 5]}}\n",
+            "two zones share a part of the workspace; got 'a and b'",
+        ),
+        ("zones: {a: {w: [0, 9]}}\n", "w"),
+        ("zones: {a: {x: [0]}}\n", r"zones\.a\.x"),
+        ("zones: {a: {x: [0, far]}}\n", r"zones\.a\.x"),
+        ("zones: {a/b: {x: [0, 9]}}\n", "a/b"),
+        ("overlap: -1\nzones: {a: {x: [0, 9]}}\n", "overlap"),
+        ("zones: {a: {x: [0, 1e12]}}\n", r"zones\.a"),
+        ("zones: {a: {x: [0, 9], robot: {file: ../b.yaml, proof: no}}}\n", "robot"),
+    ],
+)
+def test_a_file_of_zones_that_cannot_be_is_refused(tmp_path: Path, text: str, told: str) -> None:
+    file = tmp_path / "zones.yaml"
+    file.write_text(HEAD + text)
+    with pytest.raises(InputError, match=told):
+        boxes_of(read_zones(file), str(file))
+
+
+def test_a_file_without_unit_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "zones.yaml"
+    file.write_text("truearm: truearm-zones/1\nzones: {a: {x: [0, 9]}}\n")
+    with pytest.raises(InputError, match="units"):
+        read_zones(file)
+
+
+def test_what_cannot_be_cut_is_refused(bending: tuple[Twin, Dataset]) -> None:
+    _, data = bending
+    with pytest.raises(InputError, match="out of range; got 1; allowed: 2 to 64"):
+        calibrate("irb120", data, zones=1)
+    with pytest.raises(InputError, match=r"zones are judged on held-out configurations.*Leave `train` out"):
+        calibrate("irb120", data, zones=2, train="all")
+    with pytest.raises(InputError, match="there is no such file"):
+        calibrate("irb120", data, zones="nowhere.yaml")
+    with pytest.raises(InputError, match="a whole number belongs here"):
+        calibrate("irb120", data, zones=2.5)  # type: ignore[arg-type]
+    rng = np.random.default_rng(0)
+    held = measured_with(named_device("point"), load_robot("irb120"), bending[0], 30, rng)
+    with pytest.raises(InputError, match="zones need readings that say where the robot stands"):
+        calibrate("irb120", held, zones=2, model="offsets")
+
+
+def test_zones_are_for_validate_alone(cut: tuple[Path, Calibration], tmp_path: Path) -> None:
+    folder, run = cut
+    zones = folder / "out" / "zones.yaml"
+    with pytest.raises(
+        InputError, match=r"names the robots of zones, and one robot belongs here.*Give calibrated.yaml"
+    ):
+        load_robot(zones)
+    with pytest.raises(InputError, match="one robot belongs here"):
+        inverse(zones, np.zeros((1, 3)) + 0.4)
+    with pytest.raises(InputError, match=r"what moved is found with one robot.*Give calibrated.yaml"):
+        validate(zones, folder / "data.csv", refit="base")
+    plain = tmp_path / "zones.yaml"
+    plain.write_text(HEAD + "zones: {left: {y: [0, null]}}\n")
+    with pytest.raises(InputError, match="says where zones are, and not which robot is in each"):
+        validate(plain, folder / "data.csv")
+    assert run.zones is not None
+    name = f"zone-{run.zones.kept[0].box.name}.yaml"
+    for file in ("zones.yaml", "calibrated.yaml", *(f"zone-{v.box.name}.yaml" for v in run.zones.kept)):
+        (tmp_path / file).write_bytes((folder / "out" / file).read_bytes())
+    (tmp_path / name).write_bytes((folder / "out" / "calibrated.yaml").read_bytes())
+    with pytest.raises(InputError, match="this robot is of another calibration than the zones"):
+        validate(tmp_path / "zones.yaml", folder / "data.csv")
+    (tmp_path / name).unlink()
+    with pytest.raises(InputError, match="there is no such file"):
+        validate(tmp_path / "zones.yaml", folder / "data.csv")
+
+
+def test_the_command_takes_a_number_or_a_file(cut: tuple[Path, Calibration], tmp_path: Path) -> None:
+    folder, _ = cut
+    told = CliRunner().invoke(
+        app, ["calibrate", "irb120", str(folder / "data.csv"), "--zones", "2", "--out", str(tmp_path / "out")]
+    )
+    assert told.exit_code == 0
+    assert "\nZones: " in told.stdout
+    assert told.stdout.splitlines()[-1].startswith(f"Written to {tmp_path / 'out'}: calibrated.yaml, result.json")
+    told = CliRunner().invoke(
+        app, ["calibrate", "irb120", str(folder / "data.csv"), "--zones", "2 or 3", "--out", str(tmp_path / "out")]
+    )
+    assert told.exit_code != 0
+
+
+def test_boxes_fill_the_space_and_are_nearly_cubes() -> None:
+    rng = np.random.default_rng(0)
+    places = rng.uniform([0.0, 0.0, 0.0], [4.0, 1.0, 2.0], (400, 3))
+    assert divisions_for(places, 4) in ((4, 1, 1), (2, 1, 2))
+    assert divisions_for(places, 8) == (4, 1, 2)
+    assert divisions_for(places, 5) == (5, 1, 1)
+    boxes = cut_boxes(places, (2, 1, 2))
+    held = np.array([box.holds(places) for box in boxes])
+    assert (held.sum(axis=0) == 1).all()
+    assert held.sum(axis=1).min() > 60
+
+
+def test_the_nominal_flange_is_that_of_the_table(cut: tuple[Path, Calibration]) -> None:
+    _, run = cut
+    joints = run.data.joints[:5]
+    assert flange_places(run.robot, joints) == pytest.approx(load_robot("irb120").forward(joints)[0], abs=1e-12)

@@ -1,0 +1,114 @@
+"""Orientation errors by their parts: a rotation vector in the base frame, and differences of ZXZ angles."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from truearm.library import load_robot
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.statistics import errors_of
+from truearm.modeling.chain import Array
+from truearm.modeling.robot import Robot
+from truearm.modeling.transform import Transform, quaternion_from_rotation, rotation_from_vector
+from truearm.results.validation_parts import orientation_lines, orientation_summary
+from truearm.validation.orientation_errors import orientation_errors, zxz_angles
+
+
+def about(axis: str, angle: Array) -> Array:
+    return rotation_from_vector(np.outer(angle, np.eye(3)["xyz".index(axis)]))
+
+
+def zxz(angles: Array) -> Array:
+    return np.asarray(about("z", angles[:, 0]) @ about("x", angles[:, 1]) @ about("z", angles[:, 2]))
+
+
+def test_angles_come_back_in_every_quadrant() -> None:
+    rng = np.random.default_rng(0)
+    angles = rng.uniform([-np.pi, 0.01, -np.pi], [np.pi, np.pi - 0.01, np.pi], (200, 3))
+    assert np.abs(zxz_angles(zxz(angles)) - angles).max() < 1e-12
+
+
+def test_angles_without_a_middle_one() -> None:
+    turned = zxz(np.array([[0.3, 0.0, 0.4], [0.3, np.pi, 0.4]]))
+    found = zxz_angles(turned)
+    assert np.abs(zxz(found) - turned).max() < 1e-12
+    assert found[:, 2].tolist() == [0.0, 0.0]
+
+
+def with_poses(turned: Array, joints: Array) -> tuple[Robot, Dataset]:
+    """Return a robot before an instrument that is turned, and readings that miss it by turns in its base frame."""
+    half = np.sqrt(0.5)
+    robot = load_robot("irb120").with_frames(
+        Transform((0.4, -0.3, 0.2), (half, 0.0, 0.0, half)), {"tool": Transform((0.1, 0.0, 0.05), (1.0, 0.0, 0.0, 0.0))}
+    )
+    position, R = robot.world_poses(joints, "tool")
+    in_base = robot.base.rotation.T @ R
+    measured = robot.base.rotation @ np.swapaxes(turned, 1, 2) @ in_base
+    data = Dataset(
+        source="made",
+        labels=tuple(str(i) for i in range(len(joints))),
+        joints=joints,
+        joint_kinds=("revolute",) * 6,
+        targets=("tool",),
+        configuration=np.arange(len(joints)),
+        target=np.zeros(len(joints), dtype=np.intp),
+        position=position,
+        quaternion=quaternion_from_rotation(measured),
+    )
+    return robot, data
+
+
+def test_a_turn_about_an_axis_of_the_base_shows_there() -> None:
+    rng = np.random.default_rng(1)
+    joints = load_robot("irb120").random_configurations(20, rng)
+    robot, data = with_poses(about("x", np.full(20, 0.01)), joints)
+    found = orientation_errors(robot, data, errors_of(robot, data))
+    assert found is not None
+    assert found.vector == pytest.approx(np.tile([0.01, 0.0, 0.0], (20, 1)), abs=1e-9)
+    # A turn about the base's z axis is an error of Phi alone.
+    robot, data = with_poses(about("z", np.full(20, 0.01)), joints)
+    found = orientation_errors(robot, data, errors_of(robot, data))
+    assert found is not None
+    assert found.zxz[np.isfinite(found.zxz[:, 0])] == pytest.approx(
+        np.tile([0.01, 0.0, 0.0], (20 - found.locked, 1)), abs=1e-9
+    )
+    summary = orientation_summary(found)
+    assert summary["rotation_vector"]["rz"]["mean"] == pytest.approx(np.degrees(0.01))
+    assert summary["zxz"]["phi"]["max"] == pytest.approx(np.degrees(0.01))
+
+
+def test_angles_across_half_a_turn_differ_by_little() -> None:
+    joints = np.radians([[0.0, 0.0, 0.0, 0.0, 45.0, 0.0]])
+    robot, _ = with_poses(about("z", np.zeros(1)), joints)
+    phi = float(zxz_angles(robot.base.rotation.T @ robot.world_poses(joints, "tool")[1])[0, 0])
+    joints[0, 0] = np.pi - 0.5e-3 - phi  # joint 1 turns about the base's z axis, so Phi goes with it
+    robot, data = with_poses(about("z", np.full(1, -1e-3)), joints)
+    found = orientation_errors(robot, data, errors_of(robot, data))
+    assert found is not None
+    assert found.zxz[0] == pytest.approx([-1e-3, 0.0, 0.0], abs=1e-9)
+
+
+def test_where_the_middle_angle_is_nearly_zero_the_others_are_left_out() -> None:
+    joints = np.radians([[0.0, 0.0, 0.0, 0.0, 90.0, 0.0], [0.0, 0.0, 0.0, 0.0, 45.0, 0.0]])
+    robot, data = with_poses(about("x", np.full(2, 1e-4)), joints)
+    found = orientation_errors(robot, data, errors_of(robot, data))
+    assert found is not None
+    assert found.locked == 1
+    assert np.isnan(found.zxz[0, [0, 2]]).all()
+    assert np.isfinite(found.zxz[1]).all()
+    (line,) = orientation_lines(found)
+    assert "(Phi and Psi without 1 readings near Theta 0 or 180)" in line
+    alone = orientation_errors(robot, data.of_configurations([0]), errors_of(robot, data.of_configurations([0])))
+    assert alone is not None
+    assert orientation_summary(alone)["zxz"]["phi"] is None
+    assert "Phi –" in orientation_lines(alone)[0]
+
+
+def test_positions_alone_have_no_orientation() -> None:
+    robot, data = with_poses(about("x", np.zeros(2)), np.zeros((2, 6)))
+    plain = replace(data, quaternion=None)
+    assert orientation_errors(robot, plain, errors_of(robot, plain)) is None
+    assert orientation_lines(None) == []

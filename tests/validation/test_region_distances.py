@@ -1,0 +1,124 @@
+"""Distances from where the robot was calibrated: by the tip, by the joints, from the middle; and what they say."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.simulated import campaign
+
+from truearm.errors import InputError
+from truearm.jobs.calibrate import calibrate
+from truearm.jobs.validate import measure_farther, validate
+from truearm.library import load_robot
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.statistics import errors_of
+from truearm.modeling.formats.robot_file import is_intact
+from truearm.modeling.proof import MOST_MEASURED, Proof
+from truearm.modeling.robot import Robot
+from truearm.results.calibration import Calibration
+from truearm.results.validation_parts import distance_lines, distance_summary
+from truearm.validation.region_distances import RegionDistances, region_distances
+
+
+@pytest.fixture(scope="module")
+def run() -> Calibration:
+    return calibrate("irb120", campaign("irb120", 40, 0.02e-3, 1)[1], train=30)
+
+
+def distances(robot: Robot, data: Dataset) -> RegionDistances:
+    found = region_distances(robot, data, errors_of(robot, data))
+    assert found is not None
+    return found
+
+
+def test_training_configurations_are_no_distance_away(run: Calibration) -> None:
+    found = distances(run.robot, run.data.of_configurations(run.training))
+    assert found.training == 30
+    assert found.tip.max() < 20e-6  # positions are kept to a thousandth of a degree
+    assert np.degrees(found.joints.max()) < 0.001
+
+
+def test_distances_are_those_of_the_nearest_configuration(run: Calibration) -> None:
+    data = run.data.of_configurations(run.held_out)
+    found = distances(run.robot, data)
+    training = run.data.of_configurations(run.training).joints
+    for row in (0, 7, 20):
+        reading = found.reading[row]
+        target, joints = data.targets[data.target[reading]], data.joints[data.configuration[reading]]
+        places = run.robot.forward(training, target=target)[0]
+        here = run.robot.forward(joints, target=target)[0][0]
+        assert found.tip[row] == pytest.approx(np.linalg.norm(places - here, axis=1).min(), abs=5e-5)
+        apart = np.abs(np.angle(np.exp(1j * (training - joints))))  # whole turns do not count
+        assert found.joints[row] == pytest.approx(apart.max(axis=1).min(), abs=1e-4)
+        assert found.middle[row] == pytest.approx(np.linalg.norm(places.mean(axis=0) - here), abs=5e-5)
+
+
+def test_whole_turns_are_the_same_posture(run: Calibration) -> None:
+    data = run.data.of_configurations(run.training)
+    turned = data.joints.copy()
+    turned[:, 5] += 2 * np.pi
+    assert distances(run.robot, replace(data, joints=turned)).joints.max() < np.radians(0.002)
+
+
+def test_the_file_keeps_where_it_was_measured(run: Calibration, tmp_path: Path) -> None:
+    run.save(tmp_path)
+    again = load_robot(tmp_path / "calibrated.yaml")
+    assert is_intact(again)
+    assert again.proof is not None
+    assert run.robot.proof is not None
+    assert np.allclose(again.proof.measured, run.robot.proof.measured, rtol=0, atol=1e-12)
+    text = (tmp_path / "calibrated.yaml").read_text()
+    row = next(line for number, line in enumerate(text.splitlines()) if text.splitlines()[number - 1] == "  measured:")
+    words = row.partition("-")[2].strip().strip("'\"")
+    for wrong in (words + " 5", words.rpartition(" ")[0], words.replace(words.split()[0], "here", 1), ""):
+        (tmp_path / "bent.yaml").write_text(text.replace(words, wrong, 1))
+        with pytest.raises(
+            InputError, match=r"one number belongs here for each joint.*proof.measured\[1\]|proof.measured"
+        ):
+            load_robot(tmp_path / "bent.yaml")
+    (tmp_path / "moved.yaml").write_text(text.replace(words, " ".join(["1.5"] * 6), 1))
+    assert not is_intact(load_robot(tmp_path / "moved.yaml"))
+
+
+def test_a_robot_that_does_not_know_is_judged_without(run: Calibration) -> None:
+    proof = run.robot.proof
+    assert proof is not None
+    older = replace(run.robot, proof=replace(proof, measured=()))
+    assert region_distances(older, run.data, errors_of(older, run.data)) is None
+    found = validate(older, run.data.of_configurations(run.held_out))
+    assert found.distances is None
+    assert "distance_from_training" not in found.summary()
+
+
+def test_a_thousand_configurations_are_kept_at_most() -> None:
+    rows = [[float(i) / 1000, 0.0] for i in range(3000)]
+    proof = Proof.of("converged", (), (), np.zeros(2), (), np.zeros((0, 0)), measured=rows, joint_units=["deg", "mm"])
+    assert len(proof.measured) == MOST_MEASURED
+    assert proof.measured[-1][0] == pytest.approx(2.999, abs=1e-5)
+    twice = Proof.of("converged", (), (), np.zeros(1), (), np.zeros((0, 0)), measured=[[0.1]] * 5, joint_units=["deg"])
+    assert len(twice.measured) == 1
+
+
+def test_errors_that_grow_with_the_distance_are_told() -> None:
+    rng = np.random.default_rng(0)
+    tip = rng.uniform(0.0, 0.5, 90)
+    error = 1e-4 * (1.0 + 6.0 * tip) * rng.uniform(0.8, 1.2, 90)
+    at = np.repeat(np.arange(30), 3)
+    grows = RegionDistances(np.arange(90), error, tip, np.full(90, np.nan), tip, at, 10)
+    (step,) = measure_farther(grows)
+    assert step.code == "measure-more"
+    assert "Calibrate with configurations that reach farther" in step.message
+    assert distance_summary(grows)["grows"] is True
+    assert distance_summary(grows)["joints_deg"] == []
+    spans = grows.spans(grows.tip)
+    assert [span.readings for span in spans] == [18] * 5
+    assert spans[0].mean < spans[2].mean < spans[4].mean
+    level = replace(grows, error=1e-4 * rng.uniform(0.8, 1.2, 90))
+    assert measure_farther(level) == ()
+    assert "deg" not in distance_lines(level)[0]
+    few = replace(grows, configuration=np.zeros(90, dtype=np.intp))
+    assert few.growth is None
+    assert measure_farther(few) == ()

@@ -13,7 +13,7 @@ from tests.cli.conftest import Truearm
 from truearm.library import load_robot
 from truearm.measurement.hexapod.geometry import triangle
 from truearm.measurement.hexapod.poses import poses
-from truearm.measurement.hexapod.sheet import read_sheet
+from truearm.measurement.hexapod.sheet_reading import read_sheet
 from truearm.measurement.readers.canonical import read_csv
 
 
@@ -84,6 +84,7 @@ def test_from_plan_to_data(truearm: Truearm, tmp_path: Path) -> None:
         "poses_reached",
         "joints_are",
         "configurations",
+        "places",
         "left_out",
         "smallest_room_mm",
     ]
@@ -112,13 +113,68 @@ def test_from_plan_to_data(truearm: Truearm, tmp_path: Path) -> None:
     assert found.configurations == len(rows) - 1
     assert found.position == pytest.approx(read_sheet(sheet).dataset().position, abs=1e-12)
     entries = json.loads(truearm("hexapod", "solve", sheet, "--json").out)["poses"]
-    assert list(entries[0]) == ["configuration", "design", "solution", "legs", "cups_mm"]
+    assert list(entries[0]) == ["configuration", "design", "solution", "legs", "place", "side", "cups_mm"]
 
 
 def _legs(design: str) -> list[str]:
     i, j, k = design[0], design[3], design[7]
     first, second, third = list(design[4:7])
     return [f"B{b}-T{t}" for b, t in ((i, first), (j, first), (k, first), (i, second), (j, second), (j, third))]
+
+
+def test_several_places_and_sides_from_plan_to_data(truearm: Truearm, tmp_path: Path) -> None:
+    sheet, steps, data = (tmp_path / name for name in ("sheet.csv", "steps.txt", "data.csv"))
+    words = [
+        "irb120",
+        "--fixture",
+        "220,0,300,-30",
+        "--fixture",
+        "150,250,300,20",
+        "--fourth-cup",
+        "--attachments",
+        "2",
+    ]
+    run = truearm("hexapod", "plan", *words, "--branches", "front-up", "--out", sheet, "--steps", steps)
+    assert run.code == 0
+    assert "fixture_2: " in run.out
+    assert "on side 2" in run.out
+    text = steps.read_text()
+    assert "Measure B1-B2, B2-B3, B3-B1, B1-B4, B2-B4, B3-B4." in text
+    assert "Place fixture_2: set the base fixture up there" in text
+    assert "Attachment 2: take the tool off" in text
+    rows = list(csv.DictReader(sheet.read_text().splitlines()))
+    for row in rows:
+        filled = [name for name in row if name[:1] == "B" and (name[3:4] == "B" or name[:5] in _side_legs(row))]
+        row.update(dict.fromkeys(filled, "300") | {f"{name} [mm]": "150" for name in ("T1-T2", "T2-T3", "T3-T1")})
+    with sheet.open("w", newline="") as stream:
+        writer = csv.DictWriter(stream, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+    run = truearm("hexapod", "solve", sheet, "--out", data)
+    assert run.code == 0
+    assert "place fixture_2, side 4, design" in run.out
+    assert "Tool changer, from 5 pairs of readings with 2 attachments:" in run.out
+    found = read_csv(data)
+    assert found.fixtures == ("fixture_1", "fixture_2")
+    assert found.sigma is not None
+    summary = json.loads(truearm("hexapod", "solve", sheet, "--json").out)
+    assert list(summary["tool_changer"]) == [
+        "attachments",
+        "pairs",
+        "deviation_mm",
+        "rest_mm",
+        "mean_mm",
+        "largest_mm",
+        "ballbar_mm",
+    ]
+    twice = truearm("hexapod", "solve", sheet, sheet)
+    assert twice.code == 2
+    assert "the sheet is given twice" in twice.err
+
+
+def _side_legs(row: dict[str, str]) -> list[str]:
+    cups = ("", "123", "214", "324", "134")[int(row["side"])]
+    return [f"B{cups[int(name[1]) - 1]}{name[2:]}" for name in _legs(row["design"])]
 
 
 def test_a_wrong_fixture_and_a_plan_over_its_robot(truearm: Truearm, tmp_path: Path) -> None:

@@ -91,6 +91,7 @@ COMMANDS: Final[tuple[str, ...]] = (
     "hexapod solve sheet.csv --out made.csv",
     "hexapod solve --pose 7 --lengths 300,300,300,300,300,300 --json",
     "hexapod plan irb120 --fixture 220,0,100,-30 --tool triangular --distinct --branches front-up --out plan.csv",
+    "hexapod plan irb120 --fixture 220,0,300,-30 --fixture 150,250,300,20 --fourth-cup --attachments 2 --out plan.csv",
     "hexapod world-frame irb120 touches.csv --base 300.3,300,299.6 --target 1",
 )
 #: Files that a sample cannot do without.

@@ -18,7 +18,8 @@ from truearm.jobs.import_ur_kinematics import import_ur_kinematics
 from truearm.jobs.load_robot import load_robot
 from truearm.library import load_robot as of_library
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.hexapod.sheet import read_sheet
+from truearm.measurement.hexapod.sheet_reading import read_sheet
+from truearm.measurement.hexapod.sheets_together import together
 from truearm.measurement.hexapod.touches import read_touches
 from truearm.measurement.readers.canonical import csv_text, read_csv
 from truearm.measurement.readers.drawn_circles import Page, read_drawn_circles
@@ -163,7 +164,8 @@ READERS: Final[Mapping[str, Reader]] = {
         lambda folder: _dataset(read_hand_eye(folder / "views.csv", "camera", None).data, folder),
     ),
     "hexapod-sheet": Reader(
-        {"sheet.csv": "sheet.csv"}, lambda folder: _dataset(read_sheet(folder / "sheet.csv").dataset(), folder)
+        {"sheet.csv": "sheet.csv"},
+        lambda folder: _dataset(together([read_sheet(folder / "sheet.csv")]).dataset(), folder),
     ),
     "hexapod-touches": Reader(
         {"touches.csv": "touches.csv"}, lambda folder: read_touches(folder / "touches.csv", of_library("irb120"))

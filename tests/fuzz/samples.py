@@ -115,13 +115,24 @@ def _rename(place: Path, names: dict[str, str]) -> None:
 
 
 def _sheet() -> str:
+    """Return a sheet with two places, two sides of four cups and two attachments of the tool."""
     found, bar, base = poses(), ballbar(np.random.default_rng(0)), triangle([0.3] * 3, "B")
     rows, lengths = [], []
-    for label, number in (("a", 5), ("b", 40), ("c", 66)):
+    for label, number, place, side, attachment in (
+        ("a", 5, "l", 1, "1"),
+        ("b", 40, "l", 2, "1"),
+        ("c", 66, "r", 1, "2"),
+    ):
         pose = found[number - 1]
-        rows.append(PlannedRow(label, "front-up-flip", number, pose.design, pose.solution, np.full(6, 0.1)))
-        lengths.append(measured_legs(bar, pose.design, base, pose.cups))
-    lengths[0] |= measured_sides(bar, base, "B") | measured_sides(bar, found[0].cups, "T")
+        row = PlannedRow(
+            label, "front-up-flip", number, pose.design, pose.solution, np.full(6, 0.1), place, side, attachment
+        )
+        read = measured_legs(bar, pose.design, base, pose.cups)
+        lengths.append({name: read[own] for name, own in zip(row.leg_names, pose.design.leg_names, strict=True)})
+        rows.append(row)
+        if label in "ae":
+            lengths[-1] |= measured_sides(bar, base, "B") | dict.fromkeys(("B1-B4", "B2-B4", "B3-B4"), 0.3)
+    lengths[0] |= measured_sides(bar, found[0].cups, "T")
     return sheet_csv(rows, [Joint(f"axis_{n}", "revolute", {}) for n in range(1, 7)], lengths)
 
 

@@ -13,7 +13,7 @@ import truearm
 from truearm import InputError
 from truearm.measurement.hexapod.geometry import triangle
 from truearm.measurement.hexapod.poses import poses
-from truearm.measurement.hexapod.sheet import read_sheet
+from truearm.measurement.hexapod.sheet_reading import read_sheet
 from truearm.modeling.inverse import inverse
 from truearm.modeling.transform import Transform
 from truearm.planning.hexapod.tool import with_cups

@@ -13,7 +13,8 @@ from truearm.errors import InputError
 from truearm.library import load_robot
 from truearm.measurement.hexapod.geometry import triangle
 from truearm.measurement.hexapod.poses import poses
-from truearm.measurement.hexapod.sheet import PlannedRow, Sheet, read_sheet, sheet_csv
+from truearm.measurement.hexapod.sheet import PlannedRow, Sheet, sheet_csv
+from truearm.measurement.hexapod.sheet_reading import read_sheet
 from truearm.measurement.hexapod.touches import read_touches
 from truearm.modeling.parts import Joint
 from truearm.simulation.hexapod.simulated import ballbar, measured_legs, measured_sides

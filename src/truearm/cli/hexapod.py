@@ -55,7 +55,8 @@ def uncertainty(
 @app.command()
 def solve(
     sheet: Annotated[
-        Path | None, typer.Argument(metavar="SHEET.csv", help="A sheet of 'truearm hexapod plan', filled in.")
+        list[Path] | None,
+        typer.Argument(metavar="SHEET.csv", help="Sheets of 'truearm hexapod plan', filled in, of one robot and tool."),
     ] = None,
     pose: Annotated[int | None, typer.Option(metavar="1..72", help="Without a sheet: which pose.")] = None,
     legs: Annotated[
@@ -74,7 +75,7 @@ def solve(
     from truearm.units import sized_si
 
     found = hexapod_solve(
-        sheet,
+        sheet or None,
         pose=pose,
         legs=None if legs is None else read_lengths(legs, "legs"),  # type: ignore[arg-type]
         base=read_lengths(base, "base"),  # type: ignore[arg-type]
@@ -91,10 +92,11 @@ def solve(
 def plan(
     robot: RobotName,
     fixture: Annotated[
-        str,
+        list[str],
         typer.Option(
             metavar="X,Y,Z,TURN",
-            help="Base fixture in the robot's base frame: B1 \\[mm] and turn about z \\[deg], or X,Y,Z,QW,QX,QY,QZ.",
+            help="Base fixture in the robot's base frame: B1 \\[mm] and turn about z \\[deg], or X,Y,Z,QW,QX,QY,QZ. "
+            "Again for each place.",
         ),
     ],
     out: Annotated[Path, typer.Option("--out", metavar="SHEET.csv", help="Sheet to fill in.")],
@@ -104,22 +106,30 @@ def plan(
     branches: Annotated[
         str | None, typer.Option(metavar="NAME,..", help="Only these, as front-up,back-down.", show_default="all")
     ] = None,
+    fourth_cup: Annotated[
+        bool, typer.Option("--fourth-cup", help="Plan for a fourth cup below the three others, on all four sides.")
+    ] = False,
+    attachments: Annotated[
+        int, typer.Option(metavar="N", min=1, help="How often the tool is attached; what is measured again then.")
+    ] = 1,
     arm_radius: Annotated[float, typer.Option(metavar="MM", min=0.0, help="Of the arm, for room at the bars.")] = 50.0,
     joints: JointsText = None,
     json: Json = False,
 ) -> None:
-    """Plan which configurations of a robot can be measured with the fixture at one place."""
+    """Plan which configurations of a robot can be measured with the fixture at one place or several."""
     from truearm.jobs.hexapod_plan import hexapod_plan
     from truearm.units import sized_si
 
     found = hexapod_plan(
         robot,
-        _read_fixture(fixture),
+        [_read_fixture(place) for place in fixture],
         out=out,
         steps=steps,
         tool=tool,
         distinct=distinct,
         branches=() if branches is None else branches.split(","),
+        fourth_cup=fourth_cup,
+        attachments=attachments,
         arm_radius=sized_si(arm_radius, "mm", parameter="arm_radius"),
         joints=joints,  # type: ignore[arg-type]
     )

@@ -1,10 +1,11 @@
-"""Which configurations of a robot can be measured with the hexapod device at one place."""
+"""Which configurations of a robot can be measured with the hexapod device, at one place or several."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from truearm.jobs.arguments import (
     lengths_argument,
     name_argument,
     robot_argument,
+    whole_argument,
 )
 from truearm.measurement.hexapod.poses import distinct as distinct_poses
 from truearm.measurement.hexapod.poses import poses
@@ -27,25 +29,30 @@ from truearm.modeling.inverse.branches import BRANCHES
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 from truearm.planning.hexapod.clearance import ARM_RADIUS
-from truearm.planning.hexapod.reachable import reachable
+from truearm.planning.hexapod.reachable import attached_anew, reachable_at_places
 from truearm.planning.hexapod.tool import with_cups
 from truearm.results.hexapod import HexapodPlan
 from truearm.writing import same_place, write_files
 
+#: More attachments than anybody compares.
+_MOST_ATTACHMENTS: Final = 50
+
 
 def hexapod_plan(
     robot: Robot | str | Path,
-    fixture: Transform | Sequence[float],
+    fixture: Transform | Sequence[float] | Sequence[Transform | Sequence[float]],
     *,
     out: str | Path | None = None,
     steps: str | Path | None = None,
     tool: str | None = None,
     distinct: bool = False,
     branches: Sequence[str] = (),
+    fourth_cup: bool = False,
+    attachments: int = 1,
     arm_radius: float = ARM_RADIUS,
     joints: JointsOf | None = None,
 ) -> HexapodPlan:
-    """Plan which configurations of a robot can be measured with the base fixture at one place.
+    """Plan which configurations of a robot can be measured with the base fixture at one place or several.
 
     Parameters
     ----------
@@ -53,7 +60,7 @@ def hexapod_plan(
         A robot, or what :func:`truearm.load_robot` takes, with six joints that are solved in closed form.
     fixture
         The base fixture in the robot's base frame: a transform; x, y, z of B1 [m] and a turn about z [rad]; or x, y, z
-        [m] and a quaternion w, x, y, z.
+        [m] and a quaternion w, x, y, z. Several of them are places where it stands one after the other.
     out
         CSV file for the sheet to fill in; None writes nothing.
     steps
@@ -64,6 +71,11 @@ def hexapod_plan(
         Leave out near-equal poses.
     branches
         Only branches whose names begin so, such as ``front-up``; all of them if empty.
+    fourth_cup
+        Plan for a fourth cup below the three others, and poses on all four sides.
+    attachments
+        How often the tool is attached. After each time but the first, five configurations of the last place are
+        measured again, which tells how well the tool changer repeats the cups.
     arm_radius
         Of the arm's links, for the room at the bars [m].
     joints
@@ -73,11 +85,13 @@ def hexapod_plan(
     Raises
     ------
     InputError
-        If the robot has no such tool or no closed form, or can reach none of the poses with the fixture there.
+        If the robot has no such tool or no closed form, or can reach none of the poses with the fixture at a place.
     """
-    place = _fixture_argument(fixture)
+    places = _places_argument(fixture)
     wanted_branches = _branches_argument(branches)
     radius = length_argument(arm_radius, "arm_radius", 0.0)
+    four_cups = flag_argument(fourth_cup, "fourth_cup")
+    times = whole_argument(attachments, "attachments", 1, _MOST_ATTACHMENTS)
     only_distinct = flag_argument(distinct, "distinct")
     sheet = None if out is None else file_for(out, robot)
     text = None if steps is None else file_for(steps, robot, parameter="steps")
@@ -90,19 +104,31 @@ def hexapod_plan(
         arm, cups = with_cups(loaded, name)
         wanted = poses(cups)
     with refusals_of("robot"):
-        found = reachable(
+        found = reachable_at_places(
             arm,
-            place,
+            places,
             distinct_poses(wanted) if only_distinct else wanted,
             arm_radius=radius,
             branches=wanted_branches,
+            fourth_cup=four_cups,
         )
-    plan = HexapodPlan(arm, found, joints_are)
+    plan = HexapodPlan(arm, attached_anew(found, times), joints_are)
     files = {sheet: plan.sheet_text(), text: plan.steps_text()}
     written = {file.absolute(): content for file, content in files.items() if file is not None}
     if written:
         write_files(next(iter(written)).parent, {str(file): content for file, content in written.items()})
     return plan
+
+
+def _places_argument(fixture: object) -> tuple[Transform, ...]:
+    places = list(fixture) if isinstance(fixture, np.ndarray) and fixture.ndim == 2 else fixture
+    if isinstance(places, list | tuple) and places and all(_is_place(one) for one in places):
+        return tuple(_fixture_argument(one) for one in places)
+    return (_fixture_argument(fixture),)
+
+
+def _is_place(one: object) -> bool:
+    return isinstance(one, Transform | np.ndarray | list | tuple)
 
 
 def _fixture_argument(fixture: object) -> Transform:

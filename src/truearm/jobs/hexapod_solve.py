@@ -14,12 +14,15 @@ from truearm.jobs.arguments import file_for, files_of, length_argument, lengths_
 from truearm.measurement.hexapod.geometry import DEVICE, Device, side_names, triangle
 from truearm.measurement.hexapod.kinematics import tool_cups
 from truearm.measurement.hexapod.poses import poses
-from truearm.measurement.hexapod.sheet import Sheet, read_sheet
+from truearm.measurement.hexapod.sheet import Sheet
+from truearm.measurement.hexapod.sheet_reading import read_sheet
+from truearm.measurement.hexapod.sheets_together import together
 from truearm.results.hexapod import HexapodSolution, SolvedPose
+from truearm.writing import same_place
 
 
 def hexapod_solve(
-    sheet: Sheet | str | Path | None = None,
+    sheet: Sheet | str | Path | Sequence[Sheet | str | Path] | None = None,
     *,
     pose: int | None = None,
     legs: Sequence[float] | None = None,
@@ -33,7 +36,7 @@ def hexapod_solve(
     Parameters
     ----------
     sheet
-        A sheet that ``truearm.hexapod_plan`` wrote, filled in.
+        A sheet that ``truearm.hexapod_plan`` wrote, filled in; or several, of one robot with one tool.
     pose, legs
         Instead of a sheet: which of the 72 poses, and its six lengths [m] in the order of the pose's legs.
     base, tool
@@ -46,7 +49,8 @@ def hexapod_solve(
     Raises
     ------
     InputError
-        If neither a sheet nor a pose is given, or both; if a length is beyond the ballbar's range, or legs do not meet.
+        If neither a sheet nor a pose is given, or both; if a length is beyond the ballbar's range, or legs do not meet;
+        if sheets are not of one robot and tool, or a fixture did not stand still.
     """
     device = replace(DEVICE, reach=length_argument(reach, "reach", 0.0))
     if (sheet is None) == (legs is None) or (legs is None) != (pose is None):
@@ -63,24 +67,49 @@ def hexapod_solve(
                 cure="Use a sheet, or leave it out.",
             )
         return HexapodSolution((_one_pose(pose, legs, base, tool, device),), (), None)
-    inputs = files_of(sheet)
+    given = _sheets_argument(sheet)
+    inputs = files_of(*given)
     path = None if out is None else file_for(out, *inputs)
-    if not isinstance(sheet, Sheet):
-        with refusals_of("sheet"):
-            sheet = read_sheet(path_argument(sheet, "sheet"), device)
-    measured, cups = sheet.measured.tolist(), sheet.cups()
-    with_data = sheet.configurations is not None and bool(measured)
     with refusals_of("sheet"):
-        data = sheet.dataset() if with_data or path is not None else None
+        whole = together(
+            [one if isinstance(one, Sheet) else read_sheet(path_argument(one, "sheet"), device) for one in given]
+        )
+    measured, cups = whole.measured.tolist(), whole.cups()
+    with_data = whole.configurations is not None and bool(measured)
+    with refusals_of("sheet"):
+        data = whole.dataset() if with_data or path is not None else None
     found = HexapodSolution(
-        tuple(SolvedPose(sheet.labels[r], sheet.designs[r], sheet.solutions[r], cups[r]) for r in measured),
-        tuple(label for row, label in enumerate(sheet.labels) if row not in measured),
+        tuple(
+            SolvedPose(
+                whole.labels[row],
+                whole.designs[row],
+                whole.solutions[row],
+                cups[row],
+                place=whole.places[row] if whole.places else "",
+                side=whole.sides[row],
+            )
+            for row in measured
+        ),
+        tuple(label for row, label in enumerate(whole.labels) if row not in measured),
         data,
         inputs,
+        whole.attached(),
     )
     if path is not None:
         found.save(path)
     return found
+
+
+def _sheets_argument(sheet: object) -> tuple[object, ...]:
+    if isinstance(sheet, Sheet | str | Path) or not isinstance(sheet, Sequence):
+        return (sheet,)
+    if not sheet:
+        raise InputError("there is no sheet", parameter="sheet", allowed="one or more")
+    files = [one.absolute() for one in files_of(*sheet)]
+    twice = [file for number, file in enumerate(files) if any(same_place(file, other) for other in files[:number])]
+    if twice:
+        raise InputError("the sheet is given twice", parameter="sheet", came=str(twice[0]), cure="Give it once.")
+    return tuple(sheet)
 
 
 def _one_pose(

@@ -10,9 +10,11 @@ import numpy as np
 
 from truearm.errors import InputError
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.hexapod.geometry import Design, side_names
+from truearm.measurement.hexapod.attachments import Attachments
+from truearm.measurement.hexapod.four_cups import legs_of_side
+from truearm.measurement.hexapod.geometry import DEVICE, Design, side_names
 from truearm.measurement.hexapod.poses import HexapodPose
-from truearm.measurement.hexapod.sheet import sheet_csv
+from truearm.measurement.hexapod.sheet import CUP_DEVIATION, sheet_csv
 from truearm.measurement.hexapod.uncertainty import CupUncertainty
 from truearm.measurement.hexapod.world_frame import WorldFrame
 from truearm.measurement.readers.canonical import csv_text
@@ -20,9 +22,11 @@ from truearm.modeling.chain import Array
 from truearm.modeling.controller import JointsOf
 from truearm.modeling.formats.joint_columns import counting
 from truearm.modeling.robot import Robot
+from truearm.notices import Notice
 from truearm.planning.hexapod.reachable import Reachable
 from truearm.planning.hexapod.steps import steps_text
-from truearm.results.record import Record, joints_lines
+from truearm.results.record import Record, joints_lines, notice_lines, notice_summaries
+from truearm.shown import counted
 from truearm.writing import output_file, write_text
 
 _CUPS: Final = ("t1", "t2", "t3")
@@ -120,12 +124,18 @@ class SolvedPose:
         Which legs were measured, and how they are assembled.
     cups
         T1, T2, T3 in the frame of the base fixture [m], ``(3, 3)``.
+    place
+        Name of the place of the base fixture; empty if the sheet has none.
+    side
+        On which side of four cups the legs were measured, 1 to 4.
     """
 
     configuration: str
     design: Design
     solution: int
     cups: Array
+    place: str = ""
+    side: int = 1
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -142,12 +152,29 @@ class HexapodSolution(Record):
         The cups as measurements of the robot; None without joint positions.
     inputs
         The files that were read: none of them is overwritten.
+    attached
+        How well the tool changer repeats the cups; None if the tool was attached once, as far as is said.
     """
 
     poses: tuple[SolvedPose, ...]
     left_out: tuple[str, ...]
     data: Dataset | None
     inputs: tuple[Path, ...] = ()
+    attached: Attachments | None = None
+
+    @property
+    def notices(self) -> tuple[Notice, ...]:
+        """What to know about it."""
+        if self.attached is None or self.attached.found is not None:
+            return ()
+        return (
+            Notice(
+                "attachments-not-compared",
+                f"The tool was attached {self.attached.count} times, and no configuration was measured with two of "
+                "the attachments: how well the tool changer repeats the cups is not known, and the data declare no "
+                "standard deviations. Measure a few configurations again after the next attachment.",
+            ),
+        )
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it, in mm."""
@@ -156,23 +183,66 @@ class HexapodSolution(Record):
                 "configuration": pose.configuration,
                 "design": pose.design.name,
                 "solution": pose.solution,
-                "legs": list(pose.design.leg_names),
+                "legs": list(legs_of_side(pose.design, pose.side)),
+                "place": pose.place or None,
+                "side": pose.side,
                 "cups_mm": (pose.cups * 1e3).tolist(),
             }
             for pose in self.poses
         ]
-        return {"poses": entries, "left_out": list(self.left_out)}
+        return {
+            "poses": entries,
+            "left_out": list(self.left_out),
+            "tool_changer": self._changer(),
+            "notices": notice_summaries(self.notices),
+        }
+
+    def _changer(self) -> dict[str, Any] | None:
+        if self.attached is None or self.attached.found is None:
+            return None
+        found = self.attached.found
+        return {
+            "attachments": found.compared,
+            "pairs": found.pairs,
+            "deviation_mm": (found.changer * 1e3).tolist(),
+            "rest_mm": None if found.rest is None else (found.rest * 1e3).tolist(),
+            "mean_mm": (found.mean * 1e3).tolist(),
+            "largest_mm": (found.largest * 1e3).tolist(),
+            "ballbar_mm": CUP_DEVIATION * DEVICE.sigma * 1e3,
+        }
 
     def lines(self) -> list[str]:
         """Return what the command prints."""
         text = []
         for pose in self.poses:
-            text.append(f"{pose.configuration or 'pose'}: design {pose.design.name}, solution {pose.solution}")
+            at = [f"place {pose.place}"] if pose.place else []
+            at += [f"side {pose.side}"] if any(other.side > 1 for other in self.poses) else []
+            at += [f"design {pose.design.name}", f"solution {pose.solution}"]
+            text.append(f"{pose.configuration or 'pose'}: {', '.join(at)}")
             for cup, (x, y, z) in enumerate((pose.cups * 1e3).tolist(), 1):
                 text.append(f"  T{cup}  x {x:.4f}  y {y:.4f}  z {z:.4f} mm")
         if self.left_out:
             text.append(f"Left out, not all legs measured: {', '.join(self.left_out)}")
-        return text
+        return [*text, *self._changer_lines(), *notice_lines(self.notices)]
+
+    def _changer_lines(self) -> list[str]:
+        changer = self._changer()
+        if changer is None:
+            return []
+        worst = max(changer["deviation_mm"])
+        rest = "the robot's repeatability contained"
+        if changer["rest_mm"] is not None:
+            rest = "robot and ballbar without it {:.4f}, {:.4f}, {:.4f} mm".format(*changer["rest_mm"])
+        return [
+            f"Tool changer, from {counted(changer['pairs'], 'pair')} of readings with {changer['attachments']} "
+            "attachments:",
+            "  it repeats a coordinate of T1, T2, T3 to {:.4f}, {:.4f}, {:.4f} mm".format(*changer["deviation_mm"])
+            + f" ({rest})",
+            "  a cup is moved by {:.4f}, {:.4f}, {:.4f} mm on average,".format(*changer["mean_mm"])
+            + " by {:.4f}, {:.4f}, {:.4f} mm at most".format(*changer["largest_mm"]),
+            f"  the ballbar alone would know it to {changer['ballbar_mm']:.4f} mm: taking the tool off costs "
+            f"{worst / changer['ballbar_mm']:.0f} times as much. The data declare it.",
+        ]
 
     def save(self, file: str | Path) -> None:
         """Write the cups as a canonical CSV file, for ``truearm.calibrate``."""
@@ -183,7 +253,7 @@ class HexapodSolution(Record):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class HexapodPlan(Record):
-    """Which configurations of a robot can be measured with the base fixture at one place.
+    """Which configurations of a robot can be measured with the base fixture at one place or several.
 
     Attributes
     ----------
@@ -207,6 +277,7 @@ class HexapodPlan(Record):
             "poses_reached": found.poses_reached,
             "joints_are": self.joints_are,
             "configurations": len(found.rows),
+            "places": self._places(),
             "left_out": dict(found.left_out),
             "smallest_room_mm": float(found.clearance.min()) * 1e3,
         }
@@ -217,10 +288,31 @@ class HexapodPlan(Record):
         left_out = ", ".join(f"{n} {why}" for why, n in said["left_out"].items())
         return [
             f"{said['poses_reached']} of {said['poses']} poses, {said['configurations']} configurations",
+            *self._place_lines(said["places"]),
             f"Left out: {left_out or 'nothing'}",
             f"Smallest room between arm and bars: {said['smallest_room_mm']:.0f} mm",
             *joints_lines(self.joints_are),
         ]
+
+    def _places(self) -> list[dict[str, Any]]:
+        """Return how many configurations there are at each place, and on each side."""
+        sides: dict[str, dict[str, int]] = {}
+        for row in self.reachable.rows:
+            of_place = sides.setdefault(row.place, {})
+            of_place[str(row.side)] = of_place.get(str(row.side), 0) + 1
+        return [{"place": name or None, "sides": dict(sorted(found.items()))} for name, found in sides.items()]
+
+    def _place_lines(self, places: list[dict[str, Any]]) -> list[str]:
+        with_sides = any(len(place["sides"]) > 1 for place in places)
+        if len(places) == 1 and not with_sides:
+            return []
+        text = []
+        for place in places:
+            line = f"{place['place'] or 'The fixture'}: {counted(sum(place['sides'].values()), 'configuration')}"
+            if with_sides:
+                line += f" ({', '.join(f'{n} on side {side}' for side, n in place['sides'].items())})"
+            text.append(line)
+        return text
 
     def sheet_text(self) -> str:
         """Return the sheet to fill in, as CSV."""

@@ -10,6 +10,7 @@ import pytest
 
 from truearm.errors import InputError
 from truearm.library import load_robot
+from truearm.measurement.hexapod.four_cups import SIDES_OF_FOUR, four_cups, side_frames
 from truearm.measurement.hexapod.geometry import DEVICE, Device, triangle
 from truearm.measurement.hexapod.poses import CUPS, poses
 from truearm.measurement.hexapod.sheet import PlannedRow
@@ -18,7 +19,7 @@ from truearm.modeling.chain import Array
 from truearm.modeling.inverse import inverse
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY, Transform
-from truearm.simulation.hexapod.fourth_cup import SIDES_OF_FOUR, four_cups, side_frames, with_fourth
+from truearm.simulation.hexapod.fourth_cup import with_fourth
 from truearm.simulation.hexapod.session import SetUp, cups_dataset, joined, measure_poses
 from truearm.simulation.hexapod.simulated import ballbar
 from truearm.simulation.hexapod.tool_changer import ToolChanger

@@ -11,6 +11,7 @@ import numpy as np
 
 from truearm.errors import InputError
 from truearm.library import load_robot
+from truearm.measurement.hexapod.four_cups import four_cups, side_frames
 from truearm.measurement.hexapod.geometry import DEVICE
 from truearm.measurement.hexapod.kinematics import SOLUTIONS, tool_cups
 from truearm.measurement.hexapod.poses import CUPS, HexapodPose, poses
@@ -21,7 +22,6 @@ from truearm.modeling.robot import Robot
 from truearm.modeling.transform import IDENTITY, Transform, rigid_motion
 from truearm.planning.hexapod.reachable import Reachable, reachable
 from truearm.planning.hexapod.tool import with_cups
-from truearm.simulation.hexapod.fourth_cup import four_cups, side_frames
 from truearm.simulation.hexapod.session import measure_poses, set_up
 from truearm.simulation.hexapod.simulated import ballbar
 from truearm.simulation.hexapod.tool_changer import ToolChanger

@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from truearm.measurement.hexapod.four_cups import SIDES_OF_FOUR, four_cups
 from truearm.measurement.hexapod.geometry import DEVICE, designs, triangle
 from truearm.measurement.hexapod.kinematics import leg_lengths, tool_cups
 from truearm.measurement.hexapod.poses import (
@@ -25,7 +26,6 @@ from truearm.measurement.hexapod.uncertainty import (
     cup_uncertainty,
 )
 from truearm.modeling.transform import rigid_motion
-from truearm.simulation.hexapod.fourth_cup import SIDES_OF_FOUR, four_cups
 from truearm.studies.hexapod_device.run import ATTACHED, REPEATED, Outcome
 from truearm.studies.study import Row, Table
 from truearm.validation.pose_accuracy import repeatability

@@ -11,6 +11,7 @@ import numpy as np
 
 from truearm.identification.hexapod.placements import identify_placements
 from truearm.measurement.dataset import Dataset
+from truearm.measurement.hexapod.four_cups import four_cups, side_frames
 from truearm.measurement.hexapod.geometry import DEVICE
 from truearm.measurement.hexapod.poses import HexapodPose
 from truearm.measurement.hexapod.sheet import PlannedRow
@@ -20,7 +21,7 @@ from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 from truearm.planning.hexapod.reachable import reachable
-from truearm.simulation.hexapod.fourth_cup import four_cups, side_frames, with_fourth
+from truearm.simulation.hexapod.fourth_cup import with_fourth
 from truearm.simulation.hexapod.session import SetUp, cups_dataset, joined, measure_poses, set_up
 from truearm.simulation.hexapod.simulated import ballbar
 from truearm.simulation.hexapod.tool_changer import ToolChanger

@@ -79,7 +79,7 @@ def test_the_shares_add_up_to_the_held_out_square() -> None:
     parts = line.split("; ")[0].split(": ")[1].split(", ")
     assert parts[0].startswith("what the model cannot express ")
     assert parts[-1] == "instrument noise 0.035 mm"
-    assert line.endswith(f"the held-out rms of {summary['rms_mm']:.3f} mm, within their uncertainty")
+    assert line.endswith(f"mm, held out {summary['rms_mm']:.3f} mm, the same within its uncertainty")
 
 
 def test_noise_alone_is_the_instruments() -> None:
@@ -161,7 +161,7 @@ def test_nothing_held_out_leaves_no_remainder() -> None:
     assert not budget.held_out
     assert {share.source for share in budget.shares} == {"instrument", "table", "repeatability", "model", "parameters"}
     assert budget.square == pytest.approx(sum(share.square or 0.0 for share in budget.shares))
-    assert "rms to expect at configurations like these" in budget_lines(budget)[0]
+    assert "mm, to expect at configurations like these" in budget_lines(budget)[0]
     assert budget.workspace is not None
     expected = expected_error(fit).overall
     assert sum(share.square or 0.0 for share in budget.workspace) == pytest.approx(expected.mean**2, rel=0.6)

@@ -250,6 +250,10 @@ NAMED_ELSEWHERE = {
     "identification/inclinometers/fit.py": "so is the first stage of the method with inclinometers",
     "identification/judging/next_steps.py": "a list of notices, one of which is called like an effect",
     "identification/judging/unmodelled.py": "compliance is what a payload that nobody gave is seen by",
+    "modeling/formats/robot_file/": "a truth of a robot file has constants of joints, by what they are",
+    "simulation/truths.py": "and a twin is made with them",
+    "results/tilting.py": "what the method with inclinometers finds, in words",
+    "reporting/tilting_report.py": "and its pictures",
     "studies/": "a study chooses models as its document does",
 }
 

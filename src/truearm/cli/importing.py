@@ -181,17 +181,26 @@ def hand_eye(
             metavar="PPM", help="How well the size of the board is known, a deviation.", show_default="taken as exact"
         ),
     ] = None,
+    ahead: Annotated[
+        float | None,
+        typer.Option(
+            metavar="MM",
+            help="How far before the camera the target is; that of the first session for every later one.",
+            show_default="where the board was on average",
+        ),
+    ] = None,
     json: Json = False,
 ) -> None:
     """Poses of a board in a camera, one of them on the flange, or pictures that show it."""
     from truearm.jobs.import_hand_eye import import_hand_eye
-    from truearm.units import to_si
+    from truearm.units import sized_si, to_si
 
     imported = import_hand_eye(
         file,
         on_flange=on_flange,  # type: ignore[arg-type]
         board=board,
         scale_sigma=None if scale_sigma is None else to_si(scale_sigma, "ppm"),
+        ahead=None if ahead is None else sized_si(ahead, "mm", parameter="ahead"),
         out=out,
     )
     if json:

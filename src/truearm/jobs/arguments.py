@@ -15,6 +15,7 @@ from truearm.errors import InputError, did_you_mean, name_parameter, refusals_of
 from truearm.files import path_argument
 from truearm.library import is_robot, load_robot, urdf_source
 from truearm.limits import limit, refuse_beyond
+from truearm.manifest import sets_in
 from truearm.measurement.controller_joints import in_model_joints
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.readers.canonical import read_csv
@@ -24,6 +25,7 @@ from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 from truearm.modeling.wrench import WRENCH_FRAMES, Wrench
+from truearm.shown import listed
 from truearm.units import accepted_range, sized_si
 from truearm.writing import new_file, output_file, output_folder
 
@@ -119,6 +121,28 @@ def folder_for(names: Iterable[str], out: object, *read: object, parameter: str 
         Whether only files may be overwritten that truearm has written there.
     """
     return output_folder(out, names, files_of(*read), parameter, ours=ours)
+
+
+def folder_beside(names: Iterable[str], mark: str, out: object, *read: object) -> Path:
+    """Return the folder for files as :func:`folder_for` does, but refuse the folder of another kind of result.
+
+    Parameters
+    ----------
+    mark
+        The file by which a result of this kind is known.
+    """
+    wanted = tuple(names)
+    folder = folder_for(wanted, out, *read, ours=True)
+    for one in sets_in(folder):
+        if mark not in one.files and any(name in one.files for name in wanted):
+            raise InputError(
+                f"{listed([name for name in wanted if name in one.files])} there belong to another result",
+                parameter="out",
+                where=str(folder),
+                came=f"the folder of {next(iter(one.files))}",
+                cure="Choose another folder.",
+            )
+    return folder
 
 
 def file_for(out: object, *read: object, parameter: str = "out") -> Path:

@@ -189,6 +189,12 @@ def calibrate(
     bootstrap = _fits_argument(bootstrap)
     trials = trials_argument(monte_carlo, loss, bounds)
     wanted_zones = zones_argument(zones, held_out=train != "all")
+    if trials is not None and bootstrap:
+        raise InputError(
+            "simulated calibrations are compared with the deviations of the fit itself, not with those of a bootstrap",
+            parameter="monte_carlo, bootstrap",
+            cure="Leave one of them out.",
+        )
     for given, name in ((trials, "monte_carlo"), (wanted_zones, "zones")):
         if given is not None and hold:
             raise InputError(

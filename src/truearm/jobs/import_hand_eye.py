@@ -6,9 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from truearm.arrays import finite_number
-from truearm.errors import refusals_of, wrong_kind
+from truearm.errors import InputError, refusals_of, wrong_kind
 from truearm.files import path_argument
-from truearm.jobs.arguments import choice_argument, file_for
+from truearm.jobs.arguments import choice_argument, file_for, length_argument
 from truearm.measurement.board.charuco import Charuco
 from truearm.measurement.readers.canonical import csv_text
 from truearm.measurement.readers.hand_eye import (
@@ -28,6 +28,7 @@ def import_hand_eye(
     on_flange: OnFlange,
     board: str | None = None,
     scale_sigma: float | None = None,
+    ahead: float | None = None,
     out: str | Path | None = None,
 ) -> ImportedHandEye:
     """Read where a camera saw a board, from poses or from pictures, as poses of what is on the flange.
@@ -46,6 +47,9 @@ def import_hand_eye(
     scale_sigma
         Standard deviation of how much longer than named the lengths on the board are, or of the poses' own scale: 2e-4
         for 200 ppm. None takes them as exact.
+    ahead
+        How far before the camera the point is that the data follow [m]; None for where the board was on average. A
+        later session of the same camera needs that of the first.
     out
         Canonical CSV file to write; None writes nothing.
 
@@ -63,9 +67,18 @@ def import_hand_eye(
         pictures = pictures_named(table)
     refuse_wrong_place(pictures, board)
     scale = None if scale_sigma is None else finite_number(scale_sigma, "scale_sigma", lowest=0.0)
+    if ahead is not None:
+        ahead = length_argument(ahead, "ahead", 0.0)
+        if on_flange != "camera":
+            raise InputError(
+                "only a camera on the flange has a point ahead of it",
+                parameter="ahead",
+                came=f"{ahead * 1e3:g} mm",
+                cure="Leave it out.",
+            )
     target = None if out is None else file_for(out, table, *pictures)
     with refusals_of("file"):
-        read = read_hand_eye(table, on_flange, named)
+        read = read_hand_eye(table, on_flange, named, ahead)
     data = replace(read.data, scale_sigma=scale)
     if target is not None:
         write_text(target, csv_text(data))

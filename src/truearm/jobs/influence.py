@@ -27,7 +27,7 @@ from truearm.jobs.arguments import (
     command_argument,
     count_argument,
     files_of,
-    folder_for,
+    folder_beside,
     gravity_argument,
     length_argument,
     payload_argument,
@@ -55,6 +55,9 @@ Frames = Literal["placed", "robot"]
 _LARGEST: Final = (math.radians(10.0), 0.1)
 #: Moves the tip by less than rounding [m].
 _NOTHING: Final = 1e-12
+
+#: Configurations from which on base and target are found.
+_LEAST: Final = 5
 
 
 def influence(
@@ -150,7 +153,7 @@ def influence(
         gravity=fall,
     )
     refuse_swapped(robot, data, "influence")
-    folder = None if out is None else folder_for(INFLUENCE_FILES, out, robot, data, ours=True)
+    folder = None if out is None else folder_beside(INFLUENCE_FILES, INFLUENCE_FILES[0], out, robot, data)
     progress("reading the robot")
     given = robot_argument(robot)
     nominal = wanted.prepared(given.with_payload(carried, fall))
@@ -242,6 +245,14 @@ def _parts(
     if not (data.has_position & (data.target == data.targets.index(tip))).any():
         raise InputError("there is no position reading of this target", where=data.source, came=tip)
     count = train_count(train, data.configurations, data.source)
+    if count < _LEAST:
+        raise InputError(
+            "base, target and parameters are not found from so few configurations",
+            parameter="train",
+            where=data.source,
+            came=counted(count, "training configuration"),
+            allowed=f"{_LEAST} or more",
+        )
     order = np.random.default_rng(seed).permutation(data.configurations)
     first = data.of_configurations(order[:count])
     second = data.of_configurations(order[count:]) if count < data.configurations else None

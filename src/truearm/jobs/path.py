@@ -22,7 +22,7 @@ from truearm.jobs.arguments import (
     choices_argument,
     command_argument,
     files_of,
-    folder_for,
+    folder_beside,
     gravity_argument,
     joints_argument,
     name_argument,
@@ -130,7 +130,7 @@ def path(
         () if controller_kinematics is None or str(controller_kinematics) in STATED else (controller_kinematics,)
     )
     written = (MOTION, CORRECTED, LOADS, REPORT)
-    folder = None if out is None else folder_for(written, out, robot, file, *kinematics)
+    folder = None if out is None else folder_beside(written, MOTION, out, robot, file, *kinematics)
     pushed = wrench_argument(wrench, wrench_frame)
     carried, fall = payload_argument(payload), gravity_argument(gravity)
     arm = pushed_argument(robot_argument(robot).with_payload(carried, fall), pushed)

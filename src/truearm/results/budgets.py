@@ -18,6 +18,8 @@ SOURCES: Final = {
     "remainder": "remainder",
 }
 
+#: Many times the shares is not called the same, however uncertain: outliers make anything uncertain.
+_ALIKE: Final = 3.0
 #: Standard deviations of a share beyond which it is more than chance.
 _SURE: Final = 2.0
 
@@ -64,17 +66,19 @@ def budget_lines(budget: ErrorBudget | None) -> list[str]:
     sure = [share for share in budget.shares if share.source != "remainder" and _is_sure(share)]
     sure.sort(key=lambda share: -(share.square or 0.0))
     parts = [f"{SOURCES[share.source]} {(share.rms or 0.0) * 1e3:.{places}f} mm" for share in sure]
-    what = "held-out rms" if budget.held_out else "rms to expect at configurations like these"
-    rest = "within their uncertainty"
-    if budget.held_out and not budget.remainder_is_chance:
+    what = "held out" if budget.held_out else "to expect at configurations like these"
+    shares = sum(share.square or 0.0 for share in budget.shares if share.source != "remainder")
+    together = math.sqrt(max(shares, 0.0))
+    rest = "the same within its uncertainty" if budget.held_out else "which is their sum"
+    if budget.held_out and not (budget.remainder_is_chance and budget.square < _ALIKE * shares):
         left = next(share for share in budget.shares if share.source == "remainder").rms or 0.0
-        rest = f"but for {abs(left) * 1e3:.{places}f} mm {'more' if left > 0.0 else 'less'} than they explain"
+        rest = f"in squares {abs(left) * 1e3:.{places}f} mm {'more' if left > 0.0 else 'less'} than they explain"
     for share in budget.shares:
         if share.square is not None and share.source != "remainder" and share.square < -_SURE * share.deviation:
             rest += f"; {SOURCES[share.source]} takes {abs(share.rms or 0.0) * 1e3:.{places}f} mm away, see the report"
     return [
-        f"What limits the accuracy: {', '.join(parts) or 'nothing that is more than chance'}; squared they add up to "
-        f"the {what} of {budget.rms * 1e3:.{places}f} mm, {rest}"
+        f"What limits the accuracy: {', '.join(parts) or 'nothing that is more than chance'}; all shares together, in "
+        f"squares, {together * 1e3:.{places}f} mm, {what} {budget.rms * 1e3:.{places}f} mm, {rest}"
     ]
 
 

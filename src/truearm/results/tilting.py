@@ -32,6 +32,9 @@ GEOMETRY: Final = "geometry.html"
 
 _SHOWN: Final = {"clearance": "tilt", "backlash": "backlash", "compliance": "compliance"}
 
+#: Steps that only a calibration can take: here the effects are chosen.
+_OF_CALIBRATE: Final = ("other-model", "give-loads")
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Tilting(Record):
@@ -186,7 +189,7 @@ class Tilting(Record):
             text.append(f"  geometry alone   {error_line(alone.validation or alone.train)}")
             text.append(f"  tilting first    {error_line(judged)}")
             text.append(f"Status of the geometry: {after.status.value}. {after.advice}".rstrip())
-            text += [step.line for step in after.next]
+            text += [step.line for step in after.next if step.code not in _OF_CALIBRATE]
         return text + notice_lines(self.warnings)
 
     def save(self, folder: str | Path, progress: Callable[[str], None] = lambda _: None) -> tuple[Path, ...]:

@@ -33,7 +33,8 @@ from truearm.modeling.transform import Transform
 LEAST_CONFIGURATIONS: Final = 12
 #: Held-out configurations that a zone is judged by at least, and standard errors by which it must gain.
 LEAST_HELD_OUT: Final = 5
-_SURE: Final = 2.0
+#: Chance for any of the zones to be kept that is as good as the model of the whole.
+_CHANCE: Final = 0.025
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,7 +209,8 @@ def judge_zones(
 ) -> tuple[ZoneVerdict, ...]:
     """Identify a model for each box, and judge it on held-out readings there against the model of the whole.
 
-    A zone is kept if its mean error there is lower by more than two standard errors of the paired differences.
+    A zone is kept if its mean error there is lower by more than chance: by a one-sided t test of the paired differences
+    in which any of the zones passes in one case of forty if all are as good as the whole.
 
     Parameters
     ----------
@@ -232,11 +234,13 @@ def judge_zones(
         if len(mine) >= LEAST_CONFIGURATIONS and len(judges) >= LEAST_HELD_OUT:
             part = training.of_configurations(mine)
             fit = identify(whole.robot, part, whole.model, loss=loss, redundancy=redundancy, bounds=bounds)
-        verdicts.append(_verdict(whole, fit, box, len(mine), held_out, judges))
+        verdicts.append(_verdict(whole, fit, box, len(mine), held_out, judges, len(boxes)))
     return tuple(verdicts)
 
 
-def _verdict(whole: Fit, fit: Fit | None, box: Box, training: int, held_out: Dataset, judges: IntArray) -> ZoneVerdict:
+def _verdict(
+    whole: Fit, fit: Fit | None, box: Box, training: int, held_out: Dataset, judges: IntArray, zones: int
+) -> ZoneVerdict:
     count = len(judges)
     if fit is None:
         few = (
@@ -245,6 +249,8 @@ def _verdict(whole: Fit, fit: Fit | None, box: Box, training: int, held_out: Dat
             else f"{count} held-out configurations, and a judgement needs {LEAST_HELD_OUT}"
         )
         return ZoneVerdict(box, training, count, None, None, None, False, f"only {few}", None)
+    from scipy.special import stdtrit
+
     part = held_out.of_configurations(judges)
     missing = {target.name for target in whole.robot.targets} - {target.name for target in fit.robot.targets}
     if missing & set(part.targets):
@@ -259,7 +265,7 @@ def _verdict(whole: Fit, fit: Fit | None, box: Box, training: int, held_out: Dat
     gain = before[read] - after[read]
     sums = np.bincount(at, gain - gain.mean())
     error = math.sqrt(judged / (judged - 1) * float(sums @ sums)) / len(gain)
-    kept = bool(gain.mean() > _SURE * error)
+    kept = bool(gain.mean() > float(stdtrit(judged - 1, 1.0 - _CHANCE / zones)) * error)
     why = (
         "better by more than chance"
         if kept

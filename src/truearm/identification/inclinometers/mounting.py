@@ -38,6 +38,8 @@ _SIGMA: Final = math.radians(1.0)
 #: Share of what the stated way leaves that another one may leave at most to be believed.
 _BETTER: Final = 1 / 3
 _ROUNDS: Final = 15
+#: Configurations from which on the angles of an instrument tell how it sits; with fewer it sits as the file says.
+_LEAST: Final = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,6 +89,12 @@ def find_mounting(robot: Robot, read: Inclinations) -> Mounting:
     mounts, zeros, notices = [], [], []
     for number, (name, link) in enumerate(zip(read.instruments.names, read.instruments.links, strict=True)):
         angle = read.angle[:, number]
+        if np.isfinite(angle).any(axis=1).sum() < _LEAST:  # too few to tell a turn from a zero
+            mounts.append(np.eye(3))
+            apart = angle - np.arcsin(np.clip(plumb[link], -1.0, 1.0))
+            read_of = np.isfinite(apart).any(axis=0)
+            zeros.append(np.where(read_of, np.nanmean(np.where(read_of, apart, 0.0), axis=0), np.nan))
+            continue
         mount, zero, left = (found[0] for found in _turned(plumb[link], angle, np.eye(3)[None]))
         if left > _FITS or _turn_of(mount) > _AS_STATED:
             _refuse(read.source, name, link, plumb, angle)

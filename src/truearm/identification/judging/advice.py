@@ -200,7 +200,6 @@ def _check_effects(fit: Fit) -> list[Notice]:
                 f"The robot file does not say where on their axes the bearings of {listed(assumed)} lie. They are "
                 "taken at the joints' origins, and so are the moments that tilt them. If drawings tell, enter "
                 "the entry bearing of these joints in the robot file.",
-                "note",
             )
         )
     vague = [name for name in own if name not in unknown and (robot.parameters[name].informed or 1.0) < _LEAST_INFORMED]

@@ -24,7 +24,7 @@ from truearm.identification.solving.rounds import Redundant
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.observations import OBSERVATIONS
 from truearm.measurement.statistics import Errors, errors_of
-from truearm.modeling.parameters import PLACES
+from truearm.modeling.parameters import PLACES, Parameter
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform, rotation_from_quaternion, rotation_from_vector, rotation_vector
 from truearm.notices import Notice
@@ -36,6 +36,8 @@ _LEAST_F: Final = 10.0
 _LEAST_FREEDOM: Final = 10
 #: Below this no instrument sees the difference [m].
 _NEGLIGIBLE: Final = 2e-6
+#: Priors by which a parameter goes far, and those within which it is at ease.
+_STRAINED, _AT_EASE = 2.5, 1.0
 #: Chance below which a place found is not the one held, and how far apart they are then at least [m, rad].
 _CHANCE: Final = 1e-6
 _APART: Final = (1e-3, math.radians(0.1))
@@ -81,22 +83,21 @@ def check_held(
     added = max(len(found.free.names) - len(fit.free.names), 1)
     apart = [words for words, size in _apart(fit, found) if size >= 1.0] if data.anchored and priors else []
     unlikely = bool(apart) and chi_squared_tail(max(_rise(fit, found, data), 0.0), added) < _CHANCE
-    rows = 3 * with_held[1]
-    freedom = rows - len(found.free.names)
+    freedom = with_held[2] - len(found.free.names)
     misfit = (
         freedom >= _LEAST_FREEDOM
         and with_held[0] > max(_MORE * without[0], _NEGLIGIBLE)
-        and (with_held[0] ** 2 - without[0] ** 2) * rows / added > _LEAST_F * without[0] ** 2 * rows / freedom
+        and (with_held[0] ** 2 - without[0] ** 2) / added > _LEAST_F * without[0] ** 2 / freedom
     )
     if not misfit and not unlikely:
-        return []
+        return _strained(fit, found) if priors else []
     message = "The places that are held contradict the readings"
     if misfit:
         message += (
             f": with them the fit leaves {with_held[0] * 1e3:.3g} mm of the training readings, with all of them found "
             f"{without[0] * 1e3:.3g} mm (root mean square)"
         )
-    if apart:
+    if apart and unlikely:
         message += f"{'. Found' if misfit else ': found'} from the readings, {listed(apart)} from where it is held"
     message += (
         ". Check the numbers, their units and what they refer to: the base is the frame of the robot's table, whose z "
@@ -105,12 +106,38 @@ def check_held(
     return [Notice("hold-contradicts", message, "error")]
 
 
-def _left(errors: Errors) -> tuple[float, int]:
-    """Return the root mean square of what is left [m], and of how many readings."""
-    parts = [e.ravel() for e in (errors.position_norms, errors.length_errors) if e is not None]
-    every = np.concatenate(parts) if parts else np.zeros(0)
-    every = every[np.isfinite(every)]
-    return (float(np.sqrt(np.mean(every**2))) if len(every) else 0.0), len(every)
+def _strained(fit: Fit, found: Fit) -> list[Notice]:
+    """Return a notice if parameters of the arm go far with the places held, and only then."""
+
+    def far(one: Fit, p: Parameter) -> float:
+        return (one.robot.values[p.name] - p.nominal) / p.prior
+
+    strained = [
+        f"{p.name} ({far(fit, p):+.1f} times its prior)"
+        for p in fit.free.parameters
+        if p.group not in PLACES and abs(far(fit, p)) > _STRAINED and abs(far(found, p)) < _AT_EASE
+    ]
+    if not strained:
+        return []
+    return [
+        Notice(
+            "hold-strained",
+            f"With the places held, {listed(strained)} went far from nominal, and with all of them found not. That is "
+            "what an error of the held numbers does which the readings cannot show. Check them; what is expected of "
+            "the robot takes them as exact.",
+        )
+    ]
+
+
+def _left(errors: Errors) -> tuple[float, int, int]:
+    """Return the root mean square of what is left [m], of how many readings, and how many numbers they are."""
+    positions, lengths = (
+        np.zeros(0) if e is None else e.ravel()[np.isfinite(e.ravel())]
+        for e in (errors.position_norms, errors.length_errors)
+    )
+    every = np.concatenate([positions, lengths])
+    rms = float(np.sqrt(np.mean(every**2))) if len(every) else 0.0
+    return rms, len(every), 3 * len(positions) + len(lengths)
 
 
 def _rise(fit: Fit, found: Fit, data: Dataset) -> float:

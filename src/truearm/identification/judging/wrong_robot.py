@@ -27,13 +27,17 @@ from truearm.measurement.dataset import Dataset
 from truearm.measurement.observations import OBSERVATIONS
 from truearm.measurement.statistics import errors_of
 from truearm.modeling.chain import Array
-from truearm.modeling.parameters import FreeParameters, Parameter
+from truearm.modeling.parameters import SCALE, FreeParameters, Parameter
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.shown import listed
 
 #: The code of the notice.
 WRONG_ROBOT: Final = "wrong-robot"
+LENGTHS_SCALED: Final = "lengths-scaled"
+#: Deviations from which all lengths have grown together, and share of their growth that readings must see.
+_GROWN: Final = 4.0
+_LEAST_SEEN: Final = 0.25
 #: Share of the prior variance that the readings must remove from a combination of lengths for it to count.
 _LEAST_INFORMED: Final = 0.9
 #: How much wider than they are the priors of all but lengths are taken.
@@ -94,7 +98,9 @@ class Lengths:
         r, J = problem.linearised(free.start)
         weight = np.sqrt(np.concatenate([_weights(fit, problem, i) for i in range(len(problem.blocks))])) / fit.excess
         count = len(lengths)
-        prior = free.prior * np.where(np.arange(len(names)) < len(names) - count, _WIDER, 1.0)
+        # What is known of an instrument's scale is known of lengths.
+        wider = [not _is_length(p) and p.name != SCALE for p in free.parameters]
+        prior = free.prior * np.where(wider, _WIDER, 1.0)
         J = J * (weight[:, None] * prior)
         # The controller computes with the table of the robot file, whatever earlier calibrations have found.
         table = replace(robot, known={}).parameters
@@ -116,6 +122,17 @@ class Lengths:
     def chance(self) -> float:
         """How often the lengths of a robot as good as its priors move as far."""
         return chi_squared_tail(self.chi_squared, len(self.moved)) if len(self.moved) else 1.0
+
+    @property
+    def growth(self) -> tuple[float, float]:
+        """By what factor less one all lengths grew together, and how many of its deviations that is; 0 if unseen."""
+        nominal = np.array([p.nominal / p.prior for p in self.parameters])
+        seen = self.directions @ nominal if len(self.moved) else np.zeros(0)
+        size = float(seen @ seen)
+        if size < _LEAST_SEEN * max(float(nominal @ nominal), 1e-300):
+            return 0.0, 0.0
+        along = float(seen @ self.moved)
+        return along / size, along / math.sqrt(size)
 
     def named(self) -> list[str]:
         """Return the combinations that moved farthest, in words, with how far.
@@ -179,7 +196,7 @@ def check_robot(fit: Fit, data: Dataset) -> list[Notice]:
     """
     lengths = Lengths.of(fit, data)
     if lengths.chance >= _SIGNIFICANT:
-        return []
+        return _check_growth(fit.robot, lengths)
     better = _Better.of(fit.robot, data)
     return [
         Notice(
@@ -189,6 +206,23 @@ def check_robot(fit: Fit, data: Dataset) -> list[Notice]:
             f"{'' if better is None else better.text} Take the file of the robot that was measured. If this is the "
             "one, enter the lengths that its controller computes with, or wider priors: corrections of programs are "
             "wrong by what the lengths differ.",
+            "error",
+        )
+    ]
+
+
+def _check_growth(robot: Robot, lengths: Lengths) -> list[Notice]:
+    """Return a notice if all lengths grew by one factor, which a wrong length in the measurement does."""
+    growth, deviations = lengths.growth
+    if abs(deviations) < _GROWN:
+        return []
+    way = f"{abs(growth) * 100:.2g} % too {'long' if growth > 0.0 else 'short'}"
+    return [
+        Notice(
+            LENGTHS_SCALED,
+            f"All lengths of {robot.name} come out {way}, by one factor: {abs(deviations):.1f} times what its priors "
+            "let expect. That is what a wrong length in the measurement does: the scale of the instrument, the distance between sockets or spheres, the squares of a "
+            "board, units. Measure that again. What is expected of the robot takes it as right.",
             "error",
         )
     ]

@@ -227,6 +227,8 @@ def gauge_freedoms(data: Dataset, held: Held = NOTHING_HELD) -> tuple[str, ...]:
         return ()
     if data.distance is not None or (data.setup is not None and data.setup.distance is not None):
         return ("base",)
+    if any(any(place.translation) for place in held.targets.values()):  # it is a length on the flange
+        return ("base",)
     for fixture in range(len(data.fixtures)):
         lengths = data.position if data.height is None else np.column_stack([data.position, data.height])
         mine = lengths[data.against == fixture]

@@ -72,7 +72,9 @@ def pictures_named(path: Path) -> tuple[Path, ...]:
     return tuple(path.parent / name for name in cells.texts(cells.names.index("picture")))
 
 
-def read_hand_eye(path: Path, on_flange: OnFlange, board: Charuco | None) -> HandEyeReadings:
+def read_hand_eye(
+    path: Path, on_flange: OnFlange, board: Charuco | None, ahead: float | None = None
+) -> HandEyeReadings:
     """Read a table of poses of a board in a camera, or of pictures of it.
 
     Parameters
@@ -81,6 +83,8 @@ def read_hand_eye(path: Path, on_flange: OnFlange, board: Charuco | None) -> Han
         What moves with the robot; the other one stands beside it.
     board
         What the pictures show; None for a table of poses.
+    ahead
+        How far before a camera on the flange the target is [m]; None for where the board was on average.
 
     Raises
     ------
@@ -100,7 +104,10 @@ def read_hand_eye(path: Path, on_flange: OnFlange, board: Charuco | None) -> Han
         found = configurations_of(cells, columns)
         refuse_repeated(cells, found, "Each row is a picture of the board: give it a label of its own.")
         views = seen_in_pictures([path.parent / name for name in cells.texts(columns["picture"][0])], board)
-    ahead = views.point_ahead() if on_flange == "camera" else 0.0
+    if on_flange != "camera":
+        ahead = 0.0
+    elif ahead is None:
+        ahead = views.point_ahead()
     if on_flange == "camera":
         places, turns, sigma, sigma_rot = views.camera_in_board(ahead)
     else:

@@ -35,6 +35,8 @@ _JOINTS: Final = 6
 _POINTS, _POSES = 12, 18
 #: Sum of coordinates below which nothing was measured [m].
 _NOT_MEASURED: Final = 1e-6
+#: Headings that no joint has.
+_NO_JOINTS: Final = frozenset({"x", "y", "z", "configuration", "target", "name", "point", "id"})
 _HEADINGS: Final = {
     "joints": [f"J{number} [deg]" for number in range(1, _JOINTS + 1)],
     "measured": [f"measured {axis} [mm]" for axis in "XYZ"],
@@ -94,6 +96,7 @@ def read_robodk(path: Path, angle_unit: AngleUnit | None, joints_are: JointsOf) 
             cure="Export the calibration or validation measurements as they are, or use `truearm import table`.",
         )
     _refuse_no_heading(cells)
+    _refuse_other_headings(cells)
     poses = columns == _POSES
     if poses and angle_unit is None:
         raise InputError(
@@ -184,6 +187,20 @@ def _refuse_no_heading(cells: Cells) -> None:
             where=f"{cells.source}, line {cells.header}",
             cure="Write a line of headings above it.",
         )
+
+
+def _refuse_other_headings(cells: Cells) -> None:
+    """Refuse a table whose headings say that its columns are others: they go by their place."""
+    for place, heading in enumerate(cells.names[:_JOINTS]):
+        name = heading.split("[")[0].strip().lower()
+        if name in _NO_JOINTS:
+            raise InputError(
+                "the heading of this column is not that of a joint, and joints come first",
+                where=f"{cells.source}, line {cells.header}, column {place + 1}",
+                came=heading,
+                allowed=f"{_JOINTS} joints, the measured point, the tool point",
+                cure="Put the columns in this order. A canonical CSV needs no import.",
+            )
 
 
 def _is_number(text: str) -> bool:

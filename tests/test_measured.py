@@ -96,10 +96,11 @@ def test_what_beta_and_the_payload_are_worth(irb120: Dataset, calibrated: Run) -
     third = {column: value for column, value in robot.joints[2].row.items() if column != "beta"}
     joints = tuple(replace(j, row=third) if j is robot.joints[2] else j for j in robot.joints)
     without = replace(robot, joints=joints)
+    seeds = SEEDS[:3]  # both differences are many times what the splits scatter by
     runs = {
-        "as it is": [calibrated("elastic", 50, seed, PAYLOAD) for seed in SEEDS],
-        "no beta": [calibrate(without, irb120, model="elastic", payload=PAYLOAD, train=50, seed=s) for s in SEEDS],
-        "bare": [calibrated("elastic", 50, seed) for seed in SEEDS],
+        "as it is": [calibrated("elastic", 50, seed, PAYLOAD) for seed in seeds],
+        "no beta": [calibrate(without, irb120, model="elastic", payload=PAYLOAD, train=50, seed=s) for s in seeds],
+        "bare": [calibrated("elastic", 50, seed) for seed in seeds],
     }
     found = {case: np.median([mean_mm(run) for run in of_case]) for case, of_case in runs.items()}
     assert found["no beta"] > found["as it is"] + 0.015  # the document's figure without it is 0.146 mm
@@ -238,7 +239,7 @@ def test_chosen_configurations_against_random_ones_on_the_irb120(
         rng = np.random.default_rng(seed)
         plan = plan_measurements(arm, training.postures, model, poses=38, rng=rng)
         chosen.append(judged(plan.chosen))
-        drawn.append(np.median([judged(rng.permutation(300)[:38]) for _ in range(5)], axis=0))
+        drawn.append(np.median([judged(rng.permutation(300)[:38]) for _ in range(3)], axis=0))
     by_o1, by_chance = np.median(chosen, axis=0), np.median(drawn, axis=0)
     if "hardening" in effects:
         assert by_o1[0] <= by_chance[0]

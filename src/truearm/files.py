@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 import stat
+from copy import deepcopy
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 
@@ -17,6 +19,8 @@ _BETWEEN_ENTRIES: Final = ("\n", ",", ":", "[", "{", "- ", "-\t", "? ")
 _BRACKET: Final = re.compile(r"[\[\]{}]")
 #: An entry that stands for another one, or what looks like it.
 _ALIAS: Final = re.compile(r"(?:^|[\s\[{,:])\*[^\s\[\]{},]")
+#: YAML texts up to this length are kept as they were parsed, in case they are read again.
+_KEPT_SIZE: Final = 200_000
 #: What is read but is no file, for messages. Whoever reads them may wait for ever, or never come to an end.
 _NO_FILES: Final = (
     (stat.S_ISFIFO, "a named pipe"),
@@ -128,7 +132,7 @@ def read_yaml(path: Path, schema: type[Model]) -> Model:
     try:
         if _ALIAS.search(text):
             _refuse_multiplied(YAML(typ="safe", pure=True).compose(text), path)
-        content = YAML(typ="safe", pure=True).load(text)
+        content = deepcopy(_loaded(text)) if len(text) <= _KEPT_SIZE else _loaded.__wrapped__(text)
     except MarkedYAMLError as error:
         mark = error.problem_mark
         where = f"{path}, line {mark.line + 1}" if mark else str(path)
@@ -145,6 +149,14 @@ def read_yaml(path: Path, schema: type[Model]) -> Model:
             f"a value cannot be understood ({reason})", where=str(path), cure="Put text into quotes."
         ) from error
     return validated(content, schema, str(path))
+
+
+@lru_cache(maxsize=32)
+def _loaded(text: str) -> Any:
+    """Return what a YAML text holds; files that are read again and again are not parsed again, which is slow."""
+    from ruamel.yaml import YAML
+
+    return YAML(typ="safe", pure=True).load(text)
 
 
 def _deepest(text: str) -> int:

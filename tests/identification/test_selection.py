@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -25,6 +26,8 @@ from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import Twin, measure
 from truearm.simulation.twin_joint import JointTruth
 
+#: The module, whose name the job of the same name hides.
+calibrating = import_module("truearm.jobs.calibrate")
 NOISE = 2e-5
 ELASTIC = next(model for model in MODELS if model.name == "elastic")
 
@@ -131,6 +134,13 @@ def test_a_target_seen_once_is_no_obstacle() -> None:
     assert math.isfinite(select(arm(), data, candidates=FEW).start)
 
 
+@pytest.fixture
+def few(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let calibrations choose from some effects alone."""
+    monkeypatch.setattr(calibrating, "select", partial(select, candidates=FEW))
+
+
+@pytest.mark.usefixtures("few")
 def test_bounds_may_name_effects_that_are_not_chosen() -> None:
     data = seen(twin_of(backlash=math.radians(0.05)), 40, 9)
     entries = {"truearm": "truearm-bounds/1", "units": {"length": "mm", "angle": "deg"}}
@@ -151,6 +161,7 @@ def test_too_few_configurations_are_refused(count: int) -> None:
         select(arm(), data)
 
 
+@pytest.mark.usefixtures("few")
 def test_the_held_out_part_has_no_say() -> None:
     data = seen(twin_of(backlash=math.radians(0.05)), 16, 12)
     order = np.random.default_rng(3).permutation(16)

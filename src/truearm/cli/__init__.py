@@ -6,9 +6,12 @@ import os
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
+from copy import copy
 from typing import Annotated, NoReturn, TextIO
 
 import typer
+from typer.main import get_command_name
+from typer.models import CommandInfo
 
 from truearm.cli.axes import axes
 from truearm.cli.calibrate import calibrate
@@ -103,7 +106,7 @@ def main() -> None:
     try:
         _refuse_unprintable(sys.argv[1:])
         try:
-            app(prog_name="truearm")
+            _asked_for(sys.argv[1:])(prog_name="truearm")
         finally:
             sys.stdout.flush()
     except (InputError, CommandError) as error:
@@ -131,6 +134,19 @@ def main() -> None:
         if not isinstance(error, LinAlgError):
             raise
         _end(f"the equations cannot be solved ({error}). Look at the data with 'truearm check'.")
+
+
+def _asked_for(words: Sequence[str]) -> typer.Typer:
+    """Return the command with the one part that is asked for: to make all of them takes longer than many run."""
+    part = copy(app)
+    for name in words[:1]:
+        part.registered_commands = [c for c in app.registered_commands if (c.name or _spelled(c)) == name]
+        part.registered_groups = [g for g in app.registered_groups if g.name == name]
+    return part if part.registered_commands or part.registered_groups else app
+
+
+def _spelled(command: CommandInfo) -> str:
+    return get_command_name(command.callback.__name__ if command.callback else "")
 
 
 def _refuse_unprintable(words: Sequence[str]) -> None:

@@ -207,9 +207,9 @@ class Twin:
         gravity = np.array(self.robot.gravity)
         moving = velocity.any() or acceleration.any()
         T = np.stack([np.eye(4), np.zeros((4, 4)), np.zeros((4, 4))]) if moving else np.eye(4)[None]
-        axes, frames, weights = [], [], []
+        axes, frames, ways = [], [], []
         for link, q, (alpha, beta, gamma), qd, qdd in zip(
-            links, geared, deflection, velocity, acceleration, strict=True
+            links, geared.tolist(), deflection.tolist(), velocity, acceleration, strict=True
         ):
             T = moved(T, link, q + gamma, qd, qdd)
             axes.append(T[0] @ link.axes)
@@ -217,26 +217,27 @@ class Twin:
                 T = T @ link.axes @ tilt(alpha, beta) @ np.linalg.inv(link.axes)
             T = T @ link.after
             frames.append(T[0])
-            weights.append(weight(link.body, T, gravity))
-        for (lower, upper), pulls in self._balanced(frames):
-            weights[lower - 1] = weights[lower - 1] + pulls[0] if lower else weights[lower - 1]
-            weights[upper - 1] = weights[upper - 1] + pulls[1]
+            ways.append(T)
         flange = T @ self._flange
+        bodies = np.array([*(link.body for link in links), self._payload])
+        weights = weight(bodies, np.stack([*ways, flange], axis=1), gravity)
+        for (lower, upper), pulls in self._balanced(frames):
+            if lower:
+                weights[lower - 1] += pulls[0]
+            weights[upper - 1] += pulls[1]
         pushed = forces_of(wrench, flange[0, :3, 3])
         if self.robot.wrench is not None:
             pushed = pushed + forces_on_tool(self.robot.wrench, flange[0], self._wrench_axes)
-        carried = weight(self._payload, flange, gravity) + pushed
-        loads = []
-        for axis, of_link in zip(reversed(axes), reversed(weights), strict=True):
-            carried = carried + of_link
-            loads.append(wrench_at(carried, axis))
-        world = self._base @ flange[0]
+        weights[-1] += pushed
+        carried = np.cumsum(weights[::-1], axis=0)[::-1][:-1]  # by a joint: its own link and all behind it
+        world, at_flange = self._base @ flange[0], np.eye(4)
+        at_flange[:3, 3] = flange[0, :3, 3]
         return Posture(
             links=np.stack(frames),
             targets={name: world @ place for name, place in self._targets.items()},
-            loads=np.stack(loads[::-1]),
+            loads=wrench_at(carried, np.stack(axes)),
             deflection=deflection,
-            wrench=wrench_at(pushed, np.block([[np.eye(3), flange[0, :3, 3:]], [np.zeros((1, 3)), np.eye(1)]])),
+            wrench=wrench_at(pushed, at_flange),
         )
 
     def _balanced(self, frames: Sequence[Array]) -> Iterator[tuple[tuple[int, int], tuple[Array, Array]]]:

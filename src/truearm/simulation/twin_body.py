@@ -36,6 +36,8 @@ class Link:
         Constant matrices ``(4, 4)``.
     generator
         Derivative of the joint's matrix by its variable at zero ``(4, 4)``.
+    square
+        That derivative times itself ``(4, 4)``.
     turns
         Whether the joint turns.
     zero
@@ -48,6 +50,7 @@ class Link:
 
     before: Array
     generator: Array
+    square: Array
     turns: bool
     zero: float
     axes: Array
@@ -69,9 +72,11 @@ class Link:
         """
         place = next(i for i, element in enumerate(elements) if element.variable is not None)
         joint = elements[place]
+        S = generator(joint)
         return cls(
             before=product(elements[:place], values, growth),
-            generator=generator(joint),
+            generator=S,
+            square=S @ S,
             turns=joint.turns,
             zero=amount(joint, values, growth),
             axes=_joint_axes(joint, bearing),
@@ -105,10 +110,10 @@ def generator(element: Element) -> Array:
     return S
 
 
-def exponential(S: Array, amount: float, turns: bool) -> Array:
-    """Return the matrix of a turn or a slide by its generator."""
+def exponential(S: Array, amount: float, turns: bool, square: Array | None = None) -> Array:
+    """Return the matrix of a turn or a slide by its generator, whose square may be at hand."""
     if turns:
-        return _IDENTITY + math.sin(amount) * S + (1 - math.cos(amount)) * S @ S
+        return _IDENTITY + math.sin(amount) * S + (1 - math.cos(amount)) * (S @ S if square is None else square)
     return _IDENTITY + amount * S
 
 
@@ -127,7 +132,7 @@ def second_moments(
 def moved(T: Moving, link: Link, variable: float, velocity: float, acceleration: float) -> Moving:
     """Return the frame right behind a link's joint."""
     S = link.generator
-    A = exponential(S, link.zero + variable, link.turns)
+    A = exponential(S, link.zero + variable, link.turns, link.square)
     if len(T) == 1:
         return np.asarray(T @ link.before @ A)
     A1 = velocity * A @ S
@@ -136,19 +141,27 @@ def moved(T: Moving, link: Link, variable: float, velocity: float, acceleration:
     return np.stack([at @ A, rate @ A + at @ A1, change @ A + 2 * rate @ A1 + at @ A2])
 
 
-def weight(body: Array, T: Moving, gravity: Array) -> Array:
-    """Return weight and inertial forces on a body: the sum of ``p f^T`` over its points ``(4, 4)``."""
-    pull = -T[2] if len(T) > 1 else np.zeros((4, 4))
-    pull[:3, 3] += gravity
-    return np.asarray(T[0] @ body @ pull.T)
+def weight(bodies: Array, T: Moving, gravity: Array) -> Array:
+    """Return weight and inertial forces on bodies: the sum of ``p f^T`` over the points of each ``(n, 4, 4)``.
+
+    Parameters
+    ----------
+    bodies
+        Second moments ``(n, 4, 4)``.
+    T
+        Their frames with first and second derivative, ``(3, n, 4, 4)``, or alone, ``(1, n, 4, 4)``.
+    """
+    pull = -T[2] if len(T) > 1 else np.zeros(bodies.shape)
+    pull[:, :3, 3] += gravity
+    return np.asarray(T[0] @ bodies @ np.swapaxes(pull, 1, 2))
 
 
 def wrench_at(carried: Array, frame: Array) -> Array:
-    """Return force and moment ``(6,)`` of the forces behind a sum of ``p f^T``, about and in the axes of a frame."""
-    force = carried[3, :3]
-    p = carried[:3, :3] - np.outer(frame[:3, 3], force)
-    moment = np.array([p[1, 2] - p[2, 1], p[2, 0] - p[0, 2], p[0, 1] - p[1, 0]])
-    return np.concatenate([force @ frame[:3, :3], moment @ frame[:3, :3]])
+    """Return force and moment ``(..., 6)`` of the forces behind sums of ``p f^T``, about and in the axes of frames."""
+    force = carried[..., 3, :3]
+    p = carried[..., :3, :3] - frame[..., :3, 3, None] * force[..., None, :]
+    moment = (p - np.swapaxes(p, -1, -2))[..., [1, 2, 0], [2, 0, 1]]
+    return np.asarray((np.stack([force, moment], axis=-2) @ frame[..., :3, :3]).reshape(*force.shape[:-1], 6))
 
 
 def forces_of(wrench: Array, point: Array) -> Array:

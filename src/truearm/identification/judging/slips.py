@@ -29,7 +29,7 @@ from truearm.identification.judging.slip_trials import (
 )
 from truearm.identification.solving.models import named_model
 from truearm.identification.solving.problem import Problem
-from truearm.identification.start_values.frames import initial_frames
+from truearm.identification.start_values.frames import initial_frames, placed_errors
 from truearm.identification.start_values.from_readings import start_from_readings
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.observations import OBSERVATIONS
@@ -71,7 +71,7 @@ _FITTED_NOISE: Final = 1e-4
 
 def slips_in_positions(robot: Robot, data: Dataset) -> list[Notice]:
     """Return which slip explains positions in the instrument's frame; nothing if they fit, or if none does."""
-    data = _few_targets(data)
+    data, robot = _few_targets(data), robot.with_frames(Transform(), {})  # made once for all that is tried
     turned = _quaternion_slips(robot, data)
     some, rest = _some(data), replace(data, quaternion=None, sigma_rot=None)
     some = replace(some, quaternion=None, sigma_rot=None)
@@ -195,7 +195,7 @@ def _fitted_misfit(robot: Robot, data: Dataset) -> float:
 def _misfit(robot: Robot, data: Dataset) -> float:
     """Return the median distance that the placed nominal robot leaves [m]; infinite if it cannot be placed."""
     if data.fixture is None:
-        return float(np.median(errors_of(initial_frames(robot, data), data).position_norms))
+        return float(np.median(placed_errors(robot, data)))
     try:
         return float(np.nanmedian(off_by(errors_of(start_from_readings(robot, data), data))))
     except InputError:

@@ -11,6 +11,7 @@ No start needs to be given by hand, and the number of joints does not matter.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -25,6 +26,25 @@ from truearm.modeling.transform import Transform, rotation_from_quaternion
 
 #: Weight of one radian against one metre in the search for the base's orientation: an arm's length.
 _ARM = 0.3
+
+
+@dataclass(frozen=True, eq=False)
+class _Placement:
+    """Where the data say that the robot stands, and its targets on the flange.
+
+    Attributes
+    ----------
+    base
+        Of the robot in the instrument's frame.
+    targets
+        Places on the flange by name, in the order of the data's targets.
+    left_over
+        What no place explains of each position reading [m], ``(readings, 3)``, in the axes of the base.
+    """
+
+    base: Transform
+    targets: dict[str, Transform | Array]
+    left_over: Array
 
 
 def initial_frames(robot: Robot, data: Dataset, held: Held = NOTHING_HELD) -> Robot:
@@ -44,7 +64,23 @@ def initial_frames(robot: Robot, data: Dataset, held: Held = NOTHING_HELD) -> Ro
     InputError
         If no target has a position.
     """
-    placed = robot.with_frames(Transform(), {})
+    placement = _placement(robot.with_frames(Transform(), {}), data, held)
+    return robot.with_frames(placement.base, placement.targets)  # type: ignore[arg-type]
+
+
+def placed_errors(robot: Robot, data: Dataset) -> Array:
+    """Return how far each position reading is from the robot placed by :func:`initial_frames` [m], ``(readings,)``.
+
+    Parameters
+    ----------
+    robot
+        At the origin, with no targets.
+    """
+    return np.asarray(np.linalg.norm(_placement(robot, data, NOTHING_HELD).left_over, axis=1))
+
+
+def _placement(placed: Robot, data: Dataset, held: Held) -> _Placement:
+    """Return where the data say that a robot stands that is at the origin and has no targets."""
     p, R = placed.world_poses(data.postures)
     with_position = data.has_position
     if not with_position.any():
@@ -114,7 +150,7 @@ def initial_frames(robot: Robot, data: Dataset, held: Held = NOTHING_HELD) -> Ro
             places[data.targets[t]] = point
     places = {name: places[name] for name in (data.targets[t] for t in seen)}
     stands = held.base or Transform.from_matrix(base, base @ solution[-3:] + centre)
-    return robot.with_frames(stands, places)  # type: ignore[arg-type]
+    return _Placement(stands, places, (right - known @ solution).reshape(-1, 3))
 
 
 def _turned_back(Y: Array) -> Array:

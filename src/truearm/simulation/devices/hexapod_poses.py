@@ -116,13 +116,15 @@ class HexapodPoses(Device):
 def _jogged(nominal: Robot, arm: Arm, names: list[str], joints: Array, goals: Array) -> Array:
     """Return joint positions with the arm's cups as near to their goals ``(n, 3, 3)`` as a rigid tool can be."""
     joints = joints.copy()
+    moving = np.arange(len(joints))
     for _ in range(_STEPS):
-        frames = arm.frames(joints)
-        missing = np.stack([goals[:, k] - frames[name][:, :3, 3] for k, name in enumerate(names)], axis=1)
-        J = np.concatenate([nominal.joint_jacobian(joints, name)[:, :3] for name in names], axis=1)
-        step = np.linalg.pinv(J, rcond=1e-4) @ missing.reshape(len(joints), -1, 1)
-        joints += step[..., 0]
-        if float(np.abs(step).max()) < _SETTLED:
+        frames = arm.frames(joints[moving])
+        missing = np.stack([goals[moving, k] - frames[name][:, :3, 3] for k, name in enumerate(names)], axis=1)
+        J = np.concatenate([nominal.joint_jacobian(joints[moving], name)[:, :3] for name in names], axis=1)
+        step = (np.linalg.pinv(J, rcond=1e-4) @ missing.reshape(len(moving), -1, 1))[..., 0]
+        joints[moving] += step
+        moving = moving[np.abs(step).max(axis=1) >= _SETTLED]
+        if not len(moving):
             break
     return joints
 

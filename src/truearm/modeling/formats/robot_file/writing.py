@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import io
+import math
 import re
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, Final
 
 from truearm.modeling.controller import AS_THE_MODEL
 from truearm.modeling.formats.balancer_entry import balancer_entry
@@ -19,6 +20,12 @@ from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform
 from truearm.modeling.wrench import refuse_pushed
 from truearm.units import SHOWN_AS, written
+
+#: Texts that stand without quotes, but for words that are no texts in some YAML.
+_PLAIN: Final = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+_NO_TEXTS: Final = ("null", "true", "false", "yes", "no", "on", "off", "y", "n")
+#: Beyond this many characters the general writer begins new lines.
+_LONGEST_ROW: Final = 4000
 
 
 def robot_text(robot: Robot) -> str:
@@ -35,9 +42,46 @@ def robot_text(robot: Robot) -> str:
     yaml = YAML()
     yaml.width = 4096
     yaml.indent(mapping=2, sequence=4, offset=2)
-    stream = io.StringIO()
-    yaml.dump(file_content(robot), stream)
-    return stream.getvalue()
+    content, stream, rows = file_content(robot), io.StringIO(), list[str]()
+    token = "row-"
+    while token in f"{content}":
+        token += "x-"
+    yaml.dump(_without_rows(content, token, rows), stream)
+    return re.sub(f"(?<=[:-] ){token}([0-9]+)$", lambda found: rows[int(found[1])], stream.getvalue(), flags=re.M)
+
+
+def _without_rows(entry: Any, token: str, rows: list[str]) -> Any:
+    """Return an entry with `token` and a number for each table on one line, whose texts are appended to `rows`.
+
+    They are most of a robot file, and its general writer takes far longer for them.
+    """
+    from ruamel.yaml.comments import CommentedMap
+
+    if isinstance(entry, CommentedMap) and entry.fa.flow_style():
+        row = _row(entry)
+        if row is None or len(row) > _LONGEST_ROW:
+            return entry
+        rows.append(row)
+        return f"{token}{len(rows) - 1}"
+    if type(entry) is dict:
+        return {name: _without_rows(part, token, rows) for name, part in entry.items()}
+    return [_without_rows(part, token, rows) for part in entry] if type(entry) is list else entry
+
+
+def _row(entry: Any) -> str | None:
+    """Return a table, a list or a value on one line; None where the general writer has to say how it is written."""
+    if isinstance(entry, dict):
+        pairs = [(_row(name), _row(part)) for name, part in entry.items()]
+        known = all(name is not None and part is not None for name, part in pairs)
+        return "{" + ", ".join(f"{name}: {part}" for name, part in pairs) + "}" if known else None
+    if isinstance(entry, list):
+        parts = [part for part in map(_row, entry) if part is not None]
+        return f"[{', '.join(parts)}]" if len(parts) == len(entry) else None
+    if type(entry) is float:
+        return repr(entry) if math.isfinite(entry) else None
+    if type(entry) is int:
+        return repr(entry)
+    return entry if type(entry) is str and _PLAIN.fullmatch(entry) and entry.lower() not in _NO_TEXTS else None
 
 
 def file_content(robot: Robot) -> dict[str, Any]:

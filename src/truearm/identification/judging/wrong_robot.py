@@ -221,8 +221,9 @@ def _check_growth(robot: Robot, lengths: Lengths) -> list[Notice]:
         Notice(
             LENGTHS_SCALED,
             f"All lengths of {robot.name} come out {way}, by one factor: {abs(deviations):.1f} times what its priors "
-            "let expect. That is what a wrong length in the measurement does: the scale of the instrument, the distance between sockets or spheres, the squares of a "
-            "board, units. Measure that again. What is expected of the robot takes it as right.",
+            "let expect. That is what a wrong length in the measurement does: the scale of the instrument, the "
+            "distance between sockets or spheres, the squares of a board, units. Measure that again. What is expected "
+            "of the robot takes it as right.",
             "error",
         )
     ]

@@ -288,7 +288,7 @@ def _fit(solved: Solved, model: Model, loss: Loss, draws: Array | None = None) -
     share = (deviation / free.prior) ** 2
     informed = np.clip(1.0 - share, 0.0, 1.0) if problem.priors else 1.0 / (1.0 + share)
     if limits is not None and not problem.priors:  # what a bound knows, no reading told
-        evenly = np.abs(limits[1] - limits[0]) / math.sqrt(12.0)
+        evenly = np.abs(limits[1] - limits[0]) / np.sqrt(12.0)
         bounded = np.isfinite(evenly) & (evenly > 0.0)
         of_bounds = np.clip(1.0 - (deviation / np.where(bounded, evenly, 1.0)) ** 2, 0.0, 1.0)
         informed = np.where(bounded, np.minimum(informed, of_bounds), informed)

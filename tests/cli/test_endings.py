@@ -113,9 +113,9 @@ def test_words_that_cannot_be_shown_or_written(truearm: Truearm, word: str, said
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--poses", "x"], "--poses: a whole number belongs here; got 'x'; allowed: a whole number"),
-        (["--poses", "0"], "--poses: the number is too small; got '0'; allowed: 1 or more."),
-        (["--poses", "9" * 5000], "--poses: the number is too large; got '999"),
+        (["--poses", "3", "--seed", "x"], "--seed: a whole number belongs here; got 'x'; allowed: a whole number"),
+        (["--poses", "3", "--seed", "-1"], "--seed: the number is too small; got '-1'; allowed: 0 or more."),
+        (["--poses", "3", "--seed", "9" * 5000], "--seed: the number is too large; got '999"),
         (["--poses", "3", "--noise", "nan"], "--noise: this is not a number; got 'nan'; allowed: 0 or more."),
         (["--poses", "3", "--noise", "inf"], "--noise: the number is too large to be plausible; got inf"),
     ],

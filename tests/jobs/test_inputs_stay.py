@@ -21,7 +21,9 @@ from truearm.results.axis_calibration import AXIS_FILES
 from truearm.results.calibration import RESULT_FILES
 from truearm.results.followed_path import MOTION
 from truearm.results.followed_path import REPORT as PATH_REPORT
+from truearm.results.influence import INFLUENCE_FILES
 from truearm.results.program_correction import REPORT
+from truearm.results.tilting import GEOMETRY, TILTING_FILES
 from truearm.results.validation import VALIDATION_FILES
 
 #: How a job refuses it; a program that is called as a record is no program to begin with.
@@ -29,7 +31,14 @@ REFUSED = r"would be overwritten|not overwritten|of this name itself|no robot la
 #: Parameters that name what a job writes.
 OUTPUTS = ("out", "steps", "file", "folder")
 #: Of these names those that a job reads.
-FILES = (("import_table", "file"), ("import_robodk", "file"), ("import_ur_kinematics", "file"), ("path", "file"))
+FILES = (
+    ("import_table", "file"),
+    ("import_robodk", "file"),
+    ("import_ur_kinematics", "file"),
+    ("path", "file"),
+    ("import_hand_eye", "file"),
+    ("import_sockets", "file"),
+)
 Arguments = dict[str, Any]
 
 
@@ -42,6 +51,12 @@ def _robot(folder: Path) -> Path:
     return _written(folder / "given.yaml", robot_text(truearm.load_robot("irb120")))
 
 
+def _katana_poses(folder: Path) -> Path:
+    path = folder / "katana-poses.csv"
+    truearm.simulate("katana450", truth="tilting", poses=12, noise=1e-5, out=path)
+    return path
+
+
 _UNITS = "units: {length: mm, angle: deg}\n"
 
 
@@ -50,9 +65,19 @@ READ: dict[str, Callable[[Path], Arguments]] = {
     "calibrate": lambda folder: {
         "robot": _robot(folder),
         "bounds": _written(folder / "bounds.yaml", f"truearm: truearm-bounds/1\n{_UNITS}within: {{d_1: 5}}\n"),
-        "zones": _written(
-            folder / "zones.yaml", "truearm: truearm-zones/1\nunits: {length: mm}\nzones: {left: {y: [0, null]}}\n"
-        ),
+    },
+    "tilting": lambda folder: {
+        "robot": _written(folder / "katana.yaml", robot_text(truearm.load_robot("katana450"))),
+        "poses": _katana_poses(folder),
+        "pushed": folder / "inclinations-pushed.csv",
+    },
+    "influence": lambda folder: {"robot": _robot(folder), "data": EXAMPLES["load_data"](folder)["data"], "poses": None},
+    "plan_inclinometers": lambda folder: {
+        "robot": _written(folder / "katana.yaml", robot_text(truearm.load_robot("katana450")))
+    },
+    "simulate_inclinometers": lambda folder: {
+        "robot": _written(folder / "katana.yaml", robot_text(truearm.load_robot("katana450"))),
+        "truth": _written(folder / "true.yaml", robot_text(truearm.load_robot("katana450"))),
     },
     "plan": lambda folder: {
         "robot": _robot(folder),
@@ -101,12 +126,15 @@ READ: dict[str, Callable[[Path], Arguments]] = {
 #: What is no file that a job reads and overwrites: a folder of data whose files have names of their own.
 FOLDERS = (("study", "data"), ("lines", "data"))
 #: What only another robot reads: tests/compensation/test_controller_model.py tries it.
-ELSEWHERE = (("compensate", "controller_kinematics"), ("path", "controller_kinematics"))
+#: and what goes with nothing that is held, test_a_file_of_zones_stays below.
+ELSEWHERE = (("compensate", "controller_kinematics"), ("path", "controller_kinematics"), ("calibrate", "zones"))
 
 
 #: The names of what a job writes into the folder `out`.
 INTO_FOLDERS = {
     "calibrate": RESULT_FILES,
+    "tilting": (*TILTING_FILES, GEOMETRY),
+    "influence": INFLUENCE_FILES,
     "validate": VALIDATION_FILES,
     "axes": AXIS_FILES,
     "compensate": ("plate.mod", "plate.mod.truearm.json", REPORT),
@@ -211,6 +239,16 @@ def test_no_job_overwrites_what_it_reads(job: str, parameter: str, examples: Pat
                 assert [path.name for path in out.iterdir()] == [name]
                 refused += 1
     assert refused >= 3
+
+
+def test_a_file_of_zones_stays(examples: Path, tmp_path: Path) -> None:
+    data = EXAMPLES["load_data"](shutil.copytree(examples, tmp_path / "work"))["data"]
+    zones = tmp_path / "zones.yaml"
+    text = "truearm: truearm-zones/1\nunits: {length: mm}\nzones: {left: {y: [0, null]}}\n"
+    zones.write_text(text)
+    with pytest.raises(InputError, match=REFUSED):
+        truearm.calibrate("irb120", data, zones=zones, out=tmp_path)
+    assert zones.read_text() == text
 
 
 def test_every_job_that_writes_is_tried_or_overwrites_nothing() -> None:

@@ -89,15 +89,12 @@ def find_mounting(robot: Robot, read: Inclinations) -> Mounting:
     mounts, zeros, notices = [], [], []
     for number, (name, link) in enumerate(zip(read.instruments.names, read.instruments.links, strict=True)):
         angle = read.angle[:, number]
-        if np.isfinite(angle).any(axis=1).sum() < _LEAST:  # too few to tell a turn from a zero
-            mounts.append(np.eye(3))
-            apart = angle - np.arcsin(np.clip(plumb[link], -1.0, 1.0))
-            read_of = np.isfinite(apart).any(axis=0)
-            zeros.append(np.where(read_of, np.nanmean(np.where(read_of, apart, 0.0), axis=0), np.nan))
-            continue
         mount, zero, left = (found[0] for found in _turned(plumb[link], angle, np.eye(3)[None]))
-        if left > _FITS or _turn_of(mount) > _AS_STATED:
-            _refuse(read.source, name, link, plumb, angle)
+        few = int(np.isfinite(angle).any(axis=1).sum()) < _LEAST  # too few to tell a turn from a zero
+        if few or left > _FITS or _turn_of(mount) > _AS_STATED:
+            if not few and _unlike(plumb[link], angle) > _FITS:
+                _refuse(read.source, name, link, plumb, angle)
+            mount, zero = np.eye(3), _zeros_as_stated(plumb[link], angle)
         mounts.append(mount)
         zeros.append(np.where(np.isfinite(angle).any(axis=0), zero, np.nan))
     found = Mounting(np.array(mounts), np.array(zeros), ())
@@ -194,6 +191,15 @@ def _unlike(plumb: Array, angle: Array) -> float:
     read = np.isfinite(apart).any(axis=0)
     apart = apart[:, read] - np.nanmean(apart[:, read], axis=0)
     return float(np.sqrt(np.nanmean(apart**2)))
+
+
+def _zeros_as_stated(plumb: Array, angle: Array) -> Array:
+    """Return the zeros of the axes of an instrument that sits as stated [rad], ``(3,)``; NaN where none was read."""
+    apart = angle - np.arcsin(np.clip(plumb, -1.0, 1.0))
+    known = np.isfinite(apart)
+    return np.where(
+        known.any(axis=0), np.where(known, apart, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1), np.nan
+    )
 
 
 def _refuse(source: str, name: str, link: int, plumb: Array, angle: Array) -> None:

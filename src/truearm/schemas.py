@@ -142,7 +142,9 @@ def _refusal(error: ValidationError, content: Any, schema: type[BaseModel], wher
     if is_name or kind == "invalid_key":  # pydantic says None, and not what the file has
         place = (*place[:-1], first["input"])
     holder, entry, holders = content, "", ""
-    for part in place:  # items of a list count from 1, keys stand as they are
+    for number, part in enumerate(place):  # items of a list count from 1, keys stand as they are
+        if isinstance(part, str) and number + 1 < len(place) and not (isinstance(content, Mapping) and part in content):
+            continue  # which of several kinds was meant
         holders, holder = entry, content
         if isinstance(content, list) and isinstance(part, int):
             entry += f"[{part + 1}]"

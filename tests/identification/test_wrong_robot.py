@@ -190,3 +190,29 @@ def test_wrong_data_are_said_before_the_robot_is_doubted() -> None:
     errors = {notice.code for notice in calibrate(UR10, moved).warnings if notice.level == "error"}
     assert "instrument-moved" in errors
     assert "wrong-robot" not in errors
+
+
+def test_one_factor_in_all_lengths_is_a_wrong_length_of_the_measurement() -> None:
+    """Robots within their priors, read by an instrument that takes a millimetre for 0.985 mm, or for what it is."""
+    robot = load_robot("irb120")
+    told: dict[float, list[str]] = {1.0: [], 1.015: []}
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        data = measure(truth_twin(robot, "random", rng), robot.random_configurations(30, rng), 5e-5, rng)
+        for factor in told:
+            found = doubts(robot, replace(data, position=factor * data.position))
+            assert all(n.level == "error" for n in found)
+            told[factor] += [n.code for n in found]
+    assert told[1.0] == []
+    assert len(told[1.015]) >= 5
+    assert set(told[1.015]) == {"lengths-scaled", "wrong-robot"}
+
+
+def test_a_scale_that_is_known_is_known_of_lengths() -> None:
+    """With a scale of 200 ppm a board 1 % too large still shows: it cannot be the instrument's."""
+    robot = load_robot("irb120")
+    rng = np.random.default_rng(0)
+    data = measure(truth_twin(robot, "random", rng), robot.random_configurations(30, rng), 5e-5, rng)
+    larger = replace(data, position=0.985 * data.position, scale_sigma=2e-4)
+    assert {n.code for n in doubts(robot, larger)} & {"lengths-scaled", "wrong-robot"}
+    assert doubts(robot, replace(data, scale_sigma=2e-4)) == []

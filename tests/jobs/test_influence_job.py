@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from tests.simulated import campaign
 
 import truearm
 from truearm.errors import InputError
@@ -196,3 +197,18 @@ def test_files_hold_every_pose(tmp_path: Path) -> None:
     page = (tmp_path / "report.html").read_text()
     for place in ("influence", "map", "errors"):
         assert f'id="{place}"' in page
+
+
+def test_too_few_configurations_to_place_anything_are_refused() -> None:
+    _, data = campaign("irb120", 20, 5e-5, 1)
+    with pytest.raises(InputError, match="not found from so few configurations; got '2 training configurations'"):
+        truearm.influence("irb120", data, train=2)
+
+
+def test_the_folder_of_a_calibration_is_not_taken(tmp_path: Path) -> None:
+    _, data = campaign("irb120", 20, 5e-5, 1)
+    truearm.calibrate("irb120", data, model="offsets", out=tmp_path)
+    before = (tmp_path / "result.json").read_text()
+    with pytest.raises(InputError, match=r"result\.json, report\.html there belong to another result"):
+        truearm.influence("irb120", data, model="offsets", out=tmp_path)
+    assert (tmp_path / "result.json").read_text() == before

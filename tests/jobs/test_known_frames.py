@@ -36,7 +36,8 @@ from truearm.measurement.dataset import Dataset
 from truearm.measurement.readers.canonical import csv_text
 from truearm.modeling.robot import Robot
 from truearm.results.calibration import Calibration
-from truearm.simulation.twin import Twin
+from truearm.simulation.truths import truth_twin
+from truearm.simulation.twin import Twin, measure
 
 
 @cache
@@ -343,3 +344,27 @@ def test_the_command_holds_as_the_job_does(tmp_path: Path) -> None:
 def test_zones_and_simulated_calibrations_are_refused_with_places_that_are_held(more: Any, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"this is not made with places that are held"):
         held(["base"], tmp_path, **more)
+
+
+def test_a_held_base_that_the_arm_makes_up_for_is_told(tmp_path: Path) -> None:
+    """3 mm along x go into a_1, which the readings alone do not tell from the base."""
+    robot = library_robot("irb120")
+    rng = np.random.default_rng(0)
+    twin = truth_twin(robot, "nominal", rng)
+    data = measure(twin, robot.random_configurations(40, rng), 0.03e-3, rng)
+    frames = frames_of(twin.robot, tmp_path / "frames.yaml")
+    right = calibrate(robot, data, hold=["base", "targets"], frames=frames)
+    assert "hold-strained" not in {n.code for n in right.warnings}
+    along_x = twin.robot.base.rotation @ [3e-3, 0.0, 0.0]
+    moved = twin.robot.with_values(
+        {f"base_{axis}": twin.robot.values[f"base_{axis}"] + float(v) for axis, v in zip("xyz", along_x, strict=True)}
+    )
+    wrong = calibrate(robot, data, hold=["base", "targets"], frames=frames_of(moved, frames))
+    (notice,) = [n for n in wrong.warnings if n.code == "hold-strained"]
+    assert notice.level == "warning"
+    assert "a_1 (" in notice.message
+
+
+def test_simulated_calibrations_and_a_bootstrap_do_not_go_together() -> None:
+    with pytest.raises(InputError, match="not with those of a bootstrap"):
+        calibrate("irb120", noisy()[1], monte_carlo=100, bootstrap=20)

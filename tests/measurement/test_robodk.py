@@ -68,6 +68,7 @@ def test_poses_turn_about_moving_axes(tmp_path: Path) -> None:
     ("text", "words"),
     [
         ("a,b,c,d\n1,2,3,4\n", "this is no table of RoboDK's calibration; got '4 columns'"),
+        (POINTS.replace("J1,", "configuration,"), "not that of a joint, and joints come first; got 'configuration'"),
         (POINTS.removeprefix(HEADINGS), "holds numbers where headings belong"),
         (POINTS.replace(",", ";"), "not separated by commas"),
         (POINTS.replace("1500.5", "here"), "line 2, column X.*a number belongs here; got 'here'"),

@@ -172,9 +172,10 @@ class Tilting(Record):
         """Return what was found of every joint, then what that does to the errors of poses."""
         changed, left = (math.degrees(size) for size in self.sizes)
         beside = f" and {counted(self.pushed, 'configuration')} of poses under loads" if self.pushed else ""
+        over = f"{self.fit.excess:.2f} times" if self.fit.excess > 1.0 else "no more than"
         text = [
             f"From {counted(self.used, 'change')} of inclination in {counted(len(self.read.pairs), 'pair')}{beside}:",
-            f"  rms {changed:.4f} deg, left {left:.5f} deg, {self.fit.excess:.2f} times what is declared",
+            f"  rms {changed:.4f} deg, left {left:.5f} deg, {over} what is declared",
         ]
         rows = self.constants()
         for joint in dict.fromkeys(row["joint"] for row in rows):

@@ -25,7 +25,7 @@ where it began. A section of Hermite cubics has the velocities of the natural sp
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path as FilePath
@@ -33,7 +33,7 @@ from typing import Annotated, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, Field, model_validator
+from pydantic import BaseModel, Discriminator, Field, Tag, model_validator
 
 from truearm.errors import InputError, refusals_at
 from truearm.files import read_yaml
@@ -81,10 +81,19 @@ class _Kept(BaseModel):
         return self
 
 
+def _way_of_circle(value: object) -> str:
+    return "about" if isinstance(value, Mapping | _About) else "points"
+
+
+_Circle = Annotated[
+    Annotated[tuple[Triple, Triple], Tag("points")] | Annotated[_About, Tag("about")], Discriminator(_way_of_circle)
+]
+
+
 class _Section(BaseModel):
     model_config = STRICT
     line: Triple | None = None
-    circle: tuple[Triple, Triple] | _About | None = None
+    circle: _Circle | None = None
     hermite: Annotated[tuple[Triple, ...], Field(min_length=1)] | None = None
     velocities: tuple[Triple, ...] | None = None
     times: tuple[NotNegative, ...] | None = None

@@ -118,11 +118,8 @@ def _sheet() -> str:
     """Return a sheet with two places, two sides of four cups and two attachments of the tool."""
     found, bar, base = poses(), ballbar(np.random.default_rng(0)), triangle([0.3] * 3, "B")
     rows, lengths = [], []
-    for label, number, place, side, attachment in (
-        ("a", 5, "l", 1, "1"),
-        ("b", 40, "l", 2, "1"),
-        ("c", 66, "r", 1, "2"),
-    ):
+    for label, number in zip("abcdefgh", (5, 40, 66, 12, 20, 33, 50, 70), strict=True):
+        place, side, attachment = ("l", 1 + number % 2, "1") if label in "abcd" else ("r", 1, "2")
         pose = found[number - 1]
         row = PlannedRow(
             label, "front-up-flip", number, pose.design, pose.solution, np.full(6, 0.1), place, side, attachment

@@ -126,7 +126,10 @@ def influence(
     turned = finite_number(angle, "angle")
     if not 0.0 < turned <= _LARGEST[0]:
         raise InputError(
-            "no angle errs by that", parameter="angle", came=f"{math.degrees(turned):g} deg", allowed="above 0, to 10 deg"
+            "no angle errs by that",
+            parameter="angle",
+            came=f"{math.degrees(turned):g} deg",
+            allowed="above 0, to 10 deg",
         )
     moved = length_argument(length, "length")
     if not 0.0 < moved <= _LARGEST[1]:

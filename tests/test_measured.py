@@ -96,7 +96,7 @@ def test_what_beta_and_the_payload_are_worth(irb120: Dataset, calibrated: Run) -
     third = {column: value for column, value in robot.joints[2].row.items() if column != "beta"}
     joints = tuple(replace(j, row=third) if j is robot.joints[2] else j for j in robot.joints)
     without = replace(robot, joints=joints)
-    seeds = SEEDS[:3]  # both differences are many times what the splits scatter by
+    seeds = SEEDS[:3]
     runs = {
         "as it is": [calibrated("elastic", 50, seed, PAYLOAD) for seed in seeds],
         "no beta": [calibrate(without, irb120, model="elastic", payload=PAYLOAD, train=50, seed=s) for s in seeds],

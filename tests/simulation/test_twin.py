@@ -121,7 +121,7 @@ def test_moving_loads_are_those_of_pinocchio(kinds: str, seed: int) -> None:
             I = body.inertia  # noqa: E741
             entries = (I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2])
             cx, cy, cz = map(float, body.lever)
-            masses.append(LinkMass(number, body.mass, (cx, cy, cz), tuple(map(float, entries))))
+            masses.append(LinkMass(number, body.mass, (cx, cy, cz), tuple(map(float, entries))))  # type: ignore[arg-type]
             model.appendBodyToJoint(joint, body, after)
     flange = Transform((0.1, -0.2, 0.3), (0.5, 0.5, -0.5, 0.5))
     payload = Payload(1.3, (0.05, 0.02, 0.1))
@@ -413,7 +413,7 @@ def test_only_joints_about_z_tilt() -> None:
 @pytest.mark.parametrize("name", ["approach", "temperature", "wrench", "velocity", "acceleration"])
 def test_conditions_of_another_shape_are_refused(name: str) -> None:
     with pytest.raises(InputError, match=f"{name}.*shape \\(2, 7\\)"):
-        measure(Twin(planar(0.5, 0.4)), np.zeros((3, 2)), 0.0, RNG(0), **{name: np.zeros((2, 7))})
+        measure(Twin(planar(0.5, 0.4)), np.zeros((3, 2)), 0.0, RNG(0), **{name: np.zeros((2, 7))})  # type: ignore[arg-type]
 
 
 def test_readings_of_another_shape_are_refused() -> None:

@@ -144,6 +144,11 @@ def with_effect(effect: str, name: str, unit: str, nominal: float = 0.0, value: 
             id="list of periods",
         ),
         pytest.param(
+            changed("limits: [-165, 165]", "limits: [-165, 165], bearing: -1e9"),
+            ["joints[1].bearing", "farther along its axis", "got '-1e+06 m'", "up to 10 m either way"],
+            id="bearing",
+        ),
+        pytest.param(
             changed("limits: [-165, 165]", "limits: [-165, 165], transmission_periods: 0"),
             ["joints[1].transmission_periods", "too small", "got 0", "allowed: 1 or more"],
             id="no periods",

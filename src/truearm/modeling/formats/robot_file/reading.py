@@ -64,13 +64,13 @@ def _robot(content: RobotFile, where: str) -> Robot:
                 cure=f"joints[{names.index(name) + 1}] has it too: rename one of them.",
             )
     given = [balancer.name for balancer in content.balancers]
-    for number, name in enumerate(given, 1):
-        if name is not None and name in given[: number - 1]:
+    for number, called in enumerate(given, 1):
+        if called is not None and called in given[: number - 1]:
             raise InputError(
                 "two balancers have the same name",
                 where=f"{where}, balancers[{number}]",
-                came=name,
-                cure=f"balancers[{given.index(name) + 1}] has it too, and both would pull: rename one of them, or take "
+                came=called,
+                cure=f"balancers[{given.index(called) + 1}] has it too, and both would pull: rename one of them, or take "
                 "it out if it is the same one.",
             )
     numbered = [("link", "masses", mass.link) for mass in content.masses]

@@ -70,8 +70,8 @@ def _robot(content: RobotFile, where: str) -> Robot:
                 "two balancers have the same name",
                 where=f"{where}, balancers[{number}]",
                 came=called,
-                cure=f"balancers[{given.index(called) + 1}] has it too, and both would pull: rename one of them, or take "
-                "it out if it is the same one.",
+                cure=f"balancers[{given.index(called) + 1}] has it too, and both would pull: rename one of them, "
+                "or take it out if it is the same one.",
             )
     numbered = [("link", "masses", mass.link) for mass in content.masses]
     for name, truth in content.truths.items():

@@ -20,11 +20,11 @@ from truearm.limits import refuse_beyond
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.observations import Observation, compared
 from truearm.measurement.sighting import Sighting
-from truearm.modeling.chain import Array, ForwardKinematics
+from truearm.modeling.chain import Array, ForwardKinematics, together
 from truearm.modeling.parameters import SCALE, FreeParameters
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
-from truearm.modeling.robot_parameters import by_parameters, effect_rates
+from truearm.modeling.robot_parameters import by_parameters, by_parameters_together, effect_rates
 
 #: What the residuals of readings of the fixtures themselves are called.
 SETUP: Final = "setup"
@@ -216,7 +216,9 @@ class Evaluation:
             raw = self._by_reading(self.residual[..., rows], block) * sigma
             turned = seen.position_jacobian if observation.velocity == "linear" else seen.orientation_jacobian
             moved = observation.jacobian(seen, raw, turned(velocity, names))
-            np.divide(moved, sigma, out=self._by_reading(by_parameter[..., rows], block))
+            written = self._by_reading(by_parameter[..., rows], block)
+            for k in range(observation.components):  # reading after reading is how it is stored, not how it is swept
+                np.divide(moved[..., k], block.sigma, out=written[..., k])
         return np.swapaxes(J, -1, -2)
 
     @cached_property
@@ -228,15 +230,18 @@ class Evaluation:
         robot = self.problem.robot
         joints = robot.moving[: len(robot.joints)]
         by_joint = np.zeros((len(joints), self.problem.rows))
+        moved = self._together.position_jacobian(joints)
+        places = {name: k for k, name in enumerate(self._kinematics)}
         for block, rows in self._rows():
             if block.data is not self.problem.data:
                 continue
             observation, sigma = block.observation, block.sigma[:, None]
-            kinematics, seen = self._kinematics[block.target], self._sightings[rows.start]
+            seen = self._sightings[rows.start]
             raw = self._by_reading(self.residual[rows], block) * sigma
             if observation.velocity == "linear":
-                velocity = seen.position_jacobian(kinematics.position_jacobian(joints), ())
+                velocity = seen.position_jacobian(moved[:, :, places[block.target]], ())
             else:
+                kinematics = self._kinematics[block.target]
                 velocity = seen.orientation_jacobian(kinematics.orientation_jacobian(joints), ())
             np.divide(observation.jacobian(seen, raw, velocity), sigma, out=self._by_reading(by_joint[:, rows], block))
         return by_joint.T
@@ -277,12 +282,25 @@ class Evaluation:
 
     @cached_property
     def _kinematics(self) -> dict[str, ForwardKinematics]:
+        """Forward kinematics to each target, whose positions are known from one sweep."""
+        if self._ends:
+            self._together  # noqa: B018
+        return self._ends
+
+    @cached_property
+    def _ends(self) -> dict[str, ForwardKinematics]:
         """Forward kinematics to each target; all go on from one to the flange."""
         robot = self.problem.robot
         variables = robot.variables(self.problem.postures, self._values)
         trunk = robot.trunk.forward_kinematics(variables, self._values)
-        names = dict.fromkeys(block.target for block in self.problem.blocks if block.data is self.problem.data)
+        blocks = [block for block in self.problem.blocks if block.data is self.problem.data]
+        names = dict.fromkeys(block.target for block in blocks)
         return {name: robot.target(name).chain.forward_kinematics(variables, self._values, trunk) for name in names}
+
+    @cached_property
+    def _together(self) -> ForwardKinematics:
+        """The way to the flange, run through for all targets."""
+        return together([*self._ends.values()])
 
     @cached_property
     def _fixtures(self) -> dict[str, ForwardKinematics]:
@@ -300,13 +318,22 @@ class Evaluation:
             return (
                 kinematics.position_jacobian(places) if moves == "linear" else kinematics.orientation_jacobian(places)
             )
-        known = self._velocities
-        if (block.target, moves) not in known:
+        if moves == "linear":
+            return self._linear[:, :, list(self._kinematics).index(block.target)]
+        known = self._angular
+        if block.target not in known:
             known.clear()  # blocks come target by target: more would only fill memory
             kinematics = self._kinematics[block.target]
-            derivative = kinematics.position_jacobian if moves == "linear" else kinematics.orientation_jacobian
-            known[block.target, moves] = by_parameters(problem.robot, kinematics, derivative, names, self._rates)
-        return known[block.target, moves]
+            known[block.target] = by_parameters(
+                problem.robot, kinematics, kinematics.orientation_jacobian, names, self._rates
+            )
+        return known[block.target]
+
+    @cached_property
+    def _linear(self) -> Array:
+        """How all targets move in the world with each parameter, ``(parameters, 3, targets, ..., n)``."""
+        names = self.problem.free.names
+        return by_parameters_together(self.problem.robot, self._together, self._kinematics, names, self._rates)
 
     @cached_property
     def _rates(self) -> dict[str, Mapping[int, Array]]:
@@ -314,7 +341,7 @@ class Evaluation:
         return effect_rates(problem.robot, problem.postures, problem.free.names, self._values)
 
     @cached_property
-    def _velocities(self) -> dict[tuple[str, str], Array]:
+    def _angular(self) -> dict[str, Array]:
         return {}
 
 

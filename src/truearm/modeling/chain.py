@@ -319,15 +319,19 @@ def together(ends: Sequence[ForwardKinematics]) -> ForwardKinematics:
     start = ends[0].start
     if start is None or any(end.start is not start for end in ends):
         raise ValueError("the chains do not go on from one start")
-    inner = (1,) * len(start.shape)
-    x, y, z = (
-        np.stack([np.broadcast_to(part, np.broadcast_shapes(part.shape, inner)) for part in np.broadcast_arrays(*parts)])
-        for parts in zip(*(end._own_tips[0] for end in ends), strict=True)
-    )
+    x, y, z = (_beside(parts, len(start.shape)) for parts in zip(*(end._own_tips[0] for end in ends), strict=True))
     whole = ForwardKinematics(start.elements, start.moves, (len(ends), *start.shape), start, (x, y, z))
     for k, end in enumerate(ends):
         end.__dict__["position"] = whole.position[:, k]
     return whole
+
+
+def _beside(parts: Sequence[Number], axes: int) -> Array:
+    """Return coordinates of several points, each a number or an array of so many axes, with the points in front."""
+    if all(isinstance(part, float) for part in parts):
+        return np.array(parts).reshape(-1, *(1,) * axes)
+    shape = np.broadcast_shapes((1,) * axes, *(np.shape(part) for part in parts))
+    return np.stack([np.broadcast_to(part, shape) for part in parts])
 
 
 # -- one element -----------------------------------------------------------------------------------------

@@ -114,6 +114,12 @@ class Problem:
             everywhere = np.array_equal(seen, np.arange(data.configurations))
             yield Block(observation, data, target, fixture, readings, slice(None) if everywhere else seen, known)
 
+    @cached_property
+    def placed(self) -> tuple[tuple[Block, slice], ...]:
+        """The blocks, with the equations of the problem that each of them is."""
+        ends = np.cumsum([block.rows for block in self.blocks]).tolist()
+        return tuple((block, slice(end - block.rows, end)) for block, end in zip(self.blocks, ends, strict=True))
+
     def kind(self, block: Block) -> str:
         """Return the name under which the deviations of a block are counted."""
         return block.observation.name if block.data is self.data else SETUP
@@ -171,8 +177,12 @@ class Problem:
         """Return the residual of the priors and the diagonal of its Jacobian, both ``(parameters,)``; zero without."""
         if not self.priors:
             return np.zeros(len(vector)), np.zeros(len(vector))
-        weight = 1.0 / self.free.prior
-        return (vector - self.free.nominal) * weight, weight
+        nominal, weight = self._priors
+        return (vector - nominal) * weight, weight
+
+    @cached_property
+    def _priors(self) -> tuple[Array, Array]:
+        return self.free.nominal, 1.0 / self.free.prior
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,7 +204,7 @@ class Evaluation:
     def residual(self) -> Array:
         """Whitened residual of the readings, ``(rows,)``."""
         r = np.empty((*self.vector.shape[:-1], self.problem.rows))
-        for block, rows in self._rows():
+        for block, rows in self.problem.placed:
             raw = block.observation.residual(self._sightings[rows.start], block.data, block.readings)
             np.divide(raw, block.sigma[:, None], out=self._by_reading(r[..., rows], block))
         return r
@@ -208,8 +218,8 @@ class Evaluation:
         refuse_beyond("parameters", len(names), where=self.problem.data.source)
         refuse_beyond("derivatives", math.prod(shape), where=self.problem.data.source)
         J = np.empty(shape)
-        by_parameter = np.moveaxis(J, -2, 0)
-        for block, rows in self._rows():
+        by_parameter = np.moveaxis(J, -2, 0) if J.ndim > 2 else J
+        for block, rows in self.problem.placed:
             observation, sigma = block.observation, block.sigma[:, None]
             seen = self._sightings[rows.start]
             velocity = self._velocity(block)
@@ -232,7 +242,7 @@ class Evaluation:
         by_joint = np.zeros((len(joints), self.problem.rows))
         moved = self._together.position_jacobian(joints)
         places = {name: k for k, name in enumerate(self._kinematics)}
-        for block, rows in self._rows():
+        for block, rows in self.problem.placed:
             if block.data is not self.problem.data:
                 continue
             observation, sigma = block.observation, block.sigma[:, None]
@@ -245,13 +255,6 @@ class Evaluation:
                 velocity = seen.orientation_jacobian(kinematics.orientation_jacobian(joints), ())
             np.divide(observation.jacobian(seen, raw, velocity), sigma, out=self._by_reading(by_joint[:, rows], block))
         return by_joint.T
-
-    def _rows(self) -> Iterator[tuple[Block, slice]]:
-        """Go through the blocks, with the equations of the problem that each of them is."""
-        first = 0
-        for block in self.problem.blocks:
-            yield block, slice(first, first + block.rows)
-            first += block.rows
 
     @staticmethod
     def _by_reading(rows: Array, block: Block) -> Array:
@@ -272,7 +275,7 @@ class Evaluation:
                 None if block.fixture is None else self._fixtures[block.fixture],
                 self._scale if block.data is self.problem.data else 0.0,
             )
-            for block, rows in self._rows()
+            for block, rows in self.problem.placed
         }
 
     @cached_property

@@ -227,8 +227,7 @@ def solve_with_joints(
     shared = problem.at(problem.free.start).by_joints * np.sqrt(joints)
     whitening = Whitening(Arrivals(problem.arrivals), shared)
     solution = solve(WhitenedProblem(problem, whitening), loss, limits, small)
-    residual, jacobian = whitening.undone(solution.residual), whitening.undone(solution.jacobian)
-    return replace(solution, residual=residual, jacobian=jacobian)
+    return replace(solution, at=problem.at(solution.vector))
 
 
 def components_found(

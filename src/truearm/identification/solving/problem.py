@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -28,6 +29,11 @@ from truearm.modeling.robot_parameters import by_parameters, by_parameters_toget
 
 #: What the residuals of readings of the fixtures themselves are called.
 SETUP: Final = "setup"
+#: Derivatives that are in memory at once where those of all readings are not needed together.
+_AT_ONCE: Final = 4_000_000
+
+#: Equations of a problem, all of them or those with these indices.
+Rows = slice | NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,6 +166,36 @@ class Problem:
             found.append(np.repeat(of_readings, block.observation.components))
         return np.unique(np.concatenate(found), return_inverse=True)[1].reshape(-1) if found else np.zeros(0, np.intp)
 
+    @cached_property
+    def portions(self) -> tuple[tuple[Rows, Problem], ...]:
+        """The problem in parts of whole configurations, with the equations that each of them is.
+
+        There is one, the problem itself, where few enough derivatives are in it. What is known of fixtures is in the
+        first.
+        """
+        n = self.data.configurations
+        count = min(-(-self.rows * len(self.free.names) // _AT_ONCE), n)
+        if count < 2:
+            return ((slice(None), self),)
+        edges = np.linspace(0, n, count + 1).astype(int).tolist()
+        return tuple(self._between(first, end) for first, end in pairwise(edges))
+
+    def _between(self, first: int, end: int) -> tuple[Rows, Problem]:
+        """Return the configurations from one to before another as a problem, with its equations."""
+        data = self.data.of_configurations(np.arange(first, end))
+        part = replace(self, data=data if first == 0 else replace(data, setup=None))
+        part.__dict__["postures"] = self.postures.between(first, end)
+        rows = []
+        for block, place in self.placed:
+            if block.data is self.data:
+                at = self.data.configuration[block.readings]
+                mine = np.flatnonzero((at >= first) & (at < end))
+            else:
+                mine = np.arange(len(block.readings) if first == 0 else 0)
+            size = block.observation.components
+            rows.append((place.start + size * mine[:, None] + np.arange(size)).reshape(-1))
+        return np.concatenate(rows), part
+
     def at(self, vector: Array) -> Evaluation:
         """Compare the robot with the readings at a vector ``(parameters,)``, or at one for each of many trials."""
         return Evaluation(self, vector)
@@ -200,10 +236,19 @@ class Evaluation:
     problem: Problem
     vector: Array
 
+    def portions(self) -> Iterator[tuple[Rows, Evaluation]]:
+        """Go through the problem part by part, each with its equations: then not all derivatives are in memory."""
+        for rows, part in self.problem.portions:
+            yield rows, self if part is self.problem else Evaluation(part, self.vector)
+
     @cached_property
     def residual(self) -> Array:
         """Whitened residual of the readings, ``(rows,)``."""
         r = np.empty((*self.vector.shape[:-1], self.problem.rows))
+        if len(self.problem.portions) > 1:
+            for rows, part in self.portions():
+                r[..., rows] = part.residual
+            return r
         for block, rows in self.problem.placed:
             raw = block.observation.residual(self._sightings[rows.start], block.data, block.readings)
             np.divide(raw, block.sigma[:, None], out=self._by_reading(r[..., rows], block))
@@ -240,6 +285,10 @@ class Evaluation:
         robot = self.problem.robot
         joints = robot.moving[: len(robot.joints)]
         by_joint = np.zeros((len(joints), self.problem.rows))
+        if len(self.problem.portions) > 1:
+            for part_rows, part in self.portions():
+                by_joint[:, part_rows] = part.by_joints.T
+            return by_joint.T
         moved = self._together.position_jacobian(joints)
         places = {name: k for k, name in enumerate(self._kinematics)}
         for block, rows in self.problem.placed:

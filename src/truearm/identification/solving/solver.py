@@ -7,6 +7,7 @@ bounds (`scipy.optimize.lsq_linear`). Losses other than the linear one reweight 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final, Protocol
 
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.identification.solving.losses import ABSOLUTE, Loss, norms_of, robust_scale, weighed_together, weights
+from truearm.identification.solving.problem import Rows
 from truearm.modeling.chain import Array
 from truearm.modeling.parameters import FreeParameters
 
@@ -218,17 +220,28 @@ def _triangle(here: Evaluated, w: Array | None) -> tuple[Array, Array]:
     w
         Weight of every row's square, ``(rows,)``; None for ones.
     """
-    J, r = here.jacobian, here.residual
-    rows, count = J.shape
-    stacked = np.zeros((count + 1, rows + (count if here.problem.priors else 0)))  # column by column, as QR takes it
-    stacked[:count, :rows], stacked[count, :rows] = J.T, r
-    if w is not None:
-        stacked[:, :rows] *= np.sqrt(w)
+    triangle: Array | None = None
     if here.problem.priors:
         prior, weight = here.problem.prior_rows(here.vector)
-        stacked[range(count), range(rows, rows + count)], stacked[count, rows:] = weight, prior
-    triangle = np.asarray(np.linalg.qr(stacked.T, mode="r"), dtype=np.float64)
+        triangle = np.column_stack([np.diag(weight), prior])
+    for rows, part in parts_of(here):
+        J, r = part.jacobian, part.residual
+        known = 0 if triangle is None else len(triangle)
+        stacked = np.empty((J.shape[1] + 1, len(J) + known))  # column by column, as QR takes it
+        stacked[:-1, : len(J)], stacked[-1, : len(J)] = J.T, r
+        if w is not None:
+            stacked[:, : len(J)] *= np.sqrt(w[rows])
+        if triangle is not None:
+            stacked[:, len(J) :] = triangle.T
+        triangle = np.asarray(np.linalg.qr(stacked.T, mode="r"), dtype=np.float64)
+    assert triangle is not None
     return triangle[:, :-1], triangle[:, -1]
+
+
+def parts_of(here: Evaluated) -> Iterable[tuple[Rows, Evaluated]]:
+    """Return the parts in which the derivatives of an evaluated problem are found, each with its equations."""
+    portions = getattr(here, "portions", None)
+    return ((slice(None), here),) if portions is None else portions()
 
 
 def _room(x: Array, bounds: tuple[Array, Array] | None, prior: Array) -> tuple[Array, Array] | None:

@@ -21,7 +21,7 @@ from truearm.identification.solving.losses import Loss, meets_exactly, norms_of,
 from truearm.identification.solving.models import Model
 from truearm.identification.solving.problem import SETUP, Problem, check_circumstances, check_solvable
 from truearm.identification.solving.redundancy import Redundancy, find_redundancies
-from truearm.identification.solving.solver import SMALL, Solution, solve
+from truearm.identification.solving.solver import SMALL, Solution, parts_of, solve
 from truearm.identification.solving.variance_components import (
     Components,
     CovariancePart,
@@ -242,7 +242,9 @@ def components_found(
     prior = problem.free.prior
     at = Linearised(
         residual=solution.residual,
-        by_parameters=solution.jacobian[:, uncertain] * prior[uncertain],
+        by_parameters=lambda: (
+            (rows, part.jacobian[:, uncertain] * prior[uncertain]) for rows, part in parts_of(solution.at)
+        ),
         by_joints=problem.at(solution.vector).by_joints,
         offset=((solution.vector - problem.free.nominal) / prior)[uncertain],
         priors=problem.priors,
@@ -360,9 +362,12 @@ def noise_found(problem: Problem, solution: Solution, loss: Loss) -> dict[str, t
 def _informed_rows(problem: Problem, solution: Solution) -> float:
     """Return how many parameters' worth of residual the fit used up."""
     prior = problem.free.prior
-    s2 = np.linalg.svd(np.linalg.qr(solution.jacobian * prior, mode="r"), compute_uv=False) ** 2
     if not problem.priors:
         return float(len(prior))
+    triangle = np.zeros((0, len(prior)))
+    for _, part in parts_of(solution.at):
+        triangle = np.linalg.qr(np.concatenate([part.jacobian * prior, triangle]), mode="r")
+    s2 = np.linalg.svd(triangle, compute_uv=False) ** 2
     return float(np.sum(s2 / (s2 + 1.0)))
 
 

@@ -46,6 +46,9 @@ class Linearised:
         Which equations share a draw of the joints' errors.
     factor
         Index of the factor by which the variance of each equation may differ from the one assumed, ``(rows,)``.
+    triangle
+        Of the derivative by the parameters, ``(k, parameters)``, where it is known: products of its columns are those
+        of all equations.
     """
 
     residual: Array
@@ -55,13 +58,14 @@ class Linearised:
     priors: bool
     arrivals: Arrivals
     factor: NDArray[np.intp]
+    triangle: Array | None = None
 
     @cached_property
     def directions(self) -> Array:
         """Directions of the parameters, per prior, that the readings as assumed know to one, ``(parameters, p)``."""
         size = len(self.offset)
         triangle = np.eye(size) if self.priors else np.zeros((0, size))
-        for _, A in self.parts():
+        for A in (A for _, A in self.parts()) if self.triangle is None else (self.triangle,):
             triangle = np.asarray(np.linalg.qr(np.concatenate([A, triangle]), mode="r"), dtype=np.float64)
         _, s, Vt = np.linalg.svd(triangle, full_matrices=False)
         return np.asarray(Vt.T / np.maximum(s, 1e-12 * s[:1]))
@@ -102,7 +106,7 @@ class Moments:
             here, products = self._by_arrival(rows, np.column_stack([at.by_joints[rows], whole]))
             self.M[:, here], self.t[:, here] = products[..., :joints], products[..., -1]
             if fits:
-                kept.append((here, products[..., joints:-1]))
+                kept.append((here, np.ascontiguousarray(products[..., joints:-1])))
         self._kept = kept if fits else None
 
     def _by_arrival(self, rows: Rows, every: Array) -> tuple[NDArray[np.intp], Array]:
@@ -158,9 +162,13 @@ class Likelihood:
         inner = np.eye(len(joints)) + root[:, None] * self.M * root
         self.E = root[:, None] * np.linalg.inv(inner) * root
         whole, b = np.tensordot(by, of.C, 1), by @ of.c
-        for mine, _, T, ET in self._parts():
-            whole -= _product(T, ET)
-            b -= np.einsum("akp,ak->p", ET, self.t[mine])
+        seen = (self.E @ self.t[..., None])[..., 0]
+        values, vectors = np.linalg.eigh(self.E)
+        half = np.sqrt(np.maximum(values, 0.0))[..., None] * np.swapaxes(vectors, 1, 2)
+        for mine, _, T in self._parts():
+            HT = half[mine] @ T
+            whole -= _product(HT, HT)
+            b -= _moved(T, seen[mine])
         self.whole = whole
         self._by_joints: dict[tuple[int, ...], tuple[Array, Array]] = {}
         self.L = _root(whole + of.known)
@@ -169,15 +177,14 @@ class Likelihood:
         logs = float(of.rows @ np.log(factors)) + float(np.linalg.slogdet(inner)[1].sum())
         self.likelihood = -0.5 * (logs + 2.0 * float(np.log(np.abs(np.diag(self.L))).sum()) + left)
 
-    def _parts(self, *, always: bool = False) -> Iterator[tuple[NDArray[np.intp], Array, Array, Array]]:
-        """Go through the arrivals: indices, products by factor, their sum, and that by the joints' variances.
+    def _parts(self, *, always: bool = False) -> Iterator[tuple[NDArray[np.intp], Array, Array]]:
+        """Go through the arrivals: indices, products with the parameters by factor, and these by their variances.
 
         There is nothing to go through where no joint has a variance, unless it is asked for.
         """
         if always or self.joints.any():
             for mine, by_factor in self.of.parts():
-                T = np.tensordot(1.0 / self.factors, by_factor, 1)
-                yield mine, by_factor, T, self.E[mine] @ T
+                yield mine, by_factor, np.tensordot(1.0 / self.factors, by_factor, 1)
 
     @cached_property
     def inverse(self) -> Array:
@@ -190,7 +197,7 @@ class Likelihood:
         """What the parameters explain of the products of each arrival, ``(factors, arrivals, joints)``."""
         seen = np.empty_like(self.of.t)
         for mine, by_factor in self.of.parts():
-            seen[:, mine] = by_factor @ self.found
+            seen[:, mine] = (by_factor.reshape(-1, len(self.found)) @ self.found).reshape(by_factor.shape[:-1])
         return seen
 
     @cached_property
@@ -210,7 +217,8 @@ class Likelihood:
                 rest = rest - variance * self.curvature(np.flatnonzero(self.joints == variance))
             return np.asarray(rest / self.factors[0])
         found = self.of.C[kind].copy()
-        for mine, by_factor, _, ET in self._parts():
+        for mine, by_factor, T in self._parts():
+            ET = self.E[mine] @ T
             cross = _product(by_factor[kind], ET)
             found += _product(ET, self.of.M[kind][mine] @ ET) - cross - cross.T
         return found / self.factors[kind] ** 2
@@ -222,10 +230,10 @@ class Likelihood:
             _, g, _, Lm = self._small
             p = len(self.found)
             curvature, shift = np.zeros((p, p)), np.zeros(p)
-            for mine, _, T, _ in self._parts(always=True):
+            for mine, _, T in self._parts(always=True):
                 N = Lm[mine][:, kind] @ T
                 curvature += _product(N, N)
-                shift += np.einsum("akp,ak->p", N, g[mine][:, kind])
+                shift += _moved(N, g[mine][:, kind])
             self._by_joints[key] = curvature, shift
         return self._by_joints[key]
 
@@ -254,10 +262,10 @@ class Likelihood:
                 squares[i] = r
                 traces[i] = of.rows[kind] / v - float(np.sum(self.E * of.M[kind])) / v**2
                 shifts[i] = (of.c[kind] - of.C[kind] @ self.found) / v**2
-                for mine, by_factor, _, ET in self._parts():
-                    shifts[i] -= np.einsum("akp,ak->p", by_factor[kind], e[mine]) / v**2
-                    shifts[i] -= np.einsum("akp,ak->p", ET, h[mine])
-                inner[i] = h - (self.M @ (self.E @ h[..., None]))[..., 0]
+                pulled = (self.E @ h[..., None])[..., 0]
+                for mine, by_factor, T in self._parts():
+                    shifts[i] -= _moved(by_factor[kind], e[mine]) / v**2 + _moved(T, pulled[mine])
+                inner[i] = h - (self.M @ pulled[..., None])[..., 0]
                 inside[i] = h
             else:
                 squares[i] = float(np.sum(g[:, kind] ** 2))
@@ -284,3 +292,8 @@ def _product(left: Array, right: Array) -> Array:
     """Return the sum over arrivals and joints of products of parameters, for two ``(arrivals, joints, p)``."""
     p = left.shape[-1]
     return left.reshape(-1, p).T @ right.reshape(-1, p)
+
+
+def _moved(products: Array, by: Array) -> Array:
+    """Return the sum over arrivals and joints of ``(arrivals, joints, p)`` times ``(arrivals, joints)``, ``(p,)``."""
+    return products.reshape(-1, products.shape[-1]).T @ by.reshape(-1)

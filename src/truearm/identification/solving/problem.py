@@ -277,6 +277,18 @@ class Evaluation:
         return np.swapaxes(J, -1, -2)
 
     @cached_property
+    def triangle(self) -> Array:
+        """Triangle of the derivatives, whose products with each other are theirs, ``(parameters, parameters)``.
+
+        With fewer equations than parameters it has as many rows as equations.
+        """
+        found = np.zeros((0, len(self.problem.free.names)))
+        for _, part in self.portions():
+            rows = part.jacobian if not len(found) else np.concatenate([part.jacobian, found])
+            found = np.asarray(np.linalg.qr(rows, mode="r"), dtype=np.float64)
+        return found
+
+    @cached_property
     def by_joints(self) -> Array:
         """Derivative of the residual by errors of the joints, behind all their deflections, ``(rows, joints)``.
 

@@ -19,9 +19,9 @@ from truearm.identification.solving.bounds import Bounds, bound_vectors
 from truearm.identification.solving.likelihood import Linearised
 from truearm.identification.solving.losses import Loss, meets_exactly, norms_of, scale_of, weighed_together
 from truearm.identification.solving.models import Model
-from truearm.identification.solving.problem import SETUP, Problem, check_circumstances, check_solvable
+from truearm.identification.solving.problem import SETUP, Evaluation, Problem, check_circumstances, check_solvable
 from truearm.identification.solving.redundancy import Redundancy, find_redundancies
-from truearm.identification.solving.solver import SMALL, Solution, parts_of, solve
+from truearm.identification.solving.solver import SMALL, Solution, solve
 from truearm.identification.solving.variance_components import (
     Components,
     CovariancePart,
@@ -230,6 +230,11 @@ def solve_with_joints(
     return replace(solution, at=problem.at(solution.vector))
 
 
+def evaluated(problem: Problem, solution: Solution) -> Evaluation:
+    """Return the problem at its solution."""
+    return solution.at if isinstance(solution.at, Evaluation) else problem.at(solution.vector)
+
+
 def components_found(
     problem: Problem, solution: Solution, limits: tuple[Array, Array] | None, before: Components | None = None
 ) -> Components:
@@ -240,16 +245,18 @@ def components_found(
     names, of_row = factors_of(problem)
     uncertain = ~bound_by(solution, problem.free, limits)
     prior = problem.free.prior
+    here = evaluated(problem, solution)
     at = Linearised(
         residual=solution.residual,
         by_parameters=lambda: (
-            (rows, part.jacobian[:, uncertain] * prior[uncertain]) for rows, part in parts_of(solution.at)
+            (rows, part.jacobian[:, uncertain] * prior[uncertain]) for rows, part in here.portions()
         ),
-        by_joints=problem.at(solution.vector).by_joints,
+        by_joints=here.by_joints,
         offset=((solution.vector - problem.free.nominal) / prior)[uncertain],
         priors=problem.priors,
         arrivals=Arrivals(problem.arrivals),
         factor=of_row,
+        triangle=here.triangle[:, uncertain] * prior[uncertain],
     )
     kinds = np.array([joint.kind for joint in problem.robot.joints])
     alike = [np.flatnonzero(kinds == kind) for kind in dict.fromkeys(kinds.tolist())]
@@ -364,10 +371,7 @@ def _informed_rows(problem: Problem, solution: Solution) -> float:
     prior = problem.free.prior
     if not problem.priors:
         return float(len(prior))
-    triangle = np.zeros((0, len(prior)))
-    for _, part in parts_of(solution.at):
-        triangle = np.linalg.qr(np.concatenate([part.jacobian * prior, triangle]), mode="r")
-    s2 = np.linalg.svd(triangle, compute_uv=False) ** 2
+    s2 = np.linalg.svd(evaluated(problem, solution).triangle * prior, compute_uv=False) ** 2
     return float(np.sum(s2 / (s2 + 1.0)))
 
 

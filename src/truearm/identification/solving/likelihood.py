@@ -221,7 +221,7 @@ class Likelihood:
             ET = self.E[mine] @ T
             cross = _product(by_factor[kind], ET)
             found += _product(ET, self.of.M[kind][mine] @ ET) - cross - cross.T
-        return found / self.factors[kind] ** 2
+        return np.asarray(found / self.factors[kind] ** 2)
 
     def _of_joints(self, kind: NDArray[np.intp]) -> tuple[Array, Array]:
         """Return the curvature for a variance of joints, and ``A' V^-1 V_i P z``."""

@@ -30,7 +30,7 @@ from truearm.modeling.robot_parameters import by_parameters, by_parameters_toget
 #: What the residuals of readings of the fixtures themselves are called.
 SETUP: Final = "setup"
 #: Derivatives that are in memory at once where those of all readings are not needed together.
-_AT_ONCE: Final = 4_000_000
+_AT_ONCE: Final = 2_000_000
 
 #: Equations of a problem, all of them or those with these indices.
 Rows = slice | NDArray[np.intp]

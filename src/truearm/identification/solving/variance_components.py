@@ -332,7 +332,7 @@ def _independent(state: Likelihood) -> bool:
     The sum of their squares, in deviations of the parameters, is what an estimate from the scatter of the arrivals
     finds of the parameters' variance, by what the variances say (the idea of White 1982).
     """
-    of, at = state.of, state.of.at
+    at = state.of.at
     root = np.sqrt(state.factors)[at.factor]
     whitening = Whitening(at.arrivals, at.by_joints * np.sqrt(state.joints) / root[:, None])
     expected = variance = squares = 0.0

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from numpy.typing import NDArray
 
 from truearm.errors import InputError
 from truearm.identification.judging.advice import check_fit
@@ -57,10 +58,11 @@ def mean_error(robot: Robot, data: Dataset) -> float:
 
 # -- stiffness
 
+Numbers = NDArray[np.intp]
+Made = tuple[Array, Array, Array, Numbers, Numbers]
 
-def synthetic(
-    rows: int, joints: int, variance: Array, rng: np.random.Generator, arc: float = 2 * math.pi
-) -> tuple[Array, Array, Array, Array, Array]:
+
+def synthetic(rows: int, joints: int, variance: Array, rng: np.random.Generator, arc: float = 2 * math.pi) -> Made:
     """Return derivatives by 5 other parameters and by curves, right sides, and joint and period of each coefficient."""
     highest = len(variance) // (2 * joints)
     F = np.column_stack(
@@ -68,8 +70,8 @@ def synthetic(
     )
     A = 3.0 * rng.normal(size=(rows, 5))
     z = A @ rng.normal(size=5) + F @ (np.sqrt(variance) * rng.normal(size=len(variance))) + rng.normal(size=rows)
-    joint = np.repeat(np.arange(joints), 2 * highest)
-    period = np.tile(np.repeat(np.arange(1, highest + 1), 2), joints)
+    joint: Numbers = np.repeat(np.arange(joints, dtype=np.intp), 2 * highest)
+    period: Numbers = np.tile(np.repeat(np.arange(1, highest + 1, dtype=np.intp), 2), joints)
     return A, F, z, joint, period
 
 
@@ -108,7 +110,7 @@ def test_variances_are_those_that_were_drawn() -> None:
     assert_allclose(np.mean(ratios, axis=0), 1.0, atol=0.4)  # the rare ones are shrunk towards the rest
 
 
-def _given(made: tuple[Array, Array, Array, Array, Array]) -> tuple[Array, float, Array, Array]:
+def _given(made: Made) -> tuple[Array, float, Numbers, Numbers]:
     A, F, z, joint, period = made
     return moments_of(A, F, z), float(len(z)), joint, period
 

@@ -246,7 +246,7 @@ class _Climb:
         squares, known = np.bincount(self.group, state.found**2), np.bincount(self.group, state.known)
         new = (squares + _ALIKE * self.alike(v)) / (known + _ALIKE)
         freedom = max(state.of.rows - float(state.known.sum()), 1e-3 * state.of.rows)
-        return np.log(np.maximum(np.append(np.where(v > 0.0, new, 0.0), state.left / freedom), 1e-300))
+        return np.asarray(np.log(np.maximum(np.append(np.where(v > 0.0, new, 0.0), state.left / freedom), 1e-300)))
 
     def at(self, state: _Marginal, place: Array) -> _Marginal:
         """Return the state at such logarithms."""
@@ -262,7 +262,7 @@ class _Climb:
             second_state = self.at(state, first)
             second = self.following(second_state)
             way, bend = first - here, second - 2.0 * first + here
-            far = min(-float(np.linalg.norm(way) / max(np.linalg.norm(bend), 1e-300)), -1.0)
+            far = min(-float(np.linalg.norm(way)) / max(float(np.linalg.norm(bend)), 1e-300), -1.0)
             place = here - 2.0 * far * way + far**2 * bend
             there = self.at(state, place)
             reached = self.objective(there)

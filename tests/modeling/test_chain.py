@@ -10,11 +10,12 @@ from tests.modeling.pinocchio_oracle import PinocchioChain
 
 from truearm.library import library, load_robot
 from truearm.modeling.balancers import Anchor, Balancer
-from truearm.modeling.chain import Array, Chain, Element, Motion
+from truearm.modeling.chain import Array, Chain, Element, Motion, together
 from truearm.modeling.conventions import CONVENTIONS, Convention, JointKind
 from truearm.modeling.effects import EFFECTS, Effect
 from truearm.modeling.parts import Joint
 from truearm.modeling.robot import Robot
+from truearm.modeling.robot_parameters import by_parameters_together, effect_rates
 from truearm.modeling.transform import Transform
 
 MOTIONS: tuple[Motion, ...] = get_args(Motion)
@@ -289,3 +290,26 @@ def test_moving_the_base_moves_every_pose_with_it() -> None:
     assert_allclose(moved_rotation, frame.rotation @ rotation, rtol=0, atol=1e-14)
     assert_allclose(moved.base.rotation, frame.rotation, rtol=0, atol=1e-14)
     assert replace(moved, base_quaternion=(1.0, 0.0, 0.0, 0.0)).base.translation == frame.translation
+
+
+@pytest.mark.parametrize("trials", [0, 3])
+def test_targets_swept_together_are_where_each_is_alone(trials: int) -> None:
+    rng = np.random.default_rng(7)
+    targets: dict[str, Transform | tuple[float, ...]] = {"tip": random_frame(rng), "point": (0.1, -0.2, 0.05)}
+    targets["other"] = (0.0, 0.3, -0.1)
+    robot = load_robot("irb120").with_effects(["compliance"]).with_frames(random_frame(rng), targets)
+    q = robot.loaded(robot.random_configurations(CONFIGURATIONS, rng))
+    names = tuple(robot.parameters)
+    values = {
+        name: p.value + p.prior * (rng.standard_normal((trials, 1)) if trials else float(rng.standard_normal()))
+        for name, p in robot.parameters.items()
+    }
+    variables = robot.variables(q, values)
+    trunk = robot.trunk.forward_kinematics(variables, values)
+    ends = {t: robot.target(t).chain.forward_kinematics(variables, values, trunk) for t in targets}
+    whole = together([*ends.values()])
+    moved = by_parameters_together(robot, whole, ends, names, effect_rates(robot, q, names, values))
+    for k, target in enumerate(targets):
+        alone = robot.forward_kinematics(q, target, values)
+        assert_allclose(ends[target].position, alone.position, rtol=0.0, atol=1e-15)
+        assert_allclose(moved[:, :, k], robot.position_jacobian(alone, q, names, values), rtol=1e-14, atol=1e-15)

@@ -85,7 +85,7 @@ class Sighting:
 
     @property
     def _scaled(self) -> bool:
-        return bool(np.any(self.scale))
+        return bool(self.scale) if isinstance(self.scale, float) else bool(np.any(self.scale))
 
     def _shrunk(self, vector: Array) -> Array:
         return vector / (1.0 + self.scale) if self._scaled else vector

@@ -9,7 +9,8 @@ sliding along it moves the tip by ``axis`` (Whitney 1972, "The mathematics of co
 arms"): with the tip at (x, y, z) in the element's own frame, turning about its z moves it by ``x Y - y X``.
 
 Each pass runs when it is first asked for, so positions alone cost the backward pass, which touches numbers where
-the forward pass touches vectors. Chains that share a trunk share its forward pass.
+the forward pass touches vectors. Chains that share a trunk share its forward pass. Points that are fixed behind the
+last element, such as the targets on a tool, are carried through both passes together.
 
 Arrays are kept configuration-last: an axis of a frame is ``(3, n)``, so that a rotation touches two axes with a
 few multiply-adds and no matrix product. What no joint has moved yet, from either end, stays a plain number or a
@@ -100,15 +101,19 @@ class ForwardKinematics:
     moves
         What each of them does.
     shape
-        ``(n,)``, or ``(trials, n)`` with trial values.
+        ``(n,)``, or ``(trials, n)`` with trial values; of several points, ``(points, ..., n)``.
     start
         The forward kinematics that this goes on from, whose elements are its first.
+    tip
+        Where the tip is, seen from the frame behind the last element; of several points, each coordinate has them as
+        its first axis.
     """
 
     elements: tuple[Element, ...]
     moves: tuple[Move, ...]
     shape: tuple[int, ...]
     start: ForwardKinematics | None = None
+    tip: Coordinates = (0.0, 0.0, 0.0)
 
     @cached_property
     def position(self) -> Array:
@@ -139,7 +144,7 @@ class ForwardKinematics:
 
     def origin(self, index: int) -> Array:
         """Return the origin of the frame that element `index` moves, in the world [m], ``(3, ..., n)``."""
-        arm = _combined(self._tips[index], self._frames[index])
+        arm = _combined(self._tip(index), self._frames[index])
         return self.position - self._filled(arm)
 
     def position_jacobian(self, indices: Sequence[int | None]) -> Array:
@@ -160,10 +165,10 @@ class ForwardKinematics:
             if not element.turns:
                 row[...] = _axis(element, axes)
             elif element.axis is not None:
-                row[...] = _combined(cross(element.axis, self._tips[index]), axes)
+                row[...] = _combined(cross(element.axis, self._tip(index)), axes)
             else:
                 i, j = _TURNED[element.along]
-                tip = self._tips[index]
+                tip = self._tip(index)
                 np.multiply(axes[j], tip[i], out=row)
                 np.multiply(axes[i], tip[j], out=other)
                 np.subtract(row, other, out=row)
@@ -193,6 +198,8 @@ class ForwardKinematics:
         if self.start is None:
             x, y, z = np.eye(3).reshape(3, 3, *(1 for _ in self.shape))
             frames: list[Axes] = [(x, y, z)]
+        elif len(self.start.shape) < len(self.shape):  # of several points, which see the same axes
+            frames = [(x[:, None], y[:, None], z[:, None]) for x, y, z in self.start._frames]
         else:
             frames = self.start._frames.copy()
         passed = len(frames) - 1
@@ -204,16 +211,25 @@ class ForwardKinematics:
         return frames
 
     @cached_property
+    def _passed(self) -> int:
+        """How many of the elements are those of the start."""
+        return 0 if self.start is None else len(self.start.elements)
+
+    @cached_property
+    def _own_tips(self) -> list[Coordinates]:
+        """The tip seen from the frame before each element behind the start, and from the frame behind the last."""
+        return _seen_before(self.tip, self.elements[self._passed :], self.moves[self._passed :])
+
+    @cached_property
     def _tips(self) -> list[Coordinates]:
-        """The tip's origin seen from the frame before each element, and from itself."""
-        tip: Coordinates = (0.0, 0.0, 0.0)
-        tips = [tip]
-        for element, move in zip(reversed(self.elements), reversed(self.moves), strict=True):
-            if move:
-                tip = in_frame_before(tip, element, move)
-            tips.append(tip)
-        tips.reverse()
-        return tips
+        """The tip seen from the frame before each element, and from the frame behind the last."""
+        own = self._own_tips
+        return _seen_before(own[0], self.elements[: self._passed], self.moves[: self._passed])[:-1] + own
+
+    def _tip(self, index: int) -> Coordinates:
+        """Return the tip seen from the frame before an element; behind the start that costs no pass through it."""
+        own = index - self._passed if index >= 0 else index
+        return self._own_tips[own] if index < 0 or own >= 0 else self._tips[index]
 
     def _filled(self, vector: Coordinates | Array) -> Array:
         full = np.empty((3, *self.shape))
@@ -286,6 +302,36 @@ class Chain:
         shape = variables.shape[1:]
         trials = next((value.shape for value in given.values() if isinstance(value, np.ndarray)), ())
         return ForwardKinematics(self.elements, tuple(moves), np.broadcast_shapes(shape, trials) if trials else shape)
+
+
+def together(ends: Sequence[ForwardKinematics]) -> ForwardKinematics:
+    """Run through the start of several chains once for all their tips.
+
+    Parameters
+    ----------
+    ends
+        Chains that go on from one start. Their positions are known afterwards.
+
+    Returns
+    -------
+    The elements of the start, of shape ``(ends, ..., n)``.
+    """
+    start = ends[0].start
+    if start is None or any(end.start is not start for end in ends):
+        raise ValueError("the chains do not go on from one start")
+    x, y, z = (_beside(parts, len(start.shape)) for parts in zip(*(end._own_tips[0] for end in ends), strict=True))
+    whole = ForwardKinematics(start.elements, start.moves, (len(ends), *start.shape), start, (x, y, z))
+    for k, end in enumerate(ends):
+        end.__dict__["position"] = whole.position[:, k]
+    return whole
+
+
+def _beside(parts: Sequence[Number], axes: int) -> Array:
+    """Return coordinates of several points, each a number or an array of so many axes, with the points in front."""
+    if all(isinstance(part, float) for part in parts):
+        return np.array(parts).reshape(-1, *(1,) * axes)
+    shape = np.broadcast_shapes((1,) * axes, *(np.shape(part) for part in parts))
+    return np.stack([np.broadcast_to(part, shape) for part in parts])
 
 
 # -- one element -----------------------------------------------------------------------------------------
@@ -364,6 +410,17 @@ def in_frame_behind(vector: Coordinates, element: Element, move: Move) -> Coordi
     seen[i] = c * vector[i] + s * vector[j]
     seen[j] = c * vector[j] - s * vector[i]
     return seen[0], seen[1], seen[2]
+
+
+def _seen_before(tip: Coordinates, elements: Sequence[Element], moves: Sequence[Move]) -> list[Coordinates]:
+    """Return a tip seen from the frame before each of some elements, and, as given, from the frame behind them."""
+    tips = [tip]
+    for element, move in zip(reversed(elements), reversed(moves), strict=True):
+        if move:
+            tip = in_frame_before(tip, element, move)
+        tips.append(tip)
+    tips.reverse()
+    return tips
 
 
 def axis_of(element: Element) -> Direction:

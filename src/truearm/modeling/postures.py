@@ -103,6 +103,12 @@ class Postures:
             relief=None,
         )
 
+    def between(self, first: int, end: int) -> Postures:
+        """Return those from one to before another, with their loads."""
+        relief = None if self.relief is None else (self.relief[0][..., first:end], self.relief[1])
+        loads = None if self.loads is None else self.loads[..., first:end]
+        return replace(self.at(np.arange(first, end)), loads=loads, relief=relief)
+
 
 def approach_of(joints: Array, order: NDArray[np.int64]) -> Array:
     """Return the sign of the last move of each joint, ``(n, joints)``.

@@ -130,5 +130,32 @@ def by_parameters(
     return derivative
 
 
+def by_parameters_together(
+    robot: RobotData,
+    whole: ForwardKinematics,
+    ends: Mapping[str, ForwardKinematics],
+    names: Sequence[str],
+    rates: Mapping[str, Mapping[int, Array]],
+) -> Array:
+    """Return the velocity of several targets by parameters, ``(parameters, 3, targets, ..., n)``.
+
+    Parameters
+    ----------
+    whole
+        The trunk, run through :func:`~truearm.modeling.chain.together` for all of them.
+    ends
+        The forward kinematics to each target.
+    rates
+        From :func:`effect_rates`.
+    """
+    derivative = by_parameters(robot, whole, whole.position_jacobian, names, rates)
+    first, row = len(whole.elements), {name: i for i, name in enumerate(names)}
+    for k, (target, end) in enumerate(ends.items()):
+        chain = robot.target(target).chain
+        own = [name for name in chain.parameters if name in row]
+        derivative[[row[name] for name in own], :, k] = end.position_jacobian([first + chain.index(n) for n in own])
+    return derivative
+
+
 def _unit(element: Element) -> Unit:
     return "rad" if element.turns else "m"

@@ -130,8 +130,13 @@ def _of_itself(robot: Robot, q: Array, model: Model, sigma: float) -> Problem:
 def _calibrated(problem: Problem, readings: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Return estimates, deviations and whether they settled, for `readings` as in :class:`MonteCarlo`."""
     nominal, prior = problem.free.nominal, problem.free.prior
-    x = np.tile(nominal, (len(readings), 1))
-    for _ in range(_STEPS):
+    # All begin at the nominal values: one Jacobian serves the first step of them all.
+    here = problem.at(nominal)
+    J = here.jacobian * prior
+    step = -np.linalg.solve(J.T @ J + np.eye(len(prior)), J.T @ (here.residual - readings).T).T
+    x = nominal + step * prior
+    size = np.abs(step).max(axis=1)
+    for _ in range(_STEPS - 1):
         here = problem.at(x)
         r, J = here.residual - readings, here.jacobian
         Jt = np.swapaxes(J, 1, 2)
@@ -139,7 +144,8 @@ def _calibrated(problem: Problem, readings: Array) -> tuple[Array, Array, NDArra
         gradient = (Jt @ r[:, :, None])[:, :, 0] * prior + (x - nominal) / prior
         step = -np.linalg.solve(information, gradient[:, :, None])[:, :, 0]
         x = x + step * prior
-        settled = np.abs(step).max(axis=1) < _SMALL
+        before, size = size, np.abs(step).max(axis=1)
+        settled = (size < _SMALL) | (size * size < _SMALL * before)  # the latter: what the next step would be, at most
         if settled.all():
             break
     variance = np.diagonal(np.linalg.inv(information), axis1=1, axis2=2)

@@ -8,13 +8,14 @@ ever formed.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.identification.solving.problem import Evaluation, Problem
+from truearm.identification.solving.problem import Evaluation, Problem, Rows
 from truearm.modeling.chain import Array
 from truearm.modeling.parameters import FreeParameters
 
@@ -48,6 +49,12 @@ class Arrivals:
             if len(mine := np.flatnonzero(sizes == size))
         )
 
+    def of(self, rows: Rows) -> Arrivals:
+        """Return the arrivals of some equations: all those of some arrivals."""
+        if isinstance(rows, slice):
+            return self
+        return Arrivals(np.unique(self.of_row[rows], return_inverse=True)[1].reshape(-1))
+
     def products(self, left: Array, right: Array) -> Array:
         """Return ``left' right`` of each arrival, ``(arrivals, a, b)``, for ``(rows, a)`` and ``(rows, b)``."""
         found = np.empty((self.count, left.shape[1], right.shape[1]))
@@ -78,6 +85,12 @@ class Whitening:
     arrivals: Arrivals
     shared: Array
 
+    def of(self, rows: Rows) -> Whitening:
+        """Return it for some equations: all those of some arrivals."""
+        if isinstance(rows, slice):
+            return self
+        return Whitening(self.arrivals.of(rows), self.shared[rows])
+
     @cached_property
     def _inner(self) -> tuple[Array, Array]:
         """Eigenvalues ``(arrivals, joints)`` and eigenvectors of ``shared' shared`` of each arrival."""
@@ -88,10 +101,6 @@ class Whitening:
         """Return ``V^-1/2`` times equations ``(rows,)`` or ``(rows, columns)``."""
         root = np.sqrt(1.0 + self._inner[0])
         return self._times(rows, -1.0 / (root * (1.0 + root)))
-
-    def undone(self, rows: Array) -> Array:
-        """Return ``V^1/2`` times equations ``(rows,)`` or ``(rows, columns)``."""
-        return self._times(rows, 1.0 / (1.0 + np.sqrt(1.0 + self._inner[0])))
 
     def _times(self, rows: Array, factor: Array) -> Array:
         flat = rows.reshape(len(rows), -1)
@@ -146,6 +155,12 @@ class WhitenedEvaluation:
     def vector(self) -> Array:
         """Where, ``(parameters,)``."""
         return self.plain.vector
+
+    def portions(self) -> Iterator[tuple[Rows, WhitenedEvaluation]]:
+        """Go through the problem part by part, each with its equations."""
+        for rows, part in self.plain.portions():
+            whitening = self.problem.whitening.of(rows)
+            yield rows, WhitenedEvaluation(WhitenedProblem(part.problem, whitening), part)
 
     @cached_property
     def residual(self) -> Array:

@@ -5,7 +5,7 @@ See :mod:`truearm.identification.solving.variance_components` for the model.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
@@ -14,10 +14,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.identification.solving.arrivals import Arrivals
+from truearm.identification.solving.problem import Rows
 from truearm.modeling.chain import Array
+
+#: Products of parameters and joints that are kept for all arrivals, and that are gone through at once.
+_KEPT: Final = 16_000_000
+_AT_ONCE: Final = 2_000_000
 
 #: Share of the largest information that is added where a matrix is singular but for rounding, in turn.
 _MORE: Final = (0.0, 1e-15, 1e-13, 1e-11)
+#: How many parameters are so few that all directions are looked at.
+_FEW: Final = 100
+#: Of very many parameters: information of the readings on a direction, by that of the priors, that is none.
+_UNSEEN: Final = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +38,8 @@ class Linearised:
     residual
         Divided by the deviations assumed so far, ``(rows,)``.
     by_parameters
-        Its derivative, per prior, ``(rows, parameters)``.
+        Its derivative, per prior, ``(rows, parameters)``; or what goes through it, the equations of some whole arrivals
+        at a time, each with their indices.
     by_joints
         Its derivative by the errors of the joints, ``(rows, joints)``.
     offset
@@ -40,23 +50,56 @@ class Linearised:
         Which equations share a draw of the joints' errors.
     factor
         Index of the factor by which the variance of each equation may differ from the one assumed, ``(rows,)``.
+    triangle
+        Of the derivative by the parameters, ``(k, parameters)``, where it is known: products of its columns are those
+        of all equations.
     """
 
     residual: Array
-    by_parameters: Array
+    by_parameters: Array | Callable[[], Iterable[tuple[Rows, Array]]]
     by_joints: Array
     offset: Array
     priors: bool
     arrivals: Arrivals
     factor: NDArray[np.intp]
+    triangle: Array | None = None
+
+    @property
+    def directions(self) -> Array:
+        """Directions of the parameters, per prior, that the readings as assumed know to one, ``(parameters, p)``.
+
+        Of very many parameters these are the directions that readings tell something about.
+        """
+        return self._directions[0]
+
+    @property
+    def unseen(self) -> Array:
+        """The other directions, per prior, of which the priors alone know something, ``(parameters, others)``."""
+        return self._directions[1]
 
     @cached_property
-    def directions(self) -> Array:
-        """Directions of the parameters, per prior, that the readings as assumed know to one, ``(parameters, p)``."""
-        A = self.by_parameters
-        rows = np.concatenate([A, np.eye(A.shape[1])]) if self.priors else A
-        _, s, Vt = np.linalg.svd(np.asarray(np.linalg.qr(rows, mode="r"), dtype=np.float64), full_matrices=False)
-        return np.asarray(Vt.T / np.maximum(s, 1e-12 * s[:1]))
+    def _directions(self) -> tuple[Array, Array]:
+        size = len(self.offset)
+        triangle = np.eye(size) if self.priors else np.zeros((0, size))
+        for A in (A for _, A in self.parts()) if self.triangle is None else (self.triangle,):
+            triangle = np.asarray(np.linalg.qr(np.concatenate([A, triangle]), mode="r"), dtype=np.float64)
+        _, s, Vt = np.linalg.svd(triangle, full_matrices=False)
+        every = np.asarray(Vt.T / np.maximum(s, 1e-12 * s[:1]))
+        if not self.priors or len(s) <= _FEW:
+            return every, every[:, :0]
+        seen = s**2 - 1.0 > _UNSEEN
+        return every[:, seen], every[:, ~seen]
+
+    def parts(self) -> Iterable[tuple[Rows, Array]]:
+        """Go through the derivative by the parameters, each part with the indices of its equations."""
+        if isinstance(self.by_parameters, np.ndarray):
+            return ((slice(None), self.by_parameters),)
+        return self.by_parameters()
+
+    def turned(self) -> Iterator[tuple[Rows, Array, Array]]:
+        """Go through it in :attr:`directions` ``(k, p)``, with what the parameters have to explain ``(k,)``."""
+        for rows, A in self.parts():
+            yield rows, A @ self.directions, (A @ self.offset if self.priors else 0.0) - self.residual[rows]
 
 
 class Moments:
@@ -64,23 +107,55 @@ class Moments:
 
     def __init__(self, at: Linearised, factors: int) -> None:
         self.at = at
-        Q = at.by_parameters @ at.directions
-        z = (at.by_parameters @ at.offset if at.priors else 0.0) - at.residual
-        self.known = at.directions.T @ at.directions if at.priors else np.zeros((Q.shape[1], Q.shape[1]))
+        joints, p = at.by_joints.shape[1], at.directions.shape[1]
+        self.known = at.directions.T @ at.directions if at.priors else np.zeros((p, p))
         self.rows = np.bincount(at.factor, minlength=factors).astype(float)
-        self.Q, self.z = Q, z
-        every = np.column_stack([at.by_joints, Q, z])
-        k = at.by_joints.shape[1]
-        by_arrival, whole = [], []
+        self.M = np.empty((factors, at.arrivals.count, joints, joints))
+        self.t = np.empty((factors, at.arrivals.count, joints))
+        self.C, self.c, self.q = np.zeros((factors, p, p)), np.zeros((factors, p)), np.zeros(factors)
+        kept: list[tuple[NDArray[np.intp], Array]] = []
+        fits = self.t.size * p <= _KEPT
+        for rows, Q, z in at.turned():
+            whole = np.column_stack([Q, z])
+            for index in range(factors):
+                mine = whole if factors == 1 else whole[at.factor[rows] == index]
+                square = mine.T @ mine
+                self.C[index] += square[:-1, :-1]
+                self.c[index] += square[:-1, -1]
+                self.q[index] += square[-1, -1]
+            here, products = self._by_arrival(rows, np.column_stack([at.by_joints[rows], whole]))
+            self.M[:, here], self.t[:, here] = products[..., :joints], products[..., -1]
+            if fits:
+                kept.append((here, np.ascontiguousarray(products[..., joints:-1])))
+        self._kept = kept if fits else None
+
+    def _by_arrival(self, rows: Rows, every: Array) -> tuple[NDArray[np.intp], Array]:
+        """Return arrivals, and products of their equations with the derivatives by the joints, by factor."""
+        at, joints = self.at, self.at.by_joints.shape[1]
+        arrivals, factor, factors = at.arrivals.of(rows), at.factor[rows], len(self.q)
+        products = np.empty((factors, arrivals.count, joints, every.shape[1]))
         for index in range(factors):
-            mine = every if factors == 1 else np.where((at.factor == index)[:, None], every, 0.0)
-            by_arrival.append(at.arrivals.products(mine[:, :k], mine))
-            whole.append(mine[:, k:].T @ mine[:, k:])
-        products, sums = np.stack(by_arrival), np.stack(whole)
-        self.M = products[..., :k]  # (factors, arrivals, joints, joints)
-        self.T = products[..., k:-1]  # (factors, arrivals, joints, parameters)
-        self.t = products[..., -1]
-        self.C, self.c, self.q = sums[:, :-1, :-1], sums[:, :-1, -1], sums[:, -1, -1]
+            mine = every if factors == 1 else np.where((factor == index)[:, None], every, 0.0)
+            products[index] = arrivals.products(mine[:, :joints], mine)
+        return np.unique(at.arrivals.of_row[rows]), products
+
+    def parts(self) -> Iterator[tuple[NDArray[np.intp], Array]]:
+        """Go through the products with the derivatives by the parameters, ``(factors, k, joints, parameters)``.
+
+        Each part comes with the indices of its arrivals. Where there are too many to be kept they are found anew.
+        """
+        most = max(1, _AT_ONCE // max(1, self.t.shape[2] * len(self.known)))
+        joints = self.at.by_joints.shape[1]
+        found = self._kept
+        if found is None:
+            by_joints = self.at.by_joints
+            for rows, Q, _ in self.at.turned():
+                here, products = self._by_arrival(rows, np.column_stack([by_joints[rows], Q]))
+                yield here, products[..., joints:]
+            return
+        for here, T in found:
+            for first in range(0, len(here), most):
+                yield here[first : first + most], T[:, first : first + most]
 
 
 def _root(information: Array) -> Array:
@@ -102,22 +177,34 @@ class Likelihood:
     def __init__(self, of: Moments, factors: Array, joints: Array) -> None:
         self.of, self.factors, self.joints = of, factors, joints
         by = 1.0 / factors
-        self.M, self.T, self.t = (np.tensordot(by, part, 1) for part in (of.M, of.T, of.t))
+        self.M, self.t = (np.tensordot(by, part, 1) for part in (of.M, of.t))
         root = np.sqrt(joints)
         inner = np.eye(len(joints)) + root[:, None] * self.M * root
         self.E = root[:, None] * np.linalg.inv(inner) * root
-        ET = self.E @ self.T
-        p = self.T.shape[2]
-        whole = np.tensordot(by, of.C, 1) - self.T.reshape(-1, p).T @ ET.reshape(-1, p)
+        whole, b = np.tensordot(by, of.C, 1), by @ of.c
+        seen = (self.E @ self.t[..., None])[..., 0]
+        values, vectors = np.linalg.eigh(self.E)
+        half = np.sqrt(np.maximum(values, 0.0))[..., None] * np.swapaxes(vectors, 1, 2)
+        for mine, _, T in self._parts():
+            HT = half[mine] @ T
+            whole -= _product(HT, HT)
+            b -= _moved(T, seen[mine])
         self.whole = whole
-        self._curvatures: dict[int | tuple[int, ...], Array] = {}
+        self._by_joints: dict[tuple[int, ...], tuple[Array, Array]] = {}
         self.L = _root(whole + of.known)
-        b = by @ of.c - np.einsum("akp,ak->p", ET, self.t)
         self.found = np.linalg.solve(self.L.T, np.linalg.solve(self.L, b))
-        self.ET = ET
         left = float(by @ of.q - np.einsum("ak,akl,al->", self.t, self.E, self.t) - b @ self.found)
         logs = float(of.rows @ np.log(factors)) + float(np.linalg.slogdet(inner)[1].sum())
         self.likelihood = -0.5 * (logs + 2.0 * float(np.log(np.abs(np.diag(self.L))).sum()) + left)
+
+    def _parts(self, *, always: bool = False) -> Iterator[tuple[NDArray[np.intp], Array, Array]]:
+        """Go through the arrivals: indices, products with the parameters by factor, and these by their variances.
+
+        There is nothing to go through where no joint has a variance, unless it is asked for.
+        """
+        if always or self.joints.any():
+            for mine, by_factor in self.of.parts():
+                yield mine, by_factor, np.tensordot(1.0 / self.factors, by_factor, 1)
 
     @cached_property
     def inverse(self) -> Array:
@@ -126,32 +213,49 @@ class Likelihood:
         return np.asarray(root.T @ root)
 
     @cached_property
-    def _parts(self) -> tuple[Array, Array, Array, Array]:
-        u = self.t - self.T @ self.found
+    def _seen(self) -> Array:
+        """What the parameters explain of the products of each arrival, ``(factors, arrivals, joints)``."""
+        seen = np.empty_like(self.of.t)
+        for mine, by_factor in self.of.parts():
+            seen[:, mine] = (by_factor.reshape(-1, len(self.found)) @ self.found).reshape(by_factor.shape[:-1])
+        return seen
+
+    @cached_property
+    def _small(self) -> tuple[Array, Array, Array, Array]:
+        u = self.t - np.tensordot(1.0 / self.factors, self._seen, 1)
         e = (self.E @ u[..., None])[..., 0]
         Lm = np.eye(len(self.joints)) - self.M @ self.E
-        return e, (Lm @ u[..., None])[..., 0], Lm @ self.M, Lm @ self.T
+        return e, (Lm @ u[..., None])[..., 0], Lm @ self.M, Lm
 
     def curvature(self, kind: NDArray[np.intp] | int) -> Array:
         """Return ``A' V^-1 V_i V^-1 A`` for the variance of joints, or that of a factor, ``(p, p)``."""
-        key = kind if isinstance(kind, int) else tuple(kind.tolist())
-        if key not in self._curvatures:
-            self._curvatures[key] = self._curvature(kind)
-        return self._curvatures[key]
-
-    def _curvature(self, kind: NDArray[np.intp] | int) -> Array:
-        of, p = self.of, self.T.shape[2]
         if not isinstance(kind, int):
-            N = self._parts[3][:, kind].reshape(-1, p)
-            return np.asarray(N.T @ N)
+            return self._of_joints(kind)[0]
         if len(self.factors) == 1:  # all of them, each times its variance, are the information
             rest = self.whole
             for variance in np.unique(self.joints[self.joints > 0.0]).tolist():
                 rest = rest - variance * self.curvature(np.flatnonzero(self.joints == variance))
             return np.asarray(rest / self.factors[0])
-        cross = of.T[kind].reshape(-1, p).T @ self.ET.reshape(-1, p)
-        inner = self.ET.reshape(-1, p).T @ (of.M[kind] @ self.ET).reshape(-1, p)
-        return np.asarray((of.C[kind] - cross - cross.T + inner) / self.factors[kind] ** 2)
+        found = self.of.C[kind].copy()
+        for mine, by_factor, T in self._parts():
+            ET = self.E[mine] @ T
+            cross = _product(by_factor[kind], ET)
+            found += _product(ET, self.of.M[kind][mine] @ ET) - cross - cross.T
+        return np.asarray(found / self.factors[kind] ** 2)
+
+    def _of_joints(self, kind: NDArray[np.intp]) -> tuple[Array, Array]:
+        """Return the curvature for a variance of joints, and ``A' V^-1 V_i P z``."""
+        key = tuple(kind.tolist())
+        if key not in self._by_joints:
+            _, g, _, Lm = self._small
+            p = len(self.found)
+            curvature, shift = np.zeros((p, p)), np.zeros(p)
+            for mine, _, T in self._parts(always=True):
+                N = Lm[mine][:, kind] @ T
+                curvature += _product(N, N)
+                shift += _moved(N, g[mine][:, kind])
+            self._by_joints[key] = curvature, shift
+        return self._by_joints[key]
 
     def slopes(self, kinds: Sequence[NDArray[np.intp] | int]) -> tuple[Array, Array, Array]:
         """Return ``z' P V_i P z`` and ``tr(P V_i)`` for variances, each ``(m,)``, and the information ``(m, m)``.
@@ -164,27 +268,29 @@ class Likelihood:
             Joints that share a variance, or the index of a factor.
         """
         of, count = self.of, len(kinds)
-        e, g, LM, N = self._parts
+        e, g, LM, _ = self._small
         squares, traces = np.empty(count), np.empty(count)
-        shifts = np.empty((count, self.T.shape[2]))  # A' V^-1 V_i P z
+        shifts = np.empty((count, len(self.found)))  # A' V^-1 V_i P z
         inner = np.empty((count, *g.shape))  # G' V^-1 V_i P z
         inside: dict[int, Array] = {}
         for i, kind in enumerate(kinds):
             if isinstance(kind, int):
-                v = self.factors[kind]
-                h = (of.t[kind] - of.T[kind] @ self.found - (of.M[kind] @ e[..., None])[..., 0]) / v**2
+                v, seen = self.factors[kind], self._seen[kind]
+                h = (of.t[kind] - seen - (of.M[kind] @ e[..., None])[..., 0]) / v**2
                 r = float(of.q[kind] - 2.0 * of.c[kind] @ self.found + self.found @ of.C[kind] @ self.found) / v**2
-                r -= float(np.sum(e * (h + (of.t[kind] - of.T[kind] @ self.found) / v**2)))
+                r -= float(np.sum(e * (h + (of.t[kind] - seen) / v**2)))
                 squares[i] = r
                 traces[i] = of.rows[kind] / v - float(np.sum(self.E * of.M[kind])) / v**2
-                shifts[i] = (of.c[kind] - of.C[kind] @ self.found - np.einsum("akp,ak->p", of.T[kind], e)) / v**2
-                shifts[i] -= np.einsum("akp,ak->p", self.ET, h)
-                inner[i] = h - (self.M @ (self.E @ h[..., None]))[..., 0]
+                shifts[i] = (of.c[kind] - of.C[kind] @ self.found) / v**2
+                pulled = (self.E @ h[..., None])[..., 0]
+                for mine, by_factor, T in self._parts():
+                    shifts[i] -= _moved(by_factor[kind], e[mine]) / v**2 + _moved(T, pulled[mine])
+                inner[i] = h - (self.M @ pulled[..., None])[..., 0]
                 inside[i] = h
             else:
                 squares[i] = float(np.sum(g[:, kind] ** 2))
                 traces[i] = float(np.sum(LM[:, kind, kind]))
-                shifts[i] = np.einsum("akp,ak->p", N[:, kind], g[:, kind])
+                shifts[i] = self._of_joints(kind)[1]
                 inner[i] = np.einsum("akl,al->ak", LM[:, :, kind], g[:, kind])
             traces[i] -= float(np.sum(self.inverse * self.curvature(kind)))
         information = np.empty((count, count))
@@ -200,3 +306,14 @@ class Likelihood:
                     value += squares[i] / self.factors[kind] if kind == other else 0.0
                 information[i, j] = 0.5 * (value - float(moved[:, i] @ moved[:, j]))
         return squares, traces, information
+
+
+def _product(left: Array, right: Array) -> Array:
+    """Return the sum over arrivals and joints of products of parameters, for two ``(arrivals, joints, p)``."""
+    p = left.shape[-1]
+    return left.reshape(-1, p).T @ right.reshape(-1, p)
+
+
+def _moved(products: Array, by: Array) -> Array:
+    """Return the sum over arrivals and joints of ``(arrivals, joints, p)`` times ``(arrivals, joints)``, ``(p,)``."""
+    return products.reshape(-1, products.shape[-1]).T @ by.reshape(-1)

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -20,14 +21,19 @@ from truearm.limits import refuse_beyond
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.observations import Observation, compared
 from truearm.measurement.sighting import Sighting
-from truearm.modeling.chain import Array, ForwardKinematics
+from truearm.modeling.chain import Array, ForwardKinematics, together
 from truearm.modeling.parameters import SCALE, FreeParameters
 from truearm.modeling.postures import Postures
 from truearm.modeling.robot import Robot
-from truearm.modeling.robot_parameters import by_parameters, effect_rates
+from truearm.modeling.robot_parameters import by_parameters, by_parameters_together, effect_rates
 
 #: What the residuals of readings of the fixtures themselves are called.
 SETUP: Final = "setup"
+#: Derivatives that are in memory at once where those of all readings are not needed together.
+_AT_ONCE: Final = 2_000_000
+
+#: Equations of a problem, all of them or those with these indices.
+Rows = slice | NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +120,12 @@ class Problem:
             everywhere = np.array_equal(seen, np.arange(data.configurations))
             yield Block(observation, data, target, fixture, readings, slice(None) if everywhere else seen, known)
 
+    @cached_property
+    def placed(self) -> tuple[tuple[Block, slice], ...]:
+        """The blocks, with the equations of the problem that each of them is."""
+        ends = np.cumsum([block.rows for block in self.blocks]).tolist()
+        return tuple((block, slice(end - block.rows, end)) for block, end in zip(self.blocks, ends, strict=True))
+
     def kind(self, block: Block) -> str:
         """Return the name under which the deviations of a block are counted."""
         return block.observation.name if block.data is self.data else SETUP
@@ -154,6 +166,36 @@ class Problem:
             found.append(np.repeat(of_readings, block.observation.components))
         return np.unique(np.concatenate(found), return_inverse=True)[1].reshape(-1) if found else np.zeros(0, np.intp)
 
+    @cached_property
+    def portions(self) -> tuple[tuple[Rows, Problem], ...]:
+        """The problem in parts of whole configurations, with the equations that each of them is.
+
+        There is one, the problem itself, where few enough derivatives are in it. What is known of fixtures is in the
+        first.
+        """
+        n = self.data.configurations
+        count = min(-(-self.rows * len(self.free.names) // _AT_ONCE), n)
+        if count < 2:
+            return ((slice(None), self),)
+        edges = np.linspace(0, n, count + 1).astype(int).tolist()
+        return tuple(self._between(first, end) for first, end in pairwise(edges))
+
+    def _between(self, first: int, end: int) -> tuple[Rows, Problem]:
+        """Return the configurations from one to before another as a problem, with its equations."""
+        data = self.data.of_configurations(np.arange(first, end))
+        part = replace(self, data=data if first == 0 else replace(data, setup=None))
+        part.__dict__["postures"] = self.postures.between(first, end)
+        rows = []
+        for block, place in self.placed:
+            if block.data is self.data:
+                at = self.data.configuration[block.readings]
+                mine = np.flatnonzero((at >= first) & (at < end))
+            else:
+                mine = np.arange(len(block.readings) if first == 0 else 0)
+            size = block.observation.components
+            rows.append((place.start + size * mine[:, None] + np.arange(size)).reshape(-1))
+        return np.concatenate(rows), part
+
     def at(self, vector: Array) -> Evaluation:
         """Compare the robot with the readings at a vector ``(parameters,)``, or at one for each of many trials."""
         return Evaluation(self, vector)
@@ -171,8 +213,12 @@ class Problem:
         """Return the residual of the priors and the diagonal of its Jacobian, both ``(parameters,)``; zero without."""
         if not self.priors:
             return np.zeros(len(vector)), np.zeros(len(vector))
-        weight = 1.0 / self.free.prior
-        return (vector - self.free.nominal) * weight, weight
+        nominal, weight = self._priors
+        return (vector - nominal) * weight, weight
+
+    @cached_property
+    def _priors(self) -> tuple[Array, Array]:
+        return self.free.nominal, 1.0 / self.free.prior
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,11 +236,20 @@ class Evaluation:
     problem: Problem
     vector: Array
 
+    def portions(self) -> Iterator[tuple[Rows, Evaluation]]:
+        """Go through the problem part by part, each with its equations: then not all derivatives are in memory."""
+        for rows, part in self.problem.portions:
+            yield rows, self if part is self.problem else Evaluation(part, self.vector)
+
     @cached_property
     def residual(self) -> Array:
         """Whitened residual of the readings, ``(rows,)``."""
         r = np.empty((*self.vector.shape[:-1], self.problem.rows))
-        for block, rows in self._rows():
+        if len(self.problem.portions) > 1:
+            for rows, part in self.portions():
+                r[..., rows] = part.residual
+            return r
+        for block, rows in self.problem.placed:
             raw = block.observation.residual(self._sightings[rows.start], block.data, block.readings)
             np.divide(raw, block.sigma[:, None], out=self._by_reading(r[..., rows], block))
         return r
@@ -208,16 +263,30 @@ class Evaluation:
         refuse_beyond("parameters", len(names), where=self.problem.data.source)
         refuse_beyond("derivatives", math.prod(shape), where=self.problem.data.source)
         J = np.empty(shape)
-        by_parameter = np.moveaxis(J, -2, 0)
-        for block, rows in self._rows():
+        by_parameter = np.moveaxis(J, -2, 0) if J.ndim > 2 else J
+        for block, rows in self.problem.placed:
             observation, sigma = block.observation, block.sigma[:, None]
             seen = self._sightings[rows.start]
             velocity = self._velocity(block)
             raw = self._by_reading(self.residual[..., rows], block) * sigma
             turned = seen.position_jacobian if observation.velocity == "linear" else seen.orientation_jacobian
             moved = observation.jacobian(seen, raw, turned(velocity, names))
-            np.divide(moved, sigma, out=self._by_reading(by_parameter[..., rows], block))
+            written = self._by_reading(by_parameter[..., rows], block)
+            for k in range(observation.components):  # reading after reading is how it is stored, not how it is swept
+                np.divide(moved[..., k], block.sigma, out=written[..., k])
         return np.swapaxes(J, -1, -2)
+
+    @cached_property
+    def triangle(self) -> Array:
+        """Triangle of the derivatives, whose products with each other are theirs, ``(parameters, parameters)``.
+
+        With fewer equations than parameters it has as many rows as equations.
+        """
+        found = np.zeros((0, len(self.problem.free.names)))
+        for _, part in self.portions():
+            rows = part.jacobian if not len(found) else np.concatenate([part.jacobian, found])
+            found = np.asarray(np.linalg.qr(rows, mode="r"), dtype=np.float64)
+        return found
 
     @cached_property
     def by_joints(self) -> Array:
@@ -228,25 +297,25 @@ class Evaluation:
         robot = self.problem.robot
         joints = robot.moving[: len(robot.joints)]
         by_joint = np.zeros((len(joints), self.problem.rows))
-        for block, rows in self._rows():
+        if len(self.problem.portions) > 1:
+            for part_rows, part in self.portions():
+                by_joint[:, part_rows] = part.by_joints.T
+            return by_joint.T
+        moved = self._together.position_jacobian(joints)
+        places = {name: k for k, name in enumerate(self._kinematics)}
+        for block, rows in self.problem.placed:
             if block.data is not self.problem.data:
                 continue
             observation, sigma = block.observation, block.sigma[:, None]
-            kinematics, seen = self._kinematics[block.target], self._sightings[rows.start]
+            seen = self._sightings[rows.start]
             raw = self._by_reading(self.residual[rows], block) * sigma
             if observation.velocity == "linear":
-                velocity = seen.position_jacobian(kinematics.position_jacobian(joints), ())
+                velocity = seen.position_jacobian(moved[:, :, places[block.target]], ())
             else:
+                kinematics = self._kinematics[block.target]
                 velocity = seen.orientation_jacobian(kinematics.orientation_jacobian(joints), ())
             np.divide(observation.jacobian(seen, raw, velocity), sigma, out=self._by_reading(by_joint[:, rows], block))
         return by_joint.T
-
-    def _rows(self) -> Iterator[tuple[Block, slice]]:
-        """Go through the blocks, with the equations of the problem that each of them is."""
-        first = 0
-        for block in self.problem.blocks:
-            yield block, slice(first, first + block.rows)
-            first += block.rows
 
     @staticmethod
     def _by_reading(rows: Array, block: Block) -> Array:
@@ -267,7 +336,7 @@ class Evaluation:
                 None if block.fixture is None else self._fixtures[block.fixture],
                 self._scale if block.data is self.problem.data else 0.0,
             )
-            for block, rows in self._rows()
+            for block, rows in self.problem.placed
         }
 
     @cached_property
@@ -277,12 +346,25 @@ class Evaluation:
 
     @cached_property
     def _kinematics(self) -> dict[str, ForwardKinematics]:
+        """Forward kinematics to each target, whose positions are known from one sweep."""
+        if self._ends:
+            self._together  # noqa: B018
+        return self._ends
+
+    @cached_property
+    def _ends(self) -> dict[str, ForwardKinematics]:
         """Forward kinematics to each target; all go on from one to the flange."""
         robot = self.problem.robot
         variables = robot.variables(self.problem.postures, self._values)
         trunk = robot.trunk.forward_kinematics(variables, self._values)
-        names = dict.fromkeys(block.target for block in self.problem.blocks if block.data is self.problem.data)
+        blocks = [block for block in self.problem.blocks if block.data is self.problem.data]
+        names = dict.fromkeys(block.target for block in blocks)
         return {name: robot.target(name).chain.forward_kinematics(variables, self._values, trunk) for name in names}
+
+    @cached_property
+    def _together(self) -> ForwardKinematics:
+        """The way to the flange, run through for all targets."""
+        return together([*self._ends.values()])
 
     @cached_property
     def _fixtures(self) -> dict[str, ForwardKinematics]:
@@ -300,13 +382,22 @@ class Evaluation:
             return (
                 kinematics.position_jacobian(places) if moves == "linear" else kinematics.orientation_jacobian(places)
             )
-        known = self._velocities
-        if (block.target, moves) not in known:
+        if moves == "linear":
+            return self._linear[:, :, list(self._kinematics).index(block.target)]
+        known = self._angular
+        if block.target not in known:
             known.clear()  # blocks come target by target: more would only fill memory
             kinematics = self._kinematics[block.target]
-            derivative = kinematics.position_jacobian if moves == "linear" else kinematics.orientation_jacobian
-            known[block.target, moves] = by_parameters(problem.robot, kinematics, derivative, names, self._rates)
-        return known[block.target, moves]
+            known[block.target] = by_parameters(
+                problem.robot, kinematics, kinematics.orientation_jacobian, names, self._rates
+            )
+        return known[block.target]
+
+    @cached_property
+    def _linear(self) -> Array:
+        """How all targets move in the world with each parameter, ``(parameters, 3, targets, ..., n)``."""
+        names = self.problem.free.names
+        return by_parameters_together(self.problem.robot, self._together, self._kinematics, names, self._rates)
 
     @cached_property
     def _rates(self) -> dict[str, Mapping[int, Array]]:
@@ -314,7 +405,7 @@ class Evaluation:
         return effect_rates(problem.robot, problem.postures, problem.free.names, self._values)
 
     @cached_property
-    def _velocities(self) -> dict[tuple[str, str], Array]:
+    def _angular(self) -> dict[str, Array]:
         return {}
 
 

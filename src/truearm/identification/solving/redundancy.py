@@ -193,8 +193,7 @@ def unobservable_parameters(
         return ()
     noise = {observation.name: 1.0 for observation in OBSERVATIONS}
     plain = Problem(robot, _unit_noise(data), free, noise, priors=False)
-    A = plain.linearised(free.start)[1] * free.prior
-    _, s, Vt = np.linalg.svd(np.linalg.qr(A, mode="r"), full_matrices=True)
+    _, s, Vt = np.linalg.svd(plain.at(free.start).triangle * free.prior, full_matrices=True)
     unobserved = Vt[int((s > _UNOBSERVED * s[0]).sum()) :]
     if len(unobserved) == 0:
         return ()

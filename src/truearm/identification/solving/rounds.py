@@ -16,10 +16,11 @@ from truearm.errors import InputError
 from truearm.identification.held import NOTHING_HELD, Held
 from truearm.identification.solving.arrivals import Arrivals, WhitenedProblem, Whitening
 from truearm.identification.solving.bounds import Bounds, bound_vectors
+from truearm.identification.solving.curves import NO_CURVES, Curves, with_stiffness
 from truearm.identification.solving.likelihood import Linearised
 from truearm.identification.solving.losses import Loss, meets_exactly, norms_of, scale_of, weighed_together
 from truearm.identification.solving.models import Model
-from truearm.identification.solving.problem import SETUP, Problem, check_circumstances, check_solvable
+from truearm.identification.solving.problem import SETUP, Evaluation, Problem, check_circumstances, check_solvable
 from truearm.identification.solving.redundancy import Redundancy, find_redundancies
 from truearm.identification.solving.solver import SMALL, Solution, solve
 from truearm.identification.solving.variance_components import (
@@ -32,6 +33,7 @@ from truearm.identification.start_values.from_readings import start_from_reading
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.observations import OBSERVATIONS
 from truearm.modeling.chain import Array
+from truearm.modeling.effects.joint_curve import JointCurve
 from truearm.modeling.parameters import SCALE, FreeParameters
 from truearm.modeling.robot import Robot
 
@@ -71,6 +73,8 @@ class Solved:
         Variances of the readings and of the joints' errors at the solution; None for losses other than the linear one.
     held
         Places that were known.
+    curves
+        The curves of the joints, where the model has them.
     """
 
     start: Robot
@@ -80,6 +84,7 @@ class Solved:
     limits: tuple[Array, Array] | None
     components: Components | None
     held: Held = NOTHING_HELD
+    curves: Curves = NO_CURVES
 
     @property
     def robot(self) -> Robot:
@@ -115,6 +120,15 @@ def find_parameters(
     if redundancy != "prior":  # what is known of an instrument's scale is a prior: without any it is exact
         free = free.without([SCALE])
     check_bounds = None
+    if redundancy != "prior" and JointCurve.name in model.effects:
+        raise InputError(
+            "curves of joints are found with priors, whose size the data tell",
+            parameter="redundancy",
+            where=f"model {model.name}",
+            came=redundancy,
+            allowed="prior",
+            cure=f"Leave out `redundancy`, or the joint effect {JointCurve.name}.",
+        )
     if not free.names:
         raise InputError(
             "everything that this model frees is held, so there is nothing to find",
@@ -154,7 +168,7 @@ def find_parameters(
             _check_dropped(out, free, check_bounds, bounds_file)
         kept = problem.free.without(out)
         limits = None if check_bounds is None else _limits_of(check_bounds, free, kept)
-        solution, reduced, components = _solve_with_noise(
+        solution, reduced, components, curves = _solve_with_noise(
             replace(problem, free=kept), loss, limits, small, shared=shared and redundancy != "none"
         )
         steps += solution.steps
@@ -170,7 +184,10 @@ def find_parameters(
     else:
         solution = replace(solution, converged=False)
         dropped = tuple(r for r in dropped if r.dropped in out)
-    return Solved(start, reduced, replace(solution, steps=steps), dropped, limits, components, held)
+    if limits is not None and check_bounds is not None:
+        limits = _limits_of(check_bounds, free, reduced.free)
+    start = start.with_parameters(curves.priors_of(start))
+    return Solved(start, reduced, replace(solution, steps=steps), dropped, limits, components, held, curves)
 
 
 def _check_dropped(dropped: list[str], free: FreeParameters, limits: tuple[Array, Array], where: str) -> None:
@@ -190,18 +207,24 @@ def _limits_of(limits: tuple[Array, Array], free: FreeParameters, kept: FreePara
 
 def _solve_with_noise(
     problem: Problem, loss: Loss, limits: tuple[Array, Array] | None, small: float, *, shared: bool
-) -> tuple[Solution, Problem, Components | None]:
-    """Solve; then again with what the solution says of deviations and of the loads at every joint.
+) -> tuple[Solution, Problem, Components | None, Curves]:
+    """Solve; then again with what the solution says of deviations, of the joints' curves and of the loads.
 
     Deviations are estimated where they are not declared. Declared ones are widened where the residuals are larger than
     they, and errors of the joints that an arrival's readings share, allow: believed to the letter, readings that the
-    model cannot follow would overrule every prior, for the sake of directions that they hardly observe.
+    model cannot follow would overrule every prior, for the sake of directions that they hardly observe. Curves of the
+    joints join in when the first solution has told how stiff they are.
     """
+    every, within = problem, limits
+    curves = Curves.none_of(problem)
+    if curves:
+        problem = replace(problem, free=problem.free.without(curves.names))
+        limits = _within(within, every.free, problem.free)
     solution = solve(problem, loss, limits, small)
     steps = solution.steps
     joints = np.zeros(len(problem.robot.joints))
     components = None
-    for _ in range(_ROUNDS):
+    for _ in range(_ROUNDS + (curves.rounds if curves else 0)):
         if loss == "linear" and shared:
             components = components_found(problem, solution, limits, components)
             there, change, joints = _with_components(problem, components, joints)
@@ -210,25 +233,56 @@ def _solve_with_noise(
         found = dict(zip(problem.free.names, map(float, solution.vector), strict=True))
         started = FreeParameters(tuple(replace(p, value=found[p.name]) for p in problem.free.parameters))
         there = replace(there, robot=problem.robot.with_values(found), free=started)
+        if curves.rounds:
+            there, curves, joints = with_stiffness(there, every.free, curves, joints, solution.weight)
+            limits, change = _within(within, every.free, there.free), np.inf
         if change < _SETTLED and _load_shift(problem, there) < _LOADS_AGREE * small:
             break
+        if len(there.free.names) > len(problem.free.names):
+            components = None  # with curves it is asked again whether the joints err
         problem = there
-        solution = solve_with_joints(problem, joints, loss, limits, small)
+        solution = solve_with_joints(problem, joints, loss, limits, small, curves.design_effect)
         steps += solution.steps
-    return replace(solution, steps=steps), problem, components
+    return replace(solution, steps=steps), problem, components, curves
+
+
+def _within(
+    limits: tuple[Array, Array] | None, free: FreeParameters, kept: FreeParameters
+) -> tuple[Array, Array] | None:
+    return None if limits is None else _limits_of(limits, free, kept)
 
 
 def solve_with_joints(
-    problem: Problem, joints: Array, loss: Loss, limits: tuple[Array, Array] | None, small: float
+    problem: Problem,
+    joints: Array,
+    loss: Loss,
+    limits: tuple[Array, Array] | None,
+    small: float,
+    design_effect: float = 1.0,
 ) -> Solution:
-    """Solve with the variances of the joints' errors as they are; residual and Jacobian are the readings' own."""
-    if not joints.any():
-        return solve(problem, loss, limits, small)
-    shared = problem.at(problem.free.start).by_joints * np.sqrt(joints)
-    whitening = Whitening(Arrivals(problem.arrivals), shared)
-    solution = solve(WhitenedProblem(problem, whitening), loss, limits, small)
-    residual, jacobian = whitening.undone(solution.residual), whitening.undone(solution.jacobian)
-    return replace(solution, residual=residual, jacobian=jacobian)
+    """Solve with the variances of the joints' errors as they are; residual and Jacobian are the readings' own.
+
+    Parameters
+    ----------
+    design_effect
+        How many times larger the variances of the readings are taken, because they hang together.
+    """
+    root = float(np.sqrt(design_effect))
+    taken = problem
+    if root != 1.0:
+        noise = {name: deviation * root for name, deviation in problem.noise.items()}
+        taken = replace(problem, noise=noise, widened=problem.widened * root)
+    if joints.any():
+        shared = taken.at(taken.free.start).by_joints * np.sqrt(joints * design_effect)
+        solution = solve(WhitenedProblem(taken, Whitening(Arrivals(taken.arrivals), shared)), loss, limits, small)
+    else:
+        solution = solve(taken, loss, limits, small)
+    return replace(solution, at=problem.at(solution.vector)) if joints.any() or root != 1.0 else solution
+
+
+def evaluated(problem: Problem, solution: Solution) -> Evaluation:
+    """Return the problem at its solution."""
+    return solution.at if isinstance(solution.at, Evaluation) else problem.at(solution.vector)
 
 
 def components_found(
@@ -241,14 +295,18 @@ def components_found(
     names, of_row = factors_of(problem)
     uncertain = ~bound_by(solution, problem.free, limits)
     prior = problem.free.prior
+    here = evaluated(problem, solution)
     at = Linearised(
         residual=solution.residual,
-        by_parameters=solution.jacobian[:, uncertain] * prior[uncertain],
-        by_joints=problem.at(solution.vector).by_joints,
+        by_parameters=lambda: (
+            (rows, part.jacobian[:, uncertain] * prior[uncertain]) for rows, part in here.portions()
+        ),
+        by_joints=here.by_joints,
         offset=((solution.vector - problem.free.nominal) / prior)[uncertain],
         priors=problem.priors,
         arrivals=Arrivals(problem.arrivals),
         factor=of_row,
+        triangle=here.triangle[:, uncertain] * prior[uncertain],
     )
     kinds = np.array([joint.kind for joint in problem.robot.joints])
     alike = [np.flatnonzero(kinds == kind) for kind in dict.fromkeys(kinds.tolist())]
@@ -361,9 +419,9 @@ def noise_found(problem: Problem, solution: Solution, loss: Loss) -> dict[str, t
 def _informed_rows(problem: Problem, solution: Solution) -> float:
     """Return how many parameters' worth of residual the fit used up."""
     prior = problem.free.prior
-    s2 = np.linalg.svd(np.linalg.qr(solution.jacobian * prior, mode="r"), compute_uv=False) ** 2
     if not problem.priors:
         return float(len(prior))
+    s2 = np.linalg.svd(evaluated(problem, solution).triangle * prior, compute_uv=False) ** 2
     return float(np.sum(s2 / (s2 + 1.0)))
 
 

@@ -7,6 +7,7 @@ bounds (`scipy.optimize.lsq_linear`). Losses other than the linear one reweight 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final, Protocol
 
@@ -14,11 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.identification.solving.losses import ABSOLUTE, Loss, norms_of, robust_scale, weighed_together, weights
+from truearm.identification.solving.problem import Rows
 from truearm.modeling.chain import Array
 from truearm.modeling.parameters import FreeParameters
 
 #: A step this small is the last: the next one would be smaller by the share of the residual that bends, 1e-3 or less.
 SMALL: Final = 1e-6
+#: Share of that below which steps, which become smaller and smaller, would move the solution no more.
+_SURELY: Final = 1e-2
 #: Size of a step that counts as one, where the prior is no scale (base and targets) [m or rad].
 _GEOMETRIC: Final = 1e-3
 _STEPS: Final = {"linear": 60, "huber": 100, "cauchy": 100, "l1": 300, "l1-components": 300}
@@ -82,8 +86,8 @@ class Solution:
         Whether the last step was too small to matter.
     steps
         Number of steps taken.
-    residual, jacobian
-        Whitened residual ``(rows,)`` and Jacobian of the readings there, not weighted by a loss.
+    at
+        The problem there, not weighted by a loss; it finds residual and Jacobian when they are asked for.
     weight
         What the loss left of each reading, ``(readings,)``; where coordinates count alone, of their mean.
     """
@@ -91,9 +95,18 @@ class Solution:
     vector: Array
     converged: bool
     steps: int
-    residual: Array
-    jacobian: Array
+    at: Evaluated
     weight: Array
+
+    @property
+    def residual(self) -> Array:
+        """Whitened residual of the readings there, ``(rows,)``."""
+        return self.at.residual
+
+    @property
+    def jacobian(self) -> Array:
+        """Its derivative by the parameters, ``(rows, parameters)``."""
+        return self.at.jacobian
 
 
 def solve(
@@ -121,11 +134,11 @@ def solve(
     damping = 0.0
     scale: float | None = None
     components = weighed_together(loss, problem.components)
-    steps, converged = 0, False
+    steps, converged, size = 0, False, np.inf
     for steps in range(1, _STEPS[loss] + 1):
         norms = _norms(here, loss)
         scale = _next_scale(loss, norms, components, scale, steps)
-        w = np.repeat(weights(loss, norms, scale), components)
+        w = None if loss == "linear" else np.repeat(weights(loss, norms, scale), components)
         R, c = _triangle(here, w)
         cost = _cost(here, w)
         accepted = False
@@ -142,9 +155,10 @@ def solve(
         if not accepted:
             break
         here = trial
-        last = float(np.abs(step / np.minimum(prior, _GEOMETRIC)).max()) < small * (
-            _CREEPING_FACTOR if loss in ABSOLUTE else 1.0
-        )
+        before, size = size, float(np.abs(step / np.minimum(prior, _GEOMETRIC)).max())
+        last = size < small * (_CREEPING_FACTOR if loss in ABSOLUTE else 1.0)
+        if loss == "linear" and damping == 0.0 and bounds is None and size < before < np.inf:
+            last = last or size / before * size < _SURELY * small  # what the next step would be, at most
         ended = last or predicted <= (_CREEPING if loss == "l1-components" else 1e-24) * max(cost, 1.0)
         if ended:
             converged = loss not in ABSOLUTE or scale <= _L1_FLOOR * float(np.median(_norms(here, loss)) + 1e-300)
@@ -153,7 +167,7 @@ def solve(
     final = weights(loss, _norms(here, loss), scale or 1.0)
     if loss == "l1-components":
         final = _of_readings(final, problem.components)
-    return Solution(here.vector, converged, steps, here.residual, here.jacobian, final)
+    return Solution(here.vector, converged, steps, here, final)
 
 
 def _by_linear_programs(problem: Solvable, bounds: tuple[Array, Array] | None) -> Solution:
@@ -163,9 +177,7 @@ def _by_linear_programs(problem: Solvable, bounds: tuple[Array, Array] | None) -
     here, converged, steps = least_absolute(problem, bounds)
     norms = _norms(here, "l1-components")
     weight = weights("l1-components", norms, 0.3 * _L1_FLOOR * float(np.median(norms)) + 1e-300)
-    return Solution(
-        here.vector, converged, steps, here.residual, here.jacobian, _of_readings(weight, problem.components)
-    )
+    return Solution(here.vector, converged, steps, here, _of_readings(weight, problem.components))
 
 
 def _of_readings(weight: Array, components: NDArray[np.intp]) -> Array:
@@ -194,25 +206,42 @@ def _norms(here: Evaluated, loss: Loss) -> Array:
     return np.ones(len(components)) if loss == "linear" else norms_of(here.residual, components)
 
 
-def _cost(here: Evaluated, w: Array) -> float:
+def _cost(here: Evaluated, w: Array | None) -> float:
     prior, _ = here.problem.prior_rows(here.vector)
-    return float(np.sum(w * here.residual**2)) + float(prior @ prior)
+    squares = here.residual**2
+    return float(np.sum(squares if w is None else w * squares)) + float(prior @ prior)
 
 
-def _triangle(here: Evaluated, w: Array) -> tuple[Array, Array]:
+def _triangle(here: Evaluated, w: Array | None) -> tuple[Array, Array]:
     """Return R and c with |R s + c|^2 equal to the linearised cost of a step s, up to a constant.
 
     Parameters
     ----------
     w
-        Weight of every row's square, ``(rows,)``.
+        Weight of every row's square, ``(rows,)``; None for ones.
     """
-    stacked = np.column_stack([here.jacobian, here.residual]) * np.sqrt(w)[:, None]
+    triangle: Array | None = None
     if here.problem.priors:
         prior, weight = here.problem.prior_rows(here.vector)
-        stacked = np.concatenate([stacked, np.column_stack([np.diag(weight), prior])])
-    triangle = np.asarray(np.linalg.qr(stacked, mode="r"), dtype=np.float64)
+        triangle = np.column_stack([np.diag(weight), prior])
+    for rows, part in parts_of(here):
+        J, r = part.jacobian, part.residual
+        known = 0 if triangle is None else len(triangle)
+        stacked = np.empty((J.shape[1] + 1, len(J) + known))  # column by column, as QR takes it
+        stacked[:-1, : len(J)], stacked[-1, : len(J)] = J.T, r
+        if w is not None:
+            stacked[:, : len(J)] *= np.sqrt(w[rows])
+        if triangle is not None:
+            stacked[:, len(J) :] = triangle.T
+        triangle = np.asarray(np.linalg.qr(stacked.T, mode="r"), dtype=np.float64)
+    assert triangle is not None
     return triangle[:, :-1], triangle[:, -1]
+
+
+def parts_of(here: Evaluated) -> Iterable[tuple[Rows, Evaluated]]:
+    """Return the parts in which the derivatives of an evaluated problem are found, each with its equations."""
+    portions = getattr(here, "portions", None)
+    return ((slice(None), here),) if portions is None else portions()
 
 
 def _room(x: Array, bounds: tuple[Array, Array] | None, prior: Array) -> tuple[Array, Array] | None:

@@ -252,6 +252,7 @@ def _covariance(
     directions = state.of.at.directions
     inverse = np.asarray(np.linalg.solve(state.L, np.eye(len(state.L))), dtype=np.float64)
     turned = directions @ inverse.T
+    unseen = state.of.at.unseen @ state.of.at.unseen.T
     kinds: list[NDArray[np.intp] | int] = [*taken, *noise]
     relative = _relative(state, kinds)
     changes = []
@@ -269,9 +270,9 @@ def _covariance(
     ]
     if state.of.at.priors:
         rest = np.eye(len(inverse)) - sum(changes)
-        parts.append(CovariancePart(turned @ rest @ turned.T, np.inf))
+        parts.append(CovariancePart(turned @ rest @ turned.T + unseen, np.inf))
     free = [changes[place] for place in known]
-    return turned @ _widened(free, relative, len(inverse)) @ turned.T, tuple(parts)
+    return turned @ _widened(free, relative, len(inverse)) @ turned.T + unseen, tuple(parts)
 
 
 def _with_and_without(
@@ -311,10 +312,11 @@ def _agree(alone: Likelihood, best: Likelihood) -> bool:
     the covariances.
     """
     of, by = best.of, 1.0 / alone.factors
-    T = np.tensordot(by, of.T, 1)
-    p = T.shape[2]
-    scattered = (T * best.joints[:, None]).reshape(-1, p).T @ T.reshape(-1, p)
-    spread = np.tensordot(best.factors * by**2, of.C, 1) + of.known + scattered
+    p = len(of.known)
+    spread = np.tensordot(best.factors * by**2, of.C, 1) + of.known
+    for _, by_factor in of.parts():
+        T = np.tensordot(by, by_factor, 1)
+        spread += (T * best.joints[:, None]).reshape(-1, p).T @ T.reshape(-1, p)
     turned = np.asarray(np.linalg.solve(alone.L, best.L), dtype=np.float64)
     turned = np.asarray(np.linalg.solve(alone.L.T, turned), dtype=np.float64)
     values, vectors = np.linalg.eigh(turned.T @ spread @ turned - np.eye(p))
@@ -331,24 +333,26 @@ def _independent(state: Likelihood) -> bool:
     The sum of their squares, in deviations of the parameters, is what an estimate from the scatter of the arrivals
     finds of the parameters' variance, by what the variances say (the idea of White 1982).
     """
-    of, at = state.of, state.of.at
+    at = state.of.at
     root = np.sqrt(state.factors)[at.factor]
     whitening = Whitening(at.arrivals, at.by_joints * np.sqrt(state.joints) / root[:, None])
-    X = np.asarray(np.linalg.solve(state.L, whitening.applied(of.Q / root[:, None]).T).T, dtype=np.float64)
-    r = whitening.applied((of.z - of.Q @ state.found) / root)
-    pulls = at.arrivals.products(X, r[:, None])
-    expected = variance = 0.0
-    for _, rows in at.arrivals.alike:
-        part = X[rows]
-        few = part if part.shape[1] > part.shape[2] else np.swapaxes(part, 1, 2)
-        gram = np.swapaxes(few, 1, 2) @ few
-        left = gram - gram @ gram
-        expected += float(np.trace(left, axis1=1, axis2=2).sum())
-        variance += 2.0 * float(np.sum(left**2))
+    expected = variance = squares = 0.0
+    for rows, Q, z in at.turned():
+        part = whitening.of(rows)
+        X = np.asarray(np.linalg.solve(state.L, part.applied(Q / root[rows, None]).T).T, dtype=np.float64)
+        pulls = part.arrivals.products(X, part.applied((z - Q @ state.found) / root[rows])[:, None])
+        squares += float(np.sum(pulls**2))
+        for _, alike in part.arrivals.alike:
+            few = X[alike]
+            few = few if few.shape[1] > few.shape[2] else np.swapaxes(few, 1, 2)
+            gram = np.swapaxes(few, 1, 2) @ few
+            left = gram - gram @ gram
+            expected += float(np.trace(left, axis1=1, axis2=2).sum())
+            variance += 2.0 * float(np.sum(left**2))
     if variance <= 0.0:
         return True
     freedom = 2.0 * expected**2 / variance
-    return not beyond_chance(float(np.sum(pulls**2)) / expected * freedom, freedom)
+    return not beyond_chance(squares / expected * freedom, freedom)
 
 
 def beyond_chance(squares: float, freedom: float) -> bool:

@@ -1,0 +1,276 @@
+"""How large each sine and cosine of the joints' curves is expected to be, by restricted maximum likelihood.
+
+A curve with the same freedom for every period would follow noise; one that is stiff would miss what gears do. So the
+coefficients c of a linearised fit ``z = A u + F c + n`` have a normal prior of mean zero, whose variance v is the same
+for sine and cosine of a period of a joint, and the variances that make the residuals likeliest are taken (MacKay 1992,
+"Bayesian interpolation"; Tipping 2001, "Sparse Bayesian learning and the relevance vector machine"). With the
+parameters u of the arm integrated out under their own, wide, priors, what geometry and gravity can say themselves is
+theirs. With ``V = s^2 I + F diag(v) F'``, slopes of the likelihood in log v vanish where ``v = c^2 / g``, summed over
+sine and cosine: c is the likeliest coefficient and ``g = v f' V^-1 f`` what the data know of it, 0 to 1. Each step puts
+in the old v on the right.
+
+A gear makes a few lines, and little between them. The variances of neighbouring periods of a joint therefore have an
+inverse gamma distribution with one scale t, and few degrees of freedom: coefficients are then of Student's t, which
+leaves lines alone and shrinks the rest (Tipping and Lawrence 2005). Its likeliest values are
+``v = (c^2 + m t) / (g + m)``, and t the harmonic mean of the band's v. Periods that the data cannot tell apart, where a
+joint turned through a part of a turn only, keep t, and are as uncertain where the joint was not measured.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.modeling.chain import Array
+
+#: First periods in a turn of the bands whose variances are alike.
+BANDS: Final = (1, 3, 6, 11, 19, 33)
+#: Degrees of freedom of the variances of a band.
+_ALIKE: Final = 1.0
+#: Gain in log-likelihood from which the curve of a joint is believed. A sine of noise alone gains so much at one of
+#: 300 000 periods, and a robot has hundreds of periods to look at.
+_SIGNIFICANT: Final = 12.5
+#: Information of the readings on a coefficient, by that of its variance, that is none.
+_NOTHING: Final = 1e-5
+#: Of the log-likelihood: a step that gains less is the last.
+_SETTLED: Final = 0.05
+_STEPS: Final = 40
+#: Share of the variance of the readings that all coefficients which are left out may move them by together.
+_NEGLIGIBLE: Final = 0.01
+#: Share of the best seen combination of coefficients below which one is not seen.
+_ALIKE_EQUATIONS: Final = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class CurveVariances:
+    """How stiff the curves are.
+
+    Attributes
+    ----------
+    variance
+        Of each coefficient [rad^2], ``(coefficients,)``; zero where it is left out.
+    full
+        The same before those are left out that move next to nothing.
+    noise
+        Variance of the residuals by the one assumed.
+    informed
+        What the data know of each coefficient, 0 to 1, ``(coefficients,)``.
+    likelihood
+        Logarithm of the restricted likelihood, up to a constant.
+    gains
+        What the curve of each joint gains in it, by the index of the joint.
+    """
+
+    variance: Array
+    full: Array
+    noise: float
+    informed: Array
+    likelihood: float
+    gains: dict[int, float]
+
+
+def curve_variances(
+    moments: Array,
+    rows: float,
+    joint: NDArray[np.intp],
+    period: NDArray[np.intp],
+    before: Array | None = None,
+    least_noise: float = 0.0,
+) -> CurveVariances:
+    """Find the variances of the coefficients of the joints' curves.
+
+    Parameters
+    ----------
+    moments
+        From :func:`moments_without`, ``(coefficients + 1, coefficients + 1)``: of the derivatives of the equations by
+        the coefficients [1/rad], and of what the curves are to explain.
+    rows
+        How many independent equations there are.
+    joint, period
+        Of each coefficient: the index of its joint, and its periods in a turn.
+    before
+        Variances to begin with [rad^2], ``(coefficients,)``: a zero stays one.
+    least_noise
+        What the variance of the equations is at least, by the one assumed.
+    """
+    of = _Equations(*_told_apart(moments), rows)
+    variance = _start(of, joint) if before is None else before.copy()
+    group = np.unique(np.stack([joint, period]), axis=1, return_inverse=True)[1].reshape(-1)
+    band = np.unique(np.stack([joint, np.searchsorted(BANDS, period, side="right")]), axis=1, return_inverse=True)[
+        1
+    ].reshape(-1)
+    climb = _Climb(group, band, least_noise)
+    state = climb.climbed(_Marginal(of, variance, max(of.squares / rows, least_noise)))
+    gains: dict[int, float] = {}
+    while state.variance.any():
+        gains = {i: state.likelihood - state.without(joint == i) for i in np.unique(joint[state.variance > 0]).tolist()}
+        weakest = min(gains, key=lambda i: gains[i])
+        if gains[weakest] >= _SIGNIFICANT:
+            break
+        left = np.where(joint == weakest, 0.0, state.variance)
+        state = climb.climbed(_Marginal(of, left, state.noise))
+    moved = np.bincount(group, state.variance * of.size)
+    order = np.argsort(moved)
+    small = np.zeros(len(moved), dtype=bool)
+    small[order] = np.cumsum(moved[order]) <= _NEGLIGIBLE * state.noise * rows
+    kept = (state.variance > 0.0) & ~small[group]
+    return CurveVariances(
+        np.where(kept, state.variance, 0.0),
+        state.variance,
+        state.noise,
+        state.known,
+        state.likelihood,
+        gains if kept.any() else {},
+    )
+
+
+def moments_without(moments: Array, others: int) -> Array:
+    """Return products of columns of equations with other parameters integrated out under their priors.
+
+    Parameters
+    ----------
+    moments
+        Products of the derivatives by the other parameters, per prior, of those by the coefficients and of the
+        residuals, ``(others + coefficients + 1, others + coefficients + 1)``.
+    others
+        How many other parameters there are.
+    """
+    root = np.linalg.cholesky(moments[:others, :others] + np.eye(others))
+    shared = np.linalg.solve(root, moments[:others, others:])
+    return np.asarray(moments[others:, others:] - shared.T @ shared)
+
+
+def _told_apart(moments: Array) -> tuple[Array, Array, float]:
+    """Return equations that curves take part in, their right side, and the sum of squares of all others.
+
+    Through a part of a turn neighbouring periods look alike, so that these are far fewer than coefficients.
+    """
+    sizes, axes = np.linalg.eigh(moments[:-1, :-1])
+    kept = sizes > _ALIKE_EQUATIONS * max(float(sizes[-1]), 1e-300)
+    root, axes = np.sqrt(sizes[kept]), axes[:, kept]
+    z = (axes.T @ moments[:-1, -1]) / root
+    return root[:, None] * axes.T, z, max(float(moments[-1, -1] - z @ z), 0.0)
+
+
+def _start(of: _Equations, joint: NDArray[np.intp]) -> Array:
+    """Return variances with which the curves of the joints would add as much to the residuals as there is noise."""
+    found = np.zeros(len(joint))
+    joints = np.unique(joint).tolist()
+    for i in joints:
+        mine = joint == i
+        found[mine] = of.rows / max(float(of.size[mine].sum()), 1e-300) / len(joints)
+    return found
+
+
+class _Equations:
+    """What is left of the equations: derivatives by the coefficients, right side, and what no curve can explain."""
+
+    def __init__(self, F: Array, z: Array, rest: float, rows: float) -> None:
+        self.F, self.z, self.rows = F, z, rows
+        self.H, self.b, self.squares = F.T @ F, F.T @ z, float(z @ z) + rest
+        self.size = np.diag(self.H).copy()
+
+
+class _Marginal:
+    """The likelihood at some variances, with what its slopes need.
+
+    All of it follows from a matrix of coefficients, or from one of equations where these are fewer.
+    """
+
+    def __init__(self, of: _Equations, variance: Array, noise: float) -> None:
+        self.of, self.noise = of, noise
+        self.variance = np.where(variance * of.size > _NOTHING * noise, variance, 0.0)
+        used = self.variance > 0.0
+        v, b = self.variance[used], of.b[used]
+        self.known, self.found = np.zeros(len(variance)), np.zeros(len(variance))
+        if used.sum() <= len(of.F):
+            root = np.sqrt(v)
+            H = of.H[np.ix_(used, used)]
+            M = np.eye(len(v)) + root[:, None] * H * (root / noise)
+            inverse = np.linalg.inv(M)
+            self.found[used] = root * (inverse @ (root * b)) / noise
+            self.known[used] = 1.0 - np.diag(inverse)
+            logs = 2.0 * float(np.log(np.diag(np.linalg.cholesky(M))).sum())
+        else:
+            part = of.F[:, used]
+            V = np.eye(len(part)) + (part * (v / noise)) @ part.T
+            turned = np.linalg.solve(V, np.column_stack([part, of.z]))
+            self.found[used] = v * (part.T @ turned[:, -1]) / noise
+            self.known[used] = v * np.einsum("ij,ij->j", part, turned[:, :-1]) / noise
+            logs = 2.0 * float(np.log(np.diag(np.linalg.cholesky(V))).sum())
+        c = self.found[used]
+        explained = float(b @ c)
+        moved = of.F[:, used] @ c
+        self.left = max(of.squares - 2.0 * explained + float(moved @ moved), 0.0)
+        self.likelihood = -0.5 * (logs + of.rows * float(np.log(noise)) + max(of.squares - explained, 0.0) / noise)
+
+    def at(self, variance: Array, noise: float) -> _Marginal:
+        """Return it at other variances."""
+        return _Marginal(self.of, variance, noise)
+
+    def without(self, coefficients: NDArray[np.bool_]) -> float:
+        """Return the likelihood without some coefficients."""
+        return self.at(np.where(coefficients, 0.0, self.variance), self.noise).likelihood
+
+
+class _Climb:
+    """The way to the likeliest variances, in their logarithms, one for each period of a joint and one of the noise."""
+
+    def __init__(self, group: NDArray[np.intp], band: NDArray[np.intp], least_noise: float) -> None:
+        self.group, self.least_noise = group, least_noise
+        self.of_group = np.zeros(group.max(initial=-1) + 1, dtype=np.intp)
+        self.of_group[group] = band
+        self.sizes = np.bincount(group)
+
+    def alike(self, v: Array) -> Array:
+        """Return the scale of each group's band."""
+        used = v > 0.0
+        inverse = np.bincount(self.of_group[used], 1.0 / v[used], minlength=self.of_group.max() + 1)
+        return np.asarray(
+            (np.bincount(self.of_group[used], minlength=len(inverse)) / np.maximum(inverse, 1e-300))[self.of_group]
+        )
+
+    def objective(self, state: _Marginal) -> float:
+        """Return the likelihood with that of the variances."""
+        v = np.bincount(self.group, state.variance) / self.sizes
+        used = v > 0.0
+        share = self.alike(v)[used] / v[used]
+        return state.likelihood + 0.5 * _ALIKE * float(np.sum(np.log(share) - share))
+
+    def following(self, state: _Marginal) -> Array:
+        """Return where the next step leads: logarithms of the variances of the groups, and of the noise."""
+        v = np.bincount(self.group, state.variance) / self.sizes
+        squares, known = np.bincount(self.group, state.found**2), np.bincount(self.group, state.known)
+        new = (squares + _ALIKE * self.alike(v)) / (known + _ALIKE)
+        freedom = max(state.of.rows - float(state.known.sum()), 1e-3 * state.of.rows)
+        return np.asarray(np.log(np.maximum(np.append(np.where(v > 0.0, new, 0.0), state.left / freedom), 1e-300)))
+
+    def at(self, state: _Marginal, place: Array) -> _Marginal:
+        """Return the state at such logarithms."""
+        v = np.exp(place[:-1])[self.group]
+        return state.at(np.where(state.variance > 0.0, v, 0.0), max(float(np.exp(place[-1])), self.least_noise))
+
+    def climbed(self, state: _Marginal) -> _Marginal:
+        """Climb: two steps, and a third as far as they lead together (Varadhan and Roland 2008)."""
+        here = np.log(np.maximum(np.append(np.bincount(self.group, state.variance) / self.sizes, state.noise), 1e-300))
+        height = self.objective(state)
+        for _ in range(_STEPS):
+            first = self.following(state)
+            second_state = self.at(state, first)
+            second = self.following(second_state)
+            way, bend = first - here, second - 2.0 * first + here
+            far = min(-float(np.linalg.norm(way)) / max(float(np.linalg.norm(bend)), 1e-300), -1.0)
+            place = here - 2.0 * far * way + far**2 * bend
+            there = self.at(state, place)
+            reached = self.objective(there)
+            if not reached >= height:
+                place = second
+                there = self.at(state, second)
+                reached = self.objective(there)
+            gain, height, here, state = reached - height, reached, place, there
+            if gain < _SETTLED:
+                break
+        return state

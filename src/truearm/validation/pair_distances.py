@@ -28,7 +28,7 @@ from truearm.errors import InputError
 from truearm.modeling.chain import Array
 
 #: Pairs that are worked on at once, and their rows.
-_BLOCK: Final = 80_000
+_BLOCK: Final = 60_000
 _ROWS: Final = 128
 #: Two threads: what a small machine has.
 _THREADS: Final = 2

@@ -9,8 +9,8 @@ With p the predicted points, m the measured ones, u = p - m and w = p + m about 
     ``H = |w1 - w2|^2 + |u1 - u2|^2``.
 
 Numerator and H are a matrix product each, in double precision; the numerator is as small as the error, so that it loses
-no digits of it. The root is in single precision, with ``e^2 = (numerator)^2 / H`` in it: every error is right to 2e-7 of
-itself, and means over many to far less. Pairs that are close, beside the extent of all or beside their error, are
+no digits of it. The root is in single precision, with ``e^2 = (numerator)^2 / H`` in it: every error is right to 2e-7
+of itself, and means over many to far less. Pairs that are close, beside the extent of all or beside their error, are
 computed from differences of coordinates in double precision.
 """
 
@@ -28,7 +28,7 @@ from truearm.errors import InputError
 from truearm.modeling.chain import Array
 
 #: Pairs that are worked on at once, and their rows.
-_BLOCK: Final = 60_000
+_BLOCK: Final = 100_000
 _ROWS: Final = 128
 #: Two threads: what a small machine has.
 _THREADS: Final = 2

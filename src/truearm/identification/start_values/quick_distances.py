@@ -52,7 +52,7 @@ def quick_misfit(robot: Robot, data: Dataset) -> float:
     data
         For which :func:`can_be_quick` holds.
     """
-    assert data.distance is not None  # noqa: S101  by can_be_quick
+    assert data.distance is not None
     p, R = robot.world_poses(data.postures)
     off = []
     for target in np.unique(data.target).tolist():

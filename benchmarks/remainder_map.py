@@ -94,7 +94,7 @@ def judged(name: str, robot: object, training: Dataset, others: dict[str, Datase
     r, x = residuals(fit.robot, training, targets), features(training.joints)
     some = np.linspace(0, len(x) - 1, min(MOST, len(x))).astype(int)
     logs = hyperparameters(x[some], r[some])
-    _, block = kmeans2(x.reshape(len(x), -1), BLOCKS, seed=0, minit="++")
+    block = kmeans2(x.reshape(len(x), -1), BLOCKS, seed=0, minit="++")[1].astype(np.intp)
     after = r.copy()
     for b in np.unique(block):
         out = block == b

@@ -29,6 +29,6 @@ def test_right_signs_fit_and_a_wrong_one_does_not(device: str) -> None:
     assert quick_misfit(ROBOT, replace(data, joints=data.joints * [1, -1, 1, 1, 1, 1])) > 15e-3
 
 
-@pytest.mark.parametrize("device", ["tracker", "plane", "point"])
+@pytest.mark.parametrize("device", ["tracker", "plane", "point", "strings"])
 def test_other_readings_are_not_judged(device: str) -> None:
     assert not can_be_quick(campaign(device))

@@ -28,13 +28,14 @@ _PULL: Final = 1e-6
 
 
 def can_be_quick(data: Dataset) -> bool:
-    """Return whether readings are distances of targets from points, and nothing else."""
+    """Return whether readings are distances of targets from points nobody measured, and nothing else."""
     return (
         data.fixture is not None
         and data.distance is not None
         and data.height is None
         and data.quaternion is None
         and not data.has_position.any()
+        and (data.setup is None or not data.setup.has_position.any())
         and bool((np.isfinite(data.distance) & (data.against >= 0)).all())
     )
 
@@ -42,8 +43,8 @@ def can_be_quick(data: Dataset) -> bool:
 def quick_misfit(robot: Robot, data: Dataset) -> float:
     """Return the median size of what the distances are off by [m], where targets and points fit best.
 
-    Each target has points of its own, and what is known of their places does not count: with it the distances are off
-    by more.
+    Each target has points of its own, and what is known of the distances between them does not count: with it they are
+    off by more.
 
     Parameters
     ----------

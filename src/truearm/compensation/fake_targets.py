@@ -124,7 +124,9 @@ def fake_targets(robot: Robot, flange: Array, near: Array) -> FakeTargets:
         return np.asarray(rule.numbers(nominal.forward_kinematics(solutions.joints)) == wanted_branch[rows])
 
     everyone = np.arange(len(flange))
-    missed = np.flatnonzero(~on_branch(found, everyone) | ~found.usable)
+    # What is out of reach was looked for on all branches already.
+    reached = np.array([status is not PoseStatus.UNREACHABLE for status in found.status], dtype=bool)
+    missed = np.flatnonzero((~on_branch(found, everyone) | ~found.usable) & reached)
     if len(missed):
         again = inverse(robot, position[missed], rotation[missed], branch="all", seed=near[missed])
         found = _better(found, again, missed[again.pose], near, on_branch)

@@ -209,11 +209,24 @@ def commanded(robot: Robot, program: Program, cell: Cell = EMPTY_CELL) -> Array:
 
 
 def _base_of(programs: Sequence[ResolvedProgram], frames: Sequence[str], start: Array, flange: Array) -> Array:
-    """Return the base for which the corrections of targets in some frames have no common part."""
-    parts = [(one, one.some(_TARGETS_FOR_BASE // len(programs) + 1, frames)) for one in programs]
+    """Return the base for which the corrections of targets in some frames have no common part.
 
-    def corrected(shift: Array) -> tuple[Array, Array]:
-        tips = [one.tips_with(rows, shift, flange) for one, rows in parts]
-        return np.concatenate([a for a, _ in tips]), np.concatenate([b for _, b in tips])
+    Targets that are found for the first base are followed from there to the next ones. What was out of reach there is
+    looked for again where that ends.
+    """
+    everything = []
+    for one in programs:
+        rows = one.some(_TARGETS_FOR_BASE // len(programs) + 1, frames)
+        everything.append((rows, one.joints_near(rows)))
+    base = start
+    for _ in range(2):
+        parts = everything
 
-    return base_shift(corrected, start)
+        def corrected(shift: Array) -> tuple[Array, Array]:
+            nonlocal parts
+            found = [one.tips_with(*part, shift, flange) for one, part in zip(programs, parts, strict=True)]
+            parts = [(tips.rows, tips.joints) for tips in found]
+            return np.concatenate([tips.before for tips in found]), np.concatenate([tips.after for tips in found])
+
+        base = base_shift(corrected, base)
+    return base

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -56,6 +56,26 @@ def _straight(program: Program) -> frozenset[int]:
             if index is not None:
                 first.setdefault(index, move.kind)
     return frozenset(index for index, kind in first.items() if kind != "joint")
+
+
+@dataclass(frozen=True, eq=False)
+class TipsFound:
+    """Tips of targets for which joint positions were found.
+
+    Attributes
+    ----------
+    rows
+        Of the targets, ``(n,)``.
+    joints
+        The joint positions, ``(n, joints)`` [rad or m].
+    before, after
+        Tips without and with the correction, in the controller's base frame, ``(n, 4, 4)``.
+    """
+
+    rows: NDArray[np.intp]
+    joints: Array
+    before: Array
+    after: Array
 
 
 class ResolvedProgram:
@@ -181,14 +201,25 @@ class ResolvedProgram:
         evenly = np.linspace(0, len(usable) - 1, min(count, len(usable))).astype(int)
         return np.asarray(usable[np.unique(evenly)])
 
-    def tips_with(self, rows: NDArray[np.intp], base: Shift, flange: Array) -> tuple[Array, Array]:
-        """Return tips of targets in the controller's base frame, before and after correction, where found."""
+    def joints_near(self, rows: NDArray[np.intp]) -> Array:
+        """Return the joint positions of the nominal robot at targets, ``(n, joints)`` [rad or m]."""
+        return np.asarray(self._resolved.joints[rows])
+
+    def tips_with(self, rows: NDArray[np.intp], near: Array, base: Shift, flange: Array) -> TipsFound:
+        """Return tips of targets in the controller's base frame, before and after correction, where found.
+
+        Parameters
+        ----------
+        near
+            Joint positions that the answers are near to, on their branch, ``(n, joints)`` [rad or m].
+        """
         if not len(rows):
-            return np.zeros((0, 4, 4)), np.zeros((0, 4, 4))
-        found = self._found(rows, base, flange, pushed=False)
+            return TipsFound(rows, near, np.zeros((0, 4, 4)), np.zeros((0, 4, 4)))
+        found = self._found(rows, base, flange, near, pushed=False)
         good = found.solutions.usable
         tips = self._base.nominal[rows] @ self._poses[rows]
-        return tips[good], (found.flange @ self._tool.nominal[rows])[good]
+        after = found.flange @ self._tool.nominal[rows]
+        return TipsFound(rows[good], found.joints[good], tips[good], after[good])
 
     def correction(self, base: Shift, flange: Array) -> Correction:
         """Return the corrected program, with what was taken for the real base and flange."""
@@ -201,7 +232,7 @@ class ResolvedProgram:
             if row not in self._kept:
                 reasons[row] = self._why_not(row)
         if len(rows):
-            found = self._found(rows, base, flange)
+            found = self._found(rows, base, flange, self.joints_near(rows))
             joints[rows] = found.joints
             for at, row in enumerate(rows.tolist()):
                 if not found.solutions.status[at].usable:
@@ -290,11 +321,13 @@ class ResolvedProgram:
         fakes = np.linalg.inv(self._base.nominal[rows]) @ found.flange @ self._tool.nominal[rows]
         return fakes, found.solutions.usable
 
-    def _found(self, rows: NDArray[np.intp], base: Shift, flange: Array, *, pushed: bool = True) -> FakeTargets:
+    def _found(
+        self, rows: NDArray[np.intp], base: Shift, flange: Array, near: Array, *, pushed: bool = True
+    ) -> FakeTargets:
         poses = self._meant(base, flange)
         wanted = self._base.real(rows, base) @ poses[rows] @ np.linalg.inv(self._tool.real(rows, flange))
         arms, arm = (self._arms, self._arm) if pushed else (self._free_arms, self._free_arm)
-        return fake_targets_of(arms, arm[rows], wanted, self._resolved.joints[rows])
+        return fake_targets_of(arms, arm[rows], wanted, near)
 
     def _first(self, row: int) -> int:
         """Return the target that the offsets up to this one begin at."""

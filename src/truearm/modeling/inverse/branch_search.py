@@ -16,7 +16,7 @@ from truearm.modeling.chain import Array
 from truearm.modeling.inverse.branches import BRANCHES, BranchRule
 from truearm.modeling.inverse.candidates import Candidates
 from truearm.modeling.inverse.closed_form import ClosedForm
-from truearm.modeling.inverse.pose_solver import PoseTask, weakest_motion
+from truearm.modeling.inverse.pose_solver import BOLD_STEPS, STEPS_OF_MANY, PoseTask, weakest_motion
 from truearm.modeling.inverse.turns import beyond_limits, nearest_turns
 from truearm.modeling.transform import homogeneous
 
@@ -38,6 +38,8 @@ _AMOUNTS_ACROSS: Final = (
     (False, (0.05, 0.2, 0.9, 1.8, float(np.sqrt(2) * np.pi))),
     (True, (0.05, 0.2, 0.9, 1.8, float(np.sqrt(2) * np.pi))),
 )
+#: Candidates whose joints differ by less than this are one [rad].
+_SAME_PLACE: Final = 1e-4
 #: Singular value below which calibration errors decide which branches there are.
 _SINGULAR: Final = 0.01
 
@@ -165,11 +167,11 @@ class BranchSearch:
         """Look for branches ``(n, 8)`` that were expected and not found."""
         pool = self._pool
         pose, number = np.nonzero(expected & ~pool.found())
-        pool.add(pose, self._by_fake_targets(pose, number), bold=True)
+        pool.add(pose, self._by_fake_targets(pose, number), bold=True, most=BOLD_STEPS)
         # From candidates that only came near too, where one branch matters: it finds the last few in ten thousand.
         unreached = ~np.asarray(pool.found().any(axis=1))
         origins = pool.reached | unreached[pool.pose] | thorough
-        tried = np.flatnonzero(self._lost(expected)[pool.pose] & origins)
+        tried = _once(pool, np.flatnonzero(self._lost(expected)[pool.pose] & origins))
         value, motion = weakest_motion(self._task.of(pool.pose[tried]), pool.variables[:, tried])
         weak = value < _NEARLY_SINGULAR
         pose, origin, motion = pool.pose[tried][weak], pool.variables[:6, tried[weak]].T, motion[weak]
@@ -177,7 +179,8 @@ class BranchSearch:
             left = np.flatnonzero(self._lost(expected)[pose])
             way = np.tile([*amounts, *(-amount for amount in amounts)], len(left))[:, None]
             again = np.repeat(left, 2 * len(amounts))
-            pool.add(pose[again], origin[again] + way * motion[again], bold=bold)
+            most = BOLD_STEPS if bold else STEPS_OF_MANY
+            pool.add(pose[again], origin[again] + way * motion[again], bold=bold, most=most)
 
     def _by_fake_targets(self, pose: NDArray[np.intp], number: NDArray[np.intp]) -> Array:
         """Return joints ``(m, 6)`` for poses on branches, by closed forms of shifted poses alone.
@@ -199,6 +202,13 @@ class BranchSearch:
             kinematics = part.forward_kinematics(part.variables(joints))
             shifted = wanted @ np.linalg.inv(homogeneous(kinematics.matrix(), kinematics.position.T)) @ shifted
         return joints
+
+
+def _once(pool: Candidates, rows: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return the candidates among `rows` that are not in the same place as another one of their pose before them."""
+    places = np.round(np.column_stack([pool.pose[rows], pool.variables[:6, rows].T / _SAME_PLACE]))
+    _, first = np.unique(places, axis=0, return_index=True)
+    return np.asarray(rows[np.sort(first)])
 
 
 def _missed(task: PoseTask, joints: Array) -> Array:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from truearm.modeling.chain import Array
 from truearm.modeling.inverse.branches import BRANCHES, BranchRule
-from truearm.modeling.inverse.pose_solver import PoseTask, solve
+from truearm.modeling.inverse.pose_solver import MOST_STEPS, PoseTask, solve
 from truearm.modeling.inverse.turns import beyond_limits, nearest_turns
 
 #: A pose is reached within this [m, rad].
@@ -58,7 +58,7 @@ class Candidates:
         self.beyond: NDArray[np.bool_] = np.zeros((0, joints), dtype=bool)
         self.number: NDArray[np.intp] = np.zeros(0, dtype=np.intp)
 
-    def add(self, pose: NDArray[np.intp], starts: Array, *, bold: bool = False) -> None:
+    def add(self, pose: NDArray[np.intp], starts: Array, *, bold: bool = False, most: int = MOST_STEPS) -> None:
         """Solve the poses with these indices and keep what comes out.
 
         Parameters
@@ -67,11 +67,13 @@ class Candidates:
             What the joints have turned by [rad or m], ``(candidates, joints)``.
         bold
             Whether steps need not come nearer.
+        most
+            Steps at most.
         """
         if not len(pose):
             return
         robot, part = self._task.robot, self._task.of(pose)
-        solved = solve(part, starts, bold=bold)
+        solved = solve(part, starts, bold=bold, most=most)
         variables, error = solved.variables, solved.error
         joints = robot.joints_of(variables)
         turns = nearest_turns(robot, joints, self._seed[pose]) - joints

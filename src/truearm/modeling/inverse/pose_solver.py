@@ -36,7 +36,10 @@ _LEVEL_GRADIENT: Final = 1e-6
 _LONGEST_STEP: Final = 0.5
 #: Keeps the normal matrix of a singular arm invertible; what it takes from a step is far below a tenth.
 _FLOOR: Final = 1e-15
-_MOST_STEPS: Final = 60
+#: Steps at most, and where many starts are tried for one branch: what comes near at all is there in half as many.
+MOST_STEPS: Final = 60
+BOLD_STEPS: Final = 20
+STEPS_OF_MANY: Final = 30
 #: Steps before the change of tilts is foreseen; without tilts nearly all poses are met by then.
 _STEPS_WITHOUT_TILTS: Final = 8
 #: Of joints, to find how the tilts follow them [rad, m].
@@ -165,7 +168,7 @@ class Solved:
         return np.asarray(np.linalg.norm(self.error, axis=1))
 
 
-def solve(task: PoseTask, starts: Array, *, bold: bool = False) -> Solved:
+def solve(task: PoseTask, starts: Array, *, bold: bool = False, most: int = MOST_STEPS) -> Solved:
     """Go from starts to the poses of a task, or as near to them as can be.
 
     Parameters
@@ -175,13 +178,15 @@ def solve(task: PoseTask, starts: Array, *, bold: bool = False) -> Solved:
     bold
         Whether a step is taken even if the error grows, undamped. Along a bent valley near a singular posture that is
         faster by far, and it ends anywhere if there is no solution.
+    most
+        Steps at most.
     """
     part, now = task, task.variables(starts)
     found, damping = now.copy(), np.ones(len(starts))
     kinematics = part.forward_kinematics(now)
     e, jacobian = part.error(kinematics), part.jacobian(kinematics)
     error, active = e.copy(), np.arange(len(starts))
-    for number in range(_MOST_STEPS):
+    for number in range(most):
         size = np.linalg.norm(e, axis=1)
         gradient = np.linalg.norm((jacobian * e[:, :, None]).sum(1), axis=1)
         going = (

@@ -1,0 +1,34 @@
+"""The quick look at distances agrees with the placed robot where data fit, and leaves alone what it cannot judge."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from truearm.identification.start_values.quick_distances import can_be_quick, quick_misfit
+from truearm.library import load_robot
+from truearm.measurement.dataset import Dataset
+from truearm.simulation.devices import measured_with, named_device
+from truearm.simulation.truths import truth_twin
+
+ROBOT = load_robot("irb120")
+
+
+def campaign(device: str) -> Dataset:
+    rng = np.random.default_rng(0)
+    return measured_with(named_device(device), ROBOT, truth_twin(ROBOT, "random", rng), 60, rng)
+
+
+@pytest.mark.parametrize("device", ["ballbar", "two-spheres"])
+def test_right_signs_fit_and_a_wrong_one_does_not(device: str) -> None:
+    data = campaign(device)
+    assert can_be_quick(data)
+    assert quick_misfit(ROBOT, data) < 2e-3
+    assert quick_misfit(ROBOT, replace(data, joints=data.joints * [1, -1, 1, 1, 1, 1])) > 15e-3
+
+
+@pytest.mark.parametrize("device", ["tracker", "plane", "point", "strings"])
+def test_other_readings_are_not_judged(device: str) -> None:
+    assert not can_be_quick(campaign(device))

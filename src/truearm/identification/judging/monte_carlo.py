@@ -95,7 +95,7 @@ def monte_carlo(
     held_out
         Joint positions at which the calibrated robots are judged, ``(configurations, joints)``.
     """
-    problem = _of_itself(model.prepared(robot), q, model, sigma)
+    problem = of_itself(model.prepared(robot), q, model, sigma)
     free = problem.free
     drawn = np.array([p.group not in ("base", "target") for p in free.parameters])
     truth = free.nominal + free.prior * drawn * rng.standard_normal((trials, len(free.names)))
@@ -105,12 +105,12 @@ def monte_carlo(
     size = max(1, _BLOCK // len(problem.components))
     for block in (slice(first, first + size) for first in range(0, trials, size)):
         readings[block] += problem.at(truth[block]).residual
-        estimate[block], deviation[block], converged[block] = _calibrated(problem, readings[block])
+        estimate[block], deviation[block], converged[block] = calibrated(problem, readings[block])
     errors = [_position_errors(problem, truth, estimate, held_out, target.name) for target in robot.targets]
     return MonteCarlo(problem, readings, truth, estimate, deviation, converged, np.stack(errors, axis=1))
 
 
-def _of_itself(robot: Robot, q: Array, model: Model, sigma: float) -> Problem:
+def of_itself(robot: Robot, q: Array, model: Model, sigma: float) -> Problem:
     """Return the calibration of a robot from what an instrument without noise reads of it."""
     positions = [robot.world_poses(q, target.name)[0] for target in robot.targets]
     data = Dataset(
@@ -127,21 +127,35 @@ def _of_itself(robot: Robot, q: Array, model: Model, sigma: float) -> Problem:
     return Problem(robot, data, model.free(robot), {})
 
 
-def _calibrated(problem: Problem, readings: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Return estimates, deviations and whether they settled, for `readings` as in :class:`MonteCarlo`."""
+def calibrated(problem: Problem, readings: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Calibrate many robots at once, each as if it were alone: whatever stands beside it, to the last digit.
+
+    Parameters
+    ----------
+    readings
+        As in :class:`MonteCarlo`.
+
+    Returns
+    -------
+    Estimates and deviations [SI], ``(trials, parameters)``, and whether they settled, ``(trials,)``.
+    """
     nominal, prior = problem.free.nominal, problem.free.prior
     x = np.tile(nominal, (len(readings), 1))
+    information = np.empty((*x.shape, x.shape[1]))
+    going = np.arange(len(x))
     for _ in range(_STEPS):
-        here = problem.at(x)
-        r, J = here.residual - readings, here.jacobian
+        here = problem.at(x[going])
+        r, J = here.residual - readings[going], here.jacobian
         Jt = np.swapaxes(J, 1, 2)
-        information = (Jt @ J) * np.outer(prior, prior) + np.eye(len(prior))
-        gradient = (Jt @ r[:, :, None])[:, :, 0] * prior + (x - nominal) / prior
-        step = -np.linalg.solve(information, gradient[:, :, None])[:, :, 0]
-        x = x + step * prior
-        settled = np.abs(step).max(axis=1) < _SMALL
-        if settled.all():
+        information[going] = (Jt @ J) * np.outer(prior, prior) + np.eye(len(prior))
+        gradient = (Jt @ r[:, :, None])[:, :, 0] * prior + (x[going] - nominal) / prior
+        step = -np.linalg.solve(information[going], gradient[:, :, None])[:, :, 0]
+        x[going] += step * prior
+        going = going[~(np.abs(step).max(axis=1) < _SMALL)]
+        if not len(going):
             break
+    settled = np.ones(len(x), dtype=bool)
+    settled[going] = False
     variance = np.diagonal(np.linalg.inv(information), axis1=1, axis2=2)
     return x, prior * np.sqrt(variance), settled
 

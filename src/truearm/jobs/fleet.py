@@ -1,0 +1,152 @@
+"""Many robots: those of a series that were measured, or a whole series simulated."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import time
+from collections.abc import Callable, Iterable
+from concurrent.futures import Executor
+from pathlib import Path
+
+from truearm.errors import InputError, refusals_of, wrong_kind
+from truearm.executing.parts import done_parts
+from truearm.executing.workers import Given, Workers, processes, with_workers
+from truearm.files import path_argument
+from truearm.fleets.experiment import experiment
+from truearm.fleets.manifest import Manifest, read_manifest
+from truearm.fleets.recorded import RECORD, Recorded
+from truearm.jobs.arguments import (
+    command_argument,
+    count_argument,
+    flag_argument,
+    folder_for,
+    name_argument,
+    progress_argument,
+    python_call,
+)
+from truearm.jobs.fleet_parts import Task, finished
+from truearm.results.fleet import FLEET_FILES, Fleet, Run
+from truearm.shown import counted
+from truearm.version import __version__
+
+
+def fleet(
+    manifest: str | Path,
+    *,
+    out: str | Path,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    insecure: bool = False,
+    executor: Executor | None = None,
+    command: str | None = None,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Fleet:
+    """Calibrate many robots, those of a series that were measured or simulated ones, and judge the series.
+
+    What is done is written into the folder part by part. Whatever stops the work, the same call goes on where it
+    stopped; the result is the same to the last digit, whoever does how many parts.
+
+    Parameters
+    ----------
+    manifest
+        File that says which robots, or which experiment, see :mod:`truearm.fleets.manifest`.
+    out
+        Folder for the parts, record.json, fleet.json and robots.csv.
+    workers
+        Processes of this machine that do the parts; None for one a processor. One is this process itself.
+    scheduler
+        Address of a Dask scheduler whose workers do the parts instead, such as ``tcp://127.0.0.1:8786``. It needs the
+        extra ``truearm[fleet]``.
+    insecure
+        Whether a scheduler on another machine may be reached without TLS: whoever can reach it can run programs there.
+    executor
+        Or an executor that does them, which stays open.
+    command
+        How to run it again, for the folder's manifest; None writes the call in Python.
+    progress
+        Called with a few words at each step.
+
+    Raises
+    ------
+    InputError
+        If the manifest, a file that it names, the folder or the scheduler cannot be used.
+    """
+    progress_argument(progress)
+    path = path_argument(manifest, "manifest")
+    count = None if workers is None else count_argument(workers, "workers")
+    address = None if scheduler is None else name_argument(scheduler, "scheduler")
+    insecure = flag_argument(insecure, "insecure")
+    if executor is not None and not isinstance(executor, Executor):
+        raise wrong_kind("an executor belongs here", executor, "executor", "a concurrent.futures.Executor")
+    given = {"workers": count, "scheduler": address, "executor": executor}
+    several = [name for name, value in given.items() if value is not None]
+    if len(several) > 1:
+        raise InputError("one of them does the parts", parameter=", ".join(several), cure="Leave the others out.")
+    call = command_argument(command) or python_call("fleet", manifest, workers=count, scheduler=address)
+    folder = folder_for((RECORD, *FLEET_FILES), out, path)
+    with refusals_of("manifest"):
+        asked = read_manifest(path)
+        make = _tasks(asked)
+    recorded = Recorded(folder, asked)
+    recorded.begin()
+    with recorded.alone():
+        before = recorded.done()
+        missing = [part for part in range(asked.parts) if part not in before]
+        run = Run(asked.parts, len(before))
+        if missing:
+            chosen = _workers(count, address, insecure, executor, len(missing))
+            with with_workers(chosen) as open_:
+                run = _computed(recorded, map(make, missing), open_, len(before), progress)
+        progress("reading the parts")
+        found = Fleet(recorded, run, call)
+        found.save()
+    return found
+
+
+def _workers(
+    count: int | None, scheduler: str | None, insecure: bool, executor: Executor | None, parts: int
+) -> Workers:
+    """Return who does the parts."""
+    if executor is not None:
+        return Given(executor)
+    if scheduler is not None:
+        from truearm.executing.cluster import cluster
+
+        return cluster(scheduler, insecure=insecure)
+    return processes(min(count or os.cpu_count() or 1, parts))
+
+
+def _tasks(asked: Manifest) -> Callable[[int], Task]:
+    """Return what makes the task of a part."""
+    if asked.experiment is None:
+        return lambda part: Task(part, __version__, robots=tuple(asked.robots[n] for n in asked.numbers(part)))
+    made = pickle.dumps(experiment(asked.experiment))
+    return lambda part: Task(part, __version__, made, tuple(asked.numbers(part)))
+
+
+def _computed(
+    recorded: Recorded, tasks: Iterable[Task], workers: Workers, before: int, progress: Callable[[str], None]
+) -> Run:
+    """Let workers do what is missing, and write each part as it comes."""
+    asked = recorded.manifest
+    told, lost = list[str](), list[int]()
+    done, failed, began = before, 0, time.perf_counter()
+
+    def tell(words: str) -> None:
+        told.append(words)
+        progress(words)
+
+    progress(f"part {done} of {asked.parts}")
+    for one in done_parts(finished, tasks, workers, tell):
+        done += 1
+        if one.result is None:
+            lost.append(one.part.part)
+            continue
+        recorded.write(one.part.part, one.result.text)
+        failed += one.result.failed
+        left = (time.perf_counter() - began) / (done - before) * (asked.parts - done)
+        words = f", {counted(failed, 'robot')} failed" if failed else ""
+        progress(f"part {done} of {asked.parts}{words}, about {left:.0f} s left")
+    names = [name for part in sorted(lost) for name in asked.names(part)]
+    return Run(asked.parts, before, tuple(told), tuple(names))

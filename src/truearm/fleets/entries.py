@@ -80,7 +80,8 @@ def robots_of(
     """
     if not isinstance(said, list):
         raise InputError("a list of robots belongs here", where=f"{manifest}, robots")
-    robots, files = [], {}
+    robots: list[RobotEntry] = []
+    files: dict[str, Path] = {}
     for number, one in enumerate(said, 1):
         entry = validated(one, _Entry, f"{manifest}, robots[{number}]")
         if any(entry.name == known.name for known in robots):

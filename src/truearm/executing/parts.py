@@ -15,16 +15,12 @@ from truearm.shown import counted
 Part = TypeVar("Part")
 Result = TypeVar("Result")
 
-#: How often workers that die take a part with them before it is given up.
+#: How often workers may die of a part that is done alone before it is given up.
 _MOST_DEATHS: Final = 3
-#: Pools whose workers all died one after the other before any part was done.
-_MOST_POOLS: Final = 3
+#: How often workers may die one after the other before any part is done.
+_MOST_IN_A_ROW: Final = 10
 #: How long to wait before looking after the workers [s].
 _PATIENCE: Final = 1.0
-
-
-class WorkerLost(Exception):
-    """What an executor raises that has repeated a part on several workers and lost them all."""
 
 
 @dataclass(frozen=True)
@@ -40,12 +36,11 @@ def done_parts(
     parts: Iterable[Part],
     workers: Workers,
     tell: Callable[[str], None] = lambda _: None,
-    lost: tuple[type[BaseException], ...] = (),
 ) -> Iterator[Done[Part, Result]]:
     """Do parts of work, and return each as soon as it is done.
 
-    Where a worker dies, new ones are started. Nobody knows which of the parts that were being done killed it, so they
-    are repeated one by one; the one that kills its worker again and again is given up.
+    Where a worker dies, new ones are started. Nobody knows of which of the parts that were being done it died, so they
+    are repeated one by one; one that kills its worker again and again is given up.
 
     Parameters
     ----------
@@ -57,19 +52,22 @@ def done_parts(
         Who does them.
     tell
         Called with what happened to workers.
-    lost
-        What the executor raises for a part that its workers died of.
 
     Raises
     ------
     InputError
-        If the workers are gone and cannot be replaced.
+        If the workers are gone and cannot be replaced, or all end before they have done anything.
     """
-    return _Run(work, iter(parts), workers, tell, (WorkerLost, *lost)).results()
+    run = _Run(work, iter(parts), workers, tell)
+    try:
+        yield from run.results()
+    finally:
+        for future in run.running:
+            future.cancel()
 
 
 class _Run(Generic[Part, Result]):
-    """Parts that are waiting, being done, and suspected of having killed a worker."""
+    """What is being done, and what will be repeated alone because a worker died while it was done."""
 
     def __init__(
         self,
@@ -77,97 +75,90 @@ class _Run(Generic[Part, Result]):
         parts: Iterator[Part],
         workers: Workers,
         tell: Callable[[str], None],
-        lost: tuple[type[BaseException], ...],
     ) -> None:
-        self.work, self.parts, self.workers, self.tell, self.lost = work, parts, workers, tell, lost
+        self._work, self._parts, self._workers, self._tell = work, parts, workers, tell
         self.running: dict[Future[Result], Part] = {}
-        self.suspects: deque[tuple[Part, int]] = deque()
-        self.alone = 0  # deaths of the one suspect that runs by itself
-        self.pools = 0
+        self._suspects: deque[tuple[Part, int]] = deque()  # with how often a worker died of them alone
+        self._alone: int | None = None  # of the suspect that is being done
+        self._in_a_row = 0
 
     def results(self) -> Iterator[Done[Part, Result]]:
-        try:
-            while self._hand_out():
-                finished, _ = wait(self.running, _PATIENCE, FIRST_COMPLETED)
-                for words in self.workers.news():
-                    self.tell(words)
-                broken = False
-                for future in finished:
-                    part = self.running[future]
-                    try:
-                        result = future.result()
-                    except self.lost:
-                        del self.running[future]
-                        yield Done(part, None)
-                        continue
-                    except (BrokenExecutor, CancelledError) as error:
-                        broken = True
-                        reason = error
-                        continue
-                    del self.running[future]
-                    self.alone = self.pools = 0
-                    yield Done(part, result)
-                if broken:
-                    yield from self._again(reason)
-        finally:
-            for future in self.running:
-                future.cancel()
+        """Go on until every part is done or given up."""
+        while self._hand_out():
+            finished, _ = wait(self.running, _PATIENCE, FIRST_COMPLETED)
+            for words in self._workers.news():
+                self._tell(words)
+            broken: BaseException | None = None
+            for future in finished:
+                try:
+                    result = future.result()
+                except self._workers.lost:
+                    yield Done(self._taken(future), None)
+                except (BrokenExecutor, CancelledError) as error:
+                    broken = error
+                else:
+                    self._in_a_row = 0
+                    yield Done(self._taken(future), result)
+            if broken is not None:
+                yield from self._broken(broken)
+
+    def _taken(self, future: Future[Result]) -> Part:
+        self._alone = None
+        return self.running.pop(future)
 
     def _hand_out(self) -> bool:
         """Hand out as many parts as may be done at once; return whether any is being done."""
-        try:
-            if self.suspects:
-                if not self.running:
-                    part, self.alone = self.suspects[0]
-                    self.running[self.workers.executor.submit(self.work, part)] = part
-                    self.suspects.popleft()
-                return True
-            while len(self.running) < self.workers.in_flight:
-                part = next(self.parts, None)  # type: ignore[arg-type]
-                if part is None:
-                    break
-                try:
-                    future = self.workers.executor.submit(self.work, part)
-                except BrokenExecutor:  # a worker has died meanwhile
-                    self.suspects.append((part, 0))
-                    if not self.running:
-                        self._renew()
-                    return True
-                self.running[future] = part
-        except BrokenExecutor:
-            self._renew()
-            return True
+        while not self._suspects and len(self.running) < self._workers.in_flight:
+            found = next(((part,) for part in self._parts), None)
+            if found is None:
+                break
+            if not self._handed(found[0]):
+                self._suspects.append((found[0], 0))
+        while self._suspects and not self.running:
+            part, self._alone = self._suspects[0]
+            if self._handed(part):
+                self._suspects.popleft()
+            else:
+                self._renew()
         return bool(self.running)
 
-    def _again(self, reason: BaseException) -> Iterator[Done[Part, Result]]:
-        """Put the parts that were being done among the suspects; give up the one that was alone too often."""
+    def _handed(self, part: Part) -> bool:
+        """Hand out a part; False if a worker has just died."""
+        try:
+            self.running[self._workers.executor.submit(self._work, part)] = part
+        except BrokenExecutor:
+            return False
+        return True
+
+    def _broken(self, reason: BaseException) -> Iterator[Done[Part, Result]]:
+        """Repeat what was being done, or give up the part of which a worker died alone too often."""
         held = [*self.running.values()]
         self.running.clear()
-        if len(held) == 1 and self.alone + 1 >= _MOST_DEATHS:
-            self.tell("a worker died of the same part again, and the part is given up")
-            self._renew()
-            yield Done(held[0], None)
-            self.alone = 0
-            return
-        deaths = self.alone + 1 if len(held) == 1 else 0
-        self.tell(f"a worker died, and {counted(len(held), 'part')} will be repeated")
-        self.suspects.extendleft((part, deaths) for part in reversed(held))
-        self.alone = 0
+        deaths = 0 if self._alone is None else self._alone + 1
+        self._alone = None
+        given_up = deaths == _MOST_DEATHS
+        if given_up:
+            self._tell("a worker died of the same part again, and the part is given up")
+        else:
+            self._tell(f"a worker died, and {counted(len(held), 'part')} will be repeated")
+            self._suspects.extendleft((part, deaths) for part in reversed(held))
         try:
             self._renew()
         except InputError as error:
             raise error from reason
+        if given_up:
+            yield Done(held[0], None)
 
     def _renew(self) -> None:
-        self.pools += 1
-        if self.pools > _MOST_POOLS * _MOST_DEATHS:
+        self._in_a_row += 1
+        if self._in_a_row > _MOST_IN_A_ROW:
             raise InputError(
                 "worker processes end before they have done anything",
                 parameter="workers",
                 cure="Look at what they print. In a script that Python runs, call the job below: "
                 "if __name__ == '__main__'.",
             )
-        if not self.workers.renew():
+        if not self._workers.renew():
             raise InputError(
                 "the workers are gone",
                 parameter="workers",

@@ -6,11 +6,11 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing.connection import wait
-from typing import Any, Final, ParamSpec, Protocol, TypeVar
+from typing import Final, ParamSpec, Protocol, TypeVar
 
 from truearm.errors import InputError
 
@@ -31,6 +31,10 @@ class Workers(Protocol):
     @property
     def executor(self) -> Executor:
         """Who takes the next part."""
+
+    @property
+    def lost(self) -> tuple[type[BaseException], ...]:
+        """What its executor raises for a part that workers died of, after it was repeated."""
 
     def renew(self) -> bool:
         """Put new workers in the place of those that died; False if that cannot be done."""
@@ -65,6 +69,7 @@ class ThisProcess:
     """Parts are done here, one after the other."""
 
     in_flight: Final = 1
+    lost: tuple[type[BaseException], ...] = ()
 
     def __init__(self) -> None:
         self.executor: Executor = _AtOnce()
@@ -92,6 +97,8 @@ class Processes:
     workers
         How many.
     """
+
+    lost: tuple[type[BaseException], ...] = ()
 
     def __init__(self, workers: int) -> None:
         if getattr(multiprocessing.current_process(), "_inheriting", False):
@@ -158,6 +165,8 @@ class Given:
         How many parts it is handed at once.
     """
 
+    lost: tuple[type[BaseException], ...] = ()
+
     def __init__(self, executor: Executor, in_flight: int = 32) -> None:
         self.executor = executor
         self.in_flight = in_flight
@@ -188,8 +197,3 @@ def with_workers(workers: Workers) -> Iterator[Workers]:
 def processes(workers: int) -> Workers:
     """Return so many processes of this machine; this one alone for one."""
     return ThisProcess() if workers == 1 else Processes(workers)
-
-
-def environment_of_workers() -> Mapping[str, Any]:
-    """Return what every worker has in its environment."""
-    return dict.fromkeys(_ONE_THREAD, "1")

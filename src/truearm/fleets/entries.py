@@ -2,7 +2,7 @@
 
 A table is a CSV file with one row a robot. It has the columns ``name``, ``robot`` and ``data``; ``of`` and ``date`` if
 machines were measured again; and one for each option that some robot has, where an empty cell is what the manifest says
-of all. Files are named from the folder of the file that names them.
+of all. Files are named from the manifest's folder.
 """
 
 from __future__ import annotations
@@ -128,7 +128,6 @@ def robots_of(said: list[Any] | str, options: Mapping[str, Any], manifest: Path)
         table = folder / said
         entries = _rows(table, manifest)
         files[said] = table
-        folder = table.parent
     else:
         entries = [_listed(one, f"{manifest}, robots[{number}]") for number, one in enumerate(said, 1)]
     if not entries:

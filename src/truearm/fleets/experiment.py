@@ -73,7 +73,7 @@ def experiment(asked: ExperimentEntry) -> Experiment:
             came=asked.targets,
             allowed=f"1 to {len(places)}",
         )
-    robot = known.with_frames(known.base, dict([*places.items()][: asked.targets]))  # type: ignore[arg-type]
+    robot = known.with_frames(known.base, dict([*places.items()][: asked.targets]))
     rng = np.random.default_rng(np.random.SeedSequence(asked.seed, spawn_key=(0,)))
     held_out = robot.random_configurations(asked.held_out, rng)
     if isinstance(asked.configurations, int):
@@ -153,12 +153,13 @@ class Series:
                 )
                 for k in kept
             }
-            accuracy = {name: Accuracy.of(all_[i]) for name, all_ in lengths.items()}
             rows.append(
                 Row(
                     name,
                     "calibrated",
-                    **accuracy,
+                    held_out=Accuracy.of(lengths["held_out"][i]),
+                    nominal=Accuracy.of(lengths["nominal"][i]),
+                    truth=Accuracy.of(lengths["truth"][i]),
                     parameters=parameters,
                     fit_status="converged",
                     seconds=seconds,

@@ -111,9 +111,9 @@ def _workers(
     if executor is not None:
         return Given(executor)
     if scheduler is not None:
-        from truearm.executing.cluster import cluster
+        from truearm.executing.cluster import Cluster
 
-        return cluster(scheduler, insecure=insecure)
+        return Cluster(scheduler, insecure=insecure)
     return processes(min(count or os.cpu_count() or 1, parts))
 
 

@@ -113,7 +113,7 @@ class Fleet(Record):
         return {"robots": count, "failed": failed, "means": {kind: np.array(v) for kind, v in means.items()}}
 
     def _accuracies(self) -> dict[str, Mapping[str, float]]:
-        shown = {}
+        shown: dict[str, Mapping[str, float]] = {}
         for kind, values in self._found["means"].items():
             if len(values):
                 quantiles = np.percentile(values, _SHARES) * 1e3

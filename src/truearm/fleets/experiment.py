@@ -138,7 +138,9 @@ class Series:
         for i, number in enumerate(numbers):
             name = made.asked.name(number)
             if not settled[i]:
-                rows.append(Row(name, "failed", "the calibration did not settle", seconds=seconds))
+                rows.append(
+                    Row(name, "failed", "the calibration did not settle", seconds=seconds, robot=made.robot.name)
+                )
                 continue
             parameters = {
                 free.parameters[k].name: FoundParameter(
@@ -161,6 +163,7 @@ class Series:
                     parameters=parameters,
                     fit_status="converged",
                     seconds=seconds,
+                    robot=made.robot.name,
                 )
             )
         return rows

@@ -192,9 +192,9 @@ def read_manifest(path: Path) -> Manifest:
         return Manifest(path, experiment, (), said.chunk or SIMULATED_TOGETHER, content, _hashes(files))
     if said.units is not None:
         raise InputError("nothing here has a unit", where=f"{path}, units", cure="Remove it.")
-    robots, files = robots_of(said.robots, said.options, path)
-    content |= {"robots": [robot.content() for robot in robots]}
-    return Manifest(path, None, robots, said.chunk or MEASURED_TOGETHER, content, _hashes(files))
+    named = robots_of(said.robots or [], said.options, path)
+    content |= {"robots": named.content}
+    return Manifest(path, None, named.entries, said.chunk or MEASURED_TOGETHER, content, _hashes(named.files))
 
 
 def _experiment(said: ManifestFile, path: Path) -> tuple[ExperimentEntry, dict[str, Path]]:

@@ -107,6 +107,14 @@ class Row:
         Codes of what there is to know about it.
     seconds
         How long it took; no result depends on it.
+    robot
+        Name of the robot: robots of one name are compared with one another.
+    errors
+        Those of `notices` that are of the level error.
+    drawn
+        Whether priors drew the parameters towards nominal.
+    covariance
+        Of the parameters, in priors: the rows of the lower triangle one after the other; empty where it is not kept.
     """
 
     name: str
@@ -121,6 +129,15 @@ class Row:
     fit_status: str | None = None
     notices: tuple[str, ...] = ()
     seconds: float = 0.0
+    robot: str = ""
+    errors: tuple[str, ...] = ()
+    drawn: bool = True
+    covariance: tuple[float, ...] = ()
+
+    @property
+    def machine(self) -> str:
+        """The machine that was measured: rows of one machine are measurements of it at several times."""
+        return self.of or self.name
 
     def content(self, shared: Mapping[str, Mapping[str, Any]] | None = None) -> dict[str, Any]:
         """Return it as JSON holds it, without what `shared` says of its parameters already."""
@@ -143,6 +160,10 @@ class Row:
             "fit_status": self.fit_status,
             "notices": [*self.notices],
             "seconds": self.seconds,
+            "robot": self.robot,
+            "errors": [*self.errors],
+            **({} if self.drawn else {"drawn": False}),
+            **({"covariance": [*self.covariance]} if self.covariance else {}),
         }
 
     @classmethod
@@ -168,4 +189,8 @@ class Row:
             fit_status=content["fit_status"],
             notices=tuple(content["notices"]),
             seconds=content["seconds"],
+            robot=content["robot"],
+            errors=tuple(content["errors"]),
+            drawn=content.get("drawn", True),
+            covariance=tuple(content.get("covariance", ())),
         )

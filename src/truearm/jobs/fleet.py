@@ -87,7 +87,7 @@ def fleet(
     folder = folder_for((RECORD, *FLEET_FILES), out, path)
     with refusals_of("manifest"):
         asked = read_manifest(path)
-        make = _tasks(asked)
+        make = _tasks(asked, folder.absolute())
     recorded = Recorded(folder, asked)
     recorded.check()
     missing = asked.parts - len(recorded.done())
@@ -115,10 +115,11 @@ def _workers(
     return processes(min(count or os.cpu_count() or 1, parts))
 
 
-def _tasks(asked: Manifest) -> Callable[[int], Task]:
+def _tasks(asked: Manifest, folder: Path) -> Callable[[int], Task]:
     """Return what makes the task of a part."""
     if asked.experiment is None:
-        return lambda part: Task(part, __version__, robots=tuple(asked.robots[n] for n in asked.numbers(part)))
+        robots = asked.robots
+        return lambda part: Task(part, __version__, robots=tuple(robots[n] for n in asked.numbers(part)), folder=folder)
     made = pickle.dumps(experiment(asked.experiment))
     return lambda part: Task(part, __version__, made, tuple(asked.numbers(part)))
 

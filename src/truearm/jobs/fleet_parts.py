@@ -5,6 +5,7 @@ from __future__ import annotations
 import pickle
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 
 from truearm.errors import InputError
 from truearm.fleets.entries import RobotEntry
@@ -30,6 +31,8 @@ class Task:
         Which simulated robots, counted from 0.
     robots
         Or which measured ones.
+    folder
+        Of the fleet, for what is written of each robot that was measured.
     """
 
     part: int
@@ -37,6 +40,7 @@ class Task:
     experiment: bytes | None = None
     numbers: tuple[int, ...] = ()
     robots: tuple[RobotEntry, ...] = ()
+    folder: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -71,7 +75,7 @@ def finished(task: Task) -> Finished:
         series = _series(task.experiment)
         rows, shared = series.rows(task.numbers), series.shared
     else:
-        rows, shared = [calibrated_row(entry) for entry in task.robots], {}
+        rows, shared = [calibrated_row(entry, task.folder) for entry in task.robots], {}
     return Finished(part_text(rows, shared), sum(row.status == "failed" for row in rows))
 
 

@@ -1,0 +1,242 @@
+"""Machines that were measured again: which parameters have changed, how fast, and how sure that is.
+
+Two results of one machine share what the priors add: where nothing but a prior holds a parameter both are at nominal,
+and their difference says nothing. Be ``C_1`` and ``C_2`` their covariances with the variances ``P`` of the priors as
+unit. If the machine is the same, its true values vary as the priors say, and base and targets stood elsewhere, then the
+results covary by ``(I - C_1)(I - C_2)``, each varies by ``I - C``, and their difference by ``C_1 + C_2 - C_1 C_2 -
+C_2 C_1``: what errors of the readings add, and what the two campaigns shrink differently. Where both determine nothing
+but ``d_2 + d_3`` that is as small as the sum is known, although each alone is known to its prior only.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from truearm.fleets.analysis.accuracy import SURE
+from truearm.fleets.analysis.kind import Kind
+from truearm.modeling.chain import Array
+
+#: Days of a month.
+MONTH: Final = 365.25 / 12.0
+#: In at most this share of fleets is a drift told although no machine has changed.
+FALSE_ALARMS: Final = 0.05
+#: Machines from which on it is asked whether all drift alike.
+_LEAST_ALIKE: Final = 5
+
+
+@dataclass(frozen=True)
+class Drift:
+    """How a parameter of a machine went on from campaign to campaign; everything in SI units.
+
+    Attributes
+    ----------
+    machine
+        Which one.
+    parameter, unit
+        Its name and unit.
+    campaigns
+        So many measurements of it.
+    months
+        From the first to the last.
+    slope, low, high
+        Change in a month with its interval of 95 %.
+    times
+        The slope in its deviations.
+    chance
+        How often a fleet in which nothing changes shows one so large anywhere, 1 at most.
+    steady
+        Whether a straight line fits; None of two campaigns, which any line fits.
+    alone
+        Whether the value is the parameter's own; False where it is told together with others.
+    """
+
+    machine: str
+    parameter: str
+    unit: str
+    campaigns: int
+    months: float
+    slope: float
+    low: float
+    high: float
+    times: float
+    chance: float
+    steady: bool | None
+    alone: bool
+
+    @property
+    def significant(self) -> bool:
+        """Whether the change is more than chance."""
+        return self.chance < FALSE_ALARMS
+
+    @property
+    def change(self) -> float:
+        """From the first campaign to the last, along the line [SI]."""
+        return self.slope * self.months
+
+
+@dataclass(frozen=True)
+class AllDrift:
+    """A parameter that changes alike in all machines: [SI] a month, mean over machines, with its interval of 95 %."""
+
+    parameter: str
+    unit: str
+    machines: int
+    slope: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Drifts:
+    """Machines that were measured again.
+
+    Attributes
+    ----------
+    found
+        Every parameter of every one of them, the surest change first.
+    alike
+        Parameters that change alike in all machines: what measured them may have changed instead.
+    undated
+        Machines with several measurements, but not at two known dates.
+    unknown
+        Parameters of which no change can be seen, because nothing but priors holds them.
+    """
+
+    found: tuple[Drift, ...] = ()
+    alike: tuple[AllDrift, ...] = ()
+    undated: tuple[str, ...] = ()
+    unknown: tuple[str, ...] = ()
+
+    @property
+    def significant(self) -> tuple[Drift, ...]:
+        """What has changed by more than chance."""
+        return tuple(one for one in self.found if one.significant)
+
+    @property
+    def machines(self) -> tuple[str, ...]:
+        """The machines that were measured again at a known date."""
+        return tuple(dict.fromkeys(one.machine for one in self.found))
+
+
+def drifts(kind: Kind) -> Drifts:
+    """Return how parameters of machines that were measured at several dates went on.
+
+    A line is fitted through the results of each machine, weighted by the covariance of the differences between them.
+    The chance is that of the normal distribution times the number of comparisons (Bonferroni).
+    """
+    again: dict[str, list[int]] = {}
+    for row, machine in enumerate(kind.machines):
+        again.setdefault(machine, []).append(row)
+    lines, undated = [], []
+    for machine, rows in again.items():
+        if len(rows) < 2:
+            continue
+        dated = sorted((row for row in rows if not np.isnan(kind.days[row])), key=lambda row: kind.days[row])
+        if len(dated) < 2 or kind.days[dated[0]] == kind.days[dated[-1]]:
+            undated.append(machine)
+            continue
+        lines += _lines(kind, machine, dated)
+    if not lines:
+        return Drifts(undated=tuple(undated))
+    told = _with_chances(lines)
+    unknown = tuple(name for name, share in zip(kind.parameters, kind.share.tolist(), strict=True) if not share >= 0.05)
+    return Drifts(
+        tuple(sorted(told, key=lambda one: (one.chance, -abs(one.times)))), _alike(told), tuple(undated), unknown
+    )
+
+
+def _lines(kind: Kind, machine: str, rows: list[int]) -> list[Drift]:
+    """Return a line through the campaigns of a machine for each parameter that all of them determine or share."""
+    from scipy.special import chdtrc
+
+    months = (kind.days[rows] - kind.days[rows[0]]) / MONTH
+    z = 1.959963984540054
+    made = []
+    covariances = _covariances(kind, rows)
+    for number in np.flatnonzero(kind.determined | kind.shared).tolist():
+        values = kind.difference[rows, number]
+        if np.isnan(values).any():
+            continue
+        variance = covariances[:, :, number] * kind.prior[number] ** 2
+        contrast = np.diff(np.eye(len(rows)), axis=0)
+        between = contrast @ variance @ contrast.T
+        y, t = contrast @ values, contrast @ months
+        scale = np.sqrt(np.maximum(np.diag(between), 0.0))
+        if not (scale > 0.0).all():
+            continue
+        inverse = np.linalg.pinv(between / np.outer(scale, scale), hermitian=True) / np.outer(scale, scale)
+        weight = float(t @ inverse @ t)
+        if not weight > 0.0:
+            continue
+        slope, error = float(t @ inverse @ y) / weight, weight**-0.5
+        left = y - slope * t
+        steady = None if len(rows) == 2 else bool(chdtrc(len(rows) - 2, float(left @ inverse @ left)) > 1.0 - SURE)
+        alone = bool(kind.determined[number])
+        pull = float(np.mean(kind.pull[rows, number])) if alone else 1.0
+        made.append(
+            Drift(
+                machine=machine,
+                parameter=kind.parameters[number],
+                unit=kind.units[number],
+                campaigns=len(rows),
+                months=float(months[-1]),
+                slope=slope / pull,
+                low=(slope - z * error) / pull,
+                high=(slope + z * error) / pull,
+                times=slope / error,
+                chance=1.0,
+                steady=steady,
+                alone=alone,
+            )
+        )
+    return made
+
+
+def _covariances(kind: Kind, rows: list[int]) -> Array:
+    """Return how the results of campaigns covary, parameter by parameter, in priors ``(rows, rows, parameters)``."""
+    own = (kind.deviation[rows] / kind.prior) ** 2
+    if not kind.drawn[rows].all():  # nothing is shared
+        return np.asarray(np.eye(len(rows))[:, :, None] * own[:, None, :])
+    whole = [kind.covariances[row] for row in rows]
+    known = [c for c in whole if c is not None]
+    if len(known) == len(rows):
+        stacked = np.stack(known)
+        both = np.einsum("rij,sij->rsi", stacked, stacked)
+        own = np.einsum("rii->ri", stacked)
+    else:  # without correlations, at least as large
+        both = own[:, None, :] * own[None, :, :]
+    made = 1.0 - own[:, None, :] - own[None, :, :] + both
+    made[np.arange(len(rows)), np.arange(len(rows))] = 1.0 - own
+    return np.asarray(made)
+
+
+def _with_chances(lines: list[Drift]) -> list[Drift]:
+    from scipy.special import ndtr
+
+    times = np.array([one.times for one in lines])
+    chances = np.minimum(2.0 * ndtr(-np.abs(times)) * len(lines), 1.0)
+    return [replace(one, chance=chance) for one, chance in zip(lines, chances.tolist(), strict=True)]
+
+
+def _alike(lines: list[Drift]) -> tuple[AllDrift, ...]:
+    """Return parameters whose mean slope over the machines is more than chance (Student's t, Bonferroni)."""
+    from scipy.special import stdtrit
+
+    of: dict[str, list[Drift]] = {}
+    for one in lines:
+        of.setdefault(one.parameter, []).append(one)
+    made = []
+    for name, those in of.items():
+        n = len(those)
+        if n < _LEAST_ALIKE:
+            continue
+        slopes = np.array([one.slope for one in those])
+        mean, error = float(np.mean(slopes)), float(np.std(slopes, ddof=1) / np.sqrt(n))
+        tail = (1.0 - SURE) / 2.0
+        if error > 0.0 and abs(mean) > float(stdtrit(n - 1, 1.0 - tail / len(of))) * error:
+            half = float(stdtrit(n - 1, 1.0 - tail)) * error
+            made.append(AllDrift(name, those[0].unit, n, mean, mean - half, mean + half))
+    return tuple(made)

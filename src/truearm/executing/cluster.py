@@ -5,6 +5,7 @@ from __future__ import annotations
 import ipaddress
 import logging
 import pkgutil
+import socket
 import time
 from concurrent.futures import Executor
 from typing import Any, Final
@@ -15,12 +16,19 @@ from truearm.shown import counted, listed
 from truearm.version import __version__
 
 #: How long to wait for the scheduler, and for its first worker [s].
-PATIENCE: Final = 8.0
+PATIENCE: Final = 4.0
+#: How long to wait for its first words [s].
+_GREETING: Final = 2.0
 #: How long there may be no worker before the work is given up [s].
 _ALONE: Final = 60.0
 #: How often to ask the scheduler about its workers [s].
 _LOOK: Final = 2.0
+#: What a scheduler says first [bytes], and how long a message it may announce.
+_LENGTH: Final = 8
+_LONGEST_GREETING: Final = 1_000_000
+#: How schedulers are reached.
 _PROTOCOLS: Final = ("tcp", "tls")
+#: What to do where the cluster has gone.
 _RUN_AGAIN: Final = "Run this again when it is there: what is on disk is not computed twice."
 
 
@@ -58,25 +66,47 @@ class Cluster:
         self.executor: Executor = self._client.get_executor(pure=False)
 
     def _reached(self, distributed: Any) -> Any:
-        import dask
-
+        """Return a client of the scheduler, once it is sure that one listens: Dask waits for others for ever."""
+        client = distributed.Client.__new__(distributed.Client)
         try:
-            with dask.config.set({"distributed.comm.timeouts.connect": PATIENCE}):
-                return distributed.Client(self._address, timeout=PATIENCE, set_as_default=False)
-        except TypeError as error:  # what Dask raises for TLS without certificates
-            raise InputError(
-                f"the scheduler cannot be reached by TLS ({_first_line(error)})",
-                parameter="scheduler",
-                came=self._address,
-                cure="Name the certificates in Dask's configuration: distributed.comm.tls.",
-            ) from error
-        except (OSError, ValueError, RuntimeError) as error:
+            self._greeted(distributed)
+            client.__init__(self._address, timeout=PATIENCE, set_as_default=False)
+        except Exception as error:
+            client.status = "closed"  # or it would be waited for when it is forgotten
+            if isinstance(error, InputError) or not isinstance(error, OSError | ValueError | RuntimeError):
+                raise
             raise InputError(
                 "no Dask scheduler answers there",
                 parameter="scheduler",
                 came=self._address,
                 cure="Start one with 'dask scheduler', or correct the address.",
             ) from error
+        return client
+
+    def _greeted(self, distributed: Any) -> None:
+        """Make sure that a scheduler listens: it speaks first, the length of a short message."""
+        parts = urlsplit(self._address)
+        with socket.create_connection((str(parts.hostname), int(parts.port or 0)), timeout=PATIENCE) as plain:
+            stream = plain
+            if parts.scheme == "tls":
+                context = distributed.Security().get_connection_args("client").get("ssl_context")
+                if context is None:
+                    raise InputError(
+                        "the scheduler is reached by TLS, and there are no certificates for that",
+                        parameter="scheduler",
+                        came=self._address,
+                        cure="Name them in Dask's configuration: distributed.comm.tls.",
+                    )
+                stream = context.wrap_socket(plain, server_hostname=parts.hostname)
+            first = b""
+            stream.settimeout(_GREETING)
+            while len(first) < _LENGTH:
+                came = stream.recv(_LENGTH - len(first))
+                if not came:
+                    raise OSError("nothing is said there")
+                first += came
+            if int.from_bytes(first, "little") > _LONGEST_GREETING:
+                raise OSError("something else listens there")
 
     def _waited_for_workers(self) -> dict[str, Any]:
         """Return the workers as soon as there are any."""
@@ -209,10 +239,6 @@ def _is_here(host: str) -> bool:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
         return False
-
-
-def _first_line(error: BaseException) -> str:
-    return str(error).strip().partition("\n")[0].rstrip(".")
 
 
 def _distributed() -> Any:

@@ -55,8 +55,8 @@ class Recorded:
         """Return where a part is, counted from 0."""
         return self.folder / PARTS / f"{part // _TOGETHER:04}" / f"{part + 1:07}.jsonl"
 
-    def begin(self) -> None:
-        """Write down what is asked, or refuse a folder in which something else was.
+    def check(self) -> None:
+        """Refuse a folder in which something else was asked.
 
         Raises
         ------
@@ -74,7 +74,13 @@ class Recorded:
                 where=str(self.folder / PARTS),
                 cure="Choose another `out`.",
             )
-        write_text(path, json.dumps(self._record(), indent=1, default=str) + "\n")
+
+    def begin(self) -> None:
+        """Write down what is asked, where it does not stand there yet."""
+        path = self.folder / RECORD
+        if not exists(path):
+            write_text(path, json.dumps(self._record(), indent=1, default=str) + "\n")
+        self.check()
 
     def _record(self) -> dict[str, Any]:
         asked = self.manifest

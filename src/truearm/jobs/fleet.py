@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 import pickle
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from concurrent.futures import Executor
 from pathlib import Path
 
 from truearm.errors import InputError, refusals_of, wrong_kind
 from truearm.executing.parts import done_parts
-from truearm.executing.workers import Given, Workers, processes, with_workers
+from truearm.executing.workers import Given, ThisProcess, Workers, processes, with_workers
 from truearm.files import path_argument
 from truearm.fleets.experiment import experiment
 from truearm.fleets.manifest import Manifest, read_manifest
@@ -89,18 +89,16 @@ def fleet(
         asked = read_manifest(path)
         make = _tasks(asked, folder.absolute())
     recorded = Recorded(folder, asked)
-    recorded.begin()
-    with recorded.alone():
-        before = recorded.done()
-        missing = [part for part in range(asked.parts) if part not in before]
-        run = Run(asked.parts, len(before))
-        if missing:
-            chosen = _workers(count, address, insecure, executor, len(missing))
-            with with_workers(chosen) as open_:
-                run = _computed(recorded, map(make, missing), open_, len(before), progress)
-        progress("reading the parts")
-        found = Fleet(recorded, run, call)
-        found.save()
+    recorded.check()
+    missing = asked.parts - len(recorded.done())
+    chosen = _workers(count, address, insecure, executor, missing) if missing else ThisProcess()
+    with with_workers(chosen):
+        recorded.begin()
+        with recorded.alone():
+            run = _computed(recorded, make, chosen, progress)
+            progress("reading the parts")
+            found = Fleet(recorded, run, call)
+            found.save()
     return found
 
 
@@ -127,12 +125,13 @@ def _tasks(asked: Manifest, folder: Path) -> Callable[[int], Task]:
 
 
 def _computed(
-    recorded: Recorded, tasks: Iterable[Task], workers: Workers, before: int, progress: Callable[[str], None]
+    recorded: Recorded, make: Callable[[int], Task], workers: Workers, progress: Callable[[str], None]
 ) -> Run:
     """Let workers do what is missing, and write each part as it comes."""
-    asked = recorded.manifest
+    asked, known = recorded.manifest, recorded.done()
+    tasks = (make(part) for part in range(asked.parts) if part not in known)
     told, lost = list[str](), list[int]()
-    done, failed, began = before, 0, time.perf_counter()
+    done, failed, began = len(known), 0, time.perf_counter()
 
     def tell(words: str) -> None:
         told.append(words)
@@ -146,8 +145,8 @@ def _computed(
             continue
         recorded.write(one.part.part, one.result.text)
         failed += one.result.failed
-        left = (time.perf_counter() - began) / (done - before) * (asked.parts - done)
+        left = (time.perf_counter() - began) / (done - len(known)) * (asked.parts - done)
         words = f", {counted(failed, 'robot')} failed" if failed else ""
         progress(f"part {done} of {asked.parts}{words}, about {left:.0f} s left")
     names = [name for part in sorted(lost) for name in asked.names(part)]
-    return Run(asked.parts, before, tuple(told), tuple(names))
+    return Run(asked.parts, len(known), tuple(told), tuple(names))

@@ -1,8 +1,8 @@
 """Series of robots with a known spread, known faults and a known drift, calibrated in closed form.
 
-A calibration is linear here: readings are the Jacobian times the true differences plus noise, and the estimate is that of
-least squares with priors, base and target free. So spread, drift and covariances are exact, and a thousand robots take
-no time.
+A calibration is linear here: readings are the Jacobian times the true differences plus noise, and the estimate is that
+of least squares with priors, base and target free. So spread, drift and covariances are exact, and a thousand robots
+take no time.
 """
 
 from __future__ import annotations

@@ -78,7 +78,7 @@ def accuracy_lines(found: Analysis) -> list[str]:
     if found.failed:
         low, high = (100.0 * end for end in found.failing)
         text.append(
-            f"Not calibrated: {len(found.failed)} of {found.measurements}; of such a series {low:.2g} to {high:.2g} % "
+            f"Not calibrated: {len(found.failed)} of {found.measurements}; of such a series {low:.3g} to {high:.3g} % "
             "(95 %)."
         )
     return text

@@ -29,6 +29,8 @@ _LEAST_ALIKE: Final = 5
 #: Machines of which every parameter is told; of more, deviations beyond which a change may be more than chance.
 _FEW: Final = 50
 _LIKELY: Final = 2.5
+#: A line is called no line where chance alone bends one as far so rarely.
+_BENT: Final = 0.01
 
 
 @dataclass(frozen=True)
@@ -201,7 +203,7 @@ def _lines(kind: Kind, machine: str, rows: list[int]) -> list[Drift]:
             continue
         slope, error = float(t @ inverse @ y) / weight, weight**-0.5
         left = y - slope * t
-        steady = None if len(rows) == 2 else bool(chdtrc(len(rows) - 2, float(left @ inverse @ left)) > 1.0 - SURE)
+        steady = None if len(rows) == 2 else bool(chdtrc(len(rows) - 2, float(left @ inverse @ left)) > _BENT)
         alone = bool(kind.determined[number])
         pull = float(np.mean(kind.pull[rows, number])) if alone else 1.0
         made.append(

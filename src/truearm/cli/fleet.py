@@ -29,7 +29,6 @@ def fleet(
 ) -> None:
     """Calibrate many robots of a series, measured or simulated; run again, it goes on where it stopped."""
     from truearm.jobs.fleet import fleet as run
-    from truearm.results.fleet import FLEET_FILES
 
     with progress() as say:
         found = run(
@@ -45,5 +44,5 @@ def fleet(
         print_json(found.summary())
     else:
         print_record(found)
-        print_line(f"Written to {out}: {', '.join(FLEET_FILES)}, and the parts")
+        print_line(f"Written to {out}: {', '.join(found.files)}, and the parts")
     end_on_error(found.warnings)

@@ -137,9 +137,9 @@ def _checked(name: str, value: Any, folder: Path, where: str) -> Any:
     if name == "payload":
         with refusals_at(where):
             Payload.of(value, name)
-    known = _KNOWN.get(name)
-    for one in () if known is None else value if isinstance(value, list) else [value]:
-        if one not in known:
+    known = _KNOWN.get(name, ())
+    for one in value if isinstance(value, list) else [value]:
+        if known and one not in known:
             raise InputError(
                 "there is nothing of this name",
                 where=where,

@@ -5,31 +5,28 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
-
+from truearm.fleets.analysis.analysis import Analysis, analysed
+from truearm.fleets.analysis.priors import with_proposed
 from truearm.fleets.recorded import Recorded
 from truearm.fleets.rows import Accuracy
+from truearm.library import load_robot
+from truearm.modeling.formats.robot_file import robot_text
+from truearm.modeling.robot import Robot
 from truearm.notices import Notice
+from truearm.results.fleet_words import analysis_lines, analysis_notices, analysis_summary
 from truearm.results.record import Record, notice_lines, notice_summaries
 from truearm.shown import counted, listed
 from truearm.writing import output_folder, write_files
 
+#: The nominal robot with the priors that follow from a fleet; written where some do.
+PRIORS_FILE: Final = "priors.yaml"
 #: What a fleet writes into its folder beside its parts.
-FLEET_FILES: Final = ("fleet.json", "robots.csv")
-#: Of what accuracies are shown [percent of the robots].
-_SHARES: Final = (5.0, 50.0, 95.0)
-#: What an accuracy is of, by its name in a row.
-_KINDS: Final = {
-    "nominal": "Nominal robots",
-    "held_out": "Calibrated robots",
-    "truth": "Calibrated robots, without the instrument's noise",
-}
+FLEET_FILES: Final = ("fleet.json", "robots.csv", "report.html", PRIORS_FILE)
 
 
 @dataclass(frozen=True)
@@ -84,57 +81,52 @@ class Fleet(Record):
                     "error",
                 )
             )
-        failed = self._found["failed"]
+        failed = self.analysis.failed
         if failed:
             names = listed([name for name, _ in failed])
             found.append(
                 Notice(
                     "robots-failed",
-                    f"{len(failed)} of {counted(self._found['robots'], 'robot')} could not be calibrated ({names}); "
-                    f"the first: {failed[0][1]}",
+                    f"{len(failed)} of {counted(self.analysis.measurements, 'robot')} could not be calibrated "
+                    f"({names}); the first: {failed[0][1]}",
                 )
             )
-        return tuple(found)
+        return (*found, *analysis_notices(self.analysis))
 
     @cached_property
-    def _found(self) -> dict[str, Any]:
-        """Figures of all rows, read once."""
-        means: dict[str, list[float]] = {kind: [] for kind in _KINDS}
-        failed = []
-        count = 0
-        for row in self.recorded.rows():
-            count += 1
-            if row.status == "failed":
-                failed.append((row.name, row.message))
-            for kind, values in means.items():
-                accuracy: Accuracy | None = getattr(row, kind)
-                if accuracy is not None:
-                    values.append(accuracy.mean)
-        return {"robots": count, "failed": failed, "means": {kind: np.array(v) for kind, v in means.items()}}
+    def analysis(self) -> Analysis:
+        """What the fleet says, of all rows, read once."""
+        return analysed(self.recorded.rows())
 
-    def _accuracies(self) -> dict[str, Mapping[str, float]]:
-        shown: dict[str, Mapping[str, float]] = {}
-        for kind, values in self._found["means"].items():
-            if len(values):
-                quantiles = np.percentile(values, _SHARES) * 1e3
-                shown[kind] = {
-                    **{f"p{share:g}": float(value) for share, value in zip(_SHARES, quantiles, strict=True)},
-                    "max": float(values.max()) * 1e3,
-                    "robots": len(values),
-                }
-        return shown
+    @cached_property
+    def proposed(self) -> tuple[Robot, tuple[str, ...]] | None:
+        """The nominal robot with the priors that follow from the kind with most robots, and which; None if none do."""
+        if not self.analysis.kinds or all(one.proposed is None for one in self.analysis.kinds[0].spreads):
+            return None
+        asked, first = self.recorded.manifest, self.analysis.kinds[0].kind.names[0]
+        if asked.experiment is not None:
+            source = asked.experiment.robot
+        else:
+            source = next(entry.robot for entry in asked.robots if entry.name == first)
+        robot, names = with_proposed(load_robot(source), self.analysis.kinds[0].spreads)
+        return (robot, names) if names else None
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Names of the files that are written beside the parts."""
+        return FLEET_FILES if self.proposed is not None else tuple(n for n in FLEET_FILES if n != PRIORS_FILE)
 
     def content(self) -> dict[str, Any]:
         """Return what ``fleet.json`` holds, in mm: the same however the parts were computed."""
-        found = self._found
+        found = self.analysis
         return {
             "truearm": "truearm-fleet-result/1",
             "digest": self.recorded.manifest.digest,
             "robots": self.recorded.manifest.count,
-            "calibrated": found["robots"] - len(found["failed"]),
-            "failed": [{"name": name, "message": message} for name, message in found["failed"]],
+            "calibrated": found.measurements - len(found.failed),
+            "failed": [{"name": name, "message": message} for name, message in found.failed],
             "missing": [*self.run.lost],
-            "mean_error_mm": self._accuracies(),
+            **analysis_summary(found),
         }
 
     def summary(self) -> dict[str, Any]:
@@ -148,52 +140,63 @@ class Fleet(Record):
 
     def lines(self) -> list[str]:
         """Return what the command prints."""
-        found, run = self._found, self.run
+        found, run = self.analysis, self.run
         text = [
             f"{counted(self.recorded.manifest.count, 'robot')}, "
-            f"{found['robots'] - len(found['failed'])} calibrated, {len(found['failed'])} failed."
+            f"{found.measurements - len(found.failed)} calibrated, {len(found.failed)} failed."
         ]
         if run.before:
             text.append(f"{run.before} of {counted(run.parts, 'part')} were on disk already.")
         text += [f"{words[0].upper()}{words[1:]}." for words in run.told]
-        for kind, shown in self._accuracies().items():
-            text.append(
-                f"{_KINDS[kind]}: mean error {shown['p50']:.3f} mm in the middle of the series, "
-                f"{shown['p5']:.3f} to {shown['p95']:.3f} mm for 90 % of it, {shown['max']:.3f} mm at most."
-            )
+        text += analysis_lines(found)
+        if self.proposed is not None:
+            text.append(f"Priors proposed: {counted(len(self.proposed[1]), 'parameter')} in {PRIORS_FILE}.")
         return text + notice_lines(self.warnings)
 
     def csv_text(self) -> str:
         """Return the robots as a table, one row each."""
         stream = io.StringIO()
         table = csv.writer(stream, lineterminator="\n")
-        kinds = [kind for kind in _KINDS if len(self._found["means"][kind])]
-        table.writerow(["name", "of", "date", "status", *(f"{kind} mean [mm]" for kind in kinds), "message"])
+        kinds = [*self.analysis.errors]
+        figures = [f"{kind} {figure} [mm]" for kind in kinds for figure in ("mean", "max")]
+        table.writerow(["name", "of", "date", "status", "fit", *figures, "errors", "look", "message"])
+        looks = {look.robot: look.reasons for look in self.analysis.looks}
         for row in self.recorded.rows():
-            means = [getattr(row, kind) for kind in kinds]
+            errors = [getattr(row, kind) for kind in kinds]
             table.writerow(
                 [
                     row.name,
                     row.of or "",
                     row.date or "",
                     row.status,
-                    *("" if a is None else f"{a.mean * 1e3:.6f}" for a in means),
+                    row.fit_status or "",
+                    *("" if v != v else f"{v * 1e3:.6f}" for a in errors for v in _mean_and_max(a)),
+                    " ".join(row.errors),
+                    " ".join(reason.why.replace(" ", "-") for reason in looks.get(row.name, ())),
                     row.message,
                 ]
             )
         return stream.getvalue()
 
     def save(self) -> tuple[Path, ...]:
-        """Write ``fleet.json`` and ``robots.csv`` beside the parts.
+        """Write ``fleet.json``, ``robots.csv`` and ``report.html`` beside the parts, and ``priors.yaml`` if any follow.
 
         Returns
         -------
         The files written.
         """
+        from truearm.reporting.fleet_report import fleet_html
+
         folder = output_folder(self.recorded.folder, FLEET_FILES, (self.recorded.manifest.file,), ours=True)
-        files = {
+        files: dict[str, str | bytes] = {
             "fleet.json": json.dumps(self.content(), indent=2, allow_nan=False) + "\n",
             "robots.csv": self.csv_text(),
+            "report.html": fleet_html(self),
+            **({} if self.proposed is None else {PRIORS_FILE: robot_text(self.proposed[0])}),
         }
         write_files(folder, files, self.command or None)
         return tuple(folder / name for name in files)
+
+
+def _mean_and_max(errors: Accuracy | None) -> tuple[float, float]:
+    return (float("nan"),) * 2 if errors is None else (errors.mean, errors.max)

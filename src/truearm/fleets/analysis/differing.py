@@ -38,6 +38,8 @@ class Difference:
         What it was compared with: the other robots, or the prior where these are few.
     alone
         Whether the value is the parameter's own; False where it is told together with others.
+    together
+        With which, as far as that is known.
     """
 
     robot: str
@@ -48,6 +50,7 @@ class Difference:
     chance: float
     beside: Beside
     alone: bool
+    together: tuple[str, ...] = ()
 
 
 def differences(kind: Kind) -> tuple[Difference, ...]:
@@ -96,6 +99,7 @@ def differences(kind: Kind) -> tuple[Difference, ...]:
             chance=float(chance[row, column]),
             beside=beside,
             alone=bool(kind.determined[chosen[column]]),
+            together=kind.together(int(chosen[column])),
         )
         for row, column in found.tolist()
     ]

@@ -10,13 +10,14 @@ but ``d_2 + d_3`` that is as small as the sum is known, although each alone is k
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
 from truearm.fleets.analysis.accuracy import SURE
-from truearm.fleets.analysis.kind import Kind
+from truearm.fleets.analysis.kind import UNINFORMED, Kind
 from truearm.modeling.chain import Array
 
 #: Days of a month.
@@ -25,6 +26,9 @@ MONTH: Final = 365.25 / 12.0
 FALSE_ALARMS: Final = 0.05
 #: Machines from which on it is asked whether all drift alike.
 _LEAST_ALIKE: Final = 5
+#: Machines of which every parameter is told; of more, deviations beyond which a change may be more than chance.
+_FEW: Final = 50
+_LIKELY: Final = 2.5
 
 
 @dataclass(frozen=True)
@@ -49,8 +53,12 @@ class Drift:
         How often a fleet in which nothing changes shows one so large anywhere, 1 at most.
     steady
         Whether a straight line fits; None of two campaigns, which any line fits.
+    campaign_months, changes, deviations
+        When each campaign was, in months after the first, what had changed by then, and the standard deviation of that.
     alone
         Whether the value is the parameter's own; False where it is told together with others.
+    together
+        With which, as far as that is known.
     """
 
     machine: str
@@ -64,7 +72,11 @@ class Drift:
     times: float
     chance: float
     steady: bool | None
+    campaign_months: tuple[float, ...]
+    changes: tuple[float, ...]
+    deviations: tuple[float, ...]
     alone: bool
+    together: tuple[str, ...] = ()
 
     @property
     def significant(self) -> bool:
@@ -96,7 +108,10 @@ class Drifts:
     Attributes
     ----------
     found
-        Every parameter of every one of them, the surest change first.
+        Their parameters, the surest change first; of many machines those that changed by more than chance, and the
+        surest of each.
+    compared
+        How many parameters of machines were looked at.
     alike
         Parameters that change alike in all machines: what measured them may have changed instead.
     undated
@@ -106,6 +121,7 @@ class Drifts:
     """
 
     found: tuple[Drift, ...] = ()
+    compared: int = 0
     alike: tuple[AllDrift, ...] = ()
     undated: tuple[str, ...] = ()
     unknown: tuple[str, ...] = ()
@@ -130,7 +146,11 @@ def drifts(kind: Kind) -> Drifts:
     again: dict[str, list[int]] = {}
     for row, machine in enumerate(kind.machines):
         again.setdefault(machine, []).append(row)
-    lines, undated = [], []
+    lines: list[Drift] = []
+    undated = []
+    slopes: dict[str, list[float]] = {}
+    compared = 0
+    few = sum(len(rows) > 1 for rows in again.values()) <= _FEW
     for machine, rows in again.items():
         if len(rows) < 2:
             continue
@@ -138,13 +158,21 @@ def drifts(kind: Kind) -> Drifts:
         if len(dated) < 2 or kind.days[dated[0]] == kind.days[dated[-1]]:
             undated.append(machine)
             continue
-        lines += _lines(kind, machine, dated)
-    if not lines:
-        return Drifts(undated=tuple(undated))
-    told = _with_chances(lines)
-    unknown = tuple(name for name, share in zip(kind.parameters, kind.share.tolist(), strict=True) if not share >= 0.05)
+        of_machine = sorted(_lines(kind, machine, dated), key=lambda one: -abs(one.times))
+        compared += len(of_machine)
+        for one in of_machine:
+            slopes.setdefault(one.parameter, []).append(one.slope)
+        lines += [one for i, one in enumerate(of_machine) if few or i == 0 or abs(one.times) > _LIKELY]
+    told = _with_chances(lines, compared)
+    told = [one for i, one in enumerate(told) if few or one.significant or one.machine != told[i - 1].machine]
+    units = dict(zip(kind.parameters, kind.units, strict=True))
+    nothing = kind.share < UNINFORMED
     return Drifts(
-        tuple(sorted(told, key=lambda one: (one.chance, -abs(one.times)))), _alike(told), tuple(undated), unknown
+        tuple(sorted(told, key=lambda one: (one.chance, -abs(one.times)))),
+        compared,
+        _alike(slopes, units),
+        tuple(undated),
+        tuple(name for name, held in zip(kind.parameters, nothing.tolist(), strict=True) if held) if lines else (),
     )
 
 
@@ -189,10 +217,22 @@ def _lines(kind: Kind, machine: str, rows: list[int]) -> list[Drift]:
                 times=slope / error,
                 chance=1.0,
                 steady=steady,
+                campaign_months=tuple(months.tolist()),
+                changes=tuple(((values - values[0]) / pull).tolist()),
+                deviations=tuple(_since_first(variance, pull)),
                 alone=alone,
+                together=kind.together(number),
             )
         )
     return made
+
+
+def _since_first(variance: Array, pull: float) -> list[float]:
+    """Return the standard deviations of the changes since the first campaign."""
+    own = np.diag(variance)
+    since = own + own[0] - 2.0 * variance[0]
+    since[0] = 0.0
+    return [float(v) for v in np.sqrt(np.maximum(since, 0.0)) / pull]
 
 
 def _covariances(kind: Kind, rows: list[int]) -> Array:
@@ -213,30 +253,26 @@ def _covariances(kind: Kind, rows: list[int]) -> Array:
     return np.asarray(made)
 
 
-def _with_chances(lines: list[Drift]) -> list[Drift]:
+def _with_chances(lines: list[Drift], compared: int) -> list[Drift]:
     from scipy.special import ndtr
 
     times = np.array([one.times for one in lines])
-    chances = np.minimum(2.0 * ndtr(-np.abs(times)) * len(lines), 1.0)
+    chances = np.minimum(2.0 * ndtr(-np.abs(times)) * compared, 1.0)
     return [replace(one, chance=chance) for one, chance in zip(lines, chances.tolist(), strict=True)]
 
 
-def _alike(lines: list[Drift]) -> tuple[AllDrift, ...]:
+def _alike(slopes: Mapping[str, Sequence[float]], units: Mapping[str, str]) -> tuple[AllDrift, ...]:
     """Return parameters whose mean slope over the machines is more than chance (Student's t, Bonferroni)."""
     from scipy.special import stdtrit
 
-    of: dict[str, list[Drift]] = {}
-    for one in lines:
-        of.setdefault(one.parameter, []).append(one)
     made = []
-    for name, those in of.items():
+    tail = (1.0 - SURE) / 2.0
+    for name, those in slopes.items():
         n = len(those)
         if n < _LEAST_ALIKE:
             continue
-        slopes = np.array([one.slope for one in those])
-        mean, error = float(np.mean(slopes)), float(np.std(slopes, ddof=1) / np.sqrt(n))
-        tail = (1.0 - SURE) / 2.0
-        if error > 0.0 and abs(mean) > float(stdtrit(n - 1, 1.0 - tail / len(of))) * error:
+        mean, error = float(np.mean(those)), float(np.std(those, ddof=1) / np.sqrt(n))
+        if error > 0.0 and abs(mean) > float(stdtrit(n - 1, 1.0 - tail / len(slopes))) * error:
             half = float(stdtrit(n - 1, 1.0 - tail)) * error
-            made.append(AllDrift(name, those[0].unit, n, mean, mean - half, mean + half))
+            made.append(AllDrift(name, units[name], n, mean, mean - half, mean + half))
     return tuple(made)

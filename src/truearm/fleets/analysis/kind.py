@@ -11,10 +11,9 @@ base or target can move instead.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import date
-from itertools import groupby
 from typing import Final
 
 import numpy as np
@@ -28,6 +27,8 @@ DETERMINED: Final = 0.9
 UNINFORMED: Final = 0.05
 #: Nominal values and priors that differ by less, of their size, are the same.
 _SAME: Final = 1e-9
+#: Correlation beyond which two shared parameters are named together.
+_TOGETHER: Final = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +75,15 @@ class Kind:
     drawn: NDArray[np.bool_]
     covariances: tuple[Array | None, ...]
 
+    def together(self, number: int) -> tuple[str, ...]:
+        """Return the parameters with which the readings tell one together, as far as covariances show them."""
+        known = next((c for c in self.covariances if c is not None), None)
+        if known is None or not self.shared[number]:
+            return ()
+        correlation = known[number] / np.sqrt(np.maximum(known[number, number] * np.diag(known), 1e-300))
+        like = np.flatnonzero((np.abs(correlation) > _TOGETHER) & self.shared)
+        return tuple(self.parameters[other] for other in like.tolist() if other != number)
+
     @property
     def latest(self) -> NDArray[np.intp]:
         """Indices of the last measurement of each machine, in order; without dates the last one named."""
@@ -88,7 +98,7 @@ class Kind:
     def share(self) -> Array:
         """Typical informed share of each parameter, ``(parameters,)``; NaN where robots disagree about the prior."""
         with np.errstate(invalid="ignore"):
-            typical = _medians(np.where(np.isnan(self.difference), 0.0, self.informed))
+            typical = np.median(np.where(np.isnan(self.difference), 0.0, self.informed), axis=0)
         return np.where(np.isnan(self.prior), np.nan, typical)
 
     @property
@@ -115,9 +125,11 @@ class Kind:
 
 
 def kinds_of(rows: Iterable[Row]) -> tuple[Kind, ...]:
-    """Return the robots that were calibrated, kind by kind, the kind with most first."""
-    found = sorted((row for row in rows if row.status == "calibrated" and row.parameters), key=lambda row: row.robot)
-    kinds = [_kind(robot, [*those]) for robot, those in groupby(found, key=lambda row: row.robot)]
+    """Return the robots that were calibrated, kind by kind, the kind with most measurements first."""
+    found: dict[str, Gathered] = {}
+    for row in rows:
+        found.setdefault(row.robot, Gathered(row.robot)).add(row)
+    kinds = [gathered.kind for gathered in found.values() if gathered.names]
     return tuple(sorted(kinds, key=lambda kind: -len(kind.names)))
 
 
@@ -126,60 +138,80 @@ def day_of(text: str | None) -> float:
     return float("nan") if text is None else float(date.fromisoformat(text[:10]).toordinal())
 
 
-def _kind(robot: str, rows: Sequence[Row]) -> Kind:
-    known = dict.fromkeys(name for row in rows for name in row.parameters)
-    place = {name: number for number, name in enumerate(known)}
-    shape = (len(rows), len(place))
-    nominal, prior, difference, deviation, informed = (np.full(shape, np.nan) for _ in range(5))
-    units = dict.fromkeys(known, "")
-    for number, row in enumerate(rows):
-        for name, one in row.parameters.items():
-            at = (number, place[name])
-            units[name] = one.unit
-            nominal[at], prior[at] = one.nominal, one.prior
-            difference[at], deviation[at] = one.value - one.nominal, one.deviation
-            informed[at] = _informed(one.deviation, one.prior, drawn=row.drawn)
-    return Kind(
-        robot=robot,
-        names=tuple(row.name for row in rows),
-        machines=tuple(row.machine for row in rows),
-        days=np.array([day_of(row.date) for row in rows]),
-        parameters=tuple(known),
-        units=tuple(units.values()),
-        nominal=_one_for_all(nominal),
-        prior=_one_for_all(prior, _one_for_all(nominal)),
-        difference=difference,
-        deviation=deviation,
-        informed=informed,
-        drawn=np.array([row.drawn for row in rows]),
-        covariances=tuple(_covariance(row, place) for row in rows),
-    )
+class Gathered:
+    """Robots of one kind, taken up one after the other: only their figures are kept."""
+
+    def __init__(self, robot: str) -> None:
+        self.robot = robot
+        self.names: list[str] = []
+        self._machines: list[str] = []
+        self._days: list[float] = []
+        self._drawn: list[bool] = []
+        self._units: dict[str, str] = {}
+        self._places: dict[tuple[str, ...], list[int]] = {}
+        self._found: list[tuple[list[int], Array]] = []
+        self._covariances: list[tuple[float, ...]] = []
+
+    def add(self, row: Row) -> None:
+        """Take up a robot; one that was not calibrated has nothing to compare."""
+        if row.status != "calibrated" or not row.parameters:
+            return
+        self.names.append(row.name)
+        self._machines.append(row.machine)
+        self._days.append(day_of(row.date))
+        self._drawn.append(row.drawn)
+        names = tuple(row.parameters)
+        if names not in self._places:
+            for name, one in row.parameters.items():
+                self._units.setdefault(name, one.unit)
+            place = {name: number for number, name in enumerate(self._units)}
+            self._places[names] = [place[name] for name in names]
+        figures = [(p.value, p.nominal, p.deviation, p.prior) for p in row.parameters.values()]
+        self._found.append((self._places[names], np.array(figures)))
+        self._covariances.append(row.covariance)
+
+    @property
+    def kind(self) -> Kind:
+        """All of them as arrays."""
+        figures = np.full((len(self.names), len(self._units), 4), np.nan)
+        for number, (places, one) in enumerate(self._found):
+            figures[number, places] = one
+        value, nominals, deviation, priors = np.moveaxis(figures, 2, 0)
+        drawn = np.array(self._drawn)
+        share = (deviation / priors) ** 2
+        nominal = _one_for_all(nominals)
+        return Kind(
+            robot=self.robot,
+            names=tuple(self.names),
+            machines=tuple(self._machines),
+            days=np.array(self._days),
+            parameters=tuple(self._units),
+            units=tuple(self._units.values()),
+            nominal=nominal,
+            prior=np.where(np.isnan(nominal), np.nan, _one_for_all(priors)),
+            difference=value - nominals,
+            deviation=deviation,
+            informed=np.where(drawn[:, None], np.maximum(1.0 - share, 0.0), 1.0 / (1.0 + share)),
+            drawn=drawn,
+            covariances=tuple(
+                _whole(covariance, places, len(self._units))
+                for covariance, (places, _) in zip(self._covariances, self._found, strict=True)
+            ),
+        )
 
 
-def _informed(deviation: float, prior: float, *, drawn: bool) -> float:
-    share = (deviation / prior) ** 2
-    return max(1.0 - share, 0.0) if drawn else 1.0 / (1.0 + share)
-
-
-def _one_for_all(values: Array, beside: Array | None = None) -> Array:
-    """Return the one value of each column, NaN where rows disagree or where there is none `beside` it."""
+def _one_for_all(values: Array) -> Array:
+    """Return the one value of each column, NaN where rows disagree."""
     low, high = np.nanmin(values, axis=0), np.nanmax(values, axis=0)
-    same = high - low <= _SAME * np.maximum(np.abs(high), 1e-3)
-    return np.where(same if beside is None else same & ~np.isnan(beside), np.nanmedian(values, axis=0), np.nan)
+    return np.where(high - low <= _SAME * np.maximum(np.abs(high), 1e-3), low, np.nan)
 
 
-def _covariance(row: Row, place: dict[str, int]) -> Array | None:
-    """Return the covariance of a row among all parameters, in priors; parameters it has not identified are at prior."""
-    if not row.covariance:
+def _whole(lower: tuple[float, ...], places: list[int], count: int) -> Array | None:
+    """Return a covariance among all parameters, in priors, from its lower triangle; the others are at their priors."""
+    if not lower:
         return None
-    names = [place[name] for name in row.parameters]
-    own = np.zeros((len(names), len(names)))
-    own[np.tril_indices(len(names))] = row.covariance
-    own = own + np.tril(own, -1).T
-    whole = np.eye(len(place))
-    whole[np.ix_(names, names)] = own
+    own = np.zeros((len(places), len(places)))
+    own[np.tril_indices(len(places))] = lower
+    whole = np.eye(count)
+    whole[np.ix_(places, places)] = own + np.tril(own, -1).T
     return whole
-
-
-def _medians(values: Array) -> Array:
-    return np.asarray(np.median(values, axis=0))

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.fleets.analysis.analysis import Analysis, Errors, KindFound
+from truearm.fleets.analysis.differing import LEAST_COMPARED
 from truearm.fleets.analysis.drift import Drift
 from truearm.reporting.drawing import AFTER, BEFORE, Figure, axis, figure, logarithmic_axis
 from truearm.reporting.numbers import rounded, significant
@@ -23,6 +24,8 @@ _EACH: Final = 200
 _BINS: Final = 40
 #: Robots that differ and are drawn beside boxes.
 _MOST_MARKS: Final = 300
+#: Informed share from which on a parameter is drawn: two that are told together have half each.
+_TOLD: Final = 0.4
 #: Largest error over smallest beyond which an axis is logarithmic.
 _LOGARITHMIC: Final = 15.0
 
@@ -33,7 +36,7 @@ def fleet_figures(found: Analysis) -> dict[str, Figure]:
     if found.errors:
         figures["accuracy"] = accuracy_figure(found)
     judged = found.errors.get("held_out")
-    if judged is not None and len(judged.mean) >= 2:
+    if judged is not None and len(judged.mean) >= LEAST_COMPARED:
         figures["histogram"] = histogram_figure(judged)
     if found.kinds:
         kind = found.kinds[0]
@@ -106,8 +109,9 @@ def histogram_figure(errors: Errors) -> Figure:
 
 
 def _drawn(found: KindFound) -> NDArray[np.intp]:
-    """Return the parameters of which the robots can be compared."""
-    return np.flatnonzero(found.kind.determined | found.kind.shared)
+    """Return the parameters that are worth a look: the readings tell much of them, or a robot differs in them."""
+    differ = np.isin(np.array(found.kind.parameters), [one.parameter for one in found.differences])
+    return np.flatnonzero((found.kind.share > _TOLD) | differ)
 
 
 def parameters_figure(found: KindFound) -> Figure:

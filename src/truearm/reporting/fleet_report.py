@@ -15,12 +15,13 @@ from truearm.reporting.fleet_figures import figures_text, fleet_figures
 from truearm.reporting.numbers import significant
 from truearm.reporting.page import page
 from truearm.results.fleet import PRIORS_FILE, Fleet
-from truearm.results.fleet_words import ERRORS_OF, difference_words, reason_words, together_words
+from truearm.results.fleet_words import difference_words, reason_words, together_words
 from truearm.units import SHOWN_AS
 
 #: Rows of tables of robots: who wants more reads robots.csv and fleet.json.
 _ROWS: Final = 30
 
+_COLUMNS: Final = {"nominal": "nominal", "held_out": "calibrated", "truth": "calibrated, without noise"}
 _VERDICTS: Final = {
     "agrees": "as its prior says",
     "wider": "wider than its prior",
@@ -34,12 +35,10 @@ _VERDICTS: Final = {
 
 @dataclass(frozen=True)
 class Share:
-    """A row of the table of accuracy, as printed."""
+    """Cells of the table of accuracy, as printed: an error below which a share of the robots is, and its interval."""
 
-    share: str
     value: str
-    low: str
-    high: str
+    interval: str
 
 
 def fleet_html(found: Fleet) -> str:
@@ -53,10 +52,8 @@ def fleet_html(found: Fleet) -> str:
         simulated=found.recorded.manifest.experiment is not None,
         said=said,
         lead=_lead(said),
-        accuracies=[
-            (ERRORS_OF[name], len(errors.mean), [_share(one) for one in errors.of_means], _mm(float(errors.mean.max())))
-            for name, errors in said.errors.items()
-        ],
+        columns=[(_COLUMNS[name], len(errors.mean)) for name, errors in said.errors.items()],
+        shares=_shares(said),
         looks=[(look.robot, [reason_words(reason) for reason in look.reasons]) for look in said.looks[:_ROWS]],
         more_looks=max(len(said.looks) - _ROWS, 0),
         kind=kind,
@@ -93,12 +90,23 @@ def _mm(length: float) -> str:
     return significant(length * 1e3)
 
 
+def _shares(said: Analysis) -> list[tuple[str, list[Share]]]:
+    """Return the rows of the table of accuracy."""
+    columns = [errors.of_means for errors in said.errors.values()]
+    rows = [(f"{ones[0].share * 100:g} % below", [_share(one) for one in ones]) for ones in zip(*columns, strict=True)]
+    return [*rows, ("the worst", [Share(_mm(float(errors.mean.max())), "") for errors in said.errors.values()])]
+
+
 def _share(one: Quantile) -> Share:
-    share = f"{one.share * 100:g} %"
     if one.value is None:
-        return Share(share, "not known", "–", f"from {one.needed} robots on")
-    low = "–" if one.low is None else _mm(one.low)
-    return Share(share, _mm(one.value), low, f"from {one.needed} robots on" if one.high is None else _mm(one.high))
+        return Share("not known", f"takes {one.needed} robots")
+    if one.low is None and one.high is None:
+        return Share(_mm(one.value), f"takes {one.needed} robots")
+    if one.high is None or one.low is None:
+        return Share(
+            _mm(one.value), f"above {_mm(one.low)}" if one.low is not None else f"below {_mm(one.high or 0.0)}"
+        )
+    return Share(_mm(one.value), f"{_mm(one.low)} to {_mm(one.high)}")
 
 
 def _spread(one: ParameterSpread, found: KindFound) -> dict[str, Any]:

@@ -207,8 +207,8 @@ def analysis_notices(found: Analysis) -> list[Notice]:
             Notice(
                 "robots-differ",
                 f"{counted(len(differing), 'robot')} {'differs' if len(differing) == 1 else 'differ'} from the others "
-                f"({listed(sorted(differing))}). Look for a collision, a wrong mastering or wrong data before their "
-                "results are used, and before priors are taken from this fleet: they are not counted there.",
+                f"({listed(sorted(differing))}). Look for a collision, a wrong mastering or wrong data before "
+                "these results are used. Priors that this fleet proposes do not count them.",
             )
         )
     changed = list(dict.fromkeys(one.machine for one in found.drifts if one.significant))

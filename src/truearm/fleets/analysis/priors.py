@@ -8,6 +8,7 @@ from dataclasses import replace
 from truearm.fleets.analysis.spread import ParameterSpread
 from truearm.modeling.robot import Robot
 from truearm.shown import counted
+from truearm.units import SHOWN_AS, from_si, to_si
 
 
 def with_proposed(robot: Robot, spreads: Sequence[ParameterSpread]) -> tuple[Robot, tuple[str, ...]]:
@@ -28,3 +29,9 @@ def with_proposed(robot: Robot, spreads: Sequence[ParameterSpread]) -> tuple[Rob
     words = f"priors of {counted(len(proposed), 'parameter')} from the spread of {counted(robots, 'robot')}"
     source = "; ".join(part for part in (robot.source, words) if part)
     return replace(robot.with_parameters(proposed.values()), source=source), tuple(proposed)
+
+
+def _rounded(value: float, unit: str) -> float:
+    """Return a deviation [SI] with three digits in the unit of files: more of them mean nothing."""
+    shown = SHOWN_AS[unit]
+    return to_si(float(f"{from_si(value, shown):.3g}"), shown)

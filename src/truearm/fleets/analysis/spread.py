@@ -109,7 +109,7 @@ def _spread(kind: Kind, number: int, values: Array, variances: Array, compared: 
         nominal=float(kind.nominal[number]),
         prior=prior,
         share=float(kind.share[number]),
-        robots=n,
+        robots=n or int(np.sum(~np.isnan(kind.difference[kind.latest, number]))),
         verdict=verdict,
     )
     if verdict != "too few" or n < LEAST_SPREAD:

@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from pydantic_core import from_json, to_json
+
 from truearm.errors import InputError
 from truearm.files import exists, read_text
 from truearm.fleets.manifest import Manifest
@@ -31,9 +33,8 @@ _TOGETHER: Final = 1000
 
 def part_text(rows: list[Row], shared: Mapping[str, Mapping[str, Any]]) -> str:
     """Return robots as a part holds them, behind its first line."""
-    lines = [json.dumps({"shared": shared}, allow_nan=False)]
-    lines += [json.dumps(row.content(shared), allow_nan=False) for row in rows]
-    return "\n".join(lines) + "\n"
+    lines = [to_json({"shared": shared}), *(to_json(row.content(shared)) for row in rows)]
+    return "".join(f"{line.decode()}\n" for line in lines)
 
 
 @dataclass(frozen=True)
@@ -189,8 +190,8 @@ class Recorded:
         path = self.file(part)
         head, *lines = read_text(path).splitlines()
         try:
-            said = json.loads(head)
-            rows = [Row.read(json.loads(line), said["shared"]) for line in lines]
+            said = from_json(head)
+            rows = [Row.read(from_json(line), said["shared"]) for line in lines]
             ours = said["truearm"] == _PART_SCHEMA and said["digest"] == self.manifest.digest
             names = [row.name for row in rows]
         except (ValueError, KeyError, TypeError):

@@ -12,6 +12,7 @@ from functools import cache
 
 import numpy as np
 
+from truearm.fleets.analysis.kind import Kind, kinds_of
 from truearm.fleets.rows import FoundParameter, Row
 from truearm.identification.solving.models import named_model
 from truearm.library import load_robot
@@ -74,6 +75,12 @@ def calibrations(of: Campaign, noise: float = 3e-5) -> Calibrations:
     gain = posterior @ weighted.T  # in priors, of whitened readings
     own = of.own
     return Calibrations(of, (gain @ weighted)[np.ix_(own, own)], gain[own], posterior[np.ix_(own, own)])
+
+
+def kind_of(told: list[Row]) -> Kind:
+    """Return robots of one kind as arrays."""
+    (kind,) = kinds_of(told)
+    return kind
 
 
 def rows(

@@ -40,8 +40,8 @@ def test_the_robots_that_are_needed_give_both_ends() -> None:
             assert (found.low is not None and found.high is not None) == known
 
 
-def test_the_share_of_robots_that_fail() -> None:
-    assert share_interval(0, 10) == (0.0, pytest.approx(0.3085, abs=1e-4))  # Clopper and Pearson's table
-    assert share_interval(10, 10) == (pytest.approx(0.6915, abs=1e-4), 1.0)
-    low, high = share_interval(1, 20)
-    assert (low, high) == (pytest.approx(0.0013, abs=1e-4), pytest.approx(0.2487, abs=1e-4))
+@pytest.mark.parametrize(
+    ("count", "of", "low", "high"), [(0, 10, 0.0, 0.3085), (10, 10, 0.6915, 1.0), (1, 20, 0.0013, 0.2487)]
+)
+def test_the_share_of_robots_that_fail(count: int, of: int, low: float, high: float) -> None:
+    assert share_interval(count, of) == pytest.approx((low, high), abs=1e-4)  # Clopper and Pearson's tables

@@ -6,10 +6,9 @@ from datetime import date
 
 import numpy as np
 import pytest
-from tests.fleets.simulated_series import Calibrations, calibrations, campaign, rows
+from tests.fleets.simulated_series import Calibrations, calibrations, campaign, kind_of, rows
 
 from truearm.fleets.analysis.drift import MONTH, Drifts, drifts
-from truearm.fleets.analysis.kind import kinds_of
 from truearm.fleets.rows import Row
 from truearm.modeling.chain import Array
 
@@ -41,7 +40,7 @@ def campaigns(
                 date=f"2026-{month + 1:02d}-01",
                 correlated=correlated,
             )
-    return drifts(*kinds_of(told))
+    return drifts(kind_of(told))
 
 
 STRONG, OTHER, POOR = (
@@ -113,7 +112,7 @@ def test_a_jump_is_a_change_but_not_steady() -> None:
         there = truth.copy()
         there[0, NAMES.index("theta_offset_3")] += jump
         told += rows(there, rng, names=[f"c{month}"], of="m", date=f"2026-{month + 1:02d}-01")
-    (one,) = drifts(*kinds_of(told)).significant
+    (one,) = drifts(kind_of(told)).significant
     assert one.parameter == "theta_offset_3"
     assert one.steady is False
 
@@ -141,7 +140,7 @@ def test_machines_without_two_dates_are_named() -> None:
     rng = np.random.default_rng(8)
     truth = rng.standard_normal((1, COUNT))
     told = rows(truth, rng, names=["a"], of="m") + rows(truth, rng, names=["b"], of="m", date="2026-01-01")
-    found = drifts(*kinds_of(told))
+    found = drifts(kind_of(told))
     assert found.undated == ("m",)
     assert not found.found
 

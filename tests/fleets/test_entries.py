@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -96,7 +97,7 @@ def test_a_table_that_cannot_be_used_is_refused_where_it_is_wrong(case: str, fol
     assert words in str(refusal.value)
 
 
-LISTED = {
+LISTED: dict[str, tuple[dict[str, Any], str, str]] = {
     "an unknown option": ({"options": {"trian": 40}}, "robots[1].options.trian", "Did you mean train?"),
     "an option of another kind": ({"options": {"seed": "some"}}, "robots[1].options.seed", "a whole number"),
     "yes for a number": ({"options": {"train": True}}, "robots[1].options.train", "a whole number"),

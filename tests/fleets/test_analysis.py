@@ -55,7 +55,7 @@ def test_robots_are_looked_at_in_the_order_of_their_reasons() -> None:
         "not calibrated: there is no reading",
         "should not be used as it is (wrong-robot)",
         "the fit ended with rank-loss",
-        "is no less than before",
+        "is more than before",
         "more than those of the others allow",
         "theta_offset_3 +",
         "Not calibrated: 1 of 20",

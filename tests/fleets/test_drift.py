@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import date
 
 import numpy as np
 import pytest
 from tests.fleets.simulated_series import Calibrations, calibrations, campaign, kind_of, rows
 
+from truearm.fleets.analysis.analysis import analysed
+from truearm.fleets.analysis.differing import differences
 from truearm.fleets.analysis.drift import MONTH, Drifts, drifts
 from truearm.fleets.rows import Row
 from truearm.modeling.chain import Array
+from truearm.results.fleet_words import analysis_notices
 
 COUNT = len(campaign().own)
 NAMES = campaign().names
@@ -154,3 +158,29 @@ def test_of_many_machines_the_surest_of_each_is_kept() -> None:
     assert len(found.significant) == 120
     assert len(found.found) == 120
     assert found.compared == 60 * 19
+
+
+def test_another_robot_under_the_same_serial_number_is_suspected() -> None:
+    rng = np.random.default_rng(10)
+    truth = rng.standard_normal((3, COUNT))
+    first, later = "2026-01-01", "2026-07-01"
+    told = [
+        *rows(truth[:1], rng, names=["a"], of="m", date=first),
+        *rows(truth[1:2], rng, names=["b"], of="m", date=later),
+        *rows(truth[2:], rng, names=["c"], of="n", date=first),
+        *rows(truth[2:], rng, names=["d"], of="n", date=later),
+    ]
+    found = drifts(kind_of(told))
+    assert found.others == ("m",)
+    (notice,) = [each for each in analysis_notices(analysed(told)) if each.code == "another-machine"]
+    assert (notice.level, "of m changed" in notice.message) == ("warning", True)
+
+
+def test_a_parameter_that_few_robots_identified_is_not_compared_with_the_others() -> None:
+    rng = np.random.default_rng(11)
+    told = rows(rng.standard_normal((20, COUNT)), rng)
+    for number in range(4, 20):
+        kept = {name: one for name, one in told[number].parameters.items() if name != "a_3"}
+        told[number] = replace(told[number], parameters=kept, covariance=())
+    told[0] = replace(told[0], parameters={**told[0].parameters, "a_3": replace(told[0].parameters["a_3"], value=9.0)})
+    assert not [one for one in differences(kind_of(told)) if one.parameter == "a_3"]

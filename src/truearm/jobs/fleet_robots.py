@@ -93,6 +93,6 @@ def _own(made: Calibration) -> tuple[list[str], tuple[float, ...]]:
 
 
 def _accuracy(errors: Errors | None) -> Accuracy | None:
-    if errors is None or errors.position is None:
-        return None
-    return Accuracy.of_spread(errors.position, errors.configurations)
+    """Return the errors of positions, of lengths where an instrument reads nothing else; None where there are none."""
+    spread = None if errors is None else errors.position or errors.length
+    return None if errors is None or spread is None else Accuracy.of_spread(spread, errors.configurations)

@@ -174,7 +174,7 @@ def reason_words(reason: Reason) -> str:
         return f"changes: {drift_words(surest)}{f' and {len(others)} more' if others else ''}"
     held_out, beside = (f"{value * 1e3:.3f} mm" for value in (reason.error, reason.beside))
     if reason.why == "not better":
-        return f"its held-out error of {held_out} is no less than before ({beside})"
+        return f"its held-out error of {held_out} is more than before ({beside})"
     if reason.why == "inaccurate":
         return f"its held-out error of {held_out} is more than those of the others allow (median {beside})"
     return f"the largest held-out error of all, {held_out} (median {beside})"
@@ -228,6 +228,15 @@ def analysis_notices(found: Analysis) -> list[Notice]:
                 "drift-alike",
                 f"The same parameters changed alike in all machines ({listed(alike)}): what measured them has more "
                 "likely changed than all of them.",
+            )
+        )
+    others = [name for kind in found.kinds for name in kind.drifts.others]
+    if others:
+        notices.append(
+            Notice(
+                "another-machine",
+                f"Most parameters of {listed(others)} changed from one campaign to the next by as much as robots "
+                "differ from one another. Check whether `of` names the same machine.",
             )
         )
     undated = [name for kind in found.kinds for name in kind.drifts.undated]

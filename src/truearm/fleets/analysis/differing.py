@@ -64,19 +64,21 @@ def differences(kind: Kind) -> tuple[Difference, ...]:
     from scipy.special import stdtr
 
     rows = kind.latest
-    count = len(rows)
-    chosen = np.flatnonzero(kind.determined | kind.shared)
-    if not len(chosen) or not count:
+    series = len(rows) >= LEAST_COMPARED
+    found = np.sum(~np.isnan(kind.undrawn[0][rows]), axis=0)
+    enough = found >= (LEAST_COMPARED if series else 1)
+    chosen = np.flatnonzero((kind.determined | kind.shared) & enough)
+    if not len(chosen):
         return ()
     undrawn, variance = (part[np.ix_(rows, chosen)] for part in kind.undrawn)
-    beside: Beside
-    if count >= LEAST_COMPARED:
-        beside, freedom = "series", FREEDOM * (count - 1)
+    beside: Beside = "series" if series else "prior"
+    if series:
+        freedom = FREEDOM * (found[chosen] - 1)
         centre, spread = robust_spread(undrawn)
         more = np.maximum(variance - np.nanmedian(variance, axis=0), 0.0)
         expected = np.sqrt(np.where(spread > 0.0, spread**2 + more, variance))
     else:
-        beside, freedom = "prior", 1e6
+        freedom = np.full(len(chosen), 1e6)
         centre = np.zeros(len(chosen))
         prior = kind.prior[chosen] ** 2
         # Where priors draw, the result varies by P - C over all that they allow, that is by P times the share.
@@ -88,7 +90,7 @@ def differences(kind: Kind) -> tuple[Difference, ...]:
         times = np.where(expected > 0.0, off / expected, 0.0)
     compared = int(np.sum(~np.isnan(times)))
     chance = np.minimum(2.0 * stdtr(freedom, -np.abs(times)) * compared, 1.0)
-    found = np.argwhere(chance < FALSE_ALARMS)  # False for NaN
+    named = np.argwhere(chance < FALSE_ALARMS)  # False for NaN
     told = [
         Difference(
             robot=kind.names[int(rows[row])],
@@ -101,6 +103,6 @@ def differences(kind: Kind) -> tuple[Difference, ...]:
             alone=bool(kind.determined[chosen[column]]),
             together=kind.together(int(chosen[column])),
         )
-        for row, column in found.tolist()
+        for row, column in named.tolist()
     ]
     return tuple(sorted(told, key=lambda one: -abs(one.times)))

@@ -29,6 +29,10 @@ _LEAST_ALIKE: Final = 5
 #: Machines of which every parameter is told; of more, deviations beyond which a change may be more than chance.
 _FEW: Final = 50
 _LIKELY: Final = 2.5
+#: Root mean square change, in priors, from which on it may be another robot (of two it is 1.4), and of how many
+#: parameters at least.
+_AS_ANOTHER: Final = 0.7
+_LEAST_PARAMETERS: Final = 8
 #: A line is called no line where chance alone bends one as far so rarely.
 _BENT: Final = 0.01
 
@@ -118,6 +122,8 @@ class Drifts:
         Parameters that change alike in all machines: what measured them may have changed instead.
     undated
         Machines with several measurements, but not at two known dates.
+    others
+        Machines whose results differ as those of two robots do: their serial numbers may be wrong.
     unknown
         Parameters of which no change can be seen, because nothing but priors holds them.
     """
@@ -126,6 +132,7 @@ class Drifts:
     compared: int = 0
     alike: tuple[AllDrift, ...] = ()
     undated: tuple[str, ...] = ()
+    others: tuple[str, ...] = ()
     unknown: tuple[str, ...] = ()
 
     @property
@@ -149,7 +156,7 @@ def drifts(kind: Kind) -> Drifts:
     for row, machine in enumerate(kind.machines):
         again.setdefault(machine, []).append(row)
     lines: list[Drift] = []
-    undated = []
+    undated, others = [], []
     slopes: dict[str, list[float]] = {}
     compared = 0
     few = sum(len(rows) > 1 for rows in again.values()) <= _FEW
@@ -162,6 +169,8 @@ def drifts(kind: Kind) -> Drifts:
             continue
         of_machine = sorted(_lines(kind, machine, dated), key=lambda one: -abs(one.times))
         compared += len(of_machine)
+        if _is_another(kind, dated):
+            others.append(machine)
         for one in of_machine:
             slopes.setdefault(one.parameter, []).append(one.slope)
         lines += [one for i, one in enumerate(of_machine) if few or i == 0 or abs(one.times) > _LIKELY]
@@ -174,8 +183,18 @@ def drifts(kind: Kind) -> Drifts:
         compared,
         _alike(slopes, units),
         tuple(undated),
+        tuple(others),
         tuple(name for name, held in zip(kind.parameters, nothing.tolist(), strict=True) if held) if lines else (),
     )
+
+
+def _is_another(kind: Kind, rows: list[int]) -> bool:
+    """Return whether parameters changed from one campaign to the next by as much as robots differ from one another."""
+    chosen = kind.determined & ~np.isnan(kind.difference[rows]).any(axis=0)
+    if np.sum(chosen) < _LEAST_PARAMETERS:
+        return False
+    steps = np.diff(kind.difference[np.ix_(rows, np.flatnonzero(chosen))], axis=0) / kind.prior[chosen]
+    return bool(np.sqrt(np.mean(steps**2, axis=1)).max() > _AS_ANOTHER)
 
 
 def _lines(kind: Kind, machine: str, rows: list[int]) -> list[Drift]:

@@ -136,7 +136,7 @@ def first_looks(
             add(one.name, Reason("error", codes=one.errors))
         if one.fit_status not in _SOUND:
             add(one.name, Reason("unsound", codes=(one.fit_status or "",)))
-        if one.mean >= one.before:  # False for NaN
+        if one.mean > one.before * (1.0 + 1e-9):  # False for NaN
             add(one.name, Reason("not better", error=one.mean, beside=one.before))
         if one.mean > limit:
             add(one.name, Reason("inaccurate", error=one.mean, beside=median))

@@ -97,9 +97,7 @@ class Kind:
     @property
     def share(self) -> Array:
         """Typical informed share of each parameter, ``(parameters,)``; NaN where robots disagree about the prior."""
-        with np.errstate(invalid="ignore"):
-            typical = np.median(np.where(np.isnan(self.difference), 0.0, self.informed), axis=0)
-        return np.where(np.isnan(self.prior), np.nan, typical)
+        return np.where(np.isnan(self.prior), np.nan, np.nanmedian(self.informed, axis=0))
 
     @property
     def determined(self) -> NDArray[np.bool_]:

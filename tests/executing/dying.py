@@ -10,6 +10,10 @@ def doubled(number: int) -> int:
     return 2 * number
 
 
+def divided(number: int) -> float:
+    return 1 / number
+
+
 def deadly_once(task: tuple[Path, int]) -> int:
     """Return a number; the first process that is asked for a 3 dies."""
     mark, number = task

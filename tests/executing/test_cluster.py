@@ -39,7 +39,9 @@ def test_schedulers_here_or_by_tls_are_reached(came: str, full: str) -> None:
     assert checked_address(came, insecure=False) == full
 
 
-@pytest.mark.parametrize("came", ["", "8786", "localhost", "http://localhost:1", "tcp://:8786", "tcp://[::1:8786", "a:b"])
+@pytest.mark.parametrize(
+    "came", ["", "8786", "localhost", "http://localhost:1", "tcp://:8786", "tcp://[::1:8786", "a:b"]
+)
 def test_what_is_no_address_is_refused(came: str) -> None:
     with pytest.raises(InputError, match="no address of a scheduler") as caught:
         checked_address(came, insecure=True)
@@ -99,7 +101,12 @@ def started(*words: str, folder: Path) -> subprocess.Popen[bytes]:
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
     with (folder / f"{words[0]}.log").open("wb") as log:
         return subprocess.Popen(
-            [sys.executable, "-m", *words], cwd=folder, env=environment, stdout=log, stderr=log, stdin=subprocess.DEVNULL
+            [sys.executable, "-m", *words],
+            cwd=folder,
+            env=environment,
+            stdout=log,
+            stderr=log,
+            stdin=subprocess.DEVNULL,
         )
 
 

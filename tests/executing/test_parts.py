@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.executing.dying import deadly_once, doubled, thread_setting
+from tests.executing.dying import deadly_once, divided, doubled, thread_setting
 
 from truearm.errors import InputError
 from truearm.executing.parts import done_parts
@@ -73,7 +73,6 @@ def test_no_more_parts_are_taken_than_may_be_done_at_once() -> None:
         run = done_parts(doubled, parts(), Given(pool, in_flight=3))
         assert [next(run).result is not None for _ in range(10)] == [True] * 10
         assert len(taken) <= 10 + 2 * 3
-        run.close()
 
 
 def test_a_part_that_kills_its_worker_again_and_again_is_given_up_and_the_others_are_done() -> None:
@@ -97,8 +96,8 @@ def test_an_executor_of_somebody_else_is_not_replaced() -> None:
 
 
 def test_an_error_of_the_work_comes_out() -> None:
-    with pytest.raises(TypeError):
-        list(done_parts(doubled, [None, 1], processes(1)))  # type: ignore[list-item]
+    with pytest.raises(ZeroDivisionError):
+        list(done_parts(divided, [0, 1], processes(1)))
 
 
 def test_a_process_that_dies_is_replaced_and_its_part_repeated(tmp_path: Path) -> None:

@@ -7,13 +7,14 @@ so what is found of it depends neither on the robots beside it nor on who comput
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 
-from truearm.errors import InputError
+from truearm.errors import InputError, name_parameter, name_place
 from truearm.fleets.manifest import ExperimentEntry
 from truearm.fleets.rows import Accuracy, FoundParameter, Row
 from truearm.identification.judging.monte_carlo import calibrated, of_itself
@@ -61,8 +62,10 @@ def experiment(asked: ExperimentEntry) -> Experiment:
     InputError
         For a robot or configurations that cannot be read, a model that is not known, and targets that are not there.
     """
-    nominal = load_robot(asked.robot)
-    model = named_model(asked.model)
+    with _refusals_of_entry("robot"):
+        nominal = load_robot(asked.robot)
+    with _refusals_of_entry("model"):
+        model = named_model(asked.model)
     known = with_targets(nominal)
     places = {target.name: tuple(known.values[target.parameter(axis)] for axis in "xyz") for target in known.targets}
     if asked.targets > len(places):
@@ -79,9 +82,23 @@ def experiment(asked: ExperimentEntry) -> Experiment:
     if isinstance(asked.configurations, int):
         joints = robot.random_configurations(asked.configurations, rng)
     else:
-        joints = in_model_joints(robot, read_csv(asked.configurations)).joints
-    model.free(model.prepared(robot))
+        with _refusals_of_entry("configurations"):
+            joints = in_model_joints(robot, read_csv(asked.configurations)).joints
+    with _refusals_of_entry("model"):
+        model.free(model.prepared(robot))
     return Experiment(asked, robot, joints, held_out)
+
+
+@contextmanager
+def _refusals_of_entry(entry: str) -> Iterator[None]:
+    """Let refusals of what an entry of the manifest holds name it."""
+    try:
+        yield
+    except InputError as error:
+        name_parameter(error, "manifest")
+        if error.where is None:
+            name_place(error, f"experiment.{entry}")
+        raise
 
 
 class Series:

@@ -146,7 +146,7 @@ class Fleet(Record):
             f"{found.measurements - len(found.failed)} calibrated, {len(found.failed)} failed."
         ]
         if run.before:
-            text.append(f"{run.before} of {counted(run.parts, 'part')} were on disk already.")
+            text.append(f"{counted(run.before, 'part')} of {run.parts} on disk already.")
         text += [f"{words[0].upper()}{words[1:]}." for words in run.told]
         text += analysis_lines(found)
         if self.proposed is not None:

@@ -123,9 +123,9 @@ def robots_of(said: list[Any] | str, options: Mapping[str, Any], manifest: Path)
         Naming file and entry, or file, line and column: for two robots of one name, a file that is not there, columns
         and options that are not known, and a date that is none.
     """
-    folder, files = manifest.parent, dict[str, Path]()
+    folder, files = manifest.parent.absolute(), dict[str, Path]()  # workers may stand elsewhere
     if isinstance(said, str):
-        table = folder / said
+        table = manifest.parent / said
         entries = _rows(table, manifest)
         files[said] = table
     else:
@@ -133,8 +133,8 @@ def robots_of(said: list[Any] | str, options: Mapping[str, Any], manifest: Path)
     if not entries:
         raise InputError("there are no robots", where=f"{manifest}, robots")
     refuse_beyond("robots", len(entries), where=str(manifest))
-    general = checked_options(options, manifest.parent, lambda name: f"{manifest}, options.{name}")
-    files |= _named_files(options, manifest.parent)
+    general = checked_options(options, folder, lambda name: f"{manifest}, options.{name}")
+    files |= _named_files(options, folder)
     seen: dict[str, str] = {}
     robots = []
     for one in entries:

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truearm.fleets.analysis.accuracy import SURE
 from truearm.fleets.analysis.kind import UNINFORMED, Kind
@@ -33,6 +34,7 @@ _LIKELY: Final = 2.5
 #: parameters at least.
 _AS_ANOTHER: Final = 0.7
 _LEAST_PARAMETERS: Final = 8
+_Z: Final = 1.959963984540054
 #: A line is called no line where chance alone bends one as far so rarely.
 _BENT: Final = 0.01
 
@@ -167,13 +169,17 @@ def drifts(kind: Kind) -> Drifts:
         if len(dated) < 2 or kind.days[dated[0]] == kind.days[dated[-1]]:
             undated.append(machine)
             continue
-        of_machine = sorted(_lines(kind, machine, dated), key=lambda one: -abs(one.times))
-        compared += len(of_machine)
+        of_machine = _lines(kind, dated)
+        compared += len(of_machine.numbers)
         if _is_another(kind, dated):
             others.append(machine)
-        for one in of_machine:
-            slopes.setdefault(one.parameter, []).append(one.slope)
-        lines += [one for i, one in enumerate(of_machine) if few or i == 0 or abs(one.times) > _LIKELY]
+        for number, slope in zip(of_machine.numbers.tolist(), of_machine.slopes.tolist(), strict=True):
+            slopes.setdefault(kind.parameters[number], []).append(slope)
+        lines += [
+            of_machine.drift(kind, machine, place)
+            for place, times in enumerate(np.abs(of_machine.times).tolist())
+            if few or place == 0 or times > _LIKELY
+        ]
     told = _with_chances(lines, compared)
     told = [one for i, one in enumerate(told) if few or one.significant or one.machine != told[i - 1].machine]
     units = dict(zip(kind.parameters, kind.units, strict=True))
@@ -188,8 +194,9 @@ def drifts(kind: Kind) -> Drifts:
     )
 
 
-def _is_another(kind: Kind, rows: list[int]) -> bool:
+def _is_another(kind: Kind, machine_rows: list[int]) -> bool:
     """Return whether parameters changed from one campaign to the next by as much as robots differ from one another."""
+    rows = np.array(machine_rows)
     chosen = kind.determined & ~np.isnan(kind.difference[rows]).any(axis=0)
     if np.sum(chosen) < _LEAST_PARAMETERS:
         return False
@@ -197,71 +204,121 @@ def _is_another(kind: Kind, rows: list[int]) -> bool:
     return bool(np.sqrt(np.mean(steps**2, axis=1)).max() > _AS_ANOTHER)
 
 
-def _lines(kind: Kind, machine: str, rows: list[int]) -> list[Drift]:
+@dataclass(frozen=True, eq=False)
+class _Lines:
+    """Lines through the campaigns of a machine, one for each parameter, the surest first.
+
+    Attributes
+    ----------
+    numbers
+        Of the parameters, ``(parameters,)``.
+    months
+        Of the campaigns after the first, ``(campaigns,)``.
+    slopes, errors
+        In a month with their standard deviations [SI], ``(parameters,)``.
+    changes, deviations
+        Since the first campaign [SI], ``(parameters, campaigns)``.
+    bent
+        How rarely chance bends a line so far, ``(parameters,)``; NaN of two campaigns.
+    """
+
+    numbers: NDArray[np.intp]
+    months: Array
+    slopes: Array
+    errors: Array
+    changes: Array
+    deviations: Array
+    bent: Array
+
+    @property
+    def times(self) -> Array:
+        """Slopes in their standard deviations."""
+        return np.asarray(self.slopes / self.errors)
+
+    def drift(self, kind: Kind, machine: str, place: int) -> Drift:
+        """Return one of them by its place."""
+        number = int(self.numbers[place])
+        slope, error = float(self.slopes[place]), float(self.errors[place])
+        return Drift(
+            machine=machine,
+            parameter=kind.parameters[number],
+            unit=kind.units[number],
+            campaigns=len(self.months),
+            months=float(self.months[-1]),
+            slope=slope,
+            low=slope - _Z * error,
+            high=slope + _Z * error,
+            times=slope / error,
+            chance=1.0,
+            steady=None if len(self.months) == 2 else bool(self.bent[place] > _BENT),
+            campaign_months=tuple(self.months.tolist()),
+            changes=tuple(self.changes[place].tolist()),
+            deviations=tuple(self.deviations[place].tolist()),
+            alone=bool(kind.determined[number]),
+            together=kind.together(number),
+        )
+
+
+def _lines(kind: Kind, machine_rows: list[int]) -> _Lines:
     """Return a line through the campaigns of a machine for each parameter that all of them determine or share."""
+    rows = np.array(machine_rows)
+    there = ~np.isnan(kind.difference[rows]).any(axis=0)
+    numbers = np.flatnonzero((kind.determined | kind.shared) & there)
+    months = (kind.days[rows] - kind.days[rows[0]]) / MONTH
+    # A sum with others is not made larger: nobody knows by how much.
+    pull = np.where(kind.determined[numbers], kind.pull[np.ix_(rows, numbers)].mean(axis=0), 1.0)
+    values = (kind.difference[np.ix_(rows, numbers)] / pull).T
+    variance = np.moveaxis(_covariances(kind, rows)[:, :, numbers], 2, 0)
+    variance = variance * (kind.prior[numbers] / pull)[:, None, None] ** 2
+    contrast = np.diff(np.eye(len(rows)), axis=0)
+    between = contrast @ variance @ contrast.T
+    y, t = values @ contrast.T, contrast @ months
+    scale = np.sqrt(np.maximum(np.diagonal(between, axis1=1, axis2=2), 0.0))
+    sound = (scale > 0.0).all(axis=1)
+    numbers, y, values, variance = numbers[sound], y[sound], values[sound], variance[sound]
+    sizes = scale[sound][:, :, None] * scale[sound][:, None, :]
+    inverse = np.linalg.pinv(between[sound] / sizes, hermitian=True) / sizes
+    weight = np.maximum(np.einsum("i,pij,j->p", t, inverse, t), 1e-300)
+    slopes = np.einsum("i,pij,pj->p", t, inverse, y) / weight
+    left = y - slopes[:, None] * t
+    misfit = np.einsum("pi,pij,pj->p", left, inverse, left)
+    own = np.diagonal(variance, axis1=1, axis2=2)
+    since = np.maximum(own + own[:, :1] - 2.0 * variance[:, 0], 0.0)
+    since[:, 0] = 0.0
+    made = _Lines(
+        numbers=numbers,
+        months=months,
+        slopes=slopes,
+        errors=weight**-0.5,
+        changes=values - values[:, :1],
+        deviations=np.sqrt(since),
+        bent=_chances(misfit, len(rows) - 2),
+    )
+    order = np.argsort(-np.abs(made.times), kind="stable")
+    return _Lines(
+        numbers[order],
+        months,
+        made.slopes[order],
+        made.errors[order],
+        made.changes[order],
+        made.deviations[order],
+        made.bent[order],
+    )
+
+
+def _chances(misfit: Array, freedom: int) -> Array:
+    """Return how rarely chance makes a sum of squares so large; NaN where there is no freedom."""
     from scipy.special import chdtrc
 
-    months = (kind.days[rows] - kind.days[rows[0]]) / MONTH
-    z = 1.959963984540054
-    made = []
-    covariances = _covariances(kind, rows)
-    for number in np.flatnonzero(kind.determined | kind.shared).tolist():
-        values = kind.difference[rows, number]
-        if np.isnan(values).any():
-            continue
-        variance = covariances[:, :, number] * kind.prior[number] ** 2
-        contrast = np.diff(np.eye(len(rows)), axis=0)
-        between = contrast @ variance @ contrast.T
-        y, t = contrast @ values, contrast @ months
-        scale = np.sqrt(np.maximum(np.diag(between), 0.0))
-        if not (scale > 0.0).all():
-            continue
-        inverse = np.linalg.pinv(between / np.outer(scale, scale), hermitian=True) / np.outer(scale, scale)
-        weight = float(t @ inverse @ t)
-        if not weight > 0.0:
-            continue
-        slope, error = float(t @ inverse @ y) / weight, weight**-0.5
-        left = y - slope * t
-        steady = None if len(rows) == 2 else bool(chdtrc(len(rows) - 2, float(left @ inverse @ left)) > _BENT)
-        alone = bool(kind.determined[number])
-        pull = float(np.mean(kind.pull[rows, number])) if alone else 1.0
-        made.append(
-            Drift(
-                machine=machine,
-                parameter=kind.parameters[number],
-                unit=kind.units[number],
-                campaigns=len(rows),
-                months=float(months[-1]),
-                slope=slope / pull,
-                low=(slope - z * error) / pull,
-                high=(slope + z * error) / pull,
-                times=slope / error,
-                chance=1.0,
-                steady=steady,
-                campaign_months=tuple(months.tolist()),
-                changes=tuple(((values - values[0]) / pull).tolist()),
-                deviations=tuple(_since_first(variance, pull)),
-                alone=alone,
-                together=kind.together(number),
-            )
-        )
-    return made
+    return np.asarray(chdtrc(freedom, misfit) if freedom else np.full(len(misfit), np.nan))
 
 
-def _since_first(variance: Array, pull: float) -> list[float]:
-    """Return the standard deviations of the changes since the first campaign."""
-    own = np.diag(variance)
-    since = own + own[0] - 2.0 * variance[0]
-    since[0] = 0.0
-    return [float(v) for v in np.sqrt(np.maximum(since, 0.0)) / pull]
-
-
-def _covariances(kind: Kind, rows: list[int]) -> Array:
+def _covariances(kind: Kind, rows: NDArray[np.intp]) -> Array:
     """Return how the results of campaigns covary, parameter by parameter, in priors ``(rows, rows, parameters)``."""
     own = (kind.deviation[rows] / kind.prior) ** 2
     if not kind.drawn[rows].all():  # nothing is shared
         return np.asarray(np.eye(len(rows))[:, :, None] * own[:, None, :])
-    whole = [kind.covariances[row] for row in rows]
+    whole = [kind.covariances[row] for row in rows.tolist()]
     known = [c for c in whole if c is not None]
     if len(known) == len(rows):
         stacked = np.stack(known)

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import date
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -84,7 +85,7 @@ class Kind:
         like = np.flatnonzero((np.abs(correlation) > _TOGETHER) & self.shared)
         return tuple(self.parameters[other] for other in like.tolist() if other != number)
 
-    @property
+    @cached_property
     def latest(self) -> NDArray[np.intp]:
         """Indices of the last measurement of each machine, in order; without dates the last one named."""
         last: dict[str, tuple[float, int]] = {}
@@ -94,27 +95,27 @@ class Kind:
                 last[machine] = (when, row)
         return np.array(sorted(row for _, row in last.values()), dtype=np.intp)
 
-    @property
+    @cached_property
     def share(self) -> Array:
         """Typical informed share of each parameter, ``(parameters,)``; NaN where robots disagree about the prior."""
         return np.where(np.isnan(self.prior), np.nan, np.nanmedian(self.informed, axis=0))
 
-    @property
+    @cached_property
     def determined(self) -> NDArray[np.bool_]:
         """Which parameters are determined in most of the measurements, ``(parameters,)``."""
         return np.asarray(self.share >= DETERMINED)
 
-    @property
+    @cached_property
     def shared(self) -> NDArray[np.bool_]:
         """Which are told together with others only, ``(parameters,)``."""
         return np.asarray((self.share >= UNINFORMED) & (self.share < DETERMINED))
 
-    @property
+    @cached_property
     def pull(self) -> Array:
         """What is left of a difference where priors draw it towards nominal, ``(rows, parameters)``, 0 to 1."""
         return np.asarray(np.where(self.drawn[:, None], self.informed, 1.0))
 
-    @property
+    @cached_property
     def undrawn(self) -> tuple[Array, Array]:
         """Differences without the pull of priors, and the variances of these, both ``(rows, parameters)``."""
         with np.errstate(invalid="ignore", divide="ignore"):

@@ -149,6 +149,11 @@ class Manifest:
         return len(self.robots) if self.experiment is None else self.experiment.count
 
     @property
+    def inputs(self) -> tuple[Path, ...]:
+        """The files that are read: itself, and those that it names."""
+        return (self.file, *(self.file.parent / name for name in self.hashes))
+
+    @property
     def parts(self) -> int:
         """How many parts they are computed in."""
         return -(-self.count // self.chunk)

@@ -87,6 +87,8 @@ def fleet(
     folder = folder_for((RECORD, *FLEET_FILES), out, path)
     with refusals_of("manifest"):
         asked = read_manifest(path)
+    folder_for(FLEET_FILES, out, *asked.inputs, ours=True)
+    with refusals_of("manifest"):
         make = _tasks(asked, folder.absolute())
     recorded = Recorded(folder, asked)
     recorded.check()
@@ -98,7 +100,7 @@ def fleet(
             run = _computed(recorded, make, chosen, progress)
             progress("reading the parts")
             found = Fleet(recorded, run, call)
-            found.save()
+            found.write()
     return found
 
 

@@ -178,7 +178,7 @@ class Fleet(Record):
             )
         return stream.getvalue()
 
-    def save(self) -> tuple[Path, ...]:
+    def write(self) -> tuple[Path, ...]:
         """Write ``fleet.json``, ``robots.csv`` and ``report.html`` beside the parts, and ``priors.yaml`` if any follow.
 
         Returns
@@ -187,7 +187,7 @@ class Fleet(Record):
         """
         from truearm.reporting.fleet_report import fleet_html
 
-        folder = output_folder(self.recorded.folder, FLEET_FILES, (self.recorded.manifest.file,), ours=True)
+        folder = output_folder(self.recorded.folder, FLEET_FILES, self.recorded.manifest.inputs, ours=True)
         files: dict[str, str | bytes] = {
             "fleet.json": json.dumps(self.content(), indent=2, allow_nan=False) + "\n",
             "robots.csv": self.csv_text(),

@@ -142,22 +142,29 @@ def calibrated(problem: Problem, readings: Array) -> tuple[Array, Array, NDArray
     nominal, prior = problem.free.nominal, problem.free.prior
     x = np.tile(nominal, (len(readings), 1))
     information = np.empty((*x.shape, x.shape[1]))
+    before = np.empty(len(x))
     going = np.arange(len(x))
-    for _ in range(_STEPS):
-        here = problem.at(x[going])
+    for number in range(_STEPS):
+        # All begin at the nominal values: one Jacobian serves the first step of them all.
+        here = problem.at(x[going] if number else nominal[None])
         r, J = here.residual - readings[going], here.jacobian
         Jt = np.swapaxes(J, 1, 2)
         information[going] = (Jt @ J) * np.outer(prior, prior) + np.eye(len(prior))
         gradient = (Jt @ r[:, :, None])[:, :, 0] * prior + (x[going] - nominal) / prior
         step = -np.linalg.solve(information[going], gradient[:, :, None])[:, :, 0]
         x[going] += step * prior
-        going = going[~(np.abs(step).max(axis=1) < _SMALL)]
+        size = np.abs(step).max(axis=1)
+        settled = size < _SMALL
+        if number:  # what the next step would be, at most
+            settled |= size * size < _SMALL * before[going]
+        before[going] = size
+        going = going[~settled]
         if not len(going):
             break
-    settled = np.ones(len(x), dtype=bool)
-    settled[going] = False
+    left = np.zeros(len(x), dtype=bool)
+    left[going] = True
     variance = np.diagonal(np.linalg.inv(information), axis1=1, axis2=2)
-    return x, prior * np.sqrt(variance), settled
+    return x, prior * np.sqrt(variance), ~left
 
 
 def _position_errors(problem: Problem, truth: Array, estimate: Array, q: Array, target: str) -> Array:

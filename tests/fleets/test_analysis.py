@@ -132,3 +132,11 @@ def test_a_fleet_in_which_nothing_was_calibrated_says_so() -> None:
     assert not found.kinds
     assert not found.errors
     assert analysis_lines(found)[0].startswith("Not calibrated: 2 of 2; of such a series 15.8 to 100 %")
+
+
+def test_a_series_beside_nominal_is_told() -> None:
+    rng = np.random.default_rng(6)
+    truth = 0.3 * rng.standard_normal((20, COUNT))
+    truth[:, campaign().names.index("d_4")] += 2.0
+    (line,) = [each for each in analysis_lines(analysed(rows(truth, rng))) if "beside nominal" in each]
+    assert line.startswith("  The whole series lies beside nominal: d_4 +")

@@ -45,16 +45,24 @@ def fleet_html(found: Fleet) -> str:
     """Return the page of a fleet."""
     said = found.analysis
     kind = said.kinds[0] if said.kinds else None
+    simulated = found.recorded.manifest.experiment is not None
     return page(
         "fleet.html.jinja",
         fleet_figures(said),
         title=found.recorded.manifest.file.stem,
-        simulated=found.recorded.manifest.experiment is not None,
+        simulated=simulated,
         said=said,
         lead=_lead(said),
         columns=[(_COLUMNS[name], len(errors.mean)) for name, errors in said.errors.items()],
         shares=_shares(said),
-        looks=[(look.robot, [reason_words(reason) for reason in look.reasons]) for look in said.looks[:_ROWS]],
+        looks=[
+            (
+                look.robot,
+                [reason_words(reason) for reason in look.reasons],
+                None if simulated or look.reasons[0].why == "failed" else f"robots/{look.robot}/report.html",
+            )
+            for look in said.looks[:_ROWS]
+        ],
         more_looks=max(len(said.looks) - _ROWS, 0),
         kind=kind,
         other_kinds=[each.kind.robot for each in said.kinds[1:]],
@@ -117,7 +125,6 @@ def _spread(one: ParameterSpread, found: KindFound) -> dict[str, Any]:
         "name": one.parameter,
         "unit": SHOWN_AS[one.unit],
         "prior": figures_text(one.prior, one.unit),
-        "robots": one.robots,
         "mean": figures_text(one.mean, one.unit),
         "beside": one.beside,
         "spread": figures_text(one.spread, one.unit),
@@ -134,14 +141,12 @@ def _change(one: Drift) -> dict[str, Any]:
     return {
         "machine": one.machine,
         "parameter": together_words(one),
-        "unit": SHOWN_AS[one.unit],
         "campaigns": one.campaigns,
         "months": f"{one.months:.1f}",
-        "change": figures_text(one.change, one.unit),
+        "change": f"{figures_text(one.change, one.unit)} {SHOWN_AS[one.unit]}",
         "slope": figures_text(one.slope, one.unit),
         "interval": f"{figures_text(one.low, one.unit)} to {figures_text(one.high, one.unit)}",
-        "times": f"{abs(one.times):.1f}",
         "significant": one.significant,
-        "words": "more than chance" if one.significant else "no more than chance",
+        "words": "changed" if one.significant else "no more than chance",
         "steady": "" if one.steady is not False else ", not steadily",
     }

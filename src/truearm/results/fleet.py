@@ -141,10 +141,7 @@ class Fleet(Record):
     def lines(self) -> list[str]:
         """Return what the command prints."""
         found, run = self.analysis, self.run
-        text = [
-            f"{counted(self.recorded.manifest.count, 'robot')}, "
-            f"{found.measurements - len(found.failed)} calibrated, {len(found.failed)} failed."
-        ]
+        text = [f"{self._robots()}, {found.measurements - len(found.failed)} calibrated, {len(found.failed)} failed."]
         if run.before:
             text.append(f"{counted(run.before, 'part')} of {run.parts} on disk already.")
         text += [f"{words[0].upper()}{words[1:]}." for words in run.told]
@@ -152,6 +149,12 @@ class Fleet(Record):
         if self.proposed is not None:
             text.append(f"Priors proposed: {counted(len(self.proposed[1]), 'parameter')} in {PRIORS_FILE}.")
         return text + notice_lines(self.warnings)
+
+    def _robots(self) -> str:
+        count, machines = self.recorded.manifest.count, self.analysis.machines
+        if self.analysis.measurements != machines:
+            return f"{counted(count, 'measurement')} of {counted(machines, 'robot')}"
+        return counted(count, "robot")
 
     def csv_text(self) -> str:
         """Return the robots as a table, one row each."""

@@ -104,8 +104,17 @@ def parameter_lines(found: KindFound, *, several: bool) -> list[str]:
             told = listed([f"{one.parameter} {spread_words(one)}" for one in those])
         else:
             told = listed([one.parameter for one in those])
-        text.append(f"{'  ' if not several else '    '}{words}: {told}.")
-    return text
+        text.append(f"  {words}: {told}.")
+    shifted = [mean_words(one) for one in found.spreads if one.beside]
+    return [*text, f"  The whole series lies beside nominal: {listed(shifted)}."] if shifted else text
+
+
+def mean_words(one: ParameterSpread) -> str:
+    """Return how far the mean of a series is from nominal."""
+    if one.mean is None or one.mean_low is None or one.mean_high is None:
+        return one.parameter
+    low, high = (f"{in_unit(end, one.unit)[0]:.3g}" for end in (one.mean_low, one.mean_high))
+    return f"{one.parameter} {sized(one.mean, one.unit, sign=True)} ({low} to {high})"
 
 
 def spread_words(one: ParameterSpread) -> str:

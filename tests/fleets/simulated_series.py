@@ -12,7 +12,7 @@ from functools import cache
 
 import numpy as np
 
-from truearm.fleets.analysis.kind import Kind, kinds_of
+from truearm.fleets.analysis.kind import Gathered, Kind
 from truearm.fleets.rows import FoundParameter, Row
 from truearm.identification.solving.models import named_model
 from truearm.library import load_robot
@@ -79,8 +79,10 @@ def calibrations(of: Campaign, noise: float = 3e-5) -> Calibrations:
 
 def kind_of(told: list[Row]) -> Kind:
     """Return robots of one kind as arrays."""
-    (kind,) = kinds_of(told)
-    return kind
+    gathered = Gathered(told[0].robot)
+    for row in told:
+        gathered.add(row)
+    return gathered.kind
 
 
 def rows(

@@ -142,11 +142,6 @@ class Drifts:
         """What has changed by more than chance."""
         return tuple(one for one in self.found if one.significant)
 
-    @property
-    def machines(self) -> tuple[str, ...]:
-        """The machines that were measured again at a known date."""
-        return tuple(dict.fromkeys(one.machine for one in self.found))
-
 
 def drifts(kind: Kind) -> Drifts:
     """Return how parameters of machines that were measured at several dates went on.

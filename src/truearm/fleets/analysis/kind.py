@@ -11,7 +11,6 @@ base or target can move instead.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import date
 from functools import cached_property
@@ -121,15 +120,6 @@ class Kind:
         with np.errstate(invalid="ignore", divide="ignore"):
             pull = np.where(self.pull >= UNINFORMED, self.pull, np.nan)
             return self.difference / pull, self.deviation**2 / pull
-
-
-def kinds_of(rows: Iterable[Row]) -> tuple[Kind, ...]:
-    """Return the robots that were calibrated, kind by kind, the kind with most measurements first."""
-    found: dict[str, Gathered] = {}
-    for row in rows:
-        found.setdefault(row.robot, Gathered(row.robot)).add(row)
-    kinds = [gathered.kind for gathered in found.values() if gathered.names]
-    return tuple(sorted(kinds, key=lambda kind: -len(kind.names)))
 
 
 def day_of(text: str | None) -> float:

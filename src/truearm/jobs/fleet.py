@@ -9,7 +9,7 @@ from collections.abc import Callable
 from concurrent.futures import Executor
 from pathlib import Path
 
-from truearm.errors import InputError, refusals_of, wrong_kind
+from truearm.errors import InputError, refusals_of
 from truearm.executing.parts import done_parts
 from truearm.executing.workers import Given, ThisProcess, Workers, processes, with_workers
 from truearm.files import path_argument
@@ -19,6 +19,7 @@ from truearm.fleets.recorded import RECORD, Recorded
 from truearm.jobs.arguments import (
     command_argument,
     count_argument,
+    executor_argument,
     flag_argument,
     folder_for,
     name_argument,
@@ -77,8 +78,7 @@ def fleet(
     count = None if workers is None else count_argument(workers, "workers")
     address = None if scheduler is None else name_argument(scheduler, "scheduler")
     insecure = flag_argument(insecure, "insecure")
-    if executor is not None and not isinstance(executor, Executor):
-        raise wrong_kind("an executor belongs here", executor, "executor", "a concurrent.futures.Executor")
+    executor = executor_argument(executor)
     given = {"workers": count, "scheduler": address, "executor": executor}
     several = [name for name, value in given.items() if value is not None]
     if len(several) > 1:

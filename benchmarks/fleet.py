@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import multiprocessing
 import os
 import random
 import resource
@@ -19,6 +20,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -39,6 +41,8 @@ def one_run(manifest: str, out: str, how: dict[str, Any]) -> None:
     began = time.perf_counter()
     from truearm.jobs.fleet import fleet
 
+    if "process" in how:  # one worker as the others are, and not this process
+        how = {"executor": ProcessPoolExecutor(how["process"], mp_context=multiprocessing.get_context("spawn"))}
     steps: list[tuple[str, float]] = []
     found = fleet(manifest, out=out, progress=lambda words: steps.append((words, time.perf_counter())), **how)
     ended = time.perf_counter()
@@ -148,13 +152,14 @@ def compared(folder: Path, count: int, repetitions: int) -> dict[str, Any]:
     """Return times, memory and digests of one worker, two and a cluster of two."""
     manifest = folder / "fleet.yaml"
     manifest.write_text(MANIFEST.format(count=count, chunk=250))
-    runs: dict[str, list[dict[str, Any]]] = {"1": [], "2": [], "dask": []}
+    runs: dict[str, list[dict[str, Any]]] = {"1": [], "one process": [], "2": [], "dask": []}
     digests = set()
     with cluster(folder, 2) as there:
         for repetition in range(repetitions):
             for name in runs:
-                how = {"scheduler": there.address} if name == "dask" else {"workers": int(name)}
-                out = folder / f"{name}-{repetition}"
+                ways: dict[str, dict[str, Any]] = {"dask": {"scheduler": there.address}, "one process": {"process": 1}}
+                how = ways[name] if name in ways else {"workers": int(name)}
+                out = folder / f"{name.replace(' ', '-')}-{repetition}"
                 runs[name].append(run(manifest, out, how))
                 digests.add(digest(out))
                 sys.stdout.write(f"{name}: {runs[name][-1]}\n")
@@ -169,6 +174,9 @@ def compared(folder: Path, count: int, repetitions: int) -> dict[str, Any]:
         "seconds": best,
         "memory_of_parent_MB": {name: max(one["memory_MB"] for one in found) for name, found in runs.items()},
         "two_workers_against_one": {step: best["1"][step] / best["2"][step] for step in ("parts", "all")},
+        "two_workers_against_one_process": {
+            step: best["one process"][step] / best["2"][step] for step in ("parts", "all")
+        },
         "dask_against_two_workers": {step: best["dask"][step] / best["2"][step] for step in ("parts", "all")},
         "same_to_the_last_digit": len(digests) == 1,
         "bytes_a_robot": size / count,

@@ -11,7 +11,6 @@ from truearm.errors import InputError
 from truearm.fleets.entries import RobotEntry
 from truearm.fleets.experiment import Experiment, Series
 from truearm.fleets.recorded import part_text
-from truearm.jobs.fleet_robots import calibrated_row
 from truearm.version import __version__
 
 
@@ -75,6 +74,8 @@ def finished(task: Task) -> Finished:
         series = _series(task.experiment)
         rows, shared = series.rows(task.numbers), series.shared
     else:
+        from truearm.jobs.fleet_robots import calibrated_row  # with all that a calibration needs, only for these
+
         rows, shared = [calibrated_row(entry, task.folder) for entry in task.robots], {}
     return Finished(part_text(rows, shared), sum(row.status == "failed" for row in rows))
 

@@ -75,6 +75,7 @@ PLACES: dict[str, Arguments] = {
     "export": {"out": "robot.csv"},
     "export_robodk": {"out": "table.csv"},
     "study": {"out": "."},
+    "fleet": {"out": "."},
     "new_robot": {"file": "robot.yaml"},
     "example": {"folder": "."},
     "demo": {"out": "."},

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from truearm.jobs.example import example
     from truearm.jobs.export import export
     from truearm.jobs.export_robodk import export_robodk
+    from truearm.jobs.fleet import fleet
     from truearm.jobs.hexapod_enumerate import hexapod_enumerate
     from truearm.jobs.hexapod_plan import hexapod_plan
     from truearm.jobs.hexapod_solve import hexapod_solve
@@ -87,6 +88,7 @@ __all__ = [
     "example",
     "export",
     "export_robodk",
+    "fleet",
     "hexapod_enumerate",
     "hexapod_plan",
     "hexapod_solve",

@@ -90,6 +90,8 @@ LIMITS: Final[Mapping[str, Limit]] = {
     "monte_carlo": Limit(100_000, "the number is out of range", "trials"),
     "repeats": Limit(100_000, "the number is out of range", "repeats"),
     "bootstrap": Limit(10_000, "the number is out of range", "fits"),
+    "robots": Limit(1_000_000, "there are too many robots", "robots"),
+    "workers": Limit(1000, "the number is out of range", "workers"),
     "seeds": Limit(1000, "the number is out of range", "seeds"),
 }
 

@@ -55,6 +55,7 @@ COMMANDS: Final[tuple[str, ...]] = (
     "influence irb120.yaml --poses 20 --angle 0.1 --json",
     "poses irb120 --set diagonal --count 4 --centre 350,0,350 --side 200 --out set.csv --orientation down",
     "poses irb120.yaml --set p1-p5 --centre 350,0,350 --side 200 --tip 0,0,50 --out set.csv --json",
+    "fleet fleet.yaml --out out --workers 1 --json",
     "path irb120 path.yaml --out out --program all --seed-joints 0,10,20,0,50,0",
     "path calibrated.yaml path.yaml --out out --program rapid --targets poses --spacing 0.5 --json",
     "sphere irb120 ballbar.csv --tip 0,0,125 --out page.html",

@@ -12,6 +12,7 @@ import numpy as np
 from truearm.compensation.cell import read_frames, read_tools, read_wrenches
 from truearm.compensation.program_files import program_files, read_programs, restored
 from truearm.errors import InputError
+from truearm.fleets.manifest import read_manifest
 from truearm.identification.choosing.zone_boxes import boxes_of, read_zones
 from truearm.identification.solving.bounds import read_bounds
 from truearm.jobs.import_ur_kinematics import import_ur_kinematics
@@ -182,6 +183,13 @@ READERS: Final[Mapping[str, Reader]] = {
     "dh": _dh_table("dh.csv", "standard-dh"),
     "mdh": _dh_table("mdh.csv", "modified-dh"),
     "hayati": _dh_table("hayati.csv", "hayati"),
+    "fleet": Reader(
+        {name: name for name in ("fleet.yaml", "robots.csv", "data.csv", "bounds.yaml")},
+        lambda folder: read_manifest(folder / "fleet.yaml"),
+    ),
+    "fleet-experiment": Reader(
+        {"experiment.yaml": "experiment.yaml"}, lambda folder: read_manifest(folder / "experiment.yaml")
+    ),
     "zones": Reader(
         {"zones.yaml": "zones.yaml"}, lambda folder: boxes_of(read_zones(folder / "zones.yaml"), "zones.yaml")
     ),

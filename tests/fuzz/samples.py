@@ -51,6 +51,23 @@ visibility:
   targets: {"1": [0, 0, 1]}
 clearance: 60
 """
+FLEET = """\
+truearm: truearm-fleet/1
+robots: robots.csv
+options: {model: elastic, seed: 3, effects: [backlash], bounds: bounds.yaml}
+chunk: 2
+"""
+ROBOTS = """\
+name,robot,data,of,date,train,effects,gravity,payload
+one,irb120,data.csv,4711,2026-01-05,40,,"0,0,-9.81",
+# again
+two,kr5,data.csv,4711,2026-07-05,all,backlash;clearance,,"2.7kg,50mm,25mm,100mm"
+"""
+EXPERIMENT = """\
+truearm: truearm-fleet/1
+units: {length: mm}
+experiment: {robot: irb120, count: 30, configurations: 20, targets: 1, noise: 0.05, seed: 1}
+"""
 
 
 @cache
@@ -92,6 +109,9 @@ def folder() -> Path:
         "spatial.yaml": SPATIAL,
         "joints.csv": JOINTS,
         "bounds.yaml": BOUNDS,
+        "fleet.yaml": FLEET,
+        "robots.csv": ROBOTS,
+        "experiment.yaml": EXPERIMENT,
         "zones.yaml": ZONES,
         "constraints.yaml": CONSTRAINTS,
         "sheet.csv": _sheet(),

@@ -226,6 +226,13 @@ def _new(folder: Path, name: str) -> Path:
     return path
 
 
+_SERIES = """\
+truearm: truearm-fleet/1
+units: {length: mm}
+experiment: {robot: irb120, count: 3, configurations: 12, noise: 0.05, held_out: 5, model: offsets}
+chunk: 2
+"""
+
 #: Arguments of a call of each job, made in a folder of its own.
 EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
     "load_robot": lambda _: {"robot": "irb120"},
@@ -371,6 +378,11 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
     "convert": lambda folder: {"robot": "irb120", "convention": "hayati", "out": _new(folder, "hayati.yaml")},
     "export": lambda folder: {"robot": "irb120", "format": "hayati", "out": _new(folder, "hayati.csv")},
     "study": lambda folder: {"name": "li-table", "seeds": 1, "out": folder / "study"},
+    "fleet": lambda folder: {
+        "manifest": _written(folder / "fleet.yaml", _SERIES),
+        "out": folder / "fleet",
+        "workers": 1,
+    },
     "new_robot": lambda folder: {"file": _new(folder, "robot.yaml")},
     "example": lambda folder: {"folder": Path(tempfile.mkdtemp(dir=folder))},
     "demo": lambda folder: {"out": folder / "demo"},

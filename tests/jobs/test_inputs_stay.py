@@ -14,11 +14,13 @@ from tests.jobs.examples import EXAMPLES
 
 import truearm
 from truearm.errors import InputError
+from truearm.fleets.recorded import RECORD
 from truearm.jobs import JOBS
 from truearm.manifest import MANIFEST, UNFINISHED
 from truearm.modeling.formats.robot_file import robot_text
 from truearm.results.axis_calibration import AXIS_FILES
 from truearm.results.calibration import RESULT_FILES
+from truearm.results.fleet import FLEET_FILES
 from truearm.results.followed_path import MOTION
 from truearm.results.followed_path import REPORT as PATH_REPORT
 from truearm.results.influence import INFLUENCE_FILES
@@ -140,6 +142,7 @@ INTO_FOLDERS = {
     "compensate": ("plate.mod", "plate.mod.truearm.json", REPORT),
     "revert": ("plate.mod",),
     "path": (MOTION, PATH_REPORT),
+    "fleet": (*FLEET_FILES, RECORD),
 }
 #: The names of what a job writes where `out` is one of them, or the parameter beside it.
 BESIDE = {

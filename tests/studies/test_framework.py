@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import ast
 import json
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields, replace
+from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -13,10 +16,11 @@ import pytest
 
 import truearm
 from truearm.errors import InputError
+from truearm.executing.workers import Given
 from truearm.reporting.drawing import axis, figure
 from truearm.studies import STUDIES, Entry, run_study
 from truearm.studies.regions import IRB120
-from truearm.studies.seeds import Seed, median_of, over_seeds
+from truearm.studies.seeds import Seed, median_of, over_seeds, seeds_done_by
 from truearm.studies.study import Picture, Row, Study, Table, number
 from truearm.studies.verdicts import VERDICTS, Comparison
 
@@ -137,6 +141,47 @@ def test_every_seed_has_its_own_numbers_and_says_what_it_does() -> None:
     outcomes = over_seeds(2, said.append, one, "robot")
     assert outcomes == tuple(float(np.random.default_rng(seed).standard_normal()) for seed in (0, 1))
     assert said == ["robot 1 of 2", "robot 1 of 2: drawing", "robot 2 of 2", "robot 2 of 2: drawing"]
+
+
+def _drawn(scale: float, seed: Seed) -> float:
+    seed.step("drawing")
+    return scale * float(seed.generator().standard_normal())
+
+
+def test_workers_do_the_seeds_with_the_same_outcomes() -> None:
+    said: list[str] = []
+    here = over_seeds(5, said.append, partial(_drawn, 2.0))
+    with ThreadPoolExecutor(2) as pool, seeds_done_by(Given(pool)):
+        there = over_seeds(5, said.append, partial(_drawn, 2.0), "robot")
+    assert there == here
+    assert said[-6:] == [f"robot {done} of 5 done" for done in range(6)]
+    with pytest.raises(InputError) as caught:
+        truearm.study("li-table", seeds=1, workers=2, executor=pool)
+    assert caught.value.parameter == "workers, executor"
+
+
+def test_what_studies_do_once_a_seed_can_go_to_another_process() -> None:
+    seen = 0
+    for file in (Path(truearm.__file__).parent / "studies").rglob("*.py"):
+        tree = ast.parse(file.read_text())
+        functions = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+        functions |= {alias.name for node in tree.body if isinstance(node, ast.ImportFrom) for alias in node.names}
+        partials = {
+            target.id: node.value
+            for node in ast.walk(tree)
+            if isinstance(node, ast.Assign)
+            for target in node.targets
+            if isinstance(target, ast.Name)
+        }
+        for call in ast.walk(tree):
+            if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "over_seeds":
+                one: ast.AST = call.args[2]
+                one = partials.get(one.id, one) if isinstance(one, ast.Name) else one
+                assert isinstance(one, ast.Call), file
+                assert ast.unparse(one.func) == "partial", file
+                assert ast.unparse(one.args[0]) in functions, file
+                seen += 1
+    assert seen == 14
 
 
 def test_the_median_is_over_the_seeds() -> None:

@@ -21,6 +21,7 @@ from truearm.cli.convert import convert
 from truearm.cli.devices import devices
 from truearm.cli.distances import distances
 from truearm.cli.export import export, export_robodk
+from truearm.cli.fleet import fleet
 from truearm.cli.hexapod import app as hexapod
 from truearm.cli.ik import ik
 from truearm.cli.importing import app as importing
@@ -97,6 +98,7 @@ app.command()(export)
 app.command()(export_robodk)
 app.command("new-robot")(new_robot)
 app.command(help=HELP)(study)
+app.command()(fleet)
 app.command()(example)
 app.command()(demo)
 

@@ -28,6 +28,7 @@ def study(
         typer.Option(metavar="DIR", help="Folder of measured data, for a study that needs them.", show_default=False),
     ] = None,
     seeds: Annotated[int, typer.Option(metavar="N", min=1, help="How often to do it anew.")] = 10,
+    workers: Annotated[int, typer.Option(metavar="N", min=1, help="Processes that do the seeds.")] = 1,
     json: Json = False,
 ) -> None:
     """Make a published experiment again."""
@@ -35,7 +36,7 @@ def study(
     from truearm.studies.study import STUDY_FILES
 
     with progress() as say:
-        finished = run(name, seeds=seeds, data=data, out=out, command=command_line(), progress=say)
+        finished = run(name, seeds=seeds, data=data, out=out, workers=workers, command=command_line(), progress=say)
     if json:
         print_json(finished.summary())
     else:

@@ -51,6 +51,7 @@ JOBS: Final = (
     "export",
     "export_robodk",
     "study",
+    "fleet",
     "new_robot",
     "example",
     "demo",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from concurrent.futures import Executor
 from numbers import Integral, Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, TypeGuard, TypeVar
@@ -345,6 +346,13 @@ def progress_argument(progress: object) -> None:
     """Refuse what cannot be called with a few words."""
     if not callable(progress):
         raise wrong_kind("a function belongs here", progress, "progress", "a function that takes a text")
+
+
+def executor_argument(executor: object) -> Executor | None:
+    """Return who does parts of work; None for None."""
+    if executor is None or isinstance(executor, Executor):
+        return executor
+    raise wrong_kind("an executor belongs here", executor, "executor", "a concurrent.futures.Executor")
 
 
 def choice_argument(value: object, parameter: str, known: Mapping[str, T], what: str | None = None) -> T:

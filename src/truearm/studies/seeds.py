@@ -1,16 +1,35 @@
-"""The frame of every study: the loop over seeds, and figures of what the seeds found."""
+"""The frame of every study: the loop over seeds, here or by workers, and figures of what the seeds found."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, Final, TypeVar
 
 import numpy as np
 
+from truearm.errors import InputError
+from truearm.executing.parts import done_parts
+from truearm.executing.workers import Workers
 from truearm.studies import Progress
 
 Outcome = TypeVar("Outcome")
+
+
+#: Who does the seeds of the study that runs; None where they are done here.
+_WORKERS: Final[ContextVar[Workers | None]] = ContextVar("_WORKERS", default=None)
+
+
+@contextmanager
+def seeds_done_by(workers: Workers | None) -> Iterator[None]:
+    """Let workers do the seeds of what runs within; the outcomes are the same."""
+    mark = _WORKERS.set(workers)
+    try:
+        yield
+    finally:
+        _WORKERS.reset(mark)
 
 
 @dataclass(frozen=True)
@@ -55,7 +74,8 @@ def over_seeds(
     progress
         Called with a few words at each seed.
     one
-        Returns the record of one seed's outcome.
+        Returns the record of one seed's outcome. It may go to another process: a function of a module, perhaps with
+        arguments that it has already (``functools.partial``).
     what
         What one seed is called when progress is shown.
 
@@ -63,12 +83,42 @@ def over_seeds(
     -------
     What `one` returned, in the order of the seeds.
     """
+    workers = _WORKERS.get()
+    if workers is not None:
+        return _by_workers(workers, seeds, progress, one, what)
     outcomes = []
     for number in range(seeds):
         seed = Seed(number, seeds, progress, what)
         seed.step()
         outcomes.append(one(seed))
     return tuple(outcomes)
+
+
+def _by_workers(
+    workers: Workers, seeds: int, progress: Progress, one: Callable[[Seed], Outcome], what: str
+) -> tuple[Outcome, ...]:
+    outcomes: dict[int, Outcome] = {}
+    parts = ((one, Seed(number, seeds, _silent, what)) for number in range(seeds))
+    progress(f"{what} 0 of {seeds} done")
+    for done in done_parts(_outcome, parts, workers, progress):
+        if done.result is None:
+            raise InputError(
+                f"workers died again and again of {what} {done.part[1].number + 1}",
+                parameter="workers",
+                cure="Take fewer workers, so that each has more memory.",
+            )
+        outcomes[done.part[1].number] = done.result[0]
+        progress(f"{what} {len(outcomes)} of {seeds} done")
+    return tuple(outcomes[number] for number in range(seeds))
+
+
+def _outcome(part: tuple[Callable[[Seed], Any], Seed]) -> tuple[Any]:
+    one, seed = part
+    return (one(seed),)
+
+
+def _silent(_: str) -> None:
+    """Say nothing: nobody looks at what a worker says."""
 
 
 def median_of(outcomes: Iterable[Outcome], figure: Callable[[Outcome], float]) -> float:

@@ -95,7 +95,7 @@ def monte_carlo(
     held_out
         Joint positions at which the calibrated robots are judged, ``(configurations, joints)``.
     """
-    problem = _of_itself(model.prepared(robot), q, model, sigma)
+    problem = of_itself(model.prepared(robot), q, model, sigma)
     free = problem.free
     drawn = np.array([p.group not in ("base", "target") for p in free.parameters])
     truth = free.nominal + free.prior * drawn * rng.standard_normal((trials, len(free.names)))
@@ -105,12 +105,12 @@ def monte_carlo(
     size = max(1, _BLOCK // len(problem.components))
     for block in (slice(first, first + size) for first in range(0, trials, size)):
         readings[block] += problem.at(truth[block]).residual
-        estimate[block], deviation[block], converged[block] = _calibrated(problem, readings[block])
+        estimate[block], deviation[block], converged[block] = calibrated(problem, readings[block])
     errors = [_position_errors(problem, truth, estimate, held_out, target.name) for target in robot.targets]
     return MonteCarlo(problem, readings, truth, estimate, deviation, converged, np.stack(errors, axis=1))
 
 
-def _of_itself(robot: Robot, q: Array, model: Model, sigma: float) -> Problem:
+def of_itself(robot: Robot, q: Array, model: Model, sigma: float) -> Problem:
     """Return the calibration of a robot from what an instrument without noise reads of it."""
     positions = [robot.world_poses(q, target.name)[0] for target in robot.targets]
     data = Dataset(
@@ -127,29 +127,44 @@ def _of_itself(robot: Robot, q: Array, model: Model, sigma: float) -> Problem:
     return Problem(robot, data, model.free(robot), {})
 
 
-def _calibrated(problem: Problem, readings: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Return estimates, deviations and whether they settled, for `readings` as in :class:`MonteCarlo`."""
+def calibrated(problem: Problem, readings: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Calibrate many robots at once, each as if it were alone: whatever stands beside it, to the last digit.
+
+    Parameters
+    ----------
+    readings
+        As in :class:`MonteCarlo`.
+
+    Returns
+    -------
+    Estimates and deviations [SI], ``(trials, parameters)``, and whether they settled, ``(trials,)``.
+    """
     nominal, prior = problem.free.nominal, problem.free.prior
-    # All begin at the nominal values: one Jacobian serves the first step of them all.
-    here = problem.at(nominal)
-    J = here.jacobian * prior
-    step = -np.linalg.solve(J.T @ J + np.eye(len(prior)), J.T @ (here.residual - readings).T).T
-    x = nominal + step * prior
-    size = np.abs(step).max(axis=1)
-    for _ in range(_STEPS - 1):
-        here = problem.at(x)
-        r, J = here.residual - readings, here.jacobian
+    x = np.tile(nominal, (len(readings), 1))
+    information = np.empty((*x.shape, x.shape[1]))
+    before = np.empty(len(x))
+    going = np.arange(len(x))
+    for number in range(_STEPS):
+        # All begin at the nominal values: one Jacobian serves the first step of them all.
+        here = problem.at(x[going] if number else nominal[None])
+        r, J = here.residual - readings[going], here.jacobian
         Jt = np.swapaxes(J, 1, 2)
-        information = (Jt @ J) * np.outer(prior, prior) + np.eye(len(prior))
-        gradient = (Jt @ r[:, :, None])[:, :, 0] * prior + (x - nominal) / prior
-        step = -np.linalg.solve(information, gradient[:, :, None])[:, :, 0]
-        x = x + step * prior
-        before, size = size, np.abs(step).max(axis=1)
-        settled = (size < _SMALL) | (size * size < _SMALL * before)  # the latter: what the next step would be, at most
-        if settled.all():
+        information[going] = (Jt @ J) * np.outer(prior, prior) + np.eye(len(prior))
+        gradient = (Jt @ r[:, :, None])[:, :, 0] * prior + (x[going] - nominal) / prior
+        step = -np.linalg.solve(information[going], gradient[:, :, None])[:, :, 0]
+        x[going] += step * prior
+        size = np.abs(step).max(axis=1)
+        settled = size < _SMALL
+        if number:  # what the next step would be, at most
+            settled |= size * size < _SMALL * before[going]
+        before[going] = size
+        going = going[~settled]
+        if not len(going):
             break
+    left = np.zeros(len(x), dtype=bool)
+    left[going] = True
     variance = np.diagonal(np.linalg.inv(information), axis1=1, axis2=2)
-    return x, prior * np.sqrt(variance), settled
+    return x, prior * np.sqrt(variance), ~left
 
 
 def _position_errors(problem: Problem, truth: Array, estimate: Array, q: Array, target: str) -> Array:

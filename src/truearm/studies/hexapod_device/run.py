@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -105,7 +106,7 @@ def run(seeds: int, progress: Progress, trials: int, *, places: bool) -> Run:
     """
     robot, cups = with_cups(load_robot("irb120"))
     plan = reachable(robot, PLACE, poses(cups), branches=("front-up",))
-    return Run(over_seeds(seeds, progress, lambda seed: _sessions(robot, plan, seed, trials, places)), plan)
+    return Run(over_seeds(seeds, progress, partial(_sessions, robot, plan, trials=trials, places=places)), plan)
 
 
 def _sessions(robot: Robot, plan: Reachable, seed: Seed, trials: int, places: bool) -> Outcome:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -141,13 +142,9 @@ def run(seeds: int, progress: Progress, coarser: int) -> Run:
     chosen = smallest[f"Table {_COMPLIANCES[_FIRST]}"]
     geared = _places(_with_gears(_twin(_FIRST), chosen), tests)
 
-    def one(seed: Seed) -> Outcome:
-        rng = seed.generator()
-        return Outcome(_measured(places[_FIRST], tests, rng), _measured(geared, tests, rng))
-
     return Run(
         tests=tests,
-        outcomes=over_seeds(seeds, progress, one),
+        outcomes=over_seeds(seeds, progress, partial(_one, places[_FIRST], geared, tests)),
         run_out=chosen,
         nearest=nearest,
         allowed=smallest,
@@ -185,6 +182,14 @@ def _nearest(tests: Mapping[int, AxisTest]) -> dict[int, float]:
 def _places(twin: Twin, tests: Mapping[int, AxisTest]) -> dict[int, Array]:
     """Return where the reflector is during the run of each joint [m], ``(n, 3)``."""
     return {number: places_of(twin, number, test) for number, test in tests.items()}
+
+
+def _one(
+    places: Mapping[int, Array], geared: Mapping[int, Array], tests: Mapping[int, AxisTest], seed: Seed
+) -> Outcome:
+    """Return what is seen of the arm without gears and with them."""
+    rng = seed.generator()
+    return Outcome(_measured(places, tests, rng), _measured(geared, tests, rng))
 
 
 def _measured(places: Mapping[int, Array], tests: Mapping[int, AxisTest], rng: np.random.Generator) -> dict[int, Turn]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -218,7 +219,7 @@ class Outcome:
 
 def run(seeds: int, progress: Progress, settings: Settings) -> tuple[Outcome, ...]:
     """Calibrate in all ways, once a seed."""
-    return over_seeds(seeds, progress, lambda seed: _one(seed, settings))
+    return over_seeds(seeds, progress, partial(_one, settings=settings))
 
 
 def looked_at(outcomes: Iterable[Outcome]) -> tuple[Further, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -199,8 +200,7 @@ def run(
     data = without_table_motion(raw)
     robot = load_robot("irb120")
 
-    def one(seed: Seed) -> Outcome:
-        return _split(robot, raw, data, seed, many, searches, effects, together)
+    one = partial(_split, robot, raw, data, many=many, searches=searches, effects=effects, together=together)
 
     def remainders(words: str, model: Model) -> tuple[Remainder, ...]:
         progress(f"what is left over: {words}")

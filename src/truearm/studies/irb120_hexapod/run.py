@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -28,7 +29,7 @@ from truearm.studies.irb120 import without_beta
 from truearm.studies.irb120_hexapod.spheres import TRACKER, Spheres, spheres
 from truearm.studies.irb120_hexapod.ways import Ways, ways
 from truearm.studies.irb120_hexapod.worn import calibrated, in_base, tracked, worn_twin
-from truearm.studies.seeds import over_seeds
+from truearm.studies.seeds import Seed, over_seeds
 from truearm.validation.pose_accuracy import PoseErrors, pose_errors, repeatability
 
 TRAINING: Final = 38
@@ -116,10 +117,11 @@ def run(seeds: int, progress: Progress, unseen: int, coarser: int) -> Run:
     nominal, cups = with_cups(load_robot("irb120"))
     designed = poses(cups)
     plan = reachable(nominal, PLACE, designed, branches=("front-up",))
-    return Run(over_seeds(seeds, progress, lambda seed: _one(seed.generator(), unseen, coarser)), designed, plan)
+    return Run(over_seeds(seeds, progress, partial(_one, unseen=unseen, coarser=coarser)), designed, plan)
 
 
-def _one(rng: np.random.Generator, unseen: int, coarser: int) -> Outcome:
+def _one(seed: Seed, unseen: int, coarser: int) -> Outcome:
+    rng = seed.generator()
     twin = worn_twin(rng)
     nominal = load_robot("irb120").with_payload(twin.robot.payload)
     read = tracked(twin, regions.IRB120.draw(TRAINING, rng), TRACKER, rng)

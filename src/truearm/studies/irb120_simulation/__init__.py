@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Final
 
 from truearm.studies import Progress
@@ -26,7 +27,7 @@ def study(seeds: int, progress: Progress, unseen: int = _UNSEEN) -> Study:
     unseen
         Configurations to judge by.
     """
-    outcomes = over_seeds(seeds, progress, lambda seed: calibrations(seed, unseen))
+    outcomes = over_seeds(seeds, progress, partial(calibrations, unseen=unseen))
     before = median_of(outcomes, lambda one: 1e3 * one.before.max)
     exact = median_of(outcomes, lambda one: 1e3 * one.exact.max)
     noisy = median_of(outcomes, lambda one: 1e3 * one.noisy.mean)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -139,7 +140,7 @@ def run(seeds: int, progress: Progress, counts: Counts) -> tuple[Outcome, ...]:
     counts
         How much is measured and judged.
     """
-    return over_seeds(seeds, progress, lambda seed: _one(seed, counts))
+    return over_seeds(seeds, progress, partial(_one, counts=counts))
 
 
 def _one(seed: Seed, counts: Counts) -> Outcome:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Final, Literal
 
 import numpy as np
@@ -135,7 +136,7 @@ def run(seeds: int, progress: Progress, count: int, unseen: int) -> Run:
     progress("looking for the largest cube")
     cube = workspace_cube()
     bent = influence(katana(), np.radians([[0.0, 0.0, 0.0, 80.0, 0.0]]), NAMES, TIP, PERTURBATIONS)
-    return Run(cube, bent, over_seeds(seeds, progress, lambda seed: _one(seed, cube, count, unseen)))
+    return Run(cube, bent, over_seeds(seeds, progress, partial(_one, cube=cube, count=count, unseen=unseen)))
 
 
 def _one(seed: Seed, cube: Cube, count: int, unseen: int) -> Outcome:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Final, Literal
 
 from truearm.identification.inclinometers.fit import TILTING as EFFECTS
@@ -116,7 +117,7 @@ def run(seeds: int, progress: Progress, count: int, unseen: int) -> Run:
     """
     progress("looking for the largest cube")
     cube = workspace_cube()
-    return Run(cube, over_seeds(seeds, progress, lambda seed: _one(seed, cube, count, unseen)))
+    return Run(cube, over_seeds(seeds, progress, partial(_one, cube=cube, count=count, unseen=unseen)))
 
 
 def _one(seed: Seed, cube: Cube, count: int, unseen: int) -> Outcome:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Final, Literal
 
 import numpy as np
@@ -133,7 +134,7 @@ def run(seeds: int, progress: Progress, step: float, poses: int) -> tuple[Outcom
     poses
         How many geometry is identified from, besides the samples of the circle.
     """
-    return over_seeds(seeds, progress, lambda seed: _one(seed, step, poses))
+    return over_seeds(seeds, progress, partial(_one, step=step, poses=poses))
 
 
 def _one(seed: Seed, step: float, poses: int) -> Outcome:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -122,7 +123,7 @@ def run(seeds: int, progress: Progress, repetitions: int) -> Run:
     lines = seven_lines(_CENTRE, _SIZE)
     joints = lines.joints(nominal)
     progress("driving lines")
-    outcomes = over_seeds(seeds, progress, lambda seed: _one(nominal, twin, perfect, lines, joints, seed))
+    outcomes = over_seeds(seeds, progress, partial(_one, nominal, twin, perfect, lines, joints))
     progress(f"measuring {repetitions} times")
     inside = 100.0 * _inside(nominal, perfect, exact, repetitions).mean(axis=0)
     return Run(exact, *_determined(nominal), outcomes, inside, _circles(nominal))

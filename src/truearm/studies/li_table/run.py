@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Final, Literal
 
 import numpy as np
@@ -192,7 +193,7 @@ def run(seeds: int, progress: Progress, unseen: int) -> tuple[Outcome, ...]:
     unseen
         Points about the table to judge by.
     """
-    return over_seeds(seeds, progress, lambda seed: _one(seed, unseen))
+    return over_seeds(seeds, progress, partial(_one, unseen=unseen))
 
 
 def _one(seed: Seed, unseen: int) -> Outcome:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Final, Literal
 
 import numpy as np
@@ -172,14 +173,10 @@ def run(seeds: int, progress: Progress, configurations: int, others: int) -> Run
     twin = invented_twin(station.robot)
     truth = held_out(station.robot, twin, joints)
 
-    def other(seed: Seed) -> Outcome:
-        drawn = drawn_twin(station.robot, seed.number)
-        return _campaign(station, drawn, held_out(station.robot, drawn, joints[:others]), seed)
-
     return Run(
         station=station,
-        outcomes=over_seeds(seeds, progress, lambda seed: _campaign(station, twin, truth, seed)),
-        others=over_seeds(seeds, progress, other, what="other robot"),
+        outcomes=over_seeds(seeds, progress, partial(_campaign, station, twin, truth)),
+        others=over_seeds(seeds, progress, partial(_other, station, joints[:others]), what="other robot"),
     )
 
 
@@ -191,6 +188,12 @@ def _station() -> Station:
     tracked = plan_measurements(robot, candidates, _ELASTIC, poses=_TRACKER, rng=np.random.default_rng(1))
     plan = reachable(robot, FIXTURE, wanted, branches=(FRONT_UP, BACK_DOWN))
     return Station(robot, wanted, plan, touches(robot), tracked.joints)
+
+
+def _other(station: Station, joints: Array, seed: Seed) -> Outcome:
+    """Do so with another robot, drawn for the seed."""
+    drawn = drawn_twin(station.robot, seed.number)
+    return _campaign(station, drawn, held_out(station.robot, drawn, joints), seed)
 
 
 def _campaign(station: Station, twin: Twin, truth: HeldOut, seed: Seed) -> Outcome:

@@ -1,0 +1,351 @@
+"""Machines that were measured again: which parameters have changed, how fast, and how sure that is.
+
+Two results of one machine share what the priors add: where nothing but a prior holds a parameter both are at nominal,
+and their difference says nothing. Be ``C_1`` and ``C_2`` their covariances with the variances ``P`` of the priors as
+unit. If the machine is the same, its true values vary as the priors say, and base and targets stood elsewhere, then the
+results covary by ``(I - C_1)(I - C_2)``, each varies by ``I - C``, and their difference by ``C_1 + C_2 - C_1 C_2 -
+C_2 C_1``: what errors of the readings add, and what the two campaigns shrink differently. Where both determine nothing
+but ``d_2 + d_3`` that is as small as the sum is known, although each alone is known to its prior only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.fleets.analysis.accuracy import SURE
+from truearm.fleets.analysis.kind import UNINFORMED, Kind
+from truearm.modeling.chain import Array
+
+#: Days of a month.
+MONTH: Final = 365.25 / 12.0
+#: In at most this share of fleets is a drift told although no machine has changed.
+FALSE_ALARMS: Final = 0.05
+#: Machines from which on it is asked whether all drift alike.
+_LEAST_ALIKE: Final = 5
+#: Machines of which every parameter is told; of more, deviations beyond which a change may be more than chance.
+_FEW: Final = 50
+_LIKELY: Final = 2.5
+#: Root mean square change, in priors, from which on it may be another robot (of two it is 1.4), and of how many
+#: parameters at least.
+_AS_ANOTHER: Final = 0.7
+_LEAST_PARAMETERS: Final = 8
+_Z: Final = 1.959963984540054
+#: A line is called no line where chance alone bends one as far so rarely.
+_BENT: Final = 0.01
+
+
+@dataclass(frozen=True)
+class Drift:
+    """How a parameter of a machine went on from campaign to campaign; everything in SI units.
+
+    Attributes
+    ----------
+    machine
+        Which one.
+    parameter, unit
+        Its name and unit.
+    campaigns
+        So many measurements of it.
+    months
+        From the first to the last.
+    slope, low, high
+        Change in a month with its interval of 95 %.
+    times
+        The slope in its deviations.
+    chance
+        How often a fleet in which nothing changes shows one so large anywhere, 1 at most.
+    steady
+        Whether a straight line fits; None of two campaigns, which any line fits.
+    campaign_months, changes, deviations
+        When each campaign was, in months after the first, what had changed by then, and the standard deviation of that.
+    alone
+        Whether the value is the parameter's own; False where it is told together with others.
+    together
+        With which, as far as that is known.
+    """
+
+    machine: str
+    parameter: str
+    unit: str
+    campaigns: int
+    months: float
+    slope: float
+    low: float
+    high: float
+    times: float
+    chance: float
+    steady: bool | None
+    campaign_months: tuple[float, ...]
+    changes: tuple[float, ...]
+    deviations: tuple[float, ...]
+    alone: bool
+    together: tuple[str, ...] = ()
+
+    @property
+    def significant(self) -> bool:
+        """Whether the change is more than chance."""
+        return self.chance < FALSE_ALARMS
+
+    @property
+    def change(self) -> float:
+        """From the first campaign to the last, along the line [SI]."""
+        return self.slope * self.months
+
+
+@dataclass(frozen=True)
+class AllDrift:
+    """A parameter that changes alike in all machines: [SI] a month, mean over machines, with its interval of 95 %."""
+
+    parameter: str
+    unit: str
+    machines: int
+    slope: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Drifts:
+    """Machines that were measured again.
+
+    Attributes
+    ----------
+    found
+        Their parameters, the surest change first; of many machines those that changed by more than chance, and the
+        surest of each.
+    compared
+        How many parameters of machines were looked at.
+    alike
+        Parameters that change alike in all machines: what measured them may have changed instead.
+    undated
+        Machines with several measurements, but not at two known dates.
+    others
+        Machines whose results differ as those of two robots do: their serial numbers may be wrong.
+    unknown
+        Parameters of which no change can be seen, because nothing but priors holds them.
+    """
+
+    found: tuple[Drift, ...] = ()
+    compared: int = 0
+    alike: tuple[AllDrift, ...] = ()
+    undated: tuple[str, ...] = ()
+    others: tuple[str, ...] = ()
+    unknown: tuple[str, ...] = ()
+
+    @property
+    def significant(self) -> tuple[Drift, ...]:
+        """What has changed by more than chance."""
+        return tuple(one for one in self.found if one.significant)
+
+
+def drifts(kind: Kind) -> Drifts:
+    """Return how parameters of machines that were measured at several dates went on.
+
+    A line is fitted through the results of each machine, weighted by the covariance of the differences between them.
+    The chance is that of the normal distribution times the number of comparisons (Bonferroni).
+    """
+    again: dict[str, list[int]] = {}
+    for row, machine in enumerate(kind.machines):
+        again.setdefault(machine, []).append(row)
+    lines: list[Drift] = []
+    undated, others = [], []
+    slopes: dict[str, list[float]] = {}
+    compared = 0
+    few = sum(len(rows) > 1 for rows in again.values()) <= _FEW
+    for machine, rows in again.items():
+        if len(rows) < 2:
+            continue
+        dated = sorted((row for row in rows if not np.isnan(kind.days[row])), key=lambda row: kind.days[row])
+        if len(dated) < 2 or kind.days[dated[0]] == kind.days[dated[-1]]:
+            undated.append(machine)
+            continue
+        of_machine = _lines(kind, dated)
+        compared += len(of_machine.numbers)
+        if _is_another(kind, dated):
+            others.append(machine)
+        for number, slope in zip(of_machine.numbers.tolist(), of_machine.slopes.tolist(), strict=True):
+            slopes.setdefault(kind.parameters[number], []).append(slope)
+        lines += [
+            of_machine.drift(kind, machine, place)
+            for place, times in enumerate(np.abs(of_machine.times).tolist())
+            if few or place == 0 or times > _LIKELY
+        ]
+    told = _with_chances(lines, compared)
+    told = [one for i, one in enumerate(told) if few or one.significant or one.machine != told[i - 1].machine]
+    units = dict(zip(kind.parameters, kind.units, strict=True))
+    nothing = kind.share < UNINFORMED
+    return Drifts(
+        tuple(sorted(told, key=lambda one: (one.chance, -abs(one.times)))),
+        compared,
+        _alike(slopes, units),
+        tuple(undated),
+        tuple(others),
+        tuple(name for name, held in zip(kind.parameters, nothing.tolist(), strict=True) if held) if lines else (),
+    )
+
+
+def _is_another(kind: Kind, machine_rows: list[int]) -> bool:
+    """Return whether parameters changed from one campaign to the next by as much as robots differ from one another."""
+    rows = np.array(machine_rows)
+    chosen = kind.determined & ~np.isnan(kind.difference[rows]).any(axis=0)
+    if np.sum(chosen) < _LEAST_PARAMETERS:
+        return False
+    steps = np.diff(kind.difference[np.ix_(rows, np.flatnonzero(chosen))], axis=0) / kind.prior[chosen]
+    return bool(np.sqrt(np.mean(steps**2, axis=1)).max() > _AS_ANOTHER)
+
+
+@dataclass(frozen=True, eq=False)
+class _Lines:
+    """Lines through the campaigns of a machine, one for each parameter, the surest first.
+
+    Attributes
+    ----------
+    numbers
+        Of the parameters, ``(parameters,)``.
+    months
+        Of the campaigns after the first, ``(campaigns,)``.
+    slopes, errors
+        In a month with their standard deviations [SI], ``(parameters,)``.
+    changes, deviations
+        Since the first campaign [SI], ``(parameters, campaigns)``.
+    bent
+        How rarely chance bends a line so far, ``(parameters,)``; NaN of two campaigns.
+    """
+
+    numbers: NDArray[np.intp]
+    months: Array
+    slopes: Array
+    errors: Array
+    changes: Array
+    deviations: Array
+    bent: Array
+
+    @property
+    def times(self) -> Array:
+        """Slopes in their standard deviations."""
+        return np.asarray(self.slopes / self.errors)
+
+    def drift(self, kind: Kind, machine: str, place: int) -> Drift:
+        """Return one of them by its place."""
+        number = int(self.numbers[place])
+        slope, error = float(self.slopes[place]), float(self.errors[place])
+        return Drift(
+            machine=machine,
+            parameter=kind.parameters[number],
+            unit=kind.units[number],
+            campaigns=len(self.months),
+            months=float(self.months[-1]),
+            slope=slope,
+            low=slope - _Z * error,
+            high=slope + _Z * error,
+            times=slope / error,
+            chance=1.0,
+            steady=None if len(self.months) == 2 else bool(self.bent[place] > _BENT),
+            campaign_months=tuple(self.months.tolist()),
+            changes=tuple(self.changes[place].tolist()),
+            deviations=tuple(self.deviations[place].tolist()),
+            alone=bool(kind.determined[number]),
+            together=kind.together(number),
+        )
+
+
+def _lines(kind: Kind, machine_rows: list[int]) -> _Lines:
+    """Return a line through the campaigns of a machine for each parameter that all of them determine or share."""
+    rows = np.array(machine_rows)
+    there = ~np.isnan(kind.difference[rows]).any(axis=0)
+    numbers = np.flatnonzero((kind.determined | kind.shared) & there)
+    months = (kind.days[rows] - kind.days[rows[0]]) / MONTH
+    # A sum with others is not made larger: nobody knows by how much.
+    pull = np.where(kind.determined[numbers], kind.pull[np.ix_(rows, numbers)].mean(axis=0), 1.0)
+    values = (kind.difference[np.ix_(rows, numbers)] / pull).T
+    variance = np.moveaxis(_covariances(kind, rows)[:, :, numbers], 2, 0)
+    variance = variance * (kind.prior[numbers] / pull)[:, None, None] ** 2
+    contrast = np.diff(np.eye(len(rows)), axis=0)
+    between = contrast @ variance @ contrast.T
+    y, t = values @ contrast.T, contrast @ months
+    scale = np.sqrt(np.maximum(np.diagonal(between, axis1=1, axis2=2), 0.0))
+    sound = (scale > 0.0).all(axis=1)
+    numbers, y, values, variance = numbers[sound], y[sound], values[sound], variance[sound]
+    sizes = scale[sound][:, :, None] * scale[sound][:, None, :]
+    inverse = np.linalg.pinv(between[sound] / sizes, hermitian=True) / sizes
+    weight = np.maximum(np.einsum("i,pij,j->p", t, inverse, t), 1e-300)
+    slopes = np.einsum("i,pij,pj->p", t, inverse, y) / weight
+    left = y - slopes[:, None] * t
+    misfit = np.einsum("pi,pij,pj->p", left, inverse, left)
+    own = np.diagonal(variance, axis1=1, axis2=2)
+    since = np.maximum(own + own[:, :1] - 2.0 * variance[:, 0], 0.0)
+    since[:, 0] = 0.0
+    made = _Lines(
+        numbers=numbers,
+        months=months,
+        slopes=slopes,
+        errors=weight**-0.5,
+        changes=values - values[:, :1],
+        deviations=np.sqrt(since),
+        bent=_chances(misfit, len(rows) - 2),
+    )
+    order = np.argsort(-np.abs(made.times), kind="stable")
+    return _Lines(
+        numbers[order],
+        months,
+        made.slopes[order],
+        made.errors[order],
+        made.changes[order],
+        made.deviations[order],
+        made.bent[order],
+    )
+
+
+def _chances(misfit: Array, freedom: int) -> Array:
+    """Return how rarely chance makes a sum of squares so large; NaN where there is no freedom."""
+    from scipy.special import chdtrc
+
+    return np.asarray(chdtrc(freedom, misfit) if freedom else np.full(len(misfit), np.nan))
+
+
+def _covariances(kind: Kind, rows: NDArray[np.intp]) -> Array:
+    """Return how the results of campaigns covary, parameter by parameter, in priors ``(rows, rows, parameters)``."""
+    own = (kind.deviation[rows] / kind.prior) ** 2
+    if not kind.drawn[rows].all():  # nothing is shared
+        return np.asarray(np.eye(len(rows))[:, :, None] * own[:, None, :])
+    whole = [kind.covariances[row] for row in rows.tolist()]
+    known = [c for c in whole if c is not None]
+    if len(known) == len(rows):
+        stacked = np.stack(known)
+        both = np.einsum("rij,sij->rsi", stacked, stacked)
+        own = np.einsum("rii->ri", stacked)
+    else:  # without correlations, at least as large
+        both = own[:, None, :] * own[None, :, :]
+    made = 1.0 - own[:, None, :] - own[None, :, :] + both
+    made[np.arange(len(rows)), np.arange(len(rows))] = 1.0 - own
+    return np.asarray(made)
+
+
+def _with_chances(lines: list[Drift], compared: int) -> list[Drift]:
+    from scipy.special import ndtr
+
+    times = np.array([one.times for one in lines])
+    chances = np.minimum(2.0 * ndtr(-np.abs(times)) * compared, 1.0)
+    return [replace(one, chance=chance) for one, chance in zip(lines, chances.tolist(), strict=True)]
+
+
+def _alike(slopes: Mapping[str, Sequence[float]], units: Mapping[str, str]) -> tuple[AllDrift, ...]:
+    """Return parameters whose mean slope over the machines is more than chance (Student's t, Bonferroni)."""
+    from scipy.special import stdtrit
+
+    made = []
+    tail = (1.0 - SURE) / 2.0
+    for name, those in slopes.items():
+        n = len(those)
+        if n < _LEAST_ALIKE:
+            continue
+        mean, error = float(np.mean(those)), float(np.std(those, ddof=1) / np.sqrt(n))
+        if error > 0.0 and abs(mean) > float(stdtrit(n - 1, 1.0 - tail / len(slopes))) * error:
+            half = float(stdtrit(n - 1, 1.0 - tail)) * error
+            made.append(AllDrift(name, units[name], n, mean, mean - half, mean + half))
+    return tuple(made)

@@ -1,0 +1,247 @@
+"""The robots of a fleet that were measured: entries of a manifest, or rows of a table.
+
+A table is a CSV file with one row a robot. It has the columns ``name``, ``robot`` and ``data``; ``of`` and ``date`` if
+machines were measured again; and one for each option that some robot has, where an empty cell is what the manifest says
+of all. Files are named from the manifest's folder.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from datetime import date
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+from pydantic import BaseModel, BeforeValidator
+
+from truearm.errors import InputError, did_you_mean, nearest_names
+from truearm.files import exists, read_text
+from truearm.fleets.options import FILES, OPTIONS, checked_options, of_cells
+from truearm.limits import refuse_beyond
+from truearm.measurement.readers.cells import Layout, read_cells
+from truearm.modeling.formats.entries import NAME, NAME_IN_WORDS, STRICT
+from truearm.printable import is_one_line
+from truearm.schemas import validated
+
+#: Columns of a table that are no options.
+_REQUIRED: Final = ("name", "robot", "data")
+_COLUMNS: Final = (*_REQUIRED, "of", "date")
+_DATE: Final = re.compile(r"[0-9]{4}-[0-9]{2}-[0-9]{2}")
+_DATES: Final = "a date such as 2026-03-01"
+
+
+def _as_text(value: object) -> object:
+    """Return a serial number or a date, which YAML reads as such without quotes, as text."""
+    return value if isinstance(value, str | bool | float | list | dict) or value is None else str(value)
+
+
+Text = Annotated[str, BeforeValidator(_as_text)]
+
+
+class _Entry(BaseModel):
+    model_config = STRICT
+
+    name: Text
+    robot: str
+    data: str
+    of: Text | None = None
+    date: Text | None = None
+    options: dict[str, Any] = {}
+
+
+@dataclass(frozen=True)
+class RobotEntry:
+    """A robot that was measured.
+
+    Attributes
+    ----------
+    name
+        In the fleet, and of its folder.
+    robot
+        What :func:`truearm.load_robot` takes.
+    data
+        Canonical CSV file.
+    options
+        Keywords of :func:`truearm.calibrate`.
+    of
+        Serial number or name of the machine, where it was measured several times.
+    date
+        When (ISO 8601).
+    """
+
+    name: str
+    robot: str
+    data: Path
+    options: Mapping[str, Any] = field(default_factory=dict)
+    of: str | None = None
+    date: str | None = None
+
+
+@dataclass(frozen=True)
+class Robots:
+    """The robots that a manifest names.
+
+    Attributes
+    ----------
+    entries
+        One each.
+    files
+        All files that are read, by the names that manifest and table give them.
+    content
+        What is said, as JSON holds it, without where the manifest stands.
+    """
+
+    entries: tuple[RobotEntry, ...]
+    files: dict[str, Path]
+    content: list[dict[str, Any]]
+
+
+@dataclass(frozen=True)
+class _Said:
+    """An entry as it was written, with where each part of it stands."""
+
+    entry: _Entry
+    place: Callable[[str], str]
+    place_of_option: Callable[[str], str]
+
+
+def robots_of(said: list[Any] | str, options: Mapping[str, Any], manifest: Path) -> Robots:
+    """Return the robots that a manifest names.
+
+    Parameters
+    ----------
+    said
+        A list of entries, or the name of a table.
+    options
+        Of all robots that do not say others.
+
+    Raises
+    ------
+    InputError
+        Naming file and entry, or file, line and column: for two robots of one name, a file that is not there, columns
+        and options that are not known, and a date that is none.
+    """
+    folder, files = manifest.parent.absolute(), dict[str, Path]()  # workers may stand elsewhere
+    if isinstance(said, str):
+        table = manifest.parent / said
+        entries = _rows(table, manifest)
+        files[said] = table
+    else:
+        entries = [_listed(one, f"{manifest}, robots[{number}]") for number, one in enumerate(said, 1)]
+    if not entries:
+        raise InputError("there are no robots", where=f"{manifest}, robots")
+    refuse_beyond("robots", len(entries), where=str(manifest))
+    general = checked_options(options, folder, lambda name: f"{manifest}, options.{name}")
+    files |= _named_files(options, folder)
+    seen: dict[str, str] = {}
+    robots = []
+    for one in entries:
+        entry = one.entry
+        _check_name(entry.name, one.place("name"), seen)
+        path = _existing(folder, entry.data, one.place("data"))
+        files[entry.data] = path
+        robot = entry.robot
+        if Path(robot).suffix:
+            files[robot] = _existing(folder, robot, one.place("robot"))
+            robot = str(files[robot])
+        own = checked_options(entry.options, folder, one.place_of_option)
+        files |= _named_files(entry.options, folder)
+        _check_date(entry.date, one.place("date"))
+        if entry.of is not None and not (entry.of and is_one_line(entry.of)):
+            raise InputError("a serial number belongs here", where=one.place("of"), came=entry.of, allowed="one line")
+        robots.append(RobotEntry(entry.name, robot, path, {**general, **own}, entry.of, entry.date))
+    content = [one.entry.model_dump(mode="json") | {"options": {**options, **one.entry.options}} for one in entries]
+    return Robots(tuple(robots), files, content)
+
+
+def _listed(one: object, where: str) -> _Said:
+    entry = validated(one, _Entry, where)
+    return _Said(entry, lambda part: f"{where}.{part}", lambda name: f"{where}.options.{name}")
+
+
+def _rows(table: Path, manifest: Path) -> list[_Said]:
+    """Return the rows of a table."""
+    if not exists(table):
+        raise InputError("there is no such file", where=f"{manifest}, robots", came=str(table), cure="Check the path.")
+    cells = read_cells(read_text(table), str(table), Layout(comment="#"))
+    header = f"{table}, line {cells.header}"
+    known = (*_COLUMNS, *OPTIONS)
+    for name in cells.names:
+        if name not in known:
+            raise InputError(
+                "there is no column of this name",
+                where=header,
+                came=name,
+                allowed=", ".join(known),
+                cure=did_you_mean(name, known),
+            )
+        if cells.names.count(name) > 1:
+            raise InputError("two columns have the same name", where=header, came=name, cure="Remove one of them.")
+    for name in _REQUIRED:
+        if name not in cells.names:
+            raise InputError("a column is missing", where=header, came=", ".join(cells.names), allowed=name)
+    texts = {name: cells.texts(number, missing=name not in _REQUIRED) for number, name in enumerate(cells.names)}
+    made = []
+    for row in range(len(cells.lines)):
+        line = {name: column[row] for name, column in texts.items()}
+
+        def place(name: str, row: int = row) -> str:
+            if name in cells.names:
+                return cells.place(row, cells.names.index(name))
+            return f"{table}, line {cells.lines[row]}"
+
+        entry = _Entry(
+            **{name: line[name] for name in _COLUMNS if line.get(name)},
+            options=of_cells({name: cell for name, cell in line.items() if name in OPTIONS}, place),
+        )
+        made.append(_Said(entry, place, place))
+    return made
+
+
+def _check_name(name: str, where: str, seen: dict[str, str]) -> None:
+    """Refuse a name that cannot be a folder's, or that another robot has; letters may be large or small there."""
+    if not re.fullmatch(NAME, name) or name.endswith("."):
+        raise InputError("this cannot be a name", where=where, came=name, allowed=NAME_IN_WORDS)
+    other = seen.setdefault(name.lower(), where)
+    if other != where:
+        raise InputError(
+            "two robots have the same name",
+            where=where,
+            came=name,
+            cure=f"{other} has it too. Give each a name of its own: measurements of one machine say so by `of`.",
+        )
+
+
+def _check_date(text: str | None, where: str) -> None:
+    if text is None:
+        return
+    try:
+        if _DATE.fullmatch(text):
+            date.fromisoformat(text)
+            return
+    except ValueError as error:
+        raise InputError("there is no such day", where=where, came=text, allowed=_DATES) from error
+    raise InputError("this is no date", where=where, came=text, allowed=_DATES)
+
+
+def _existing(folder: Path, name: str, where: str) -> Path:
+    """Return a file that is named, or refuse one that is not there."""
+    path = folder / name
+    if exists(path):
+        return path
+    try:
+        near = nearest_names(path.name, [one.name for one in path.parent.iterdir()], count=2, likeness=0.75)
+    except OSError:
+        near = []
+    raise InputError(
+        "there is no such file",
+        where=where,
+        came=name,
+        cure=f"Did you mean {' or '.join(near)}?" if near else "Check the path.",
+    )
+
+
+def _named_files(options: Mapping[str, Any], folder: Path) -> dict[str, Path]:
+    return {value: folder / value for name, value in options.items() if name in FILES and isinstance(value, str)}

@@ -1,0 +1,243 @@
+"""What is asked of a fleet: robots that were measured, or an experiment with simulated ones.
+
+Robots that were measured, in the file or in a table with one row each::
+
+    truearm: truearm-fleet/1
+    robots:
+      - {name: cell-1, robot: ur5, data: cell-1.csv, options: {model: geometric, train: 40}}
+      - {name: cell-2, robot: ur5, data: cell-2.csv, of: "20195500123", date: 2026-03-01}
+    chunk: 4
+
+An experiment::
+
+    truearm: truearm-fleet/1
+    units: {length: mm}
+    experiment: {robot: irb120, count: 10000, configurations: 20, targets: 1, noise: 0.05, seed: 1}
+
+Files are named from the folder that the manifest is in.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import BaseModel, Field
+
+from truearm.errors import InputError, refusals_at
+from truearm.files import read_bytes, read_yaml
+from truearm.fleets.entries import RobotEntry, robots_of
+from truearm.limits import refuse_beyond
+from truearm.modeling.formats.entries import STRICT, NotNegative
+from truearm.units import sized_si
+
+SCHEMA: Final = "truearm-fleet/1"
+
+#: Robots of a part, where the manifest does not say: a part shall take seconds.
+SIMULATED_TOGETHER: Final = 250
+MEASURED_TOGETHER: Final = 8
+
+Count = Annotated[int, Field(ge=1, strict=True)]
+
+
+class _Units(BaseModel):
+    model_config = STRICT
+
+    length: Literal["mm", "m", "um"]
+
+
+class ExperimentFile(BaseModel):
+    """The experiment in a manifest."""
+
+    model_config = STRICT
+
+    robot: str
+    count: Count
+    configurations: Count | str = 20
+    targets: Annotated[int, Field(ge=1, le=8, strict=True)] = 1
+    model: str = "geometric"
+    noise: NotNegative
+    held_out: Count = 50
+    seed: Annotated[int, Field(ge=0, strict=True)] = 0
+
+
+class ManifestFile(BaseModel):
+    """Schema ``truearm-fleet/1``."""
+
+    model_config = STRICT
+
+    truearm: Literal["truearm-fleet/1"]
+    units: _Units | None = None
+    experiment: ExperimentFile | None = None
+    robots: list[Any] | str | None = None
+    options: dict[str, Any] = {}
+    chunk: Count | None = None
+
+
+@dataclass(frozen=True)
+class ExperimentEntry:
+    """The experiment that is asked for: many robots simulated, calibrated and judged.
+
+    Attributes
+    ----------
+    robot
+        What :func:`truearm.load_robot` takes, files from the manifest's folder.
+    count
+        Simulated robots.
+    configurations
+        How many configurations each is measured at, drawn within the limits; or the file of them.
+    targets
+        How many targets the instrument sees.
+    model
+        Which parameters are drawn and identified.
+    noise
+        Standard deviation of each coordinate [m].
+    held_out
+        Configurations that judge.
+    seed
+        Of everything.
+    """
+
+    robot: str
+    count: int
+    configurations: int | Path
+    targets: int
+    model: str
+    noise: float
+    held_out: int
+    seed: int
+
+    def name(self, number: int) -> str:
+        """Return the name of a simulated robot, counted from 0."""
+        return f"robot-{number + 1:0{len(str(self.count))}}"
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """What is asked of a fleet.
+
+    Attributes
+    ----------
+    file
+        Where it stands.
+    experiment
+        The experiment; None where robots were measured.
+    robots
+        The robots that were measured; empty for an experiment.
+    chunk
+        Robots of a part.
+    content
+        What it says, as JSON holds it.
+    hashes
+        SHA-256 of the files that it names, by their names there.
+    """
+
+    file: Path
+    experiment: ExperimentEntry | None
+    robots: tuple[RobotEntry, ...]
+    chunk: int
+    content: Mapping[str, Any] = field(repr=False)
+    hashes: Mapping[str, str] = field(repr=False)
+
+    @property
+    def count(self) -> int:
+        """How many robots there are."""
+        return len(self.robots) if self.experiment is None else self.experiment.count
+
+    @property
+    def inputs(self) -> tuple[Path, ...]:
+        """The files that are read: itself, and those that it names."""
+        return (self.file, *(self.file.parent / name for name in self.hashes))
+
+    @property
+    def parts(self) -> int:
+        """How many parts they are computed in."""
+        return -(-self.count // self.chunk)
+
+    @property
+    def digest(self) -> str:
+        """Hash of what is asked, and of the files that it names."""
+        told = json.dumps([self.content, self.hashes], sort_keys=True, default=str)
+        return hashlib.sha256(told.encode()).hexdigest()
+
+    def numbers(self, part: int) -> range:
+        """Return which robots are in a part; both are counted from 0."""
+        return range(part * self.chunk, min((part + 1) * self.chunk, self.count))
+
+    def names(self, part: int) -> list[str]:
+        """Return the names of the robots in a part, counted from 0."""
+        if self.experiment is not None:
+            return [self.experiment.name(number) for number in self.numbers(part)]
+        return [self.robots[number].name for number in self.numbers(part)]
+
+
+def read_manifest(path: Path) -> Manifest:
+    """Read a manifest, and look whether the files that it names are there.
+
+    Raises
+    ------
+    InputError
+        For what cannot be meant, naming the entry: no robots or both kinds, two robots of one name, a missing file.
+    """
+    said = read_yaml(path, ManifestFile)
+    if (said.experiment is None) == (said.robots is None):
+        raise InputError(
+            "robots that were measured or an experiment belong here, one of them",
+            where=str(path),
+            came="both" if said.robots is not None else "neither",
+            allowed="robots, experiment",
+        )
+    content = said.model_dump(mode="json")
+    if said.experiment is not None:
+        experiment, files = _experiment(said, path)
+        return Manifest(path, experiment, (), said.chunk or SIMULATED_TOGETHER, content, _hashes(files))
+    if said.units is not None:
+        raise InputError("nothing here has a unit", where=f"{path}, units", cure="Remove it.")
+    named = robots_of(said.robots or [], said.options, path)
+    content |= {"robots": named.content}
+    return Manifest(path, None, named.entries, said.chunk or MEASURED_TOGETHER, content, _hashes(named.files))
+
+
+def _experiment(said: ManifestFile, path: Path) -> tuple[ExperimentEntry, dict[str, Path]]:
+    """Return the experiment, and the files that it names."""
+    asked = said.experiment
+    assert asked is not None
+    if said.units is None:
+        raise InputError(
+            "the noise has a unit, and it is not said",
+            where=f"{path}, units",
+            allowed="{length: mm}, {length: m} or {length: um}",
+            cure="Add it.",
+        )
+    if said.options:
+        raise InputError("only robots that were measured have options", where=f"{path}, options", cure="Remove it.")
+    for name, entry, came in (
+        ("robots", "count", asked.count),
+        ("poses", "held_out", asked.held_out),
+        ("poses", "configurations", asked.configurations if isinstance(asked.configurations, int) else 0),
+    ):
+        refuse_beyond(name, came, where=f"{path}, experiment.{entry}")
+    files = {}
+    robot = asked.robot
+    if Path(robot).suffix:
+        files[robot] = path.parent / robot
+        robot = str(files[robot])
+    configurations: int | Path = asked.configurations if isinstance(asked.configurations, int) else Path()
+    if isinstance(asked.configurations, str):
+        configurations = files[asked.configurations] = path.parent / asked.configurations
+    with refusals_at(f"{path}, experiment.noise"):
+        noise = sized_si(asked.noise, said.units.length, deviation=True)
+    return (
+        ExperimentEntry(
+            robot, asked.count, configurations, asked.targets, asked.model, noise, asked.held_out, asked.seed
+        ),
+        files,
+    )
+
+
+def _hashes(files: Mapping[str, Path]) -> dict[str, str]:
+    return {name: hashlib.sha256(read_bytes(path)).hexdigest() for name, path in files.items()}

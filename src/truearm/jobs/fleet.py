@@ -1,0 +1,154 @@
+"""Many robots: those of a series that were measured, or a whole series simulated."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import time
+from collections.abc import Callable
+from concurrent.futures import Executor
+from pathlib import Path
+
+from truearm.errors import InputError, refusals_of
+from truearm.executing.parts import done_parts
+from truearm.executing.workers import Given, ThisProcess, Workers, processes, with_workers
+from truearm.files import path_argument
+from truearm.fleets.experiment import experiment
+from truearm.fleets.manifest import Manifest, read_manifest
+from truearm.fleets.recorded import RECORD, Recorded
+from truearm.jobs.arguments import (
+    command_argument,
+    count_argument,
+    executor_argument,
+    flag_argument,
+    folder_for,
+    name_argument,
+    progress_argument,
+    python_call,
+)
+from truearm.jobs.fleet_parts import Task, finished
+from truearm.results.fleet import FLEET_FILES, Fleet, Run
+from truearm.shown import counted
+from truearm.version import __version__
+
+
+def fleet(
+    manifest: str | Path,
+    *,
+    out: str | Path,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    insecure: bool = False,
+    executor: Executor | None = None,
+    command: str | None = None,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Fleet:
+    """Calibrate many robots, those of a series that were measured or simulated ones, and judge the series.
+
+    What is done is written into the folder part by part. Whatever stops the work, the same call goes on where it
+    stopped; the result is the same to the last digit, whoever does how many parts.
+
+    Parameters
+    ----------
+    manifest
+        File that says which robots, or which experiment, see :mod:`truearm.fleets.manifest`.
+    out
+        Folder for the parts, record.json, fleet.json and robots.csv.
+    workers
+        Processes of this machine that do the parts; None for one a processor. One is this process itself.
+    scheduler
+        Address of a Dask scheduler whose workers do the parts instead, such as ``tcp://127.0.0.1:8786``. It needs the
+        extra ``truearm[fleet]``.
+    insecure
+        Whether a scheduler on another machine may be reached without TLS: whoever can reach it can run programs there.
+    executor
+        Or an executor that does them, which stays open.
+    command
+        How to run it again, for the folder's manifest; None writes the call in Python.
+    progress
+        Called with a few words at each step.
+
+    Raises
+    ------
+    InputError
+        If the manifest, a file that it names, the folder or the scheduler cannot be used.
+    """
+    progress_argument(progress)
+    path = path_argument(manifest, "manifest")
+    count = None if workers is None else count_argument(workers, "workers")
+    address = None if scheduler is None else name_argument(scheduler, "scheduler")
+    insecure = flag_argument(insecure, "insecure")
+    executor = executor_argument(executor)
+    given = {"workers": count, "scheduler": address, "executor": executor}
+    several = [name for name, value in given.items() if value is not None]
+    if len(several) > 1:
+        raise InputError("one of them does the parts", parameter=", ".join(several), cure="Leave the others out.")
+    call = command_argument(command) or python_call("fleet", manifest, workers=count, scheduler=address)
+    folder = folder_for((RECORD, *FLEET_FILES), out, path)
+    with refusals_of("manifest"):
+        asked = read_manifest(path)
+    folder_for(FLEET_FILES, out, *asked.inputs, ours=True)
+    with refusals_of("manifest"):
+        make = _tasks(asked, folder.absolute())
+    recorded = Recorded(folder, asked)
+    recorded.check()
+    missing = asked.parts - len(recorded.done())
+    chosen = _workers(count, address, insecure, executor, missing) if missing else ThisProcess()
+    with with_workers(chosen):
+        recorded.begin()
+        with recorded.alone():
+            run = _computed(recorded, make, chosen, progress)
+            progress("reading the parts")
+            found = Fleet(recorded, run, call)
+            found.write()
+    return found
+
+
+def _workers(
+    count: int | None, scheduler: str | None, insecure: bool, executor: Executor | None, parts: int
+) -> Workers:
+    """Return who does the parts."""
+    if executor is not None:
+        return Given(executor)
+    if scheduler is not None:
+        from truearm.executing.cluster import Cluster
+
+        return Cluster(scheduler, insecure=insecure)
+    return processes(min(count or os.cpu_count() or 1, parts))
+
+
+def _tasks(asked: Manifest, folder: Path) -> Callable[[int], Task]:
+    """Return what makes the task of a part."""
+    if asked.experiment is None:
+        robots = asked.robots
+        return lambda part: Task(part, __version__, robots=tuple(robots[n] for n in asked.numbers(part)), folder=folder)
+    made = pickle.dumps(experiment(asked.experiment))
+    return lambda part: Task(part, __version__, made, tuple(asked.numbers(part)))
+
+
+def _computed(
+    recorded: Recorded, make: Callable[[int], Task], workers: Workers, progress: Callable[[str], None]
+) -> Run:
+    """Let workers do what is missing, and write each part as it comes."""
+    asked, known = recorded.manifest, recorded.done()
+    tasks = (make(part) for part in range(asked.parts) if part not in known)
+    told, lost = list[str](), list[int]()
+    done, failed, began = len(known), 0, time.perf_counter()
+
+    def tell(words: str) -> None:
+        told.append(words)
+        progress(words)
+
+    progress(f"part {done} of {asked.parts}")
+    for one in done_parts(finished, tasks, workers, tell):
+        done += 1
+        if one.result is None:
+            lost.append(one.part.part)
+            continue
+        recorded.write(one.part.part, one.result.text)
+        failed += one.result.failed
+        left = (time.perf_counter() - began) / (done - len(known)) * (asked.parts - done)
+        words = f", {counted(failed, 'robot')} failed" if failed else ""
+        progress(f"part {done} of {asked.parts}{words}, about {left:.0f} s left")
+    names = [name for part in sorted(lost) for name in asked.names(part)]
+    return Run(asked.parts, len(known), tuple(told), tuple(names))

@@ -1,0 +1,88 @@
+"""A part of a fleet, as a worker does it: what it is given, and the text that it returns."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from truearm.errors import InputError
+from truearm.fleets.entries import RobotEntry
+from truearm.fleets.experiment import Experiment, Series
+from truearm.fleets.recorded import part_text
+from truearm.version import __version__
+
+
+@dataclass(frozen=True)
+class Task:
+    """A part that somebody shall do.
+
+    Attributes
+    ----------
+    part
+        Its number, counted from 0.
+    version
+        Of truearm that asks.
+    experiment
+        The pickled experiment of simulated robots; None of measured ones.
+    numbers
+        Which simulated robots, counted from 0.
+    robots
+        Or which measured ones.
+    folder
+        Of the fleet, for what is written of each robot that was measured.
+    """
+
+    part: int
+    version: str
+    experiment: bytes | None = None
+    numbers: tuple[int, ...] = ()
+    robots: tuple[RobotEntry, ...] = ()
+    folder: Path | None = None
+
+
+@dataclass(frozen=True)
+class Finished:
+    """A part that is done.
+
+    Attributes
+    ----------
+    text
+        Its robots, as the file of the part holds them.
+    failed
+        How many of them could not be calibrated.
+    """
+
+    text: str
+    failed: int
+
+
+def finished(task: Task) -> Finished:
+    """Do a part.
+
+    Raises
+    ------
+    InputError
+        If this process has another version of truearm than the one that asks.
+    """
+    if task.version != __version__:
+        raise InputError(
+            "a worker has another version of truearm", parameter="scheduler", came=__version__, allowed=task.version
+        )
+    if task.experiment is not None:
+        series = _series(task.experiment)
+        rows, shared = series.rows(task.numbers), series.shared
+    else:
+        from truearm.jobs.fleet_robots import calibrated_row  # with all that a calibration needs, only for these
+
+        rows, shared = [calibrated_row(entry, task.folder) for entry in task.robots], {}
+    return Finished(part_text(rows, shared), sum(row.status == "failed" for row in rows))
+
+
+@lru_cache(maxsize=2)
+def _series(pickled: bytes) -> Series:
+    """Return a series that this process has made already, for the parts that follow."""
+    made = pickle.loads(pickled)
+    assert isinstance(made, Experiment)
+    return Series(made)

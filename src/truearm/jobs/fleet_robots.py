@@ -1,0 +1,98 @@
+"""One robot of a fleet that was measured: calibrated, and what was found of it as a row."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from truearm.errors import InputError
+from truearm.fleets.entries import RobotEntry
+from truearm.fleets.rows import Accuracy, FoundParameter, Row
+from truearm.jobs.calibrate import calibrate
+from truearm.measurement.statistics import Errors
+from truearm.modeling.parameters import PLACES, SCALE_GROUP
+from truearm.results.calibration import Calibration
+
+#: Folder of a fleet for the folders of its robots.
+ROBOTS: Final = "robots"
+#: Decimals of a covariance in priors: what a combination of two parameters is known by is seen to a hundredth of a
+#: micrometre where each alone is known to a millimetre.
+_DECIMALS: Final = 10
+#: What belongs to the campaign and not to the robot.
+_OF_CAMPAIGN: Final = (*PLACES, SCALE_GROUP)
+
+
+def calibrated_row(entry: RobotEntry, folder: Path | None = None) -> Row:
+    """Calibrate a robot that was measured; what cannot be calibrated is a row too, with the reason.
+
+    Parameters
+    ----------
+    folder
+        Of the fleet: the robot's report and calibrated robot are written into ``robots/NAME`` there; None writes
+        nothing.
+
+    Raises
+    ------
+    InputError
+        If that cannot be written.
+    """
+    began = time.perf_counter()
+    said = {"date": entry.date, "serial": entry.of}
+    notes = {name: text for name, text in said.items() if text is not None}
+    message = None
+    try:
+        made = calibrate(entry.robot, entry.data, notes=notes or None, **entry.options)
+    except InputError as error:
+        message = str(error)
+    except (ArithmeticError, ValueError, LookupError) as error:  # LinAlgError is a ValueError
+        message = f"the calibration failed ({type(error).__name__}: {error})"
+    if message is not None:
+        return Row(entry.name, "failed", message, entry.of, entry.date, seconds=time.perf_counter() - began)
+    if folder is not None:  # a folder that cannot be written to is no fault of the robot
+        made.save(folder / ROBOTS / entry.name)
+    names, covariance = _own(made)
+    found = made.fit.robot.parameters
+    return Row(
+        entry.name,
+        "calibrated",
+        "",
+        entry.of,
+        entry.date,
+        held_out=_accuracy(made.validation),
+        nominal=_accuracy(made.nominal),
+        parameters={
+            p.name: FoundParameter(p.unit, p.value, p.deviation or 0.0, p.nominal, p.prior)
+            for p in (found[name] for name in names)
+        },
+        fit_status=made.status.value,
+        notices=tuple(notice.code for notice in made.warnings),
+        seconds=time.perf_counter() - began,
+        robot=made.fit.robot.name,
+        errors=tuple(notice.code for notice in made.warnings if notice.level == "error"),
+        drawn=entry.options.get("redundancy", "prior") == "prior",
+        covariance=covariance,
+    )
+
+
+def _own(made: Calibration) -> tuple[list[str], tuple[float, ...]]:
+    """Return the parameters of the arm that were identified, and their covariance in priors, row by row."""
+    fit = made.fit
+    own = [
+        (place, name)
+        for place, name in enumerate(fit.free.names)
+        if (p := fit.robot.parameters[name]).group not in _OF_CAMPAIGN and p.deviation is not None
+    ]
+    places = [place for place, _ in own]
+    prior = fit.free.prior[places]
+    covariance = fit.covariance[np.ix_(places, places)] / np.outer(prior, prior)
+    rows = np.round(covariance, _DECIMALS)[np.tril_indices(len(places))] + 0.0
+    return [name for _, name in own], tuple(rows.tolist())
+
+
+def _accuracy(errors: Errors | None) -> Accuracy | None:
+    """Return the errors of positions, of lengths where an instrument reads nothing else; None where there are none."""
+    spread = None if errors is None else errors.position or errors.length
+    return None if errors is None or spread is None else Accuracy.of_spread(spread, errors.configurations)

@@ -1,0 +1,205 @@
+"""What was found of a fleet: how accurate its robots are, and which could not be calibrated."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Final
+
+from truearm.fleets.analysis.analysis import Analysis, analysed
+from truearm.fleets.analysis.priors import with_proposed
+from truearm.fleets.recorded import Recorded
+from truearm.fleets.rows import Accuracy
+from truearm.library import load_robot
+from truearm.modeling.formats.robot_file import robot_text
+from truearm.modeling.robot import Robot
+from truearm.notices import Notice
+from truearm.results.fleet_words import analysis_lines, analysis_notices, analysis_summary
+from truearm.results.record import Record, notice_lines, notice_summaries
+from truearm.shown import counted, listed
+from truearm.writing import output_folder, write_files
+
+#: The nominal robot with the priors that follow from a fleet; written where some do.
+PRIORS_FILE: Final = "priors.yaml"
+#: What a fleet writes into its folder beside its parts.
+FLEET_FILES: Final = ("fleet.json", "robots.csv", "report.html", PRIORS_FILE)
+
+
+@dataclass(frozen=True)
+class Run:
+    """How the parts of a fleet were computed this time; no result depends on it.
+
+    Attributes
+    ----------
+    parts, before
+        How many there are, and how many were on disk already.
+    told
+        What happened to workers, in plain words.
+    lost
+        Robots of parts that were given up, because their workers died of them.
+    """
+
+    parts: int
+    before: int
+    told: tuple[str, ...] = ()
+    lost: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Fleet(Record):
+    """A fleet of robots.
+
+    Attributes
+    ----------
+    recorded
+        Its parts on disk.
+    run
+        How they were computed.
+    command
+        How to make it again; empty if that is not known.
+    """
+
+    recorded: Recorded
+    run: Run
+    command: str = ""
+
+    @property
+    def warnings(self) -> tuple[Notice, ...]:
+        """What to know about the result, in plain words."""
+        found = []
+        if self.run.lost:
+            found.append(
+                Notice(
+                    "workers-died",
+                    f"Workers died again and again of parts with {counted(len(self.run.lost), 'robot')} "
+                    f"({listed(self.run.lost)}), and these are not in the result. Run it again with more memory, or "
+                    "leave these robots out.",
+                    "error",
+                )
+            )
+        failed = self.analysis.failed
+        if failed:
+            names = listed([name for name, _ in failed])
+            found.append(
+                Notice(
+                    "robots-failed",
+                    f"{len(failed)} of {counted(self.analysis.measurements, 'robot')} could not be calibrated "
+                    f"({names}); the first: {failed[0][1]}",
+                )
+            )
+        return (*found, *analysis_notices(self.analysis))
+
+    @cached_property
+    def analysis(self) -> Analysis:
+        """What the fleet says, of all rows, read once."""
+        return analysed(self.recorded.rows())
+
+    @cached_property
+    def proposed(self) -> tuple[Robot, tuple[str, ...]] | None:
+        """The nominal robot with the priors that follow from the kind with most robots, and which; None if none do."""
+        if not self.analysis.kinds or all(one.proposed is None for one in self.analysis.kinds[0].spreads):
+            return None
+        asked, first = self.recorded.manifest, self.analysis.kinds[0].kind.names[0]
+        if asked.experiment is not None:
+            source = asked.experiment.robot
+        else:
+            source = next(entry.robot for entry in asked.robots if entry.name == first)
+        robot, names = with_proposed(load_robot(source), self.analysis.kinds[0].spreads)
+        return (robot, names) if names else None
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Names of the files that are written beside the parts."""
+        return FLEET_FILES if self.proposed is not None else tuple(n for n in FLEET_FILES if n != PRIORS_FILE)
+
+    def content(self) -> dict[str, Any]:
+        """Return what ``fleet.json`` holds, in mm: the same however the parts were computed."""
+        found = self.analysis
+        return {
+            "truearm": "truearm-fleet-result/1",
+            "digest": self.recorded.manifest.digest,
+            "robots": self.recorded.manifest.count,
+            "calibrated": found.measurements - len(found.failed),
+            "failed": [{"name": name, "message": message} for name, message in found.failed],
+            "missing": [*self.run.lost],
+            **analysis_summary(found),
+        }
+
+    def summary(self) -> dict[str, Any]:
+        """Return what ``fleet.json`` holds, and how it was computed."""
+        run = self.run
+        return {
+            **self.content(),
+            "run": {"parts": run.parts, "on_disk_before": run.before, "told": [*run.told]},
+            "warnings": notice_summaries(self.warnings),
+        }
+
+    def lines(self) -> list[str]:
+        """Return what the command prints."""
+        found, run = self.analysis, self.run
+        text = [f"{self._robots()}, {found.measurements - len(found.failed)} calibrated, {len(found.failed)} failed."]
+        if run.before:
+            text.append(f"{counted(run.before, 'part')} of {run.parts} on disk already.")
+        text += [f"{words[0].upper()}{words[1:]}." for words in run.told]
+        text += analysis_lines(found)
+        if self.proposed is not None:
+            text.append(f"Priors proposed: {counted(len(self.proposed[1]), 'parameter')} in {PRIORS_FILE}.")
+        return text + notice_lines(self.warnings)
+
+    def _robots(self) -> str:
+        count, machines = self.recorded.manifest.count, self.analysis.machines
+        if self.analysis.measurements != machines:
+            return f"{counted(count, 'measurement')} of {counted(machines, 'robot')}"
+        return counted(count, "robot")
+
+    def csv_text(self) -> str:
+        """Return the robots as a table, one row each."""
+        stream = io.StringIO()
+        table = csv.writer(stream, lineterminator="\n")
+        kinds = [*self.analysis.errors]
+        figures = [f"{kind} {figure} [mm]" for kind in kinds for figure in ("mean", "max")]
+        table.writerow(["name", "of", "date", "status", "fit", *figures, "errors", "look", "message"])
+        looks = {look.robot: look.reasons for look in self.analysis.looks}
+        for row in self.recorded.rows():
+            errors = [getattr(row, kind) for kind in kinds]
+            table.writerow(
+                [
+                    row.name,
+                    row.of or "",
+                    row.date or "",
+                    row.status,
+                    row.fit_status or "",
+                    *("" if v != v else f"{v * 1e3:.6f}" for a in errors for v in _mean_and_max(a)),
+                    " ".join(row.errors),
+                    " ".join(reason.why.replace(" ", "-") for reason in looks.get(row.name, ())),
+                    row.message,
+                ]
+            )
+        return stream.getvalue()
+
+    def write(self) -> tuple[Path, ...]:
+        """Write ``fleet.json``, ``robots.csv`` and ``report.html`` beside the parts, and ``priors.yaml`` if any follow.
+
+        Returns
+        -------
+        The files written.
+        """
+        from truearm.reporting.fleet_report import fleet_html
+
+        folder = output_folder(self.recorded.folder, FLEET_FILES, self.recorded.manifest.inputs, ours=True)
+        files: dict[str, str | bytes] = {
+            "fleet.json": json.dumps(self.content(), indent=2, allow_nan=False) + "\n",
+            "robots.csv": self.csv_text(),
+            "report.html": fleet_html(self),
+            **({} if self.proposed is None else {PRIORS_FILE: robot_text(self.proposed[0])}),
+        }
+        write_files(folder, files, self.command or None)
+        return tuple(folder / name for name in files)
+
+
+def _mean_and_max(errors: Accuracy | None) -> tuple[float, float]:
+    return (float("nan"),) * 2 if errors is None else (errors.mean, errors.max)

@@ -1,0 +1,165 @@
+"""A Dask cluster on this machine: a real scheduler and worker processes; and addresses that are refused."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import truearm
+from truearm.errors import InputError
+from truearm.executing import cluster
+from truearm.executing.cluster import Cluster, checked_address
+
+SERIES = """\
+truearm: truearm-fleet/1
+units: {length: mm}
+experiment: {robot: irb120, count: 5, configurations: 12, noise: 0.05, held_out: 5, model: offsets}
+chunk: 2
+"""
+
+
+@pytest.mark.parametrize(
+    ("came", "full"),
+    [
+        ("127.0.0.1:8786", "tcp://127.0.0.1:8786"),
+        ("tcp://localhost:8786", "tcp://localhost:8786"),
+        ("tcp://[::1]:8786", "tcp://[::1]:8786"),
+        ("tls://cell.example:8786", "tls://cell.example:8786"),
+    ],
+)
+def test_schedulers_here_or_by_tls_are_reached(came: str, full: str) -> None:
+    assert checked_address(came, insecure=False) == full
+
+
+@pytest.mark.parametrize(
+    "came", ["", "8786", "localhost", "http://localhost:1", "tcp://:8786", "tcp://[::1:8786", "a:b"]
+)
+def test_what_is_no_address_is_refused(came: str) -> None:
+    with pytest.raises(InputError, match="no address of a scheduler") as caught:
+        checked_address(came, insecure=True)
+    assert caught.value.parameter == "scheduler"
+
+
+@pytest.mark.parametrize("came", ["tcp://cell.example:8786", "10.0.0.1:8786", "localhost.example:1"])
+def test_another_machine_needs_tls_or_the_word_for_it(came: str) -> None:
+    with pytest.raises(InputError, match="reached without TLS") as caught:
+        checked_address(came, insecure=False)
+    assert "`insecure`" in str(caught.value.cure)
+    assert checked_address(came, insecure=True).endswith(came)
+
+
+def series(folder: Path) -> Path:
+    file = folder / "fleet.yaml"
+    file.write_text(SERIES)
+    return file
+
+
+def free_port() -> int:
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        return int(one.getsockname()[1])
+
+
+def test_where_nobody_listens_the_run_is_refused_and_nothing_written(tmp_path: Path) -> None:
+    pytest.importorskip("distributed")
+    with pytest.raises(InputError, match="no Dask scheduler answers there") as caught:
+        truearm.fleet(series(tmp_path), out=tmp_path / "out", scheduler=f"127.0.0.1:{free_port()}")
+    assert "dask scheduler" in str(caught.value.cure)
+    assert not (tmp_path / "out").exists()
+
+
+def test_something_else_that_listens_is_no_scheduler(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(cluster, "_GREETING", 0.2)
+    with socket.create_server(("127.0.0.1", 0)) as silent, pytest.raises(InputError, match="no Dask scheduler"):
+        Cluster(f"127.0.0.1:{silent.getsockname()[1]}", insecure=False)
+
+
+def test_tls_without_certificates_is_refused() -> None:
+    pytest.importorskip("distributed")
+    with socket.create_server(("127.0.0.1", 0)) as silent, pytest.raises(InputError, match="no certificates") as caught:
+        Cluster(f"tls://127.0.0.1:{silent.getsockname()[1]}", insecure=False)
+    assert "distributed.comm.tls" in str(caught.value.cure)
+
+
+def test_without_dask_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(InputError, match="Dask, and it is not installed") as caught:
+        Cluster("127.0.0.1:1", insecure=False)
+    assert "truearm[fleet]" in str(caught.value.cure)
+
+
+def started(*words: str, folder: Path) -> subprocess.Popen[bytes]:
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
+    with (folder / f"{words[0]}.log").open("wb") as log:
+        return subprocess.Popen(
+            [sys.executable, "-m", *words],
+            cwd=folder,
+            env=environment,
+            stdout=log,
+            stderr=log,
+            stdin=subprocess.DEVNULL,
+        )
+
+
+@pytest.fixture(scope="module")
+def scheduler(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """A scheduler with one worker, each a process of its own."""
+    pytest.importorskip("distributed")
+    folder, port = tmp_path_factory.mktemp("cluster"), free_port()
+    address = f"tcp://127.0.0.1:{port}"
+    lead = started(
+        "distributed.cli.dask_scheduler",
+        *("--host", "127.0.0.1", "--port", str(port), "--no-dashboard", "--dashboard-address", "127.0.0.1:0"),
+        folder=folder,
+    )
+    worker = None
+    try:
+        for _ in range(200):
+            with socket.socket() as one:
+                if one.connect_ex(("127.0.0.1", port)) == 0:
+                    break
+            time.sleep(0.1)
+        worker = started(
+            "distributed.cli.dask_worker",
+            *(address, "--nthreads", "1", "--no-nanny", "--no-dashboard", "--local-directory", str(folder)),
+            folder=folder,
+        )
+        yield address
+    finally:
+        for process in (worker, lead):
+            if process is not None:
+                process.kill()
+                process.wait()
+
+
+def test_a_cluster_finds_what_this_process_finds(
+    scheduler: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cluster, "PATIENCE", 30.0)
+    file = series(tmp_path)
+    here = truearm.fleet(file, out=tmp_path / "here", workers=1)
+    there = truearm.fleet(file, out=tmp_path / "there", scheduler=scheduler)
+    assert there.content() == here.content()
+    assert (tmp_path / "there" / "robots.csv").read_bytes() == (tmp_path / "here" / "robots.csv").read_bytes()
+    rows = [[*one.recorded.rows()] for one in (here, there)]
+    assert [row.parameters for row in rows[0]] == [row.parameters for row in rows[1]]
+    assert json.loads((tmp_path / "there" / "fleet.json").read_text())["calibrated"] == 5
+
+
+def test_workers_with_another_version_are_refused_by_name(scheduler: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cluster, "PATIENCE", 30.0)
+    monkeypatch.setattr(cluster, "__version__", "99.0")
+    with pytest.raises(InputError, match="1 worker of the scheduler has another version of truearm") as caught:
+        Cluster(scheduler, insecure=False)
+    assert truearm.__version__ in str(caught.value)
+    assert "tcp://127.0.0.1:" in str(caught.value)
+    assert caught.value.allowed == "99.0"

@@ -1,0 +1,129 @@
+"""Robots that a manifest or its table names: read with their options, or refused by file and line."""
+
+from __future__ import annotations
+
+import inspect
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import truearm
+from truearm.errors import InputError
+from truearm.fleets.entries import robots_of
+from truearm.fleets.manifest import read_manifest
+from truearm.fleets.options import OPTIONS
+
+HEADER = "name,robot,data,of,date,model,train,effects\n"
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    for name in ("a.csv", "b.csv", "arm.yaml", "bounds.yaml"):
+        (tmp_path / name).write_text("x\n", "utf-8")
+    return tmp_path
+
+
+def table(folder: Path, text: str, options: str = "{}") -> Path:
+    (folder / "robots.csv").write_text(text, "utf-8")
+    path = folder / "fleet.yaml"
+    path.write_text(f"truearm: truearm-fleet/1\nrobots: robots.csv\noptions: {options}\n", "utf-8")
+    return path
+
+
+def test_options_are_those_that_calibrate_takes() -> None:
+    keywords = {name for name, p in inspect.signature(truearm.calibrate).parameters.items() if p.kind is p.KEYWORD_ONLY}
+    assert set(OPTIONS) == keywords - {"out", "notes", "command", "progress"}
+
+
+def test_a_table_gives_every_robot_its_options(folder: Path) -> None:
+    path = table(
+        folder,
+        HEADER + "one,ur5,a.csv,4711,2026-03-01,,40,\n"
+        "# measured again\ntwo,arm.yaml,b.csv,4711,2026-09-01,elastic,all,backlash;clearance\n",
+        "{model: geometric, seed: 3, bounds: bounds.yaml}",
+    )
+    one, two = read_manifest(path).robots
+    assert (one.robot, one.data, one.of, one.date) == ("ur5", folder / "a.csv", "4711", "2026-03-01")
+    assert one.options == {"model": "geometric", "seed": 3, "train": 40, "bounds": str(folder / "bounds.yaml")}
+    assert two.robot == str(folder / "arm.yaml")
+    assert two.options["model"] == "elastic"
+    assert two.options["train"] == "all"
+    assert two.options["effects"] == ["backlash", "clearance"]
+    assert {"a.csv", "b.csv", "arm.yaml", "robots.csv", "bounds.yaml"} <= set(read_manifest(path).hashes)
+
+
+def test_a_list_gives_the_same(folder: Path) -> None:
+    said = [
+        {"name": "one", "robot": "ur5", "data": "a.csv", "of": 4711, "date": "2026-03-01", "options": {"train": 40}},
+    ]
+    (one,) = robots_of(said, {"seed": 2}, folder / "fleet.yaml").entries
+    assert (one.of, one.date, one.options) == ("4711", "2026-03-01", {"seed": 2, "train": 40})
+
+
+ROW = "one,ur5,a.csv,,,,,\n"
+REFUSED = {
+    "a missing file": (HEADER + ROW + "two,ur5,c.csv,,,,,\n", "robots.csv, line 3, column data", "no such file"),
+    "a missing robot file": (HEADER + "one,leg.yaml,a.csv,,,,,\n", "line 2, column robot", "no such file"),
+    "two robots of one name": (HEADER + ROW + "One,ur5,b.csv,,,,,\n", "line 3, column name", "same name"),
+    "a name that is no folder": (HEADER + "../one,ur5,a.csv,,,,,\n", "line 2, column name", "cannot be a name"),
+    "an unknown column": ("name,robot,data,modell\none,ur5,a.csv,geometric\n", "line 1", "Did you mean model?"),
+    "a column twice": ("name,robot,data,of,of\none,ur5,a.csv,1,2\n", "line 1", "two columns"),
+    "a missing column": ("name,robot\none,ur5\n", "line 1", "allowed: data"),
+    "an empty cell": (HEADER + "one,,a.csv,,,,,\n", "line 2, column robot", "empty"),
+    "an impossible day": (HEADER + "one,ur5,a.csv,,2026-02-30,,,\n", "line 2, column date", "no such day"),
+    "a date of another form": (HEADER + "one,ur5,a.csv,,1.3.2026,,,\n", "line 2, column date", "no date"),
+    "an unknown model": (HEADER + "one,ur5,a.csv,,,geometrc,,\n", "line 2, column model", "Did you mean geometric?"),
+    "no number": (HEADER + "one,ur5,a.csv,,,,some,\n", "line 2, column train", "whole number, or all"),
+    "an unknown effect": (HEADER + "one,ur5,a.csv,,,,,backlsh\n", "line 2, column effects", "Did you mean backlash?"),
+    "no numbers": ("name,robot,data,gravity\none,ur5,a.csv,down\n", "line 2, column gravity", "numbers"),
+    "no payload": ("name,robot,data,payload\none,ur5,a.csv,heavy\n", "line 2, column payload", "heavy"),
+    "a missing bounds file": (
+        "name,robot,data,bounds\none,ur5,a.csv,b.yaml\n",
+        "line 2, column bounds",
+        "no such file",
+    ),
+    "a header alone": (HEADER, "robots.csv", "no rows"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_a_table_that_cannot_be_used_is_refused_where_it_is_wrong(case: str, folder: Path) -> None:
+    text, where, words = REFUSED[case]
+    path = table(folder, text)
+    with pytest.raises(InputError) as refusal:
+        read_manifest(path)
+    assert where in str(refusal.value)
+    assert words in str(refusal.value)
+
+
+LISTED: dict[str, tuple[dict[str, Any], str, str]] = {
+    "an unknown option": ({"options": {"trian": 40}}, "robots[1].options.trian", "Did you mean train?"),
+    "an option of another kind": ({"options": {"seed": "some"}}, "robots[1].options.seed", "a whole number"),
+    "yes for a number": ({"options": {"train": True}}, "robots[1].options.train", "a whole number"),
+    "an unknown entry": ({"dat": "2026-01-01"}, "robots[1]", "dat"),
+    "a serial number on two lines": ({"of": "a\nb"}, "robots[1].of", "serial"),
+    "a missing file": ({"data": "c.csv"}, "robots[1].data", "no such file"),
+}
+
+
+@pytest.mark.parametrize("case", LISTED)
+def test_an_entry_that_cannot_be_used_is_refused_by_its_place(case: str, folder: Path) -> None:
+    changed, where, words = LISTED[case]
+    said = [{"name": "one", "robot": "ur5", "data": "a.csv", **changed}]
+    with pytest.raises(InputError) as refusal:
+        robots_of(said, {}, folder / "fleet.yaml")
+    assert where in str(refusal.value)
+    assert words in str(refusal.value)
+
+
+def test_options_of_all_robots_are_refused_in_the_manifest(folder: Path) -> None:
+    with pytest.raises(InputError, match=r"fleet.yaml, options.loss: there is nothing of this name"):
+        read_manifest(table(folder, HEADER + ROW, "{loss: square}"))
+
+
+def test_a_missing_table_and_no_robots_are_refused(folder: Path) -> None:
+    with pytest.raises(InputError, match="no such file"):
+        robots_of("fleet.csv", {}, folder / "fleet.yaml")
+    with pytest.raises(InputError, match="there are no robots"):
+        robots_of([], {}, folder / "fleet.yaml")

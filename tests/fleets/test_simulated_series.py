@@ -1,0 +1,285 @@
+"""A series simulated: robot by robot what one calibration finds, whatever is computed beside it; resumed; refused."""
+
+from __future__ import annotations
+
+import errno
+import json
+from collections.abc import Callable
+from concurrent.futures import Executor, ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import truearm
+from truearm import writing
+from truearm.errors import InputError
+from truearm.fleets import recorded
+from truearm.fleets.experiment import Series, experiment
+from truearm.fleets.manifest import ExperimentEntry, read_manifest
+from truearm.fleets.recorded import Recorded
+from truearm.fleets.rows import Row
+from truearm.identification.judging.monte_carlo import calibrated
+from truearm.identification.solving.fit import identify
+from truearm.identification.solving.models import named_model
+from truearm.results.fleet import Fleet, Run
+
+ASKED = ExperimentEntry("irb120", 6, 15, 1, "geometric", 5e-5, 8, 3)
+
+
+def manifest(folder: Path, chunk: int = 2, name: str = "fleet.yaml", **entries: Any) -> Path:
+    asked = {"robot": "irb120", "count": 5, "configurations": 12, "noise": 0.05, "held_out": 5, "model": "offsets"}
+    text = json.dumps(
+        {"truearm": "truearm-fleet/1", "units": {"length": "mm"}, "experiment": {**asked, **entries}, "chunk": chunk}
+    )
+    (folder / name).write_text(text)
+    return folder / name
+
+
+def without_seconds(rows: list[Row]) -> list[dict[str, Any]]:
+    return [{name: value for name, value in row.content().items() if name != "seconds"} for row in rows]
+
+
+def test_each_robot_is_what_one_calibration_of_it_finds() -> None:
+    series = Series(experiment(ASKED))
+    free, rng = series.problem.free, np.random.default_rng(0)
+    truth = free.nominal + free.prior * series.drawn * rng.standard_normal((1, len(free.names)))
+    readings = series.problem.at(truth).residual + rng.standard_normal((1, series.problem.rows))
+    found, _, settled = calibrated(series.problem, readings)
+    data = series.problem.data
+    assert data.sigma is not None
+    moved = data.position + readings[0].reshape(-1, 3) * data.sigma[:, None]
+    fit = identify(series.made.robot, replace(data, position=moved), named_model("geometric"))
+    alone = np.array([fit.robot.parameters[name].value for name in free.names])
+    assert settled.all()
+    assert np.abs((found[0] - alone) / free.prior).max() < 0.05
+
+
+def test_errors_are_those_of_the_drawn_robot() -> None:
+    series = Series(experiment(ASKED))
+    rows = series.rows(range(6))
+    for row in rows:
+        assert row.status == "calibrated"
+        assert row.truth is not None
+        assert row.held_out is not None
+        assert row.nominal is not None
+        assert row.truth.mean < row.held_out.mean < row.nominal.mean / 5
+        assert row.truth.n == 8
+        off = [abs(p.value - (p.truth or 0.0)) / p.deviation for p in row.parameters.values() if p.deviation > 0]
+        assert np.mean(np.array(off) < 3.0) > 0.9
+    assert len({row.parameters["a_2"].truth for row in rows}) == 6
+
+
+def test_robots_beside_it_change_no_digit() -> None:
+    series = Series(experiment(ASKED))
+    together = without_seconds(series.rows(range(6)))
+    alone = [row for number in (5, 4, 3, 2, 1, 0) for row in without_seconds(series.rows([number]))]
+    assert together == alone[::-1]
+
+
+def test_parts_and_who_computes_them_change_no_digit(tmp_path: Path) -> None:
+    one = truearm.fleet(manifest(tmp_path, 5), out=tmp_path / "one", workers=1)
+    with ThreadPoolExecutor(2) as executor:
+        other = truearm.fleet(manifest(tmp_path, 1), out=tmp_path / "other", executor=executor)
+    two = truearm.fleet(manifest(tmp_path, 3), out=tmp_path / "two", workers=2)
+    rows = [without_seconds([*found.recorded.rows()]) for found in (one, other, two)]
+    assert rows[0] == rows[1] == rows[2]
+    for name in ("robots.csv",):
+        assert len({(tmp_path / folder / name).read_bytes() for folder in ("one", "other", "two")}) == 1
+
+
+class Counting(Executor):
+    """Does what it is given at once, and counts."""
+
+    def __init__(self, inner: Executor) -> None:
+        self.inner, self.count = inner, 0
+
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Any:
+        self.count += 1
+        return self.inner.submit(fn, *args, **kwargs)
+
+
+def test_what_is_on_disk_is_not_computed_twice(tmp_path: Path) -> None:
+    file, out = manifest(tmp_path), tmp_path / "out"
+
+    def stop(words: str) -> None:
+        if words.startswith("part 2 of 3"):
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        truearm.fleet(file, out=out, workers=1, progress=stop)
+    assert len([*out.rglob("*.jsonl")]) == 2
+    assert not (out / "fleet.json").exists()
+    with ThreadPoolExecutor(1) as inner:
+        executor = Counting(inner)
+        found = truearm.fleet(file, out=out, executor=executor)
+        assert executor.count == 1
+        assert found.run == Run(3, 2)
+        again = truearm.fleet(file, out=out, executor=executor)
+        assert executor.count == 1
+    whole = truearm.fleet(file, out=tmp_path / "whole", workers=1)
+    assert again.content() == found.content() == whole.content()
+
+
+def test_a_full_disk_is_named_and_what_was_written_before_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file, out = manifest(tmp_path), tmp_path / "out"
+    write = writing._write
+
+    def full(path: Path, content: bytes) -> None:
+        if len([*out.rglob("*.jsonl")]) == 1:
+            path.touch()
+            raise OSError(errno.ENOSPC, "No space left on device")
+        write(path, content)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(writing, "_write", full)
+        with pytest.raises(InputError, match="No space left on device"):
+            truearm.fleet(file, out=out, workers=1)
+    assert [path.name for path in out.rglob("*") if path.is_file()] == ["record.json", "0000001.jsonl"]
+    assert truearm.fleet(file, out=out, workers=1).run.before == 1
+
+
+def refused(call: Callable[[], object]) -> InputError:
+    with pytest.raises(InputError) as caught:
+        call()
+    return caught.value
+
+
+def test_a_folder_belongs_to_its_manifest(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    plan = tmp_path / "plan.csv"
+    truearm.simulate("irb120", truth="nominal", poses=12, noise=0.0, out=plan)
+    file, out = manifest(tmp_path, configurations="plan.csv"), tmp_path / "out"
+    truearm.fleet(file, out=out, workers=1)
+    truearm.fleet(file, out=out, workers=1)
+    other = manifest(tmp_path, name="other.yaml", configurations="plan.csv", seed=2)
+    assert "of another manifest" in str(refused(lambda: truearm.fleet(other, out=out, workers=1)))
+    truearm.simulate("irb120", truth="nominal", poses=12, noise=0.0, seed=1, out=plan)
+    told = refused(lambda: truearm.fleet(file, out=out, workers=1))
+    assert "has changed since" in str(told)
+    assert told.came == "plan.csv"
+    monkeypatch.setattr(recorded, "__version__", "99.0")
+    assert "another version of truearm" in str(refused(lambda: truearm.fleet(file, out=out, workers=1)))
+
+
+def test_folders_of_others_are_refused(tmp_path: Path) -> None:
+    file = manifest(tmp_path)
+    for name, made in (("record.json", "{}"), ("record.json", "no JSON"), ("fleet.json", "mine")):
+        out = tmp_path / f"out-{made}"
+        out.mkdir()
+        (out / name).write_text(made)
+        assert refused(lambda out=out: truearm.fleet(file, out=out, workers=1)).where is not None  # type: ignore[misc]
+        assert (out / name).read_text() == made
+    (tmp_path / "out" / "parts").mkdir(parents=True)
+    assert "whose it is" in str(refused(lambda: truearm.fleet(file, out=tmp_path / "out", workers=1)))
+
+
+@pytest.mark.parametrize("damage", ["{}\n", "no JSON\n", "", None])
+def test_a_damaged_part_is_named(tmp_path: Path, damage: str | None) -> None:
+    file, out = manifest(tmp_path), tmp_path / "out"
+    truearm.fleet(file, out=out, workers=1)
+    part = out / "parts" / "0000" / "0000002.jsonl"
+    lines = part.read_text().splitlines(keepends=True)
+    part.write_text("".join(lines[:-1]) if damage is None else damage)
+    told = refused(lambda: truearm.fleet(file, out=out, workers=1))
+    assert told.where == str(part)
+    part.unlink()
+    assert truearm.fleet(file, out=out, workers=1).run.before == 2
+
+
+def test_two_runs_at_once_in_one_folder_are_refused(tmp_path: Path) -> None:
+    pytest.importorskip("fcntl")
+    file, out = manifest(tmp_path), tmp_path / "out"
+    truearm.fleet(file, out=out, workers=1)
+    with Recorded(out, read_manifest(file)).alone():
+        assert "another run computes parts there" in str(refused(lambda: truearm.fleet(file, out=out, workers=1)))
+
+
+def test_robots_of_lost_parts_are_named_and_an_error(tmp_path: Path) -> None:
+    file, out = manifest(tmp_path), tmp_path / "out"
+    found = truearm.fleet(file, out=out, workers=1)
+    (out / "parts" / "0000" / "0000002.jsonl").unlink()
+    less = Fleet(found.recorded, Run(3, 0, ("a worker died",), ("robot-3", "robot-4")))
+    assert ("workers-died", "error") in [(notice.code, notice.level) for notice in less.warnings]
+    assert less.content()["missing"] == ["robot-3", "robot-4"]
+    assert "A worker died." in less.lines()
+
+
+def test_a_calibration_that_does_not_settle_is_a_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from truearm.fleets import experiment as module
+
+    def unsettled(*given: Any) -> Any:
+        found, deviation, settled = calibrated(*given)
+        settled[:1] = False
+        return found, deviation, settled
+
+    monkeypatch.setattr(module, "calibrated", unsettled)
+    found = truearm.fleet(manifest(tmp_path), out=tmp_path / "out", workers=1)
+    assert found.content()["calibrated"] == 2
+    assert "robots-failed" in [notice.code for notice in found.warnings]
+    assert next(found.recorded.rows()).message == "the calibration did not settle"
+
+
+@pytest.mark.parametrize(
+    ("entries", "what"),
+    [
+        ({"robot": "irb12"}, "irb12"),
+        ({"robot": "missing.yaml"}, "no such file"),
+        ({"configurations": "missing.csv"}, "no such file"),
+        ({"count": 0}, "too small"),
+        ({"count": 2_000_000}, "too many robots"),
+        ({"held_out": 100_000}, "out of range"),
+        ({"noise": -0.1}, "0 or more"),
+        ({"noise": 0.0}, "noise"),
+        ({"model": "geometrc"}, "no model of this name"),
+        ({"targets": 4}, "fewer targets"),
+        ({"seed": -1}, "0 or more"),
+        ({"truth": "random"}, "not known here"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused_and_nothing_written(
+    tmp_path: Path, entries: dict[str, Any], what: str
+) -> None:
+    file = manifest(tmp_path, **entries)
+    told = refused(lambda: truearm.fleet(file, out=tmp_path / "out", workers=1))
+    assert what in str(told)
+    assert told.parameter == "manifest"
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "what"),
+    [
+        ("truearm: truearm-fleet/1\n", "one of them"),
+        ("truearm: truearm-fleet/1\nexperiment: {robot: irb120, count: 2, noise: 1}\n", "has a unit"),
+        (
+            "truearm: truearm-fleet/1\nunits: {length: mm}\noptions: {train: 3}\n"
+            "experiment: {robot: irb120, count: 2, noise: 1}\n",
+            "only robots that were measured have options",
+        ),
+        ("truearm: truearm-fleet/2\n", "truearm-fleet/1"),
+    ],
+)
+def test_manifests_that_do_not_fit_are_refused(tmp_path: Path, text: str, what: str) -> None:
+    (tmp_path / "fleet.yaml").write_text(text)
+    told = refused(lambda: truearm.fleet(tmp_path / "fleet.yaml", out=tmp_path / "out", workers=1))
+    assert what in str(told)
+
+
+def test_one_of_several_does_the_parts(tmp_path: Path) -> None:
+    file = manifest(tmp_path)
+    told = refused(lambda: truearm.fleet(file, out=tmp_path / "out", workers=2, scheduler="127.0.0.1:1"))
+    assert told.parameter == "workers, scheduler"
+    wrong: Any = "four"
+    assert refused(lambda: truearm.fleet(file, out=tmp_path / "out", executor=wrong)).parameter == "executor"
+    assert refused(lambda: truearm.fleet(file, out=tmp_path / "out", workers=5000)).parameter == "workers"
+
+
+def test_a_worker_with_another_version_is_refused() -> None:
+    from truearm.jobs.fleet_parts import Task, finished
+
+    told = refused(lambda: finished(Task(0, "99.0")))
+    assert (told.parameter, told.allowed) == ("scheduler", "99.0")

@@ -1,0 +1,120 @@
+"""A fleet of robots that were measured, from the manifest to its folder."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+
+import truearm
+from truearm.errors import InputError
+from truearm.fleets.entries import RobotEntry
+from truearm.jobs import fleet_robots
+from truearm.jobs.fleet_robots import calibrated_row
+from truearm.results.calibration import RESULT_FILES
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two robots of a series, one of them measured twice, and a file without a reading."""
+    folder = tmp_path_factory.mktemp("measured")
+    for name, seed in (("a", 1), ("b", 2)):
+        truearm.simulate("irb120", truth="random", poses=20, noise=3e-5, seed=seed, out=folder / f"{name}.csv")
+    lines = (folder / "a.csv").read_text("utf-8").splitlines()
+    moved = [
+        ",".join([*line.split(",")[:3], f"{float(line.split(',')[3]) + 0.1:.6f}", *line.split(",")[4:]])
+        for line in lines[1:]
+    ]
+    (folder / "again.csv").write_text("\n".join([lines[0], *moved]) + "\n", "utf-8")
+    (folder / "empty.csv").write_text(
+        "\n".join([lines[0], *(",".join([*line.split(",")[:8], "", "", "", "0.03"]) for line in lines[1:4])]) + "\n",
+        "utf-8",
+    )
+    (folder / "robots.csv").write_text(
+        "name,robot,data,of,date,seed\n"
+        "one,irb120,a.csv,4711,2026-01-10,\n"
+        "two,irb120,b.csv,,2026-01-12,5\n"
+        "one-again,irb120,again.csv,4711,2026-07-10,\n"
+        "broken,irb120,empty.csv,,,\n",
+        "utf-8",
+    )
+    (folder / "fleet.yaml").write_text("truearm: truearm-fleet/1\nrobots: robots.csv\noptions: {train: 15}\n", "utf-8")
+    return folder
+
+
+def test_a_fleet_calibrates_every_robot_and_says_what_they_say_together(measured: Path, tmp_path: Path) -> None:
+    found = truearm.fleet(measured / "fleet.yaml", out=tmp_path / "out", workers=1)
+    out = tmp_path / "out"
+    for name in ("one", "two", "one-again"):
+        assert {*RESULT_FILES} <= {path.name for path in (out / "robots" / name).iterdir()}
+    assert not (out / "robots" / "broken").exists()
+    one = json.loads((out / "robots" / "one" / "result.json").read_text("utf-8"))
+    alone = truearm.calibrate("irb120", measured / "a.csv", train=15)
+    told = {row["name"]: row for row in one["parameters"]}
+    assert told["a_3"]["value"] == pytest.approx(alone.robot.values["a_3"] * 1e3, abs=1e-9)
+    assert one["notes"] == {"date": "2026-01-10", "serial": "4711"}
+    second = (out / "robots" / "two" / "result.json").read_text("utf-8")
+    assert "seed 5" in json.loads(second)["history"]
+
+    said = json.loads((out / "fleet.json").read_text("utf-8"))
+    assert (said["measurements"], said["machines"], said["calibrated"]) == (4, 3, 3)
+    assert [each["name"] for each in said["failed"]] == ["broken"]
+    (kind,) = said["kinds"]
+    changed = [row["parameter"] for row in kind["drift"] if row["significant"]]
+    assert changed[0] == "theta_offset_3"
+    assert {"robots-failed", "robots-drift"} <= {notice.code for notice in found.warnings}
+    assert found.analysis.looks[0].robot == "broken"
+    with (out / "robots.csv").open(encoding="utf-8") as stream:
+        table = {row["name"]: row for row in csv.DictReader(stream)}
+    assert table["broken"]["look"] == "failed"
+    assert "drifts" in table["one-again"]["look"]
+    page = (out / "report.html").read_text("utf-8")
+    for words in ("Machines measured again", "theta_offset_3", "not calibrated:", "compared with its prior"):
+        assert words in page
+    assert not (out / "priors.yaml").exists()  # of three robots none follow
+
+
+def test_a_row_holds_the_arm_alone_with_its_covariance(measured: Path) -> None:
+    row = calibrated_row(RobotEntry("one", "irb120", measured / "a.csv", {"train": 15}))
+    assert row.status == "calibrated"
+    assert row.robot == "irb120"
+    assert not any(name.startswith(("base", "target")) for name in row.parameters)
+    count = len(row.parameters)
+    assert len(row.covariance) == count * (count + 1) // 2
+    first = next(iter(row.parameters.values()))
+    assert row.covariance[0] == pytest.approx((first.deviation / first.prior) ** 2, abs=1e-9)
+    assert type(row).read(json.loads(json.dumps(row.content()))) == row
+
+
+def test_values_without_priors_are_not_drawn(measured: Path) -> None:
+    row = calibrated_row(RobotEntry("one", "irb120", measured / "a.csv", {"train": 15, "redundancy": "drop"}))
+    assert not row.drawn
+    assert type(row).read(json.loads(json.dumps(row.content()))) == row
+
+
+def test_a_robot_of_which_the_calibration_breaks_is_a_row(measured: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def breaks(*_: object, **__: object) -> None:
+        raise ArithmeticError("singular")
+
+    monkeypatch.setattr(fleet_robots, "calibrate", breaks)
+    row = calibrated_row(RobotEntry("one", "irb120", measured / "a.csv", of="4711", date="2026-01-01"))
+    assert (row.status, row.of, row.date) == ("failed", "4711", "2026-01-01")
+    assert row.message == "the calibration failed (ArithmeticError: singular)"
+
+
+def test_a_folder_that_cannot_be_written_is_no_fault_of_the_robot(measured: Path, tmp_path: Path) -> None:
+    (tmp_path / "robots").write_text("a file where the folder belongs", "utf-8")
+    with pytest.raises(InputError, match="a folder is needed"):
+        calibrated_row(RobotEntry("one", "irb120", measured / "a.csv", {"train": 15}), tmp_path)
+
+
+def test_nothing_is_started_where_the_table_is_wrong(measured: Path, tmp_path: Path) -> None:
+    (tmp_path / "robots.csv").write_text(
+        f"name,robot,data\none,irb120,{measured / 'a.csv'}\none,irb120,{measured / 'b.csv'}\n", "utf-8"
+    )
+    (tmp_path / "fleet.yaml").write_text("truearm: truearm-fleet/1\nrobots: robots.csv\n", "utf-8")
+    with pytest.raises(InputError, match=r"robots.csv, line 3, column name: two robots have the same name"):
+        truearm.fleet(tmp_path / "fleet.yaml", out=tmp_path / "out", workers=1)
+    assert not (tmp_path / "out").exists()

@@ -32,6 +32,10 @@ class JointTruth:
         How far the shaft can tilt in its housing from the middle [rad] (Patel, equation 4.11).
     gear
         Run-out of the gear: harmonic (1 for one sine a turn), amplitude [rad] and phase [rad] of each sine.
+    teeth
+        Errors that rise and fall in straight lines: periods in a turn, amplitude and phase [rad] of each triangle.
+    bumps
+        Places of a turn at which something is worn or dirty: middle [rad], half of its width [rad], height [rad].
     bearing
         Tilt of the shaft per moment across the axis [rad/(N m)]: bearings that give way.
     hysteresis
@@ -49,6 +53,8 @@ class JointTruth:
     clearance: float = 0.0
     bearing: float = 0.0
     gear: tuple[tuple[int, float, float], ...] = ()
+    teeth: tuple[tuple[int, float, float], ...] = ()
+    bumps: tuple[tuple[float, float, float], ...] = ()
     hysteresis: float = 0.0
     growth: float = 0.0
     warm_up: float = 0.0
@@ -66,6 +72,8 @@ class JointTruth:
             Moment about the axis [N m], or force along it [N].
         """
         geared = sum(amplitude * math.sin(k * position + phase) for k, amplitude, phase in self.gear)
+        geared += sum(amplitude * _triangle(k * position + phase) for k, amplitude, phase in self.teeth)
+        geared += sum(height * _bump(position - middle, half) for middle, half, height in self.bumps)
         sprung = self.compliance * load + self.quadratic * load * abs(load) + self.cubic * load**3
         return geared + self.hysteresis * approach + sprung + self.backlash / 2 * _sign(load)
 
@@ -89,6 +97,17 @@ class JointTruth:
 
 #: Follows its commanded position and nothing else.
 PERFECT: Final = JointTruth()
+
+
+def _triangle(angle: float) -> float:
+    """Return a wave between -1 and 1 of straight lines, 0 and rising at 0, like the sine."""
+    return 2.0 / math.pi * math.asin(max(-1.0, min(1.0, math.sin(angle))))
+
+
+def _bump(angle: float, half: float) -> float:
+    """Return 1 in the middle of a place of the turn, 0 beyond half of its width, and an arc of a cosine between."""
+    away = abs(math.remainder(angle, 2.0 * math.pi)) / half
+    return 0.5 * (1.0 + math.cos(math.pi * away)) if away < 1.0 else 0.0
 
 
 def _sign(load: float) -> float:

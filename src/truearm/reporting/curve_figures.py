@@ -106,12 +106,13 @@ def curve_figure(curve: FoundCurve) -> Figure:
         },
     ]
     ground = {"type": "rect", "yref": "paper", "y0": 0, "y1": 1, "layer": "below", "line": {"width": 0}}
-    start, end = (float(v) for v in (degrees[0], degrees[-1]))
+    start, end = (round(float(v), 2) for v in (degrees[0], degrees[-1]))
     return figure(
         traces,
         250,
         xaxis={**axis(f"joint {curve.number} [deg]"), "range": [start, end]},
         yaxis={**axis("curve [mdeg]"), "range": [bottom, top]},
+        legend={"orientation": "h", "x": 0, "y": 1.02, "xanchor": "left", "yanchor": "bottom", "traceorder": "normal"},
         shapes=[
             ground | {"x0": round(a, 2), "x1": round(b, 2), "fillcolor": _UNMEASURED}
             for a, b in _gaps(np.degrees(curve.measured).reshape(-1, 2), start, end)

@@ -1,9 +1,9 @@
 """Errors of gears and encoders, drawn joint by joint: what the angle of a joint is wrong by, whatever the load.
 
-An encoder whose disc sits off its axis errs once in a turn, and an oval one twice (Sanchez-Brea and Morlanes 2008); the
-wheels of a gear err as often as they turn, and its teeth as often as they mesh, some ten to sixty times in a turn of the
-joint. Amplitudes are fixed and stated here, so that what a calibration leaves
-can be held against them; phases, periods and places are drawn.
+An encoder whose disc sits off its axis errs once in a turn, and an oval one twice (Sanchez-Brea and Morlanes 2008). The
+wheels of a gear err as often as they turn, and its teeth as often as they mesh: some ten to sixty times in a turn of
+the joint. Amplitudes are fixed and stated here, so that what a calibration leaves can be held against them; phases,
+periods and places are drawn.
 """
 
 from __future__ import annotations

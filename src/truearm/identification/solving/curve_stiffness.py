@@ -126,9 +126,9 @@ def stiffness_of_triangle(
     variance = _start(F, joint, rows) if before is None else before.copy()
     variance[size <= 0.0] = 0.0
     group = np.unique(np.stack([joint, period]), axis=1, return_inverse=True)[1].reshape(-1)
-    band = np.unique(np.stack([joint, np.searchsorted(BANDS, period, side="right")]), axis=1, return_inverse=True)[
-        1
-    ].reshape(-1)
+    band = np.unique(
+        np.stack([joint, np.searchsorted(BANDS, period, side="right")]), axis=1, return_inverse=True
+    )[1].reshape(-1)
     climb = _Climb(group, band, least_noise)
     state = climb.climbed(_Marginal(F, z, rows, variance, max((float(z @ z) + rest) / rows, least_noise), rest))
     gains: dict[int, float] = {}
@@ -210,9 +210,9 @@ class _Climb:
         """Return the scale of each group's band."""
         used = v > 0.0
         inverse = np.bincount(self.of_group[used], 1.0 / v[used], minlength=self.of_group.max() + 1)
-        return np.asarray(
-            (np.bincount(self.of_group[used], minlength=len(inverse)) / np.maximum(inverse, 1e-300))[self.of_group]
-        )
+        return np.asarray((np.bincount(self.of_group[used], minlength=len(inverse)) / np.maximum(inverse, 1e-300))[
+            self.of_group
+        ])
 
     def objective(self, state: _Marginal) -> float:
         """Return the likelihood with that of the variances."""

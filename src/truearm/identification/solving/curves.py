@@ -130,7 +130,7 @@ def with_stiffness(
         place[:, 0],
         place[:, 1],
         before,
-        1.0 if declared else 0.0,
+        1.0 / problem.widened**2 if declared else 0.0,
     )
     variances = {name: v for name, v in zip(names, found.variance.tolist(), strict=True) if v > 0.0}
     now = {p.name: p for p in problem.free.parameters}

@@ -82,8 +82,10 @@ class Curves:
 
 def with_stiffness(
     problem: Problem, every: FreeParameters, curves: Curves, joints: Array, weight: Array
-) -> tuple[Problem, Curves]:
+) -> tuple[Problem, Curves, float]:
     """Return a problem with the coefficients free that the data tell, each with what is expected of it.
+
+    Its deviations are those that the curves leave; the last number is by what variances fell.
 
     Parameters
     ----------
@@ -142,12 +144,16 @@ def with_stiffness(
         )
     )
     held = {p.name: p.nominal for p in coefficients if p.name not in variances}
-    left = replace(problem, robot=robot.with_values(held), free=free)
+    fallen = found.noise if variances else 1.0
+    root = math.sqrt(fallen)
+    noise = {name: deviation * root for name, deviation in problem.noise.items()}
+    widened = max(1.0, problem.widened * root)
+    left = replace(problem, robot=robot.with_values(held), free=free, noise=noise, widened=widened)
     known = replace(
         curves,
         variances=variances,
-        design_effect=crowd * found.noise if variances else 1.0,
+        design_effect=crowd if variances else 1.0,
         gains=found.gains,
         rounds=curves.rounds - 1 if variances else 0,
     )
-    return left, known
+    return left, known, fallen

@@ -85,7 +85,8 @@ def with_stiffness(
 ) -> tuple[Problem, Curves, float]:
     """Return a problem with the coefficients free that the data tell, each with what is expected of it.
 
-    Its deviations are those that the curves leave; the last number is by what variances fell.
+    When they join in, its deviations become those that the curves leave, and declared ones are believed anew: what
+    widened them may have been the curves. The last number is by what variances fell.
 
     Parameters
     ----------
@@ -144,11 +145,11 @@ def with_stiffness(
         )
     )
     held = {p.name: p.nominal for p in coefficients if p.name not in variances}
-    fallen = found.noise if variances else 1.0
-    root = math.sqrt(fallen)
-    noise = {name: deviation * root for name, deviation in problem.noise.items()}
-    widened = max(1.0, problem.widened * root)
-    left = replace(problem, robot=robot.with_values(held), free=free, noise=noise, widened=widened)
+    left, fallen = replace(problem, robot=robot.with_values(held), free=free), 1.0
+    if variances and not curves.variances:
+        fallen = found.noise
+        noise = {name: deviation * math.sqrt(fallen) for name, deviation in problem.noise.items()}
+        left = replace(left, noise=noise, widened=1.0)
     known = replace(
         curves,
         variances=variances,

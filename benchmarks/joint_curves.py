@@ -34,6 +34,8 @@ OUT = Path(__file__).with_suffix(".json")
 DATA = Path(os.environ.get("TRUEARM_DATA", Path(__file__).parents[2] / "shared" / "data"))
 CURVE = "joint-curve"
 GEOMETRIC = named_model("geometric")
+#: What besides compliance and a series of the joints' angles the measured IRB 120 was found to do.
+SIX = ("bearing-compliance", "hardening", "warm-up", "transmission-error", "approach")
 #: Noise of a coordinate of the twins [m], and the width of the range of joint 2 where it is narrow [rad].
 NOISES = (2e-5, 5e-5)
 NARROW = math.radians(60.0)
@@ -101,7 +103,13 @@ def irb120(seeds: int) -> list[Figures]:
     data, _ = read_matrices(folder / "joints_commanded.txt", targets, {}, "deg", "mm")
     robot = load_robot("irb120").with_payload(Payload(2.7, (0.05, 0.025, 0.1)))
     elastic = named_model("elastic")
-    models = {"elastic": elastic, CURVE: elastic.also([CURVE]), "auto": None}
+    models = {
+        "elastic": elastic,
+        CURVE: elastic.also([CURVE]),
+        "six effects": elastic.also([*SIX, "fourier"]),
+        f"six effects, {CURVE}": elastic.also([*SIX, CURVE]),
+        "auto": None,
+    }
     found = []
     for seed in range(seeds):
         order = np.random.default_rng(seed).permutation(data.configurations)

@@ -5,9 +5,9 @@ coefficients c of a linearised fit ``z = A u + F c + n`` have a normal prior of 
 for sine and cosine of a period of a joint, and the variances that make the residuals likeliest are taken (MacKay 1992,
 "Bayesian interpolation"; Tipping 2001, "Sparse Bayesian learning and the relevance vector machine"). With the
 parameters u of the arm integrated out under their own, wide, priors, what geometry and gravity can say themselves is
-theirs. With ``V = s^2 I + F diag(v) F'``, slopes of the likelihood in log v vanish where ``v = c^2 / g`` summed over sine
-and cosine: c is the likeliest coefficient and ``g = v f' V^-1 f`` what the data know of it, 0 to 1. Each step puts in
-the old v on the right.
+theirs. With ``V = s^2 I + F diag(v) F'``, slopes of the likelihood in log v vanish where ``v = c^2 / g``, summed over
+sine and cosine: c is the likeliest coefficient and ``g = v f' V^-1 f`` what the data know of it, 0 to 1. Each step puts
+in the old v on the right.
 
 A gear makes a few lines, and little between them. The variances of neighbouring periods of a joint therefore have an
 inverse gamma distribution with one scale t, and few degrees of freedom: coefficients are then of Student's t, which
@@ -30,9 +30,9 @@ from truearm.modeling.chain import Array
 BANDS: Final = (1, 3, 6, 11, 19, 33)
 #: Degrees of freedom of the variances of a band.
 _ALIKE: Final = 1.0
-#: Gain in log-likelihood from which the curve of a joint is believed: what half a dozen variances that mean nothing gain
-#: in the information criterion of Akaike (1974), and as much again, because the largest of many periods are looked at.
-_SIGNIFICANT: Final = 10.0
+#: Gain in log-likelihood from which the curve of a joint is believed. A sine of noise alone gains so much at one of
+#: 300 000 periods, and a robot has hundreds of periods to look at.
+_SIGNIFICANT: Final = 12.5
 #: Of the log-likelihood: a step that gains less is the last.
 _SETTLED: Final = 0.05
 _STEPS: Final = 40
@@ -50,6 +50,8 @@ class CurveVariances:
     ----------
     variance
         Of each coefficient [rad^2], ``(coefficients,)``; zero where it is left out.
+    full
+        The same before those are left out that move next to nothing.
     noise
         Variance of the residuals by the one assumed.
     informed
@@ -61,6 +63,7 @@ class CurveVariances:
     """
 
     variance: Array
+    full: Array
     noise: float
     informed: Array
     likelihood: float
@@ -96,9 +99,9 @@ def curve_variances(
     variance = _start(F, joint, rows) if before is None else before.copy()
     variance[size <= 0.0] = 0.0
     group = np.unique(np.stack([joint, period]), axis=1, return_inverse=True)[1].reshape(-1)
-    band = np.unique(
-        np.stack([joint, np.searchsorted(BANDS, period, side="right")]), axis=1, return_inverse=True
-    )[1].reshape(-1)
+    band = np.unique(np.stack([joint, np.searchsorted(BANDS, period, side="right")]), axis=1, return_inverse=True)[
+        1
+    ].reshape(-1)
     climb = _Climb(group, band, least_noise)
     state = climb.climbed(_Marginal(F, z, rows, variance, max((float(z @ z) + rest) / rows, least_noise), rest))
     gains: dict[int, float] = {}
@@ -115,7 +118,12 @@ def curve_variances(
     small[order] = np.cumsum(moved[order]) <= _NEGLIGIBLE * state.noise * rows
     kept = (state.variance > 0.0) & ~small[group]
     return CurveVariances(
-        np.where(kept, state.variance, 0.0), state.noise, state.known, state.likelihood, gains if kept.any() else {}
+        np.where(kept, state.variance, 0.0),
+        state.variance,
+        state.noise,
+        state.known,
+        state.likelihood,
+        gains if kept.any() else {},
     )
 
 
@@ -200,9 +208,9 @@ class _Climb:
         """Return the scale of each group's band."""
         used = v > 0.0
         inverse = np.bincount(self.of_group[used], 1.0 / v[used], minlength=self.of_group.max() + 1)
-        return np.asarray((np.bincount(self.of_group[used], minlength=len(inverse)) / np.maximum(inverse, 1e-300))[
-            self.of_group
-        ])
+        return np.asarray(
+            (np.bincount(self.of_group[used], minlength=len(inverse)) / np.maximum(inverse, 1e-300))[self.of_group]
+        )
 
     def objective(self, state: _Marginal) -> float:
         """Return the likelihood with that of the variances."""

@@ -75,18 +75,16 @@ class Curves:
 
     def priors_of(self, robot: Robot) -> list[Parameter]:
         """Return a robot's coefficients with what is expected of them."""
-        return [
-            replace(robot.parameters[name], prior=math.sqrt(variance)) for name, variance in self.variances.items()
-        ]
+        return [replace(robot.parameters[name], prior=math.sqrt(variance)) for name, variance in self.variances.items()]
 
 
 def with_stiffness(
     problem: Problem, every: FreeParameters, curves: Curves, joints: Array, weight: Array
-) -> tuple[Problem, Curves, float]:
+) -> tuple[Problem, Curves, Array]:
     """Return a problem with the coefficients free that the data tell, each with what is expected of it.
 
-    When they join in, its deviations become those that the curves leave, and declared ones are believed anew: what
-    widened them may have been the curves. The last number is by what variances fell.
+    The deviations of its readings, and the variances of the joints' errors, which are returned too, are those with the
+    curves.
 
     Parameters
     ----------
@@ -126,30 +124,35 @@ def with_stiffness(
         moments += part.T @ part
     place = np.array([curves.places[name] for name in names], dtype=np.intp).reshape(-1, 2)
     before = np.array([curves.variances[name] for name in names]) if curves.variances else None
-    declared = all(block.declared for block in whole.blocks)
+    declared = any(block.declared for block in whole.blocks)
     found = curve_variances(
         moments_without(moments, m),
         len(residual) / crowd,
         place[:, 0],
         place[:, 1],
         before,
-        1.0 / problem.widened**2 if declared else 0.0,
+        problem.widened**-2 if declared else 0.0,
     )
     variances = {name: v for name, v in zip(names, found.variance.tolist(), strict=True) if v > 0.0}
     now = {p.name: p for p in problem.free.parameters}
     kept = [p for p in every.parameters if p.name in (variances if p.name in curves.places else now)]
     free = FreeParameters(
         tuple(
-            replace(robot.parameters[p.name], prior=math.sqrt(variances[p.name])) if p.name in variances else now[p.name]
+            replace(robot.parameters[p.name], prior=math.sqrt(variances[p.name]))
+            if p.name in variances
+            else now[p.name]
             for p in kept
         )
     )
     held = {p.name: p.nominal for p in coefficients if p.name not in variances}
-    left, fallen = replace(problem, robot=robot.with_values(held), free=free), 1.0
-    if variances and not curves.variances:
-        fallen = found.noise
-        noise = {name: deviation * math.sqrt(fallen) for name, deviation in problem.noise.items()}
-        left = replace(left, noise=noise, widened=1.0)
+    ratio = math.sqrt(found.noise) if variances else 1.0
+    left = replace(
+        problem,
+        robot=robot.with_values(held),
+        free=free,
+        noise={name: ratio * deviation for name, deviation in problem.noise.items()},
+        widened=max(1.0, problem.widened * ratio) if declared else problem.widened,
+    )
     known = replace(
         curves,
         variances=variances,
@@ -157,4 +160,8 @@ def with_stiffness(
         gains=found.gains,
         rounds=curves.rounds - 1 if variances else 0,
     )
-    return left, known, fallen
+    return left, known, joints * ratio**2
+
+
+#: Of a model without any.
+NO_CURVES: Final = Curves()

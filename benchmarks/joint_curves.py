@@ -61,7 +61,7 @@ def judged(robot: Robot, training: Dataset, parts: dict[str, Dataset], models: d
         began = perf_counter()
         chosen = select(robot, training).model if model is None else model
         fit = identify(robot, training, chosen)
-        found[name] = {"seconds": perf_counter() - began, "status": fit.status.value, "effects": chosen.effects}
+        found[name] = {"seconds": perf_counter() - began, "status": fit.status.value, "effects": list(chosen.effects)}
         found[name] |= {part: mean_error(fit, data) for part, data in parts.items()}
     return found
 

@@ -14,6 +14,7 @@ from truearm.identification.solving.fit import identify
 from truearm.identification.solving.models import named_model
 from truearm.library import load_robot
 from truearm.modeling.chain import Array
+from truearm.modeling.effects.joint_curve import curve_names
 from truearm.results.curves import curve_lines, curves_summary
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import measure
@@ -60,9 +61,14 @@ def test_its_size_is_that_where_it_was_measured() -> None:
 
 def test_the_strongest_periods_are_told_with_their_neighbours() -> None:
     found = curve({1: 3.0, 19: 5.0, 20: 6.0, 21: 5.5, 22: 4.5, 50: 1.0, 58: 0.1}, np.linspace(-180, 180, 90))
-    assert [one.words for one in found.strongest] == ["19 to 22 periods", "1 period", "50 periods"]
+    assert [one.range for one in found.strongest] == ["19 to 22", "1", "50"]
     assert math.degrees(found.strongest[0].amplitude) == pytest.approx(1e-3 * math.sqrt(25 + 36 + 30.25 + 20.25))
     assert curve_lines([found]) == ["Joint 2: curve of 0.0078 deg rms, strongest at 19 to 22 periods a turn"]
+    several = curve({1: 10.0, 28: 6.0, 58: 5.0, 40: 2.0}, np.linspace(-180, 180, 90))
+    assert curve_lines([several])[0].endswith("0.0091 deg rms, strongest at 1, 28 and 58 periods a turn")
+    assert curve_lines([curve({1: 1.414214}, np.linspace(-180, 180, 90))]) == [
+        "Joint 2: curve of 0.0010 deg rms, strongest at 1 period a turn"
+    ]
     (summary,) = curves_summary([found])
     assert list(summary) == ["joint", "rms_mdeg", "strongest", "measured_deg"]
     assert summary["strongest"][1] == {"periods": [1, 1], "amplitude_mdeg": pytest.approx(3.0)}
@@ -84,8 +90,9 @@ def test_curves_of_a_fit_are_those_of_its_parameters() -> None:
             for k in range(1, 61)
         )
         assert_allclose(one.at(q)[0], expected, atol=1e-15)
-        index = fit.free.names.index(f"curve_cos5_{one.number}")
-        assert one.covariance[9, 9] == fit.covariance[index, index]
+        for place, name in enumerate(curve_names(one.number)):
+            index = fit.free.names.index(name) if name in fit.free.names else None
+            assert one.covariance[place, place] == (0.0 if index is None else fit.covariance[index, index])
     assert found
     without = replace(fit, robot=fit.robot.with_values({n: 0.0 for n in fit.free.names if n.startswith("curve_")}))
     assert found_curves(without, data) == ()

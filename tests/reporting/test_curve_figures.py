@@ -93,7 +93,7 @@ def test_nothing_measured_is_grey_all_over() -> None:
 
 def test_rows_say_size_band_periods_and_range() -> None:
     (row,) = curve_rows([curve(np.linspace(-60, 150, 60), deviation=0.1)])
-    assert (row.joint, row.strongest, row.measured) == ("3, J3", "7 periods (10 mdeg)", "-60 to 150")
+    assert (row.joint, row.strongest, row.measured) == ("3, J3", "7 (10 mdeg)", "-60 to 150")
     assert (row.rms, row.band) == ("7.1", "1.5")
 
 

@@ -44,7 +44,7 @@ def curve_rows(curves: Sequence[FoundCurve]) -> tuple[CurveRow, ...]:
     """Return a row for each curve; its band is the median one where it was measured."""
     rows = []
     for curve in curves:
-        groups = [f"{one.words} ({significant(mdeg(one.amplitude), 2, 1)} mdeg)" for one in curve.strongest]
+        groups = [f"{one.range} ({significant(mdeg(one.amplitude), 2, 1)} mdeg)" for one in curve.strongest]
         ranges = [f"{low:.0f} to {high:.0f}" for low, high in np.degrees(curve.measured).reshape(-1, 2).tolist()]
         inside = _measured(curve)
         half = _NORMAL_95 * np.median(curve.at(curve.angles[inside])[1]) if inside.any() else np.nan

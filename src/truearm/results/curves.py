@@ -25,12 +25,17 @@ def curves_summary(curves: Sequence[FoundCurve]) -> list[dict[str, Any]]:
 
 
 def curve_lines(curves: Sequence[FoundCurve]) -> list[str]:
-    """Return a line for each curve."""
-    return [
-        f"Joint {curve.number}: curve of {math.degrees(curve.rms):.2g} deg rms, strongest at "
-        f"{curve.strongest[0].words} a turn"
-        for curve in curves
-    ]
+    """Return a line for each curve, with the periods whose amplitude is at least half of the strongest."""
+    lines = []
+    for curve in curves:
+        strong = [one for one in curve.strongest if 2.0 * one.amplitude >= curve.strongest[0].amplitude]
+        *others, last = [one.range for one in strong]
+        periods = f"{', '.join(others)} and {last}" if others else last
+        lines.append(
+            f"Joint {curve.number}: curve of {math.degrees(curve.rms):#.2g} deg rms, strongest at {periods} "
+            f"{'period' if periods == '1' else 'periods'} a turn"
+        )
+    return lines
 
 
 def mdeg(angle: float) -> float:

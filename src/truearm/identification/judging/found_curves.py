@@ -44,11 +44,9 @@ class Periods:
     amplitude: float
 
     @property
-    def words(self) -> str:
-        """Such as ``1 period`` or ``19 to 22 periods``."""
-        if self.lowest == self.highest:
-            return f"{self.lowest} period{'' if self.lowest == 1 else 's'}"
-        return f"{self.lowest} to {self.highest} periods"
+    def range(self) -> str:
+        """Such as ``1`` or ``19 to 22``."""
+        return f"{self.lowest}" if self.lowest == self.highest else f"{self.lowest} to {self.highest}"
 
 
 @dataclass(frozen=True, eq=False)

@@ -37,8 +37,8 @@ CURVE = "joint-curve"
 GEOMETRIC = named_model("geometric")
 #: What besides compliance and a series of the joints' angles the measured IRB 120 was found to do.
 SIX = ("bearing-compliance", "hardening", "warm-up", "transmission-error", "approach")
-#: Noise of a coordinate of the twins [m], and the width of the range of joint 2 where it is narrow [rad].
-NOISES = (2e-5, 5e-5)
+#: Noises of a coordinate of the twins [m], and the width of the range of joint 2 where it is narrow [rad].
+NOISES = (3e-5,)
 NARROW = math.radians(60.0)
 #: The norm of three normal coordinates is so many deviations, in the mean.
 FLOOR = math.sqrt(8.0 / math.pi)

@@ -117,9 +117,9 @@ bearing-compliance, hardening, warm-up, transmission-error, approach, and fourie
 |---|---|---|
 {irb120}
 
-Twins whose encoders and gears err (truths `gear-errors` and `tooth-errors`), 200 configurations x 3 targets, {twin_seeds}
-seeds: error of unseen readings divided by what the noise alone makes. In the last two rows of a robot joint 2 turns
-through 60 deg in the training; they are judged there, and over its whole range (outside).
+Twins whose encoders and gears err (truths `gear-errors` and `tooth-errors`), 200 configurations x 3 targets,
+{twin_seeds} seeds: error of unseen readings divided by what the noise alone makes. In the last two rows of a robot
+joint 2 turns through 60 deg in the training; they are judged there, and over its whole range (outside).
 
 | twin | geometric, median | worst | joint curves, median | worst |
 |---|---|---|---|---|

@@ -23,7 +23,8 @@ TURN = np.linspace(-math.pi, math.pi, 7200, endpoint=False)
 
 def curve(joint: JointTruth) -> np.ndarray:
     """Return what a joint turns beyond its position over a turn, 20 places a degree [deg]."""
-    return np.degrees([joint.turn(q, 0.0, 0.0) for q in TURN])
+    rest = np.zeros(len(TURN))
+    return np.degrees(joint.turn(TURN, rest, rest))
 
 
 def strengths(joint: JointTruth) -> np.ndarray:

@@ -203,11 +203,11 @@ def main() -> None:
     """Run the parts that were asked for, and write them beside those that were not."""
     asked = sys.argv[1] if len(sys.argv) > 1 else "all"
     seeds = int(sys.argv[2]) if len(sys.argv) > 2 else 10
-    record: Figures = json.loads(OUT.read_text()) if OUT.exists() else {}
     for name, part in (("ur5", ur5), ("irb120", irb120), ("twins", twins)):
         if asked in (name, "all"):
-            record[name] = part(seeds)
-            OUT.write_text(json.dumps(record, indent=1) + "\n")
+            made = {name: part(seeds)}
+            record: Figures = json.loads(OUT.read_text()) if OUT.exists() else {}
+            OUT.write_text(json.dumps(record | made, indent=1) + "\n")
 
 
 if __name__ == "__main__":

@@ -31,6 +31,8 @@ TABLES: Mapping[str, TableConvention] = {"dh": "standard-dh", "mdh": "modified-d
 ELASTIC = ("compliance",)
 FULL = ("gain", "fourier", "transmission-error", "compliance", "hardening", "backlash")
 TILTING = ("compliance", "bearing-compliance", "clearance")
+CURVED = ("joint-curve", "compliance")
+EFFECTS = [(), ELASTIC, FULL, TILTING, CURVED]
 #: What parameters of a real robot are away from nominal, by group: each a standard deviation in SI units.
 AWAY = {
     "base": 0.1,
@@ -40,6 +42,7 @@ AWAY = {
     "gain": 1e-3,
     "fourier": 3e-4,
     "transmission-error": 1e-4,
+    "joint-curve": 1e-5,
     "compliance": 1e-5,
     "hardening": 1e-7,
     "backlash": 3e-4,
@@ -252,7 +255,7 @@ def test_json_holds_what_is_known_of_every_parameter() -> None:
     model = json.loads(exported(replace(robot.with_parameters([known]), history=("one", "twö")), "json").text)
     assert list(model) == [
         *("truearm", "name", "title", "source", "units", "frames", "left_out", "convention", "base", "joints"),
-        *("flange", "targets", "fixtures", "effects", "masses", "balancers"),
+        *("flange", "targets", "fixtures", "effects", "curves", "masses", "balancers"),
         *("payload", "gravity", "parameters", "history"),
     ]
     assert model["truearm"] == "truearm-model/1"
@@ -278,6 +281,52 @@ def test_json_holds_what_is_known_of_every_parameter() -> None:
     assert model["joints"][0]["transmission_periods"] == robot.joints[0].transmission_periods
 
 
+def test_json_holds_curves_as_arrays() -> None:
+    robot = calibrated(load_robot("irb120"), CURVED)
+    known = replace(robot.parameters["curve_cos7_2"], deviation=2e-6, informed=0.5)
+    robot = robot.with_parameters([known])
+    text = exported(robot, "json").text
+    assert len([line for line in text.splitlines() if '"joint": ' in line and '"value": {' in line]) == 6
+    model = json.loads(text)
+    assert not [row for row in model["parameters"] if row["name"].startswith("curve_")]
+    assert {"name": "joint-curve", "parameters": []} in model["effects"]
+    assert [curve["joint"] for curve in model["curves"]] == [1, 2, 3, 4, 5, 6]
+    q = configurations(robot, 5)
+    moved = np.zeros_like(q)
+    for curve in model["curves"]:
+        for k, (s, c) in enumerate(zip(*(curve["value"][part] for part in ("sin", "cos")), strict=True), 1):
+            angle = k * q[:, curve["joint"] - 1]
+            moved[:, curve["joint"] - 1] += s * np.sin(angle) + c * np.cos(angle)
+    plain = robot.with_effects(("compliance",))
+    assert_allclose(plain.rigid.world_poses(q + moved)[0], rigid_with_curves(robot).world_poses(q)[0], atol=1e-12)
+    second = model["curves"][1]
+    assert (second["deviation"]["cos"][6], second["informed"]["cos"][6]) == (2e-6, 0.5)
+    assert second["deviation"]["sin"][6] is None
+    assert exported(load_robot("irb120"), "json").text.count('"curves": []') == 1
+
+
+def rigid_with_curves(robot: Robot) -> Robot:
+    """The arm without weight: nothing but curves moves its joints."""
+    return replace(robot, masses=(), payload=Payload(0.0))
+
+
+def test_curves_are_arrays_of_the_python_file() -> None:
+    robot = calibrated(load_robot("ur5"), CURVED)
+    short = robot.with_values({f"curve_{part}{k}_2": 0.0 for part in ("sin", "cos") for k in range(4, 61)})
+    short = short.with_values({f"curve_{part}{k}_3": 0.0 for part in ("sin", "cos") for k in range(1, 61)})
+    text = exported(short, "python").text
+    made = module(short)
+    assert [len(curve) for curve in made["CURVES"]] == [120, 6, 0, 120, 120, 120]
+    curves = text[text.index("CURVES: ") : text.index("#: By the moment M")]
+    assert max(map(len, curves.splitlines())) <= 120
+    assert len(curves.splitlines()) < 180
+    q = configurations(robot, 200)
+    for one in (robot, short):
+        for actual, expected in zip(module(one)["forward"](q), in_base(one, q), strict=True):
+            assert_allclose(actual, expected, rtol=0, atol=1e-12)
+    assert module(load_robot("ur5"))["CURVES"] == ((),) * 6
+
+
 def test_json_says_that_simulation_is_left_out() -> None:
     robot = replace(load_robot("li3"), tools={"pin": Tool({"1": (0.0, 0.0, 0.1)})}, truths={})
     assert says(robot, "json", "Left out, because it is for simulation alone: tools.")
@@ -293,7 +342,7 @@ def module(robot: Robot) -> dict[str, Any]:
     return space
 
 
-@pytest.mark.parametrize("effects", [(), ELASTIC, FULL, TILTING], ids=["geometric", "elastic", "full", "tilting"])
+@pytest.mark.parametrize("effects", EFFECTS, ids=["geometric", "elastic", "full", "tilting", "curved"])
 @pytest.mark.parametrize("robot_id", library())
 def test_the_python_file_gives_the_poses(robot_id: str, effects: tuple[str, ...]) -> None:
     robot = calibrated(load_robot(robot_id), effects)
@@ -315,7 +364,7 @@ def test_the_python_file_of_any_convention(convention: Convention, effects: tupl
     check_poses(module(robot)["forward"](q), robot, q)
 
 
-@pytest.mark.parametrize("effects", [(), ELASTIC, FULL, TILTING], ids=["geometric", "elastic", "full", "tilting"])
+@pytest.mark.parametrize("effects", EFFECTS, ids=["geometric", "elastic", "full", "tilting", "curved"])
 @pytest.mark.parametrize("robot_id", ["irb120", "ur10", "katana450", "li3"])
 def test_forward_of_inverse(robot_id: str, effects: tuple[str, ...]) -> None:
     robot = calibrated(load_robot(robot_id), effects)

@@ -16,7 +16,8 @@ def simulate(
     truth: Annotated[
         str,
         typer.Option(
-            metavar="NAME|FILE", help="nominal, random, a truth of the robot file ('truearm show'), or a robot file."
+            metavar="NAME|FILE",
+            help="nominal, random, gear-errors, tooth-errors, a truth of the robot file ('truearm show'), or a file.",
         ),
     ],
     poses: Annotated[

@@ -57,7 +57,7 @@ def lines(
     joint_errors
         The same robot with joint errors, or its file: joint positions are compensated with it.
     truth
-        Try it on a twin: ``nominal``, ``random``, a truth of the robot file, or a robot file.
+        Try it on a twin, as for :func:`truearm.simulate`: ``nominal``, ``random``, a truth of the robot file, a file.
     data
         Or judge measurements: configurations named as the poses are, ``x-1`` to ``xyz-11``.
     noise

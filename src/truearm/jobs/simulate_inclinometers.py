@@ -63,8 +63,9 @@ def simulate_inclinometers(
     robot
         The nominal robot, or what :func:`truearm.load_robot` takes.
     truth
-        ``nominal``; ``random``, geometry and joint zeros drawn from their priors; the name of a truth in the robot's
-        file; or another robot or its file, with its own base and targets if it has targets.
+        ``nominal``; ``random``, geometry and joint zeros drawn from their priors; ``gear-errors`` or ``tooth-errors``,
+        the same with errors of encoders and gears; the name of a truth in the robot's file; or another robot or its
+        file, with its own base and targets if it has targets.
     poses
         How many configurations for the inclinometers, an even number.
     out
@@ -91,7 +92,12 @@ def simulate_inclinometers(
     count, force = even_argument(poses), pull_argument(pull)
     if not isinstance(truth, Robot):
         if not isinstance(truth, str | Path):
-            raise wrong_kind("a truth belongs here", truth, "truth", "nominal, random, a truth's name, or a robot")
+            raise wrong_kind(
+                "a truth belongs here",
+                truth,
+                "truth",
+                "nominal, random, gear-errors, tooth-errors, a truth's name, or a robot",
+            )
         path_argument(truth, "truth")
     file = None if out is None else file_for(out, robot, truth)
     if file is not None:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from truearm.identification.judging.simulated_calibrations import SimulatedCalibrations
+from truearm.modeling.effects.joint_curve import JointCurve
 from truearm.modeling.parameters import PLACES
 from truearm.modeling.robot import Robot
 from truearm.reporting.drawing import AFTER, BEFORE, Figure, axis, figure
@@ -33,9 +34,11 @@ class IntervalRow:
 
 
 def interval_rows(found: SimulatedCalibrations, robot: Robot) -> tuple[IntervalRow, ...]:
-    """Return a row for each parameter that was free, in the order of the fit."""
+    """Return a row for each parameter that was free, in the order of the fit, but for terms of joint curves."""
     rows = []
     for i, name in enumerate(found.names):
+        if robot.parameters[name].group == JointCurve.name:
+            continue
         unit = SHOWN_AS[robot.parameters[name].unit]
         linear, deviation = (from_si(float(d[i]), unit) for d in (found.linear_deviation, found.deviation))
         places = decimals_of(deviation, 6)
@@ -62,7 +65,8 @@ def coverage_figure(found: SimulatedCalibrations, robot: Robot) -> Figure:
 
     Between the dotted lines lie 95 of 100 shares of so many trials, if the intervals hold 95 % of the truths.
     """
-    own = [i for i, name in enumerate(found.names) if robot.parameters[name].group not in PLACES]
+    beside = (*PLACES, JointCurve.name)
+    own = [i for i, name in enumerate(found.names) if robot.parameters[name].group not in beside]
     own = own or list(range(len(found.names)))
     shares = 100.0 * found.coverage[own]
     ratio = found.deviation[own] / np.where(found.linear_deviation[own] > 0.0, found.linear_deviation[own], np.nan)

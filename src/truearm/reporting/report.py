@@ -17,6 +17,7 @@ from truearm.modeling.chain import Array
 from truearm.modeling.parts import GRAVITY
 from truearm.notices import worst_first
 from truearm.reporting.budget_figure import budget_figure, budget_rows, workspace_budget_figure
+from truearm.reporting.curve_figures import curve_figure, curve_name, curve_rows
 from truearm.reporting.drawing import Figure
 from truearm.reporting.figures import correlation_map, expected_error_map, histogram, residuals, workspace
 from truearm.reporting.monte_carlo_figure import coverage_figure, interval_rows
@@ -123,6 +124,8 @@ class Report:
         drawn["residuals"] = residuals(run.data, parts, self._down_weighted())
         if run.monte_carlo is not None and run.monte_carlo.settled:
             drawn["coverage"] = coverage_figure(run.monte_carlo, run.fit.robot)
+        for curve in run.curves:
+            drawn[curve_name(curve)] = curve_figure(curve)
         if run.zones is not None and any(verdict.zone is not None for verdict in run.zones.verdicts):
             drawn["zone-errors"] = zones_figure(run.zones)
         drawn["correlations"] = correlation_map(run.fit)
@@ -162,6 +165,8 @@ def report_html(calibration: Calibration) -> str:
         simulated=calibration.monte_carlo,
         simulated_line="".join(simulated_lines(calibration.monte_carlo, fit.robot)),
         interval_rows=() if calibration.monte_carlo is None else interval_rows(calibration.monte_carlo, fit.robot),
+        curve_rows=curve_rows(calibration.curves),
+        curve_names=[curve_name(curve) for curve in calibration.curves],
         budget_rows=() if calibration.budget is None else budget_rows(calibration.budget),
         expected_of=expected_of(calibration.expected),
         expected_rows=expected_rows(calibration.expected),

@@ -16,6 +16,7 @@ from truearm.identification.solving.fit import Fit, ParameterStatus
 from truearm.measurement.dataset import IntArray
 from truearm.measurement.statistics import Errors, Spread
 from truearm.modeling.chain import Array
+from truearm.modeling.effects.joint_curve import JointCurve
 from truearm.reporting.numbers import decimals_of, deserved, significant, student_975
 from truearm.results.summaries import BOOTSTRAPPED, joint_error_text
 from truearm.units import SHOWN_AS, from_si
@@ -198,10 +199,12 @@ class ParameterRow:
 
 
 def parameter_rows(fit: Fit) -> tuple[ParameterRow, ...]:
-    """Return a row for every parameter of the robot, in the robot's order."""
+    """Return a row for every parameter of the robot, in the robot's order, but for the hundreds of joint curves."""
     free = set(fit.free.names)
     rows = []
     for p in fit.robot.parameters.values():
+        if p.group == JointCurve.name:
+            continue
         unit, was_free = SHOWN_AS[p.unit], p.name in free
         rows.append(
             ParameterRow(

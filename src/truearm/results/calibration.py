@@ -18,18 +18,21 @@ from truearm.identification.choosing.zone_boxes import flange_places
 from truearm.identification.choosing.zones import ZoneVerdict
 from truearm.identification.judging.error_budget import ErrorBudget, error_budget
 from truearm.identification.judging.expected_error import ExpectedError, expected_error
+from truearm.identification.judging.found_curves import FoundCurve, found_curves
 from truearm.identification.judging.next_step import NextStep
 from truearm.identification.judging.repeatability import Repeatability, repeatability
 from truearm.identification.judging.simulated_calibrations import SimulatedCalibrations
 from truearm.identification.solving.fit import Fit, Status
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import Errors
+from truearm.modeling.effects.joint_curve import JointCurve
 from truearm.modeling.formats.robot_file import robot_text, sealed
 from truearm.modeling.proof import Proof
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice, has_error
 from truearm.results.budgets import budget_lines, budget_summary
 from truearm.results.calibration_proof import proof_of
+from truearm.results.curves import curve_lines, curves_summary
 from truearm.results.record import Record, notice_lines, notice_summaries
 from truearm.results.residuals import Part, Residuals, residuals_of
 from truearm.results.simulated import simulated_lines, simulated_summary
@@ -139,6 +142,11 @@ class Calibration(Record):
         training = self.data.of_configurations(self.training)
         return error_budget(self.fit, self.data, training, held_out, self.expected)
 
+    @cached_property
+    def curves(self) -> tuple[FoundCurve, ...]:
+        """The curves of the joints, where the model has some; see the effect ``joint-curve``."""
+        return found_curves(self.fit, self.data.of_configurations(self.training))
+
     @property
     def status(self) -> Status:
         """How the fit ended, or that what it found cannot be this robot."""
@@ -173,7 +181,7 @@ class Calibration(Record):
         }
 
     def result(self) -> dict[str, Any]:
-        """Return what ``result.json`` holds: the summary and every parameter."""
+        """Return what ``result.json`` holds: the summary and every parameter but those of curves, which it sums up."""
         return {
             "truearm": "truearm-result/1",
             **self.summary(),
@@ -183,6 +191,7 @@ class Calibration(Record):
             "noise": noise_summary(self.fit, self.repeatability),
             "limits_of_accuracy": None if self.budget is None else budget_summary(self.budget),
             "parameters": list(self._parameters()),
+            **({"curves": curves_summary(self.curves)} if self.curves else {}),
             **({} if self.monte_carlo is None else {"monte_carlo": simulated_summary(self.monte_carlo, self.robot)}),
             **({} if self.zones is None else {"zones": self.zones.summary()}),
             **({} if self.selection is None else {"selection": selection_summary(self.selection)}),
@@ -205,6 +214,7 @@ class Calibration(Record):
         if self.without:
             text.append(f"Left out: {counted(len(self.without), 'configuration')} ({listed(self.without)})")
         text += expected_lines(self.expected)
+        text += curve_lines(self.curves)
         text += noise_lines(self.fit, self.repeatability)
         text += budget_lines(self.budget)
         text += simulated_lines(self.monte_carlo, self.robot)
@@ -269,6 +279,8 @@ class Calibration(Record):
     def _parameters(self) -> Sequence[dict[str, Any]]:
         rows = []
         for p in self.robot.parameters.values():
+            if p.group == JointCurve.name:
+                continue
             unit = SHOWN_AS[p.unit]
             rows.append(
                 {

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from truearm.identification.judging.simulated_calibrations import PredictedError, SimulatedCalibrations
+from truearm.modeling.effects.joint_curve import JointCurve
 from truearm.modeling.parameters import PLACES
 from truearm.modeling.robot import Robot
 from truearm.units import SHOWN_AS, from_si
@@ -27,6 +28,8 @@ def simulated_summary(found: SimulatedCalibrations, robot: Robot) -> dict[str, A
         found.coverage.tolist(),
         strict=True,
     ):
+        if robot.parameters[name].group == JointCurve.name:
+            continue
         unit = SHOWN_AS[robot.parameters[name].unit]
         rows.append(
             {
@@ -59,8 +62,11 @@ def _predicted(error: PredictedError | None) -> dict[str, Any] | None:
 
 
 def arm_coverage(found: SimulatedCalibrations, robot: Robot) -> float:
-    """Return the share of linear intervals that held the truth, over the arm's parameters; of all if it has none."""
-    own = np.array([robot.parameters[name].group not in PLACES for name in found.names])
+    """Return the share of linear intervals that held the truth, over the arm's parameters; of all if it has none.
+
+    Terms of joint curves do not count: each is a part of a curve.
+    """
+    own = np.array([robot.parameters[name].group not in (*PLACES, JointCurve.name) for name in found.names])
     return float(found.coverage[own if own.any() else ~own].mean())
 
 

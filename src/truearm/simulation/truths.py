@@ -19,6 +19,7 @@ from truearm.modeling.parts import NO_PAYLOAD, Payload, Tool
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform, rotation_from_quaternion
 from truearm.shown import counted
+from truearm.simulation.gear_errors import DRAWN, with_errors_drawn
 from truearm.simulation.twin import Twin
 from truearm.simulation.twin_joint import PERFECT, Contact, JointTruth
 
@@ -31,7 +32,7 @@ STATION = Transform((2.4, 0.9, -0.5), (math.cos(math.pi / 3), 0.0, 0.0, math.sin
 
 def truth_names(robot: Robot) -> tuple[str, ...]:
     """Return the truths a robot can be simulated with by name."""
-    return ("nominal", "random", *robot.truths)
+    return ("nominal", "random", *DRAWN, *robot.truths)
 
 
 def truth_twin(robot: Robot, truth: Robot | str | Path, rng: np.random.Generator) -> Twin:
@@ -42,10 +43,11 @@ def truth_twin(robot: Robot, truth: Robot | str | Path, rng: np.random.Generator
     robot
         The nominal robot.
     truth
-        ``nominal``; ``random``, geometry and joint zeros drawn from their priors; the name of one of the robot
-        file's truths; or a robot or its file, whose own base and targets are used if it has targets.
+        ``nominal``; ``random``, geometry and joint zeros drawn from their priors; ``gear-errors`` and
+        ``tooth-errors``, the same with errors of encoders and gears (:mod:`truearm.simulation.gear_errors`); the name
+        of one of the robot file's truths; or a robot or its file, whose own base and targets are used if it has any.
     rng
-        For ``random``.
+        For what is drawn.
 
     Raises
     ------
@@ -65,13 +67,16 @@ def truth_twin(robot: Robot, truth: Robot | str | Path, rng: np.random.Generator
         return Twin(at_station(true, tool), joints, _contact(true))
     if truth == "nominal":
         return Twin(at_station(robot, tool), joint_truths(robot), _contact(robot))
-    if truth == "random":
+    if truth == "random" or truth in DRAWN:
         drawn = {
             p.name: p.value + p.prior * float(rng.standard_normal())
             for p in robot.parameters.values()
             if p.group in ("geometry", "joint zero")
         }
-        return Twin(at_station(robot.with_values(drawn), tool), joint_truths(robot), _contact(robot))
+        joints = joint_truths(robot)
+        if truth in DRAWN:
+            joints = with_errors_drawn(robot, joints, DRAWN[str(truth)], rng)
+        return Twin(at_station(robot.with_values(drawn), tool), joints, _contact(robot))
     if not Path(truth).suffix and not exists(Path(truth)):
         known = truth_names(robot)
         raise InputError(

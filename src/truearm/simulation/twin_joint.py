@@ -36,6 +36,10 @@ class JointTruth:
         How far the shaft can tilt in its housing from the middle [rad] (Patel, equation 4.11).
     gear
         Run-out of the gear: harmonic (1 for one sine a turn), amplitude [rad] and phase [rad] of each sine.
+    teeth
+        Errors that rise and fall in straight lines: periods in a turn, amplitude and phase [rad] of each triangle.
+    bumps
+        Places of a turn at which something is worn or dirty: middle [rad], half of its width [rad], height [rad].
     bearing
         Tilt of the shaft per moment across the axis [rad/(N m)]: bearings that give way.
     hysteresis
@@ -53,6 +57,8 @@ class JointTruth:
     clearance: float = 0.0
     bearing: float = 0.0
     gear: tuple[tuple[int, float, float], ...] = ()
+    teeth: tuple[tuple[int, float, float], ...] = ()
+    bumps: tuple[tuple[float, float, float], ...] = ()
     hysteresis: float = 0.0
     growth: float = 0.0
     warm_up: float = 0.0
@@ -70,6 +76,8 @@ class JointTruth:
             Moment about the axis [N m], or force along it [N], ``(n,)``.
         """
         geared = sum((amplitude * np.sin(k * position + phase) for k, amplitude, phase in self.gear), np.zeros(()))
+        geared = sum((size * _triangle(k * position + phase) for k, size, phase in self.teeth), geared)
+        geared = sum((height * _bump(position - middle, half) for middle, half, height in self.bumps), geared)
         sprung = self.compliance * load + self.quadratic * load * np.abs(load) + self.cubic * load**3
         return np.asarray(geared + self.hysteresis * approach + sprung + self.backlash / 2 * _sign(load))
 
@@ -92,6 +100,17 @@ class JointTruth:
 
 #: Follows its commanded position and nothing else.
 PERFECT: Final = JointTruth()
+
+
+def _triangle(angle: Array | float) -> Array:
+    """Return a wave between -1 and 1 of straight lines, 0 and rising at 0, like the sine."""
+    return np.asarray(2.0 / np.pi * np.arcsin(np.clip(np.sin(angle), -1.0, 1.0)))
+
+
+def _bump(angle: Array | float, half: float) -> Array:
+    """Return 1 in the middle of a place of the turn, 0 beyond half of its width, and an arc of a cosine between."""
+    away = np.abs(angle - 2.0 * np.pi * np.round(np.asarray(angle) / (2.0 * np.pi))) / half
+    return np.asarray(np.where(away < 1.0, 0.5 * (1.0 + np.cos(np.pi * away)), 0.0))
 
 
 def _sign(load: Array | float) -> Array:

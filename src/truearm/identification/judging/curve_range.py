@@ -59,8 +59,8 @@ def check_curves(fit: Fit, training: Dataset) -> list[Notice]:
         found.append(
             Notice(
                 "curve-range",
-                f"Curves of joints are known where these were measured: {'; '.join(partly)}. Outside they go back to "
-                "nothing, and expected errors count what is not known of them.",
+                f"Curves of joints are known where these were measured: {'; '.join(partly)}. Outside they are what "
+                "was found there, continued, and expected errors count what is not known of them.",
                 "note",
             )
         )

@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 
 from truearm.identification.solving.fit import Fit
+from truearm.modeling.effects.joint_curve import JointCurve
 from truearm.modeling.parameters import PLACES
 
 #: Random configurations at which motions are compared.
@@ -20,8 +21,11 @@ _ALIKE: Final = 0.9999
 
 
 def own_parameters(fit: Fit) -> list[int]:
-    """Return the indices of the free parameters of the arm itself; of all where the arm was not free."""
-    own = [i for i, p in enumerate(fit.free.parameters) if p.group not in PLACES]
+    """Return the indices of the free parameters of the arm itself; of all where the arm was not free.
+
+    The hundreds of numbers of joint curves are left out: each is a part of a curve, and none means anything alone.
+    """
+    own = [i for i, p in enumerate(fit.free.parameters) if p.group not in (*PLACES, JointCurve.name)]
     return own or list(range(len(fit.free.parameters)))
 
 

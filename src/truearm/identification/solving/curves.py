@@ -149,13 +149,14 @@ def with_stiffness(
         )
     )
     held = {p.name: p.nominal for p in coefficients if p.name not in variances}
-    ratio = math.sqrt(found.noise) if variances else 1.0
+    ratio = min(1.0, math.sqrt(found.noise)) if variances else 1.0
+    joining = bool(variances) and not curves.variances  # what widened declared deviations may have been the curves
     left = replace(
         problem,
         robot=robot.with_values(held),
         free=free,
         noise={name: ratio * deviation for name, deviation in problem.noise.items()},
-        widened=max(1.0, problem.widened * ratio) if declared else problem.widened,
+        widened=1.0 if joining else max(1.0, problem.widened * ratio),
     )
     known = replace(
         curves,

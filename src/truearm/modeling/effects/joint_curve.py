@@ -34,6 +34,7 @@ class JointCurve(LinearEffect):
     """Parameters ``curve_sin1_i``, ``curve_cos1_i``, ``curve_sin2_i`` and so on [rad], of each turning joint."""
 
     name: ClassVar[str] = "joint-curve"
+    exportable: ClassVar[bool] = True
     selectable: ClassVar[bool] = False
 
     @cached_property

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import Any, Final
 
 from truearm.modeling.balancers import Balancer
 from truearm.modeling.chain import Element
+from truearm.modeling.effects.effect import Effect
+from truearm.modeling.effects.joint_curve import JointCurve, curve_names
 from truearm.modeling.parameters import Parameter
 from truearm.modeling.robot import Robot
 
@@ -47,17 +49,42 @@ def model_json(robot: Robot, frames: str, left_out: Iterable[str]) -> str:
         "fixtures": [
             {"name": f.name, "kind": f.kind, "elements": _elements(robot, f.chain.elements)} for f in robot.fixtures
         ],
-        "effects": [{"name": e.name, "parameters": [p.name for p in e.parameters]} for e in robot.effects],
+        "effects": [{"name": e.name, "parameters": _names(e)} for e in robot.effects],
+        "curves": None,
         "masses": [
             {"link": m.joint, "mass": m.mass, "cog": list(m.cog), "inertia": list(m.inertia)} for m in robot.masses
         ],
         "balancers": [_balancer(b) for b in robot.balancers],
         "payload": {"mass": robot.payload.mass, "cog": list(robot.payload.cog)},
         "gravity": list(robot.gravity),
-        "parameters": [_parameter(p) for p in robot.parameters.values()],
+        "parameters": [_parameter(p) for p in robot.parameters.values() if p.group != JointCurve.name],
         "history": list(robot.history),
     }
-    return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    text = json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    lines = ",\n  ".join(json.dumps(curve, allow_nan=False) for curve in _curves(robot))
+    return text.replace('\n "curves": null', f'\n "curves": [\n  {lines}\n ]' if lines else '\n "curves": []', 1)
+
+
+def _names(effect: Effect) -> list[str]:
+    """Return the names of an effect's parameters; the hundreds of a curve stand in a place of their own."""
+    return [] if effect.name == JointCurve.name else [p.name for p in effect.parameters]
+
+
+def _curves(robot: Robot) -> Iterator[dict[str, Any]]:
+    """Return what is known of each curve: of sine and cosine of 1, 2 .. periods in a turn, each an array."""
+    for number in range(1, len(robot.joints) + 1):
+        known = [robot.parameters[name] for name in curve_names(number) if name in robot.parameters]
+        if known:
+            yield {
+                "joint": number,
+                **{
+                    field: {
+                        "sin": [getattr(p, field) for p in known[0::2]],
+                        "cos": [getattr(p, field) for p in known[1::2]],
+                    }
+                    for field in ("value", "prior", "deviation", "informed")
+                },
+            }
 
 
 def _balancer(b: Balancer) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from typing import Final
 import numpy as np
 
 from truearm.modeling.chain import Array, across, axis_of
+from truearm.modeling.effects.joint_curve import curve_names
 from truearm.modeling.effects.linear_contact import LinearContactClearance
 from truearm.modeling.formats.collapsed import collapsed
 from truearm.modeling.formats.urdf_tree import roll_pitch_yaw
@@ -93,6 +94,7 @@ def _constants(robot: Robot) -> dict[str, str]:
         "GAIN": _rows(by_joint("gain", 1.0), names),
         "FOURIER": _rows(list(series), names),
         "TRANSMISSION": _rows([(n, *parts) for n, parts in zip(periods, gear, strict=True)], names),
+        "CURVES": _series([_curve(robot, i) for i in numbers], names),
         "COMPLIANCE": _rows(by_joint("compliance"), names),
         "COMPLIANCE_QUADRATIC": _rows(by_joint("compliance_quadratic"), names),
         "COMPLIANCE_CUBIC": _rows(by_joint("compliance_cubic"), names),
@@ -140,6 +142,12 @@ def _bodies(
     return places, masses, balancers
 
 
+def _curve(robot: Robot, number: int) -> Row:
+    """Return sine and cosine of each period of a joint's curve, up to the last that is not zero."""
+    amounts = [robot.values.get(name, 0.0) for name in curve_names(number)]
+    return tuple(amounts[: 2 * max((k // 2 + 1 for k, amount in enumerate(amounts) if amount), default=0)])
+
+
 def _place(frame: Array) -> tuple[Row, Row]:
     return _tidy(frame[:3, 3]), _tidy(np.array(roll_pitch_yaw(frame[:3, :3])))
 
@@ -159,3 +167,16 @@ def _rows(rows: Sequence[object], names: Sequence[str] = ()) -> str:
         return f"({rows[0]!r},) * {len(rows)}"
     labels = [f"  # {name}" for name in names] or [""] * len(rows)
     return "\n".join(["(", *(f"    {row!r},{label}" for row, label in zip(rows, labels, strict=True)), ")"])
+
+
+def _series(rows: Sequence[Row], names: Sequence[str]) -> str:
+    """Return rows of many numbers as text, as many in a line as there is room for."""
+    if not any(rows):
+        return f"((),) * {len(rows)}"
+    text = ["("]
+    for row, name in zip(rows, names, strict=True):
+        lines = wrap(", ".join(map(repr, row)), _WIDTH - 8)
+        text += (
+            [f"    (  # {name}", *(f"        {line}" for line in lines), "    ),"] if row else [f"    (),  # {name}"]
+        )
+    return "\n".join([*text, ")"])

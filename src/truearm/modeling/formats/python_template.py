@@ -43,6 +43,8 @@ BALANCERS: tuple[
 GAIN: tuple[float, ...] = (1.0,) * 2
 FOURIER: tuple[tuple[float, float, float, float], ...] = ((0.0, 0.0, 0.0, 0.0),) * 2
 TRANSMISSION: tuple[tuple[int, float, float], ...] = ((0, 0.0, 0.0),) * 2
+#: The curve of each joint over a turn: sine and cosine of the reading, of twice the reading, and so on; empty for none.
+CURVES: tuple[tuple[float, ...], ...] = ((),) * 2
 #: By the moment M of weights about the axis (for a sliding joint the force along it): c1 M, c2 M |M|, c3 M^3; the play.
 COMPLIANCE: tuple[float, ...] = (2e-05, 4e-05)
 COMPLIANCE_QUADRATIC: tuple[float, ...] = (0.0,) * 2
@@ -187,7 +189,11 @@ def _by_position(q: Array) -> Array:
     s1, c1, s2, c2 = np.array(FOURIER).T
     periods, s, c = np.array(TRANSMISSION).T
     series = s1 * np.sin(q) + c1 * np.cos(q) + s2 * np.sin(2 * q) + c2 * np.cos(2 * q)
-    return np.asarray((np.array(GAIN) - 1.0) * q + series + s * np.sin(periods * q) + c * np.cos(periods * q))
+    series += s * np.sin(periods * q) + c * np.cos(periods * q)
+    for i, curve in enumerate(CURVES):
+        angles = q[:, i, None] * np.arange(1, len(curve) // 2 + 1)
+        series[:, i] += np.sin(angles) @ np.array(curve[0::2]) + np.cos(angles) @ np.array(curve[1::2])
+    return np.asarray((np.array(GAIN) - 1.0) * q + series)
 
 
 def _by_load(force: Array, moment: Array) -> tuple[Array, Array]:

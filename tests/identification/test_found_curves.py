@@ -1,0 +1,99 @@
+"""What is said of curves of joints: where they were measured, how large they are, how often they err."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from truearm.identification.judging.found_curves import FoundCurve, found_curves
+from truearm.identification.solving.fit import identify
+from truearm.identification.solving.models import named_model
+from truearm.library import load_robot
+from truearm.modeling.chain import Array
+from truearm.modeling.effects.joint_curve import curve_names
+from truearm.results.curves import curve_lines, curves_summary
+from truearm.simulation.truths import truth_twin
+from truearm.simulation.twin import measure
+
+TURN = (-math.pi, math.pi)
+
+
+def curve(amplitudes: dict[int, float], places: Array, shown: tuple[float, float] = TURN) -> FoundCurve:
+    """Return a curve of sines with amplitudes in mdeg, measured at places in deg."""
+    amounts = np.zeros(120)
+    for periods, amplitude in amplitudes.items():
+        amounts[2 * (periods - 1)] = math.radians(amplitude * 1e-3)
+    return FoundCurve(2, "J2", amounts, np.eye(120) * 1e-10, shown, np.radians(places))
+
+
+def ranges(found: FoundCurve) -> list[list[float]]:
+    return [[round(math.degrees(end), 3) for end in ends] for ends in found.measured]
+
+
+def test_its_value_and_deviation_follow_from_its_terms() -> None:
+    found = curve({3: 10.0, 20: 4.0}, np.linspace(-180, 180, 100))
+    angles = np.linspace(-3, 3, 50)
+    value, deviation = found.at(angles)
+    assert_allclose(value, math.radians(0.010) * np.sin(3 * angles) + math.radians(0.004) * np.sin(20 * angles))
+    assert_allclose(deviation, math.sqrt(60 * 1e-10))  # sine and cosine of a period together are one deviation
+
+
+def test_a_gap_parts_the_measured_ranges() -> None:
+    limited = (math.radians(-90), math.radians(120))
+    assert ranges(curve({1: 1.0}, np.r_[-80.0:-20.0:5j, 40.0:100.0:5j], limited)) == [[-80, -20], [40, 100]]
+    assert ranges(curve({1: 1.0}, np.array([10.0]), limited)) == [[10, 10]]
+    assert ranges(curve({1: 1.0}, np.linspace(-175, 172, 60))) == [[-180, 180]]
+    assert ranges(curve({1: 1.0}, np.r_[-175.0:-20.0:30j, 40.0:172.0:30j])) == [[-180, -20], [40, 180]]
+    assert ranges(curve({1: 1.0}, np.r_[-160.0:160.0:60j])) == [[-160, 160]]
+
+
+def test_its_size_is_that_where_it_was_measured() -> None:
+    assert curve({4: 10.0}, np.linspace(-180, 180, 90)).rms == pytest.approx(
+        math.radians(0.01) / math.sqrt(2), rel=1e-3
+    )
+    short = curve({1: 10.0}, np.linspace(-10, 10, 30))  # nearly a straight line of 3.5 mdeg
+    assert math.degrees(short.rms) == pytest.approx(0.010 * math.radians(10) / math.sqrt(3), rel=0.02)
+
+
+def test_the_strongest_periods_are_told_with_their_neighbours() -> None:
+    found = curve({1: 3.0, 19: 5.0, 20: 6.0, 21: 5.5, 22: 4.5, 50: 1.0, 58: 0.1}, np.linspace(-180, 180, 90))
+    assert [one.range for one in found.strongest] == ["19 to 22", "1", "50"]
+    assert math.degrees(found.strongest[0].amplitude) == pytest.approx(1e-3 * math.sqrt(25 + 36 + 30.25 + 20.25))
+    assert curve_lines([found]) == ["Joint 2: curve of 0.0078 deg rms, strongest at 19 to 22 periods a turn"]
+    several = curve({1: 10.0, 28: 6.0, 58: 5.0, 40: 2.0}, np.linspace(-180, 180, 90))
+    assert curve_lines([several])[0].endswith("0.0091 deg rms, strongest at 1, 28 and 58 periods a turn")
+    assert curve_lines([curve({1: 1.414214}, np.linspace(-180, 180, 90))]) == [
+        "Joint 2: curve of 0.0010 deg rms, strongest at 1 period a turn"
+    ]
+    (summary,) = curves_summary([found])
+    assert list(summary) == ["joint", "rms_mdeg", "strongest", "measured_deg"]
+    assert summary["strongest"][1] == {"periods": [1, 1], "amplitude_mdeg": pytest.approx(3.0)}
+    assert summary["measured_deg"] == [[-180.0, 180.0]]
+
+
+def test_curves_of_a_fit_are_those_of_its_parameters() -> None:
+    nominal = load_robot("li3")
+    twin = truth_twin(nominal, "gear-errors", np.random.default_rng(1))
+    rng = np.random.default_rng(2)
+    data = measure(twin, nominal.random_configurations(60, rng), 1e-5, rng)
+    fit = identify(nominal, data, named_model("geometric").also(["joint-curve"]))
+    found = found_curves(fit, data)
+    q = np.linspace(-1.0, 1.0, 7)
+    values = fit.robot.values
+    for one in found:
+        expected = sum(
+            values[f"curve_sin{k}_{one.number}"] * np.sin(k * q) + values[f"curve_cos{k}_{one.number}"] * np.cos(k * q)
+            for k in range(1, 61)
+        )
+        assert_allclose(one.at(q)[0], expected, atol=1e-15)
+        for place, name in enumerate(curve_names(one.number)):
+            index = fit.free.names.index(name) if name in fit.free.names else None
+            assert one.covariance[place, place] == (0.0 if index is None else fit.covariance[index, index])
+    assert found
+    without = replace(fit, robot=fit.robot.with_values({n: 0.0 for n in fit.free.names if n.startswith("curve_")}))
+    assert found_curves(without, data) == ()
+    assert found_curves(identify(nominal, data, named_model("geometric")), data) == ()

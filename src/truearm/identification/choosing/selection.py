@@ -17,6 +17,7 @@ from typing import Final
 import numpy as np
 
 from truearm.errors import InputError
+from truearm.identification.choosing.candidates import SELECTABLE, open_effects
 from truearm.identification.held import NOTHING_HELD, Held
 from truearm.identification.solving.bounds import Bounds
 from truearm.identification.solving.losses import Loss
@@ -33,9 +34,6 @@ AUTO: Final = "auto"
 FOLDS: Final = 5
 _FOLD_TOLERANCE: Final = 1e-3  # priors; errors of folds are not compared more closely
 _START: Final = next(model for model in MODELS if model.name == "elastic")
-#: Joint effects that are tried, in this order.
-SELECTABLE: Final = tuple(effect.name for effect in EFFECTS if effect.selectable)
-
 
 @dataclass(frozen=True)
 class Attempt:
@@ -179,25 +177,6 @@ def _fold(training: Dataset, held_out: Dataset) -> tuple[Dataset, Dataset]:
     read = training.has_position if training.fixture is None else training.has_reading
     placed = np.isin(held_out.target, training.target[read]) & np.isin(held_out.against, training.against[read])
     return training, replace(held_out.of_readings(placed), quaternion=None)
-
-
-def open_effects(
-    robot: Robot, effects: Sequence[str], data: Dataset, candidates: Sequence[str] = SELECTABLE
-) -> list[str]:
-    """Return the effects that are not there yet and that the robot and the data say something about."""
-    ordered = data.approach is not None and data.number is not None
-    warmed = data.temperature is not None
-    loaded = has_weight(robot) or data.wrench is not None
-    return [
-        effect.name
-        for effect in EFFECTS
-        if effect.name in candidates
-        and effect.name not in effects
-        and effect(robot.layout).parameters
-        and (ordered or not effect.ordered)
-        and (warmed or not effect.warmed)
-        and (loaded or not effect.loaded)
-    ]
 
 
 def _model(effects: tuple[str, ...], candidates: Sequence[str]) -> Model:

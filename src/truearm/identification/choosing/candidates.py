@@ -1,0 +1,181 @@
+"""What could be added to a fit: the columns of every joint effect, evaluated once at its solution."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.identification.choosing.folds import Folds
+from truearm.identification.choosing.linear_cross_validation import LinearFit
+from truearm.identification.solving.arrivals import Arrivals, Whitening
+from truearm.identification.solving.problem import Problem
+from truearm.identification.solving.rounds import Solved, bound_by
+from truearm.measurement.dataset import Dataset
+from truearm.modeling.chain import Array
+from truearm.modeling.effects import EFFECTS
+from truearm.modeling.loads import has_weight
+from truearm.modeling.parameters import FreeParameters
+from truearm.modeling.robot import Robot
+
+#: Joint effects that are tried, in this order.
+SELECTABLE: Final = tuple(effect.name for effect in EFFECTS if effect.selectable)
+#: What keeps a problem without priors solvable, per prior.
+_HARDLY: Final = 1e-6
+#: A reading that a loss left no weight counts as if it had left this much, in the ranking.
+_LEAST_WEIGHT: Final = 1e-6
+
+
+def open_effects(
+    robot: Robot, effects: Sequence[str], data: Dataset, candidates: Sequence[str] = SELECTABLE
+) -> list[str]:
+    """Return the effects that are not there yet and that the robot and the data say something about."""
+    return [name for name in candidates if name not in effects and closed_because(robot, data, name) is None]
+
+
+def closed_because(robot: Robot, data: Dataset, name: str) -> str | None:
+    """Return why an effect cannot be tried, None if it can."""
+    effect = next(effect for effect in EFFECTS if effect.name == name)
+    if not effect(robot.layout).parameters:
+        return "the robot has nothing that it moves"
+    if effect.ordered and (data.approach is None or data.number is None):
+        return "the order of measurement is not known"
+    if effect.warmed and data.temperature is None:
+        return "no temperature was recorded"
+    if effect.loaded and not (has_weight(robot) or data.wrench is not None):
+        return "nothing loads the joints"
+    return None
+
+
+def loads_bend(robot: Robot, data: Dataset) -> bool:
+    """Return whether there are loads that elastic joints could give way to."""
+    return has_weight(robot) or data.wrench is not None
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """A fit with the linear loss' view of it, and folds: what candidates are added to.
+
+    Attributes
+    ----------
+    solved
+        The fit.
+    folds
+        Which configurations are held out together.
+    """
+
+    solved: Solved
+    folds: Folds
+
+    @property
+    def problem(self) -> Problem:
+        """The problem at whose deviations and loads the fit is a solution."""
+        return self.solved.problem
+
+    @cached_property
+    def configuration(self) -> NDArray[np.intp]:
+        """Configuration of each row, ``(rows,)``; -1 for what is known of fixtures."""
+        found = []
+        for block in self.problem.blocks:
+            own = block.data is self.problem.data
+            of = block.data.configuration[block.readings] if own else np.full(len(block.readings), -1)
+            found.append(np.repeat(of, block.observation.components))
+        return np.concatenate(found).astype(np.intp)
+
+    @cached_property
+    def fold(self) -> NDArray[np.intp]:
+        """Fold of each row, ``(rows,)``; -1 for those that every fold trains on."""
+        return np.where(self.configuration < 0, -1, self.folds.of[self.configuration])
+
+    @cached_property
+    def _whitening(self) -> Whitening | None:
+        components = self.solved.components
+        if components is None or not components.weighing.joints.any():
+            return None
+        shared = self.problem.at(self.solved.solution.vector).by_joints * np.sqrt(components.weighing.joints)
+        return Whitening(Arrivals(self.problem.arrivals), shared)
+
+    @cached_property
+    def _root_weight(self) -> Array:
+        """Square root of what the loss left of each row, ``(rows,)``."""
+        weight = np.maximum(self.solved.solution.weight, _LEAST_WEIGHT)
+        return np.sqrt(np.repeat(weight, self.problem.components))
+
+    def _weighed(self, rows: Array) -> Array:
+        rows = rows * (self._root_weight[:, None] if rows.ndim == 2 else self._root_weight)
+        return rows if self._whitening is None else self._whitening.applied(rows)
+
+    def _in_metres(self, rows: Array) -> Array:
+        """Return weighed rows as differences of what was read [m or rad], ``(rows,)``."""
+        plain = rows if self._whitening is None else self._whitening.undone(rows)
+        sigma = np.concatenate([np.repeat(b.sigma, b.observation.components) for b in self.problem.blocks])
+        return np.asarray(plain / self._root_weight * sigma)
+
+    @cached_property
+    def compared(self) -> tuple[NDArray[np.intp], int]:
+        """Rows by which models are compared, those of a reading together, and how many a reading has.
+
+        Positions; where there are none, lengths. Without readings of targets and places that one fold alone knows.
+        """
+        for kinds, components in ((("position",), 3), (("distance", "height"), 1), (("orientation",), 3)):
+            rows, first = [], 0
+            for block in self.problem.blocks:
+                mine = first + np.arange(block.rows)
+                first += block.rows
+                if block.data is not self.problem.data or block.observation.name not in kinds:
+                    continue
+                if len(np.unique(self.fold[mine])) > 1:
+                    rows.append(mine)
+            if rows:
+                return np.concatenate(rows), components
+        return np.zeros(0, dtype=np.intp), 1
+
+    def errors(self, fit: LinearFit) -> Array:
+        """Return the mean held-out error of each configuration [m], NaN where nothing is compared, ``(n,)``."""
+        rows, components = self.compared
+        left = self._in_metres(fit.held_out())[rows].reshape(-1, components)
+        of = self.configuration[rows][::components]
+        count = np.bincount(of, minlength=len(self.folds.of))
+        total = np.bincount(of, np.linalg.norm(left, axis=1), minlength=len(self.folds.of))
+        return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+    def start(self, without: Sequence[str] = ()) -> LinearFit:
+        """Return the fit, linearised, without some joint effects."""
+        free, solution = self.problem.free, self.solved.solution
+        offset = (solution.vector - free.nominal) / free.prior
+        out = np.array([p.group in without for p in free.parameters], dtype=bool)
+        fixed = bound_by(solution, free, self.solved.limits)
+        columns = solution.jacobian * free.prior
+        residual = solution.residual - columns[:, out] @ offset[out]
+        kept = ~out & ~fixed
+        penalty = np.full(int(kept.sum()), 1.0 if self.problem.priors else _HARDLY)
+        return LinearFit.of(self._weighed(residual), self._weighed(columns[:, kept]), offset[kept], penalty, self.fold)
+
+    def columns(self, names: Sequence[str], robot: Robot | None = None) -> Mapping[str, Array]:
+        """Return the columns of joint effects per prior, weighed as the fit is, ``(rows, parameters)`` each.
+
+        Parameters
+        ----------
+        names
+            Effects; those that the fit has already, too.
+        robot
+            The fitted robot with other facts about its joints, if not itself.
+        """
+        robot = (robot or self.solved.robot).with_effects(names)
+        grouped = {name: [p for p in robot.parameters.values() if p.group == name] for name in names}
+        free = FreeParameters(tuple(p for group in grouped.values() for p in group))
+        if not free.parameters:
+            return {}
+        problem = replace(self.problem, robot=robot, free=free)
+        if self.problem.postures.loads is not None:  # effects that do nothing yet leave the loads as they are
+            problem.__dict__["postures"] = self.problem.postures
+        J = self._weighed(problem.at(free.start).jacobian * free.prior)
+        found, first = {}, 0
+        for name, group in grouped.items():
+            found[name] = J[:, first : first + len(group)]
+            first += len(group)
+        return {name: columns for name, columns in found.items() if columns.shape[1]}

@@ -13,6 +13,7 @@ from truearm.files import exists
 from truearm.library import load_robot
 from truearm.modeling.chain import Array
 from truearm.modeling.effects.fourier import HARMONICS
+from truearm.modeling.effects.joint_curve import HIGHEST
 from truearm.modeling.effects.linear_contact import LinearContactClearance
 from truearm.modeling.parts import NO_PAYLOAD, Payload, Tool
 from truearm.modeling.robot import Robot
@@ -120,9 +121,10 @@ def joint_truths(robot: Robot) -> dict[int, JointTruth]:
 
     def sines(number: int) -> tuple[tuple[int, float, float], ...]:
         parts = ((k, of(f"fourier_sin{k}", number), of(f"fourier_cos{k}", number)) for k in HARMONICS)
+        curve = ((k, of(f"curve_sin{k}", number), of(f"curve_cos{k}", number)) for k in range(1, HIGHEST + 1))
         periods = robot.joints[number - 1].transmission_periods
         gear = (periods or 0, of("transmission_sin", number), of("transmission_cos", number))
-        return tuple((k, math.hypot(s, c), math.atan2(c, s)) for k, s, c in (*parts, gear) if s or c)
+        return tuple((k, math.hypot(s, c), math.atan2(c, s)) for k, s, c in (*parts, *curve, gear) if s or c)
 
     made = {
         number: JointTruth(

@@ -20,6 +20,7 @@ from truearm.modeling.effects.effect import Effect, Layout
 from truearm.modeling.effects.fourier import Fourier
 from truearm.modeling.effects.gain import Gain
 from truearm.modeling.effects.hardening import Hardening
+from truearm.modeling.effects.joint_curve import JointCurve
 from truearm.modeling.effects.linear_contact import LinearContactClearance
 from truearm.modeling.effects.thermal import ThermalGrowth
 from truearm.modeling.effects.transmission import TransmissionError
@@ -29,6 +30,7 @@ EFFECTS: Final[tuple[type[Effect], ...]] = (
     Gain,
     Fourier,
     TransmissionError,
+    JointCurve,
     Compliance,
     Hardening,
     Backlash,

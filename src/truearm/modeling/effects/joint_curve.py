@@ -1,10 +1,10 @@
 """Curve of a joint: what gear, encoder and bearing make it turn beyond its position, as a function of that position.
 
-The curve is a Fourier series of the joint's own angle. An eccentric wheel at the output errs once in a turn and an oval
-one twice (Nubiola, section 1.8); teeth, encoders and the strain waves of small gears err more often. No period has to be
-known: the more often a term errs, the less is expected of it beforehand, and how much that is, a fit finds from the
-data, joint by joint (:mod:`truearm.identification.solving.curve_stiffness`). Gears that err more than sixty times in a
-turn are the business of :mod:`truearm.modeling.effects.transmission`.
+The curve is a Fourier series of the joint's own angle. An eccentric wheel at the output errs once in a turn, an oval
+one twice (Nubiola, section 1.8); teeth, encoders and the strain waves of small gears err more often. No period has to
+be known: how much is expected of each beforehand, and so how stiff the curve is against fast changes, a fit finds from
+the data, joint by joint (:mod:`truearm.identification.solving.curve_stiffness`). Gears that err more than sixty times
+in a turn are the business of :mod:`truearm.modeling.effects.transmission`.
 """
 
 from __future__ import annotations
@@ -34,6 +34,7 @@ class JointCurve(LinearEffect):
     """Parameters ``curve_sin1_i``, ``curve_cos1_i``, ``curve_sin2_i`` and so on [rad], of each turning joint."""
 
     name: ClassVar[str] = "joint-curve"
+    selectable: ClassVar[bool] = False
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:

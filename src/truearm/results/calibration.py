@@ -40,6 +40,7 @@ from truearm.results.summaries import (
     expected_summary,
     noise_lines,
     noise_summary,
+    selection_lines,
     selection_summary,
 )
 from truearm.results.zones import ZONES_FILE, ZoneChoice, robot_file_of, zone_files
@@ -210,7 +211,7 @@ class Calibration(Record):
         text += simulated_lines(self.monte_carlo, self.robot)
         text += [] if self.zones is None else self.zones.lines()
         if self.selection is not None:
-            text.append(f"Chosen model: {self.fit.model.summary}")
+            text += selection_lines(self.selection)
         if self.fit.model.name == "frames":
             text += self._target_lines()
         text.append(f"Status: {self.status.value}. {self.advice}".rstrip())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from truearm.identification.choosing.folds import Folds
 from truearm.identification.choosing.linear_cross_validation import LinearFit
+from truearm.identification.judging.transmission import Pulls
 from truearm.identification.solving.arrivals import Arrivals, Whitening
 from truearm.identification.solving.problem import Problem
-from truearm.identification.solving.rounds import Solved, bound_by
+from truearm.identification.solving.rounds import Solved, bound_by, in_the_middle
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
 from truearm.modeling.effects import EFFECTS
@@ -96,8 +97,7 @@ class Ground:
         components = self.solved.components
         if components is None or not components.weighing.joints.any():
             return None
-        shared = self.problem.at(self.solved.solution.vector).by_joints * np.sqrt(components.weighing.joints)
-        return Whitening(Arrivals(self.problem.arrivals), shared)
+        return Whitening(Arrivals(self.problem.arrivals), self._by_joints * np.sqrt(components.weighing.joints))
 
     @cached_property
     def _root_weight(self) -> Array:
@@ -112,8 +112,39 @@ class Ground:
     def _in_metres(self, rows: Array) -> Array:
         """Return weighed rows as differences of what was read [m or rad], ``(rows,)``."""
         plain = rows if self._whitening is None else self._whitening.undone(rows)
-        sigma = np.concatenate([np.repeat(b.sigma, b.observation.components) for b in self.problem.blocks])
-        return np.asarray(plain / self._root_weight * sigma)
+        return np.asarray(plain / self._root_weight * self._sigma)
+
+    def pulls(self, rows: Array, among: NDArray[np.bool_] | None = None) -> Pulls | None:
+        """Return what weighed residuals ``(rows,)`` say of errors of the joints; None where no position was read.
+
+        Parameters
+        ----------
+        among
+            Rows that are looked at, ``(rows,)``; all if None.
+        """
+        compared, components = self.compared
+        if components != 3:
+            return None
+        mine = compared if among is None else compared[among[compared]]
+        used, of = np.unique(self.configuration[mine], return_inverse=True)
+        sigma = self._sigma[mine]
+        r = self._in_metres(rows)[mine]
+        J = self._by_joints[mine] * sigma[:, None]
+        n, k = len(used), J.shape[1]
+        pull, weight = np.zeros((n, k)), np.zeros((n, k, k))
+        np.add.at(pull, of, -J * r[:, None])
+        np.add.at(weight, of, J[:, :, None] * J[:, None, :])
+        # The targets of a configuration share its errors, so that it counts as one reading of three coordinates.
+        free = 3 * n - len(self.problem.free.names)
+        return Pulls(self.problem.data.joints[used], pull, weight, float(r @ r), free)
+
+    @cached_property
+    def _by_joints(self) -> Array:
+        return self.problem.at(self.solved.solution.vector).by_joints
+
+    @cached_property
+    def _sigma(self) -> Array:
+        return np.concatenate([np.repeat(b.sigma, b.observation.components) for b in self.problem.blocks])
 
     @cached_property
     def compared(self) -> tuple[NDArray[np.intp], int]:
@@ -134,10 +165,16 @@ class Ground:
                 return np.concatenate(rows), components
         return np.zeros(0, dtype=np.intp), 1
 
-    def errors(self, fit: LinearFit) -> Array:
-        """Return the mean held-out error of each configuration [m], NaN where nothing is compared, ``(n,)``."""
+    def errors(self, held_out: Array) -> Array:
+        """Return the mean error of each configuration [m], NaN where nothing is compared, ``(n,)``.
+
+        Parameters
+        ----------
+        held_out
+            Weighed residual of every row, ``(rows,)``.
+        """
         rows, components = self.compared
-        left = self._in_metres(fit.held_out())[rows].reshape(-1, components)
+        left = self._in_metres(held_out)[rows].reshape(-1, components)
         of = self.configuration[rows][::components]
         count = np.bincount(of, minlength=len(self.folds.of))
         total = np.bincount(of, np.linalg.norm(left, axis=1), minlength=len(self.folds.of))
@@ -155,7 +192,7 @@ class Ground:
         penalty = np.full(int(kept.sum()), 1.0 if self.problem.priors else _HARDLY)
         return LinearFit.of(self._weighed(residual), self._weighed(columns[:, kept]), offset[kept], penalty, self.fold)
 
-    def columns(self, names: Sequence[str], robot: Robot | None = None) -> Mapping[str, Array]:
+    def columns(self, names: Sequence[str], robot: Robot | None = None, *, ordered: bool = True) -> dict[str, Array]:
         """Return the columns of joint effects per prior, weighed as the fit is, ``(rows, parameters)`` each.
 
         Parameters
@@ -164,8 +201,10 @@ class Ground:
             Effects; those that the fit has already, too.
         robot
             The fitted robot with other facts about its joints, if not itself.
+        ordered
+            Whether the order of the configurations is known.
         """
-        robot = (robot or self.solved.robot).with_effects(names)
+        robot = in_the_middle((robot or self.solved.robot).with_effects(names), self.problem.data)
         grouped = {name: [p for p in robot.parameters.values() if p.group == name] for name in names}
         free = FreeParameters(tuple(p for group in grouped.values() for p in group))
         if not free.parameters:
@@ -173,6 +212,8 @@ class Ground:
         problem = replace(self.problem, robot=robot, free=free)
         if self.problem.postures.loads is not None:  # effects that do nothing yet leave the loads as they are
             problem.__dict__["postures"] = self.problem.postures
+        if not ordered:
+            problem.__dict__["postures"] = replace(problem.postures, number=None, approach=None)
         J = self._weighed(problem.at(free.start).jacobian * free.prior)
         found, first = {}, 0
         for name, group in grouped.items():

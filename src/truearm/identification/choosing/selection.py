@@ -1,83 +1,146 @@
-"""Which joint effects the data can carry: added one by one while cross-validation says that they help.
+"""Which joint effects the data can carry, chosen by cross-validation on the training part.
 
-It begins with the elastic model. Each round adds, one at a time, every effect that is not there yet, and judges by
-5-fold cross-validation on the training part. An effect is tried if it is selectable, if the robot has what it moves,
-and if the data tell what it depends on: the order of the configurations, the temperature, loads. The best of those
-whose gain is larger than its own standard error, over the paired differences of the folds, stays; the search ends where
-there is none (the rule of one standard error: Breiman and others 1984, "Classification and Regression Trees", section
-3.4.3).
+One fit is linearised, and every effect that the robot and the data say something about is a few columns more
+(:mod:`truearm.identification.choosing.candidates`). Held-out errors of any choice among them then follow in closed form
+(:mod:`truearm.identification.choosing.linear_cross_validation`): of all that are not worse than the best one by a
+standard error, the choice with the fewest parameters is taken. What is taken has to hold in real fits, whose weights,
+penalties and periods are found inside the training folds (:mod:`truearm.identification.choosing.refits`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
 
 from truearm.errors import InputError
-from truearm.identification.choosing.candidates import SELECTABLE, open_effects
+from truearm.identification.choosing.candidates import SELECTABLE, Ground, closed_because, loads_bend
+from truearm.identification.choosing.folds import FOLDS, Folds, folds_of
+from truearm.identification.choosing.refits import How, Refits
+from truearm.identification.choosing.search import Gain, Search, gain
 from truearm.identification.held import NOTHING_HELD, Held
+from truearm.identification.judging.transmission import PeriodicError, lines_of
 from truearm.identification.solving.bounds import Bounds
 from truearm.identification.solving.losses import Loss
-from truearm.identification.solving.models import MODELS, Model
+from truearm.identification.solving.models import Model, named_model
 from truearm.identification.solving.rounds import Redundant, find_parameters
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.statistics import errors_of
 from truearm.modeling.chain import Array
 from truearm.modeling.effects import EFFECTS
-from truearm.modeling.loads import has_weight
 from truearm.modeling.robot import Robot
 
 AUTO: Final = "auto"
-FOLDS: Final = 5
-_FOLD_TOLERANCE: Final = 1e-3  # priors; errors of folds are not compared more closely
-_START: Final = next(model for model in MODELS if model.name == "elastic")
+_COMPLIANCE: Final = "compliance"
+_TRANSMISSION: Final = "transmission-error"
+_CURVE: Final = "joint-curve"
+#: What a curve contains.
+_IN_CURVE: Final = "fourier"
+#: Effects that follow the order of a campaign.
+ORDERED: Final = frozenset(effect.name for effect in EFFECTS if effect.ordered)
+#: A gain of fewer standard errors in closed form is looked at again by real fits.
+_SURE: Final = 3.0
+_MOST_REFITS: Final = 3
+
 
 @dataclass(frozen=True)
-class Attempt:
-    """An effect that was tried.
+class Candidate:
+    """A joint effect that could have been chosen.
 
     Attributes
     ----------
-    round
-        From 1.
     effect
         Its name.
-    error
-        Mean position error with it [m], over the folds of the cross-validation.
-    gain, standard_error
-        Mean of the folds' gains over the model of the round before, and its standard error [m].
     taken
-        Whether it stayed.
+        Whether it was.
+    gain
+        What the chosen model gains by it, or would; None if it was not tried.
+    reason
+        Why it was left out; empty if it was not.
     """
 
-    round: int
     effect: str
+    taken: bool
+    gain: Gain | None
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Confirmation:
+    """A model that was fitted in every fold, held against a smaller one.
+
+    Attributes
+    ----------
+    effects, smaller
+        The effects of both.
+    error, smaller_error
+        Mean held-out errors [m].
+    gain
+        Of the paired differences.
+    """
+
+    effects: tuple[str, ...]
+    smaller: tuple[str, ...]
     error: float
-    gain: float
-    standard_error: float
-    taken: bool = False
+    smaller_error: float
+    gain: Gain
 
 
 @dataclass(frozen=True)
 class Selection:
-    """The way to a model.
+    """How a model was chosen.
 
     Attributes
     ----------
     model
-        Where it ended.
-    start
-        Mean position error of the elastic model in cross-validation [m].
-    attempts
-        All that was tried, in order.
+        What was chosen.
+    layout, blocks
+        How the configurations lie, see :data:`truearm.identification.choosing.folds.Layout`, and in how many blocks of
+        neighbours they were held out; 0 where one by one.
+    geometric, elastic, error
+        Mean held-out errors of these models and of the chosen one, in closed form [m]; the second is None where no
+        loads bend the joints.
+    candidates
+        Every joint effect that can be chosen.
+    confirmations
+        What was fitted in every fold.
+    lines
+        Periodic errors that were found, whose numbers of periods nobody had given.
+    smaller
+        Smaller models, the next one first.
+    passed_over
+        Models that were chosen first and whose fits were not sound, with the statuses.
     """
 
     model: Model
-    start: float
-    attempts: tuple[Attempt, ...]
+    layout: str
+    blocks: int
+    geometric: float
+    elastic: float | None
+    error: float
+    candidates: tuple[Candidate, ...]
+    confirmations: tuple[Confirmation, ...] = ()
+    lines: tuple[PeriodicError, ...] = ()
+    smaller: tuple[Model, ...] = ()
+    passed_over: tuple[tuple[tuple[str, ...], str], ...] = ()
+
+    def prepared(self, robot: Robot) -> Robot:
+        """Return the robot with the numbers of periods that were found, if the chosen model needs them."""
+        return with_lines(robot, self.lines) if _TRANSMISSION in self.model.effects else robot
+
+    def instead(self, status: str) -> Selection:
+        """Return the choice of the next smaller model, because a fit of this one ended so."""
+        model, *smaller = self.smaller
+        out = set(self.model.effects) - set(model.effects)
+        candidates = tuple(
+            replace(one, taken=False, reason=f"the fit with it ended in {status}") if one.effect in out else one
+            for one in self.candidates
+        )
+        passed_over = (*self.passed_over, (self.model.effects, status))
+        return replace(
+            self, model=model, smaller=tuple(smaller), candidates=candidates, passed_over=passed_over
+        )
 
 
 def select(
@@ -102,7 +165,7 @@ def select(
     seed
         Of the folds.
     candidates
-        Joint effects that may be tried.
+        Joint effects that may be chosen besides compliance.
     progress
         Called with a few words at each step.
 
@@ -119,69 +182,200 @@ def select(
             allowed=f"at least {2 * FOLDS}",
             cure="Measure more, or name a model.",
         )
-    order = np.random.default_rng(seed).permutation(data.configurations)
-    folds = [
-        _fold(data.of_configurations(np.setdiff1d(order, part)), data.of_configurations(part))
-        for part in np.array_split(order, FOLDS)
-    ]
-
-    def judged(effects: tuple[str, ...]) -> Array:
-        model = _model(effects, candidates)
-        errors = []
-        for training, held_out in folds:
-            found = find_parameters(
-                robot,
-                training,
-                model,
-                loss=loss,
-                redundancy=redundancy,
-                bounds=bounds,
-                bounds_file=bounds_file,
-                held=held,
-                small=_FOLD_TOLERANCE,
-            )
-            judged = errors_of(found.robot, held_out)
-            spread = judged.position or judged.length
-            errors.append(np.nan if spread is None else spread.mean)
-        return np.array(errors)
-
-    effects = _START.effects
-    progress("choosing a model: elastic")
-    now = judged(effects)
-    start = float(np.nanmean(now))
-    attempts: list[Attempt] = []
-    for number in range(1, len(candidates) + 1):
-        tried: list[tuple[Attempt, Array]] = []
-        for name in open_effects(robot, effects, data, candidates):
-            progress(f"choosing a model: {', '.join(effects)} and {name}?")
-            try:
-                errors = judged((*effects, name))
-            except InputError:  # too few equations in a fold, or a bound that a redundant one cannot keep
-                continue
-            gains = (now - errors)[np.isfinite(errors)]
-            standard_error = float(gains.std(ddof=1) / np.sqrt(len(gains)))
-            tried.append(
-                (Attempt(number, name, float(np.nanmean(errors)), float(gains.mean()), standard_error), errors)
-            )
-        better = [pair for pair in tried if pair[0].gain > pair[0].standard_error]
-        best = min(better, key=lambda pair: pair[0].error, default=None)
-        attempts += [replace(attempt, taken=best is not None and attempt is best[0]) for attempt, _ in tried]
-        if best is None:
-            break
-        effects, now = (*effects, best[0].effect), best[1]
-    return Selection(_model(effects, candidates), start, tuple(attempts))
+    names = tuple(name for name in SELECTABLE if name in candidates or name == _COMPLIANCE)
+    how = How(loss, redundancy, bounds, bounds_file, held)
+    start = (_COMPLIANCE,) if loads_bend(robot, data) else ()
+    progress("choosing a model: one fit for all")
+    solved = find_parameters(
+        robot,
+        data,
+        model_with(start, names),
+        loss=loss,
+        redundancy=redundancy,
+        bounds=bounds,
+        bounds_file=bounds_file,
+        held=held,
+    )
+    choice = _Choice(robot, data, names, how, Ground(solved, folds_of(data, seed)), progress)
+    return choice.made()
 
 
-def _fold(training: Dataset, held_out: Dataset) -> tuple[Dataset, Dataset]:
-    """Return both parts, without those held-out positions whose target the training part does not place."""
-    read = training.has_position if training.fixture is None else training.has_reading
-    placed = np.isin(held_out.target, training.target[read]) & np.isin(held_out.against, training.against[read])
-    return training, replace(held_out.of_readings(placed), quaternion=None)
+def with_lines(robot: Robot, lines: Sequence[PeriodicError]) -> Robot:
+    """Return a robot whose gears err as often in a turn as was found."""
+    periods = {line.joint: line.periods for line in lines}
+    joints = tuple(
+        replace(joint, transmission_periods=periods.get(number, joint.transmission_periods))
+        for number, joint in enumerate(robot.joints, 1)
+    )
+    return replace(robot, joints=joints) if periods else robot
 
 
-def _model(effects: tuple[str, ...], candidates: Sequence[str]) -> Model:
-    names = [effect.name for effect in EFFECTS if effect.name in effects]
-    added = [name for name in names if name not in _START.effects]
-    tried = tuple(name for name in candidates if name not in effects)
-    summary = f"elastic, and what cross-validation added: {', '.join(added) or 'nothing'}"
-    return Model(AUTO, summary, _START.groups, tuple(names), tried)
+def model_with(effects: Sequence[str], candidates: Sequence[str] = SELECTABLE) -> Model:
+    """Return the model with some joint effects, which bounds may name the others of."""
+    names = tuple(effect.name for effect in EFFECTS if effect.name in effects)
+    added = [name for name in names if name != _COMPLIANCE]
+    rigid = "" if _COMPLIANCE in names else "geometric"
+    start = rigid or "elastic"
+    summary = f"{start}, and what cross-validation added: {', '.join(added) or 'nothing'}"
+    groups = named_model("geometric").groups
+    return Model(AUTO, summary, groups, names, tuple(name for name in candidates if name not in names))
+
+
+@dataclass(eq=False)
+class _Choice:
+    """The way from one fit to a model."""
+
+    robot: Robot
+    data: Dataset
+    names: tuple[str, ...]
+    how: How
+    ground: Ground
+    progress: Callable[[str], None]
+    reasons: dict[str, str] = field(default_factory=dict)
+    lines: tuple[PeriodicError, ...] = ()
+
+    @property
+    def folds(self) -> Folds:
+        return self.ground.folds
+
+    def made(self) -> Selection:
+        """Return the choice."""
+        self.progress("choosing a model: every choice in closed form")
+        search = self._searched()
+        chosen = self._settled(search)
+        if self._found_lines(search, chosen):
+            search = self._searched()
+            chosen = self._settled(search)
+        chosen, confirmations = self._confirmed(search, chosen)
+        return self._selection(search, chosen, confirmations)
+
+    def _searched(self) -> Search:
+        """Return the search among all effects that robot, data and lines say something about."""
+        robot = with_lines(self.robot, self.lines)
+        self.reasons = {}
+        for name in self.names:
+            reason = closed_because(robot, self.data, name)
+            if reason is not None:
+                self.reasons[name] = reason
+        open_ = [name for name in self.names if name not in self.reasons]
+        there = with_lines(self.ground.solved.robot, self.lines)
+        columns = self.ground.columns(open_, there)
+        unordered = self.ground.columns([name for name in open_ if name in ORDERED], there, ordered=False)
+        return Search(self.ground, self.ground.start((_COMPLIANCE,)), columns, unordered)
+
+    def _settled(self, search: Search) -> frozenset[str]:
+        """Return the best choice among effects that the data show and that do not harm predictions without order."""
+        for name in search.columns:
+            if not search.excited(name):
+                self.reasons[name] = "the readings tell less of it than is known beforehand"
+        while True:
+            chosen = search.best([name for name in search.columns if name not in self.reasons])
+            ordered = chosen & ORDERED
+            now = search.errors_without_order(chosen)
+            if not ordered or not gain(search.errors_without_order(chosen - ordered), now, self.folds).harms:
+                return chosen
+            worst = min(sorted(ordered), key=lambda name: _mean(search.errors_without_order(chosen - {name})))
+            self.reasons[worst] = "it makes predictions worse whose place in the order is not known"
+
+    def _found_lines(self, search: Search, chosen: frozenset[str]) -> bool:
+        """Look for periodic errors in what a choice leaves; return whether there are any."""
+        if _TRANSMISSION not in self.names:
+            return False
+        pulls = self.ground.pulls(search.left(chosen))
+        self.lines = () if pulls is None else lines_of(self.robot, pulls)
+        return bool(self.lines)
+
+    def _refits(self, search: Search, chosen: frozenset[str]) -> Refits:
+        without = chosen - {_TRANSMISSION}
+
+        def robot_of(number: int, effects: Sequence[str]) -> Robot:
+            if not self.lines or _TRANSMISSION not in effects:
+                return self.robot
+            pulls = self.ground.pulls(search.left_without(number, without), self.ground.fold != number)
+            return self.robot if pulls is None else with_lines(self.robot, lines_of(self.robot, pulls))
+
+        return Refits(
+            self.robot, self.data, self.folds, self.how, lambda effects: model_with(effects, self.names), robot_of
+        )
+
+    def _confirmed(self, search: Search, chosen: frozenset[str]) -> tuple[frozenset[str], list[Confirmation]]:
+        """Return the choice as far as real fits in the folds bear it out."""
+        found: list[Confirmation] = []
+        refits = self._refits(search, chosen)
+        start = self._start(search)
+        for _ in range(_MOST_REFITS):
+            if chosen <= start:
+                return chosen, found
+            smaller = self._next_smaller(search, chosen)
+            sure = search.gain(smaller, chosen)
+            against = start if sure.mean > _SURE * sure.error and start < chosen else smaller
+            self.progress(f"choosing a model: fits with {', '.join(sorted(chosen))} in the folds")
+            errors, before = refits.errors(tuple(chosen)), refits.errors(tuple(against))
+            if errors is not None and before is not None:
+                real = gain(before, errors, self.folds)
+                found.append(
+                    Confirmation(_ordered(chosen), _ordered(against), _mean(errors), _mean(before), real)
+                )
+                if real.believed:
+                    return chosen, found
+            for name in chosen - smaller:
+                self.reasons[name] = (
+                    "there are too few readings in a fold to find it"
+                    if errors is None
+                    else "what it gains is not borne out by fits in the folds"
+                )
+            chosen = smaller
+        return (chosen if chosen <= start else start & chosen), found
+
+    def _start(self, search: Search) -> frozenset[str]:
+        """Return the better one of the geometric and the elastic model."""
+        elastic = frozenset({_COMPLIANCE})
+        return elastic if _COMPLIANCE in search.columns and search.gain((), elastic).believed else frozenset()
+
+    @staticmethod
+    def _next_smaller(search: Search, chosen: frozenset[str]) -> frozenset[str]:
+        """Return a choice without the effect that it gains least by."""
+        return min((chosen - {name} for name in chosen), key=lambda one: _mean(search.errors(one)))
+
+    def _selection(
+        self, search: Search, chosen: frozenset[str], confirmations: list[Confirmation]
+    ) -> Selection:
+        rows = []
+        for name in self.names:
+            tried = None
+            if name in search.columns:
+                tried = search.gain(chosen - {name}, chosen | {name})
+            reason = "" if name in chosen else self.reasons.get(name, "")
+            if name not in chosen and not reason and tried is not None:
+                harms = "it makes held-out errors larger"
+                reason = harms if tried.mean <= 0.0 else "it gains no more than chance may"
+                if tried.believed:
+                    reason = "without it the errors are the same to a standard error of the best model"
+            rows.append(Candidate(name, name in chosen, tried, reason))
+        smaller, now = [], chosen
+        while now:
+            now = self._next_smaller(search, now)
+            smaller.append(model_with(tuple(now), self.names))
+        smaller.append(replace(named_model("offsets"), name=AUTO))
+        elastic = _mean(search.errors((_COMPLIANCE,))) if _COMPLIANCE in search.columns else None
+        return Selection(
+            model_with(tuple(chosen), self.names),
+            self.folds.layout,
+            self.folds.blocks,
+            _mean(search.errors(())),
+            elastic,
+            _mean(search.errors(chosen)),
+            tuple(rows),
+            tuple(confirmations),
+            self.lines if _TRANSMISSION in chosen else (),
+            tuple(smaller),
+        )
+
+
+def _ordered(effects: frozenset[str]) -> tuple[str, ...]:
+    return tuple(effect.name for effect in EFFECTS if effect.name in effects)
+
+
+def _mean(errors: Array) -> float:
+    known = errors[np.isfinite(errors)]
+    return float(known.mean()) if len(known) else float("nan")

@@ -31,6 +31,7 @@ from truearm.identification.solving.rounds import (
     excess_of,
     factors_of,
     find_parameters,
+    in_the_middle,
     noise_found,
 )
 from truearm.identification.solving.solver import SMALL
@@ -298,7 +299,7 @@ def _fit(solved: Solved, model: Model, loss: Loss, draws: Array | None = None) -
         else replace(start.parameters[n], value=float(v), deviation=float(d), informed=float(i))
         for n, v, d, i, bound in zip(free.names, x, deviation, informed, at_bound, strict=True)
     ]
-    robot = start.with_parameters(identified)
+    robot = in_the_middle(start.with_parameters(identified), problem.data)
     held = tuple(robot.parameters[r.dropped] for r in solved.redundancies)
     looked_at = FreeParameters((*(robot.parameters[n] for n in free.names), *held))
     unobservable = unobservable_parameters(robot, problem.data, looked_at, held=solved.held)

@@ -32,6 +32,7 @@ from truearm.identification.start_values.from_readings import start_from_reading
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.observations import OBSERVATIONS
 from truearm.modeling.chain import Array
+from truearm.modeling.effects.warm_up import LEFT, RATE, share_left
 from truearm.modeling.parameters import SCALE, FreeParameters
 from truearm.modeling.robot import Robot
 
@@ -84,7 +85,8 @@ class Solved:
     @property
     def robot(self) -> Robot:
         """The robot with the values found."""
-        return self.start.with_values(dict(zip(self.problem.free.names, self.solution.vector.tolist(), strict=True)))
+        values = dict(zip(self.problem.free.names, self.solution.vector.tolist(), strict=True))
+        return in_the_middle(self.start.with_values(values), self.problem.data)
 
 
 def find_parameters(
@@ -171,6 +173,13 @@ def find_parameters(
         solution = replace(solution, converged=False)
         dropped = tuple(r for r in dropped if r.dropped in out)
     return Solved(start, reduced, replace(solution, steps=steps), dropped, limits, components, held)
+
+
+def in_the_middle(robot: Robot, data: Dataset) -> Robot:
+    """Return a robot that predicts what has no place in an order as in the middle of the session that was measured."""
+    if data.number is None or LEFT not in robot.parameters:
+        return robot
+    return robot.with_values({LEFT: float(share_left(data.number, robot.values[RATE]).mean())})
 
 
 def _check_dropped(dropped: list[str], free: FreeParameters, limits: tuple[Array, Array], where: str) -> None:

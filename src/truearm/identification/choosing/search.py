@@ -1,0 +1,173 @@
+"""The search among joint effects by cross-validation in closed form: every choice, or one by one where they are many."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import combinations
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.identification.choosing.candidates import Ground
+from truearm.identification.choosing.folds import Folds
+from truearm.identification.choosing.linear_cross_validation import Extensions, LinearFit
+from truearm.modeling.chain import Array
+
+#: So many choices are all looked at; of more, one effect after the other is added, or two.
+_ALL: Final = 1024
+
+
+@dataclass(frozen=True)
+class Gain:
+    """What a choice gains over another: mean and standard error of the paired differences of held-out errors [m]."""
+
+    mean: float
+    error: float
+
+    @property
+    def believed(self) -> bool:
+        """Whether it is larger than its standard error."""
+        return self.mean > self.error
+
+    @property
+    def harms(self) -> bool:
+        """Whether it is a loss, larger than its standard error."""
+        return -self.mean > self.error
+
+
+def gain(before: Array, after: Array, folds: Folds) -> Gain:
+    """Return what errors of configurations ``(n,)`` [m] gained.
+
+    The standard error is the larger one of two: over the groups of configurations that lie together, and over the
+    folds, whose configurations share a fit.
+    """
+    known = np.isfinite(before) & np.isfinite(after)
+    if not known.any():
+        return Gain(0.0, 0.0)
+    apart = (before - after)[known]
+    return Gain(float(apart.mean()), max(_standard_error(apart, of[known]) for of in (folds.group, folds.of)))
+
+
+def _standard_error(apart: Array, group: NDArray[np.intp]) -> float:
+    """Return the standard error of the mean of numbers that hang together in groups."""
+    count = np.bincount(group)
+    sums = np.bincount(group, apart - apart.mean())[count > 0]
+    return float(np.sqrt(np.sum(sums**2) * len(sums) / max(len(sums) - 1, 1)) / len(apart))
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """A linear fit, effects that could be added to it, and the held-out errors of every choice asked for.
+
+    Attributes
+    ----------
+    ground
+        What turns rows into errors.
+    fit
+        What effects are added to.
+    columns
+        Of each effect, per prior.
+    unordered
+        Columns of the effects that follow the order of a campaign, where the order is not known.
+    """
+
+    ground: Ground
+    fit: LinearFit
+    columns: dict[str, Array]
+    unordered: dict[str, Array] = field(default_factory=dict)
+    _errors: dict[frozenset[str], Array] = field(default_factory=dict)
+
+    @cached_property
+    def _extensions(self) -> Extensions:
+        return Extensions(self.fit, self._together(self.columns))
+
+    @cached_property
+    def _without_order(self) -> Extensions:
+        changed = {name: self.unordered.get(name, columns) for name, columns in self.columns.items()}
+        return replace(self._extensions, predicting=self._together(changed))
+
+    def _together(self, columns: dict[str, Array]) -> Array:
+        return np.concatenate([np.zeros((len(self.fit.fold), 0)), *columns.values()], axis=1)
+
+    @cached_property
+    def _places(self) -> dict[str, NDArray[np.intp]]:
+        found, first = {}, 0
+        for name, columns in self.columns.items():
+            found[name] = np.arange(first, first + columns.shape[1])
+            first += columns.shape[1]
+        return found
+
+    def places(self, chosen: Sequence[str] | frozenset[str]) -> NDArray[np.intp]:
+        """Return the places of the columns of some effects."""
+        mine = [self._places[name] for name in self.columns if name in chosen]
+        return np.concatenate([np.zeros(0, np.intp), *mine])
+
+    def errors(self, chosen: Sequence[str] | frozenset[str]) -> Array:
+        """Return the mean held-out error of each configuration with some effects [m], ``(n,)``."""
+        key = frozenset(chosen)
+        if key not in self._errors:
+            self._errors[key] = self.ground.errors(self._extensions.held_out(self.places(key)))
+        return self._errors[key]
+
+    def errors_without_order(self, chosen: Sequence[str] | frozenset[str]) -> Array:
+        """Return the same where the order of the held-out configurations is not known."""
+        return self.ground.errors(self._without_order.held_out(self.places(chosen)))
+
+    def gain(self, before: Sequence[str] | frozenset[str], after: Sequence[str] | frozenset[str]) -> Gain:
+        """Return what one choice gains over another."""
+        return gain(self.errors(before), self.errors(after), self.ground.folds)
+
+    def excited(self, name: str) -> bool:
+        """Return whether the readings know any parameter of an effect better than its prior does."""
+        return self._extensions.excited(self._places[name])
+
+    def left(self, chosen: Sequence[str] | frozenset[str]) -> Array:
+        """Return the residual of every row with some effects, ``(rows,)``."""
+        return self._extensions.solved(self.places(chosen))
+
+    def left_without(self, number: int, chosen: Sequence[str] | frozenset[str]) -> Array:
+        """Return the residual of every row as the fit without a fold leaves it, ``(rows,)``."""
+        return self._extensions.without_fold(number, self.places(chosen))
+
+    def best(self, among: Sequence[str]) -> frozenset[str]:
+        """Return the choice with the fewest parameters that is not worse than the best one by a standard error.
+
+        That is the rule of one standard error (Breiman and others 1984, "Classification and Regression Trees", section
+        3.4.3), over paired differences.
+        """
+        looked_at = self._every(among) if 2 ** len(among) <= _ALL else self._one_by_one(among)
+        lowest = min(looked_at, key=self._mean)
+        as_good = [chosen for chosen in looked_at if not self.gain(chosen, lowest).believed]
+        return min(as_good or [lowest], key=lambda chosen: (len(self.places(chosen)), self._mean(chosen)))
+
+    def _mean(self, chosen: frozenset[str]) -> float:
+        errors = self.errors(chosen)
+        return float(np.mean(errors[np.isfinite(errors)])) if np.isfinite(errors).any() else np.inf
+
+    @staticmethod
+    def _every(among: Sequence[str]) -> list[frozenset[str]]:
+        return [frozenset(some) for size in range(len(among) + 1) for some in combinations(among, size)]
+
+    def _one_by_one(self, among: Sequence[str]) -> list[frozenset[str]]:
+        """Add what helps most, or two that help together where none does alone; then try without each."""
+        now: frozenset[str] = frozenset()
+        seen = [now]
+        while True:
+            rest = [name for name in among if name not in now]
+            for size in (1, 2):
+                larger = [now | set(some) for some in combinations(rest, size)]
+                seen += larger
+                better = [one for one in larger if self.gain(now, one).believed]
+                if better:
+                    break
+            if not rest or not better:
+                break
+            now = min(better, key=self._mean)
+            smaller = [now - {name} for name in now]
+            seen += smaller
+            idle = [one for one in smaller if not self.gain(one, now).believed]
+            now = min(idle, key=self._mean) if idle and min(idle, key=self._mean) not in seen[: -len(smaller)] else now
+        return list(dict.fromkeys(seen))

@@ -14,17 +14,19 @@ from truearm.identification.choosing.folds import Folds
 from truearm.identification.choosing.linear_cross_validation import LinearFit
 from truearm.identification.judging.transmission import Pulls
 from truearm.identification.solving.arrivals import Arrivals, Whitening
+from truearm.identification.solving.curve_stiffness import BANDS, stiffness_of_triangle
 from truearm.identification.solving.problem import Problem
 from truearm.identification.solving.rounds import Solved, bound_by, in_the_middle
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
 from truearm.modeling.effects import EFFECTS
+from truearm.modeling.effects.joint_curve import JointCurve
 from truearm.modeling.loads import has_weight
 from truearm.modeling.parameters import FreeParameters
 from truearm.modeling.robot import Robot
 
 #: Joint effects that are tried, in this order.
-SELECTABLE: Final = tuple(effect.name for effect in EFFECTS if effect.selectable)
+SELECTABLE: Final = tuple(effect.name for effect in EFFECTS if effect.selectable or effect is JointCurve)
 #: What keeps a problem without priors solvable, per prior.
 _HARDLY: Final = 1e-6
 #: A reading that a loss left no weight counts as if it had left this much, in the ranking.
@@ -114,11 +116,13 @@ class Ground:
         plain = rows if self._whitening is None else self._whitening.undone(rows)
         return np.asarray(plain / self._root_weight * self._sigma)
 
-    def pulls(self, rows: Array, among: NDArray[np.bool_] | None = None) -> Pulls | None:
+    def pulls(self, rows: Array, spent: float, among: NDArray[np.bool_] | None = None) -> Pulls | None:
         """Return what weighed residuals ``(rows,)`` say of errors of the joints; None where no position was read.
 
         Parameters
         ----------
+        spent
+            How many equations' worth of residual the fit used up.
         among
             Rows that are looked at, ``(rows,)``; all if None.
         """
@@ -135,8 +139,8 @@ class Ground:
         np.add.at(pull, of, -J * r[:, None])
         np.add.at(weight, of, J[:, :, None] * J[:, None, :])
         # The targets of a configuration share its errors, so that it counts as one reading of three coordinates.
-        free = 3 * n - len(self.problem.free.names)
-        return Pulls(self.problem.data.joints[used], pull, weight, float(r @ r), free)
+        free = 3 * n - round(spent)
+        return Pulls(self.problem.data.joints[used], pull, weight, float(r @ r), max(free, 1))
 
     @cached_property
     def _by_joints(self) -> Array:
@@ -192,6 +196,32 @@ class Ground:
         penalty = np.full(int(kept.sum()), 1.0 if self.problem.priors else _HARDLY)
         return LinearFit.of(self._weighed(residual), self._weighed(columns[:, kept]), offset[kept], penalty, self.fold)
 
+    def curve(self, fit: LinearFit) -> Array | None:
+        """Return the columns of the joints' curves per prior, weighed, ``(rows, k)``; None where there are none.
+
+        Parameters
+        ----------
+        fit
+            With all that the curves shall not say themselves.
+        """
+        robot = self.solved.robot.with_effects([JointCurve.name])
+        free = FreeParameters(tuple(p for p in robot.parameters.values() if p.group == JointCurve.name))
+        if not free.parameters:
+            return None
+        columns = self.columns([JointCurve.name])[JointCurve.name] / free.prior
+        terms = JointCurve(robot.layout).terms
+        joint = np.concatenate([np.full(len(names), i) for i, names in terms.items()])
+        period = np.concatenate([np.arange(len(names)) // 2 + 1 for names in terms.values()])
+        n = len(self.fold)
+        left = np.zeros((len(fit.Q), columns.shape[1] + 1))
+        left[:n, :-1], left[:, -1] = columns, -fit.residual
+        left[:, :-1] -= fit.Q @ (fit.Q[:n].T @ columns)
+        triangle = np.asarray(np.linalg.qr(left, mode="r"), dtype=np.float64)
+        found = stiffness_of_triangle(triangle, n, joint, period).variance
+        variance = _by_bands(found, joint, period)
+        kept = variance > 0.0
+        return np.asarray(columns[:, kept] * np.sqrt(variance[kept])) if kept.any() else None
+
     def columns(self, names: Sequence[str], robot: Robot | None = None, *, ordered: bool = True) -> dict[str, Array]:
         """Return the columns of joint effects per prior, weighed as the fit is, ``(rows, parameters)`` each.
 
@@ -220,3 +250,14 @@ class Ground:
             found[name] = J[:, first : first + len(group)]
             first += len(group)
         return {name: columns for name, columns in found.items() if columns.shape[1]}
+
+
+def _by_bands(variance: Array, joint: NDArray[np.intp], period: NDArray[np.intp]) -> Array:
+    """Return the mean variance of the band of each coefficient of a curve.
+
+    So few numbers say little of the readings that they were found from: those of single lines would be praised for what
+    they took from the folds that are held out.
+    """
+    bands = np.stack([joint, np.searchsorted(BANDS, period, side="right")])
+    of = np.unique(bands, axis=1, return_inverse=True)[1].reshape(-1)
+    return np.asarray((np.bincount(of, variance) / np.bincount(of))[of])

@@ -20,7 +20,7 @@ FOLDS: Final = 5
 #: How the configurations lie: anywhere, along a way from one to the next, on few positions of each joint, or close to
 #: each other.
 Layout = Literal["scattered", "path", "grid", "close"]
-_BLOCKS: Final = 5  # a fold, at least
+_BLOCKS: Final = 3  # a fold, at least
 _LEAST_FOR_BLOCKS: Final = 40  # configurations
 #: Median step from one configuration to the next, over the median distance of any two, below which it is a path.
 _PATH: Final = 0.75

@@ -75,6 +75,11 @@ class LinearFit:
         """How many folds there are."""
         return int(self.fold.max(initial=-1)) + 1
 
+    @property
+    def spent(self) -> float:
+        """How many equations' worth of residual the columns use up: the trace of the hat matrix."""
+        return float(np.sum(self.Q[: len(self.fold)] ** 2))
+
     def held_out(self) -> Array:
         """Return the residual of every row as the fit without its fold leaves it, ``(rows,)``."""
         found = self.residual[: len(self.fold)].copy()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import combinations
@@ -16,6 +16,7 @@ from truearm.identification.choosing.folds import Folds
 from truearm.identification.choosing.linear_cross_validation import Extensions, LinearFit
 from truearm.modeling.chain import Array
 
+CURVE: Final = "joint-curve"
 #: So many choices are all looked at; of more, one effect after the other is added, or two.
 _ALL: Final = 1024
 
@@ -78,18 +79,19 @@ class Search:
     fit: LinearFit
     columns: dict[str, Array]
     unordered: dict[str, Array] = field(default_factory=dict)
-    _errors: dict[frozenset[str], Array] = field(default_factory=dict)
+    _errors: dict[frozenset[str], Array] = field(default_factory=dict, init=False)
 
     @cached_property
     def _extensions(self) -> Extensions:
-        return Extensions(self.fit, self._together(self.columns))
+        return Extensions(self.fit, self.together(self.columns))
 
     @cached_property
     def _without_order(self) -> Extensions:
         changed = {name: self.unordered.get(name, columns) for name, columns in self.columns.items()}
-        return replace(self._extensions, predicting=self._together(changed))
+        return replace(self._extensions, predicting=self.together(changed))
 
-    def _together(self, columns: dict[str, Array]) -> Array:
+    def together(self, columns: dict[str, Array]) -> Array:
+        """Return the columns of some effects beside each other, ``(rows, k)``."""
         return np.concatenate([np.zeros((len(self.fit.fold), 0)), *columns.values()], axis=1)
 
     @cached_property
@@ -132,6 +134,10 @@ class Search:
         """Return the residual of every row as the fit without a fold leaves it, ``(rows,)``."""
         return self._extensions.without_fold(number, self.places(chosen))
 
+    def spent(self, chosen: Sequence[str] | frozenset[str]) -> float:
+        """Return how many equations' worth of residual the fit uses up with some effects, at most."""
+        return self.fit.spent + len(self.places(chosen))
+
     def best(self, among: Sequence[str]) -> frozenset[str]:
         """Return the choice with the fewest parameters that is not worse than the best one by a standard error.
 
@@ -171,3 +177,68 @@ class Search:
             idle = [one for one in smaller if not self.gain(one, now).believed]
             now = min(idle, key=self._mean) if idle and min(idle, key=self._mean) not in seen[: -len(smaller)] else now
         return list(dict.fromkeys(seen))
+
+
+@dataclass(frozen=True, eq=False)
+class Choices:
+    """All choices among joint effects: those with joint curves, which contain much, and those without.
+
+    Attributes
+    ----------
+    plain
+        The search without curves.
+    curved
+        The search among what curves do not contain, added to a fit with curves; None where there are none.
+    """
+
+    plain: Search
+    curved: Search | None = None
+
+    def _of(self, chosen: frozenset[str]) -> tuple[Search, frozenset[str]]:
+        if CURVE not in chosen:
+            return self.plain, chosen
+        if self.curved is None:
+            raise ValueError("there are no curves to choose")
+        return self.curved, chosen & frozenset(self.curved.columns)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The effects that could be chosen."""
+        return (*self.plain.columns, *(() if self.curved is None else (CURVE,)))
+
+    def errors(self, chosen: frozenset[str]) -> Array:
+        """Return the mean held-out error of each configuration with some effects [m], ``(n,)``."""
+        search, effects = self._of(chosen)
+        return search.errors(effects)
+
+    def errors_without_order(self, chosen: frozenset[str]) -> Array:
+        """Return the same where the order of the held-out configurations is not known."""
+        search, effects = self._of(chosen)
+        return search.errors_without_order(effects)
+
+    def gain(self, before: frozenset[str], after: frozenset[str]) -> Gain:
+        """Return what one choice gains over another."""
+        return gain(self.errors(before), self.errors(after), self.plain.ground.folds)
+
+    def left(self, chosen: frozenset[str]) -> Array:
+        """Return the residual of every row with some effects, ``(rows,)``."""
+        search, effects = self._of(chosen)
+        return search.left(effects)
+
+    def spent(self, chosen: frozenset[str]) -> float:
+        """Return how many equations' worth of residual a fit with some effects uses up."""
+        search, effects = self._of(chosen)
+        return search.spent(effects)
+
+    def left_without(self, number: int, chosen: frozenset[str]) -> Array:
+        """Return the residual of every row as the fit without a fold leaves it, ``(rows,)``."""
+        search, effects = self._of(chosen)
+        return search.left_without(number, effects)
+
+    def best(self, without: Collection[str]) -> frozenset[str]:
+        """Return the best choice, with curves if they gain more than a standard error, but some effects."""
+        found = self.plain.best([name for name in self.plain.columns if name not in without])
+        if self.curved is None or CURVE in without:
+            return found
+        curved = self.curved.best([name for name in self.curved.columns if name not in without]) | {CURVE}
+        return curved if self.gain(found, curved).believed else found

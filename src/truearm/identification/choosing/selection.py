@@ -19,9 +19,9 @@ from truearm.errors import InputError
 from truearm.identification.choosing.candidates import SELECTABLE, Ground, closed_because, loads_bend
 from truearm.identification.choosing.folds import FOLDS, Folds, folds_of
 from truearm.identification.choosing.refits import How, Refits
-from truearm.identification.choosing.search import Gain, Search, gain
+from truearm.identification.choosing.search import CURVE, Choices, Gain, Search, gain
 from truearm.identification.held import NOTHING_HELD, Held
-from truearm.identification.judging.transmission import PeriodicError, lines_of
+from truearm.identification.judging.transmission import FEWEST, PeriodicError, Pulls, lines_of
 from truearm.identification.solving.bounds import Bounds
 from truearm.identification.solving.losses import Loss
 from truearm.identification.solving.models import Model, named_model
@@ -29,12 +29,12 @@ from truearm.identification.solving.rounds import Redundant, find_parameters
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
 from truearm.modeling.effects import EFFECTS
+from truearm.modeling.effects.joint_curve import HIGHEST
 from truearm.modeling.robot import Robot
 
 AUTO: Final = "auto"
 _COMPLIANCE: Final = "compliance"
 _TRANSMISSION: Final = "transmission-error"
-_CURVE: Final = "joint-curve"
 #: What a curve contains.
 _IN_CURVE: Final = "fourier"
 #: Effects that follow the order of a campaign.
@@ -249,27 +249,41 @@ class _Choice:
         chosen, confirmations = self._confirmed(search, chosen)
         return self._selection(search, chosen, confirmations)
 
-    def _searched(self) -> Search:
-        """Return the search among all effects that robot, data and lines say something about."""
+    def _searched(self) -> Choices:
+        """Return the choices among all effects that robot, data and lines say something about."""
         robot = with_lines(self.robot, self.lines)
         self.reasons = {}
         for name in self.names:
             reason = closed_because(robot, self.data, name)
             if reason is not None:
                 self.reasons[name] = reason
-        open_ = [name for name in self.names if name not in self.reasons]
+        open_ = [name for name in self.names if name not in self.reasons and name != CURVE]
         there = with_lines(self.ground.solved.robot, self.lines)
         columns = self.ground.columns(open_, there)
         unordered = self.ground.columns([name for name in open_ if name in ORDERED], there, ordered=False)
-        return Search(self.ground, self.ground.start((_COMPLIANCE,)), columns, unordered)
-
-    def _settled(self, search: Search) -> frozenset[str]:
-        """Return the best choice among effects that the data show and that do not harm predictions without order."""
-        for name in search.columns:
-            if not search.excited(name):
+        plain = Search(self.ground, self.ground.start((_COMPLIANCE,)), columns, unordered)
+        for name in columns:
+            if not plain.excited(name):
                 self.reasons[name] = "the readings tell less of it than is known beforehand"
+        return Choices(plain, self._curved(plain))
+
+    def _curved(self, plain: Search) -> Search | None:
+        """Return the search among what curves do not contain, if the data show curves."""
+        if CURVE not in self.names or CURVE in self.reasons:
+            return None
+        rest = {name: columns for name, columns in plain.columns.items() if name != _IN_CURVE}
+        beside = plain.best([name for name in rest if name not in self.reasons])
+        fit = plain.fit.with_columns(plain.together({name: rest[name] for name in rest if name in beside}))
+        columns = self.ground.curve(fit)
+        if columns is None:
+            self.reasons[CURVE] = "what is left over does not repeat with the joints' angles"
+            return None
+        return Search(self.ground, plain.fit.with_columns(columns), rest, plain.unordered)
+
+    def _settled(self, search: Choices) -> frozenset[str]:
+        """Return the best choice among effects that the data show and that do not harm predictions without order."""
         while True:
-            chosen = search.best([name for name in search.columns if name not in self.reasons])
+            chosen = search.best(self.reasons)
             ordered = chosen & ORDERED
             now = search.errors_without_order(chosen)
             if not ordered or not gain(search.errors_without_order(chosen - ordered), now, self.folds).harms:
@@ -277,28 +291,33 @@ class _Choice:
             worst = min(sorted(ordered), key=lambda name: _mean(search.errors_without_order(chosen - {name})))
             self.reasons[worst] = "it makes predictions worse whose place in the order is not known"
 
-    def _found_lines(self, search: Search, chosen: frozenset[str]) -> bool:
+    def _found_lines(self, search: Choices, chosen: frozenset[str]) -> bool:
         """Look for periodic errors in what a choice leaves; return whether there are any."""
         if _TRANSMISSION not in self.names:
             return False
-        pulls = self.ground.pulls(search.left(chosen))
-        self.lines = () if pulls is None else lines_of(self.robot, pulls)
+        pulls = self.ground.pulls(search.left(chosen), search.spent(chosen))
+        self.lines = () if pulls is None else self._lines_of(pulls, chosen)
         return bool(self.lines)
 
-    def _refits(self, search: Search, chosen: frozenset[str]) -> Refits:
+    def _lines_of(self, pulls: Pulls, chosen: frozenset[str]) -> tuple[PeriodicError, ...]:
+        """Return the lines that no curve among the chosen effects could take out."""
+        return lines_of(self.robot, pulls, HIGHEST + 1 if CURVE in chosen else FEWEST)
+
+    def _refits(self, search: Choices, chosen: frozenset[str]) -> Refits:
         without = chosen - {_TRANSMISSION}
 
         def robot_of(number: int, effects: Sequence[str]) -> Robot:
             if not self.lines or _TRANSMISSION not in effects:
                 return self.robot
-            pulls = self.ground.pulls(search.left_without(number, without), self.ground.fold != number)
-            return self.robot if pulls is None else with_lines(self.robot, lines_of(self.robot, pulls))
+            left = search.left_without(number, without)
+            pulls = self.ground.pulls(left, search.spent(without), self.ground.fold != number)
+            return self.robot if pulls is None else with_lines(self.robot, self._lines_of(pulls, without))
 
         return Refits(
             self.robot, self.data, self.folds, self.how, lambda effects: model_with(effects, self.names), robot_of
         )
 
-    def _confirmed(self, search: Search, chosen: frozenset[str]) -> tuple[frozenset[str], list[Confirmation]]:
+    def _confirmed(self, search: Choices, chosen: frozenset[str]) -> tuple[frozenset[str], list[Confirmation]]:
         """Return the choice as far as real fits in the folds bear it out."""
         found: list[Confirmation] = []
         refits = self._refits(search, chosen)
@@ -327,23 +346,23 @@ class _Choice:
             chosen = smaller
         return (chosen if chosen <= start else start & chosen), found
 
-    def _start(self, search: Search) -> frozenset[str]:
+    def _start(self, search: Choices) -> frozenset[str]:
         """Return the better one of the geometric and the elastic model."""
         elastic = frozenset({_COMPLIANCE})
-        return elastic if _COMPLIANCE in search.columns and search.gain((), elastic).believed else frozenset()
+        return elastic if _COMPLIANCE in search.names and search.gain(frozenset(), elastic).believed else frozenset()
 
     @staticmethod
-    def _next_smaller(search: Search, chosen: frozenset[str]) -> frozenset[str]:
+    def _next_smaller(search: Choices, chosen: frozenset[str]) -> frozenset[str]:
         """Return a choice without the effect that it gains least by."""
         return min((chosen - {name} for name in chosen), key=lambda one: _mean(search.errors(one)))
 
     def _selection(
-        self, search: Search, chosen: frozenset[str], confirmations: list[Confirmation]
+        self, search: Choices, chosen: frozenset[str], confirmations: list[Confirmation]
     ) -> Selection:
         rows = []
         for name in self.names:
             tried = None
-            if name in search.columns:
+            if name in search.names:
                 tried = search.gain(chosen - {name}, chosen | {name})
             reason = "" if name in chosen else self.reasons.get(name, "")
             if name not in chosen and not reason and tried is not None:
@@ -357,12 +376,12 @@ class _Choice:
             now = self._next_smaller(search, now)
             smaller.append(model_with(tuple(now), self.names))
         smaller.append(replace(named_model("offsets"), name=AUTO))
-        elastic = _mean(search.errors((_COMPLIANCE,))) if _COMPLIANCE in search.columns else None
+        elastic = _mean(search.errors(frozenset({_COMPLIANCE}))) if _COMPLIANCE in search.names else None
         return Selection(
             model_with(tuple(chosen), self.names),
             self.folds.layout,
             self.folds.blocks,
-            _mean(search.errors(())),
+            _mean(search.errors(frozenset())),
             elastic,
             _mean(search.errors(chosen)),
             tuple(rows),

@@ -23,7 +23,8 @@ from truearm.notices import Notice
 from truearm.shown import listed
 
 #: Periods in a turn that are looked at; fewer than the first are the Fourier series' business.
-_PERIODS: Final = np.arange(20, 401)
+FEWEST: Final = 20
+_PERIODS: Final = np.arange(FEWEST, 401)
 #: A periodic error is believed if chance would show one as strong in any joint less often than this.
 _LARGEST_CHANCE: Final = 1e-3
 _LEAST_CONFIGURATIONS: Final = 60  # configurations
@@ -130,10 +131,15 @@ def periodic_errors(fit: Fit, data: Dataset) -> tuple[PeriodicError, ...]:
     return lines_of(robot, Pulls(at.joints, pull, weight, float(left.sum()), free))
 
 
-def lines_of(robot: Robot, pulls: Pulls) -> tuple[PeriodicError, ...]:
+def lines_of(robot: Robot, pulls: Pulls, fewest: int = FEWEST) -> tuple[PeriodicError, ...]:
     """Return the periodic errors of a robot's joints whose gear it does not know, one a joint at most.
 
     Fewer than 60 configurations say nothing.
+
+    Parameters
+    ----------
+    fewest
+        Periods in a turn that are looked for, at least.
     """
     if len(pulls.joints) < _LEAST_CONFIGURATIONS:
         return ()
@@ -144,7 +150,7 @@ def lines_of(robot: Robot, pulls: Pulls) -> tuple[PeriodicError, ...]:
     found: list[PeriodicError] = []
     while open_joints:
         noise = total / max(free, 1)
-        tried = [(*_strongest(q[:, i], pull[:, i], weight[:, i, i], noise), i) for i in open_joints]
+        tried = [(*_strongest(q[:, i], pull[:, i], weight[:, i, i], noise, fewest), i) for i in open_joints]
         explained, periods, a, b, joint = max(tried)
         agreement = min(free * explained / total, _agreement(periods * q[:, joint], pull[:, joint]))
         chance = len(open_joints) * len(_PERIODS) * math.exp(-0.5 * agreement)
@@ -159,7 +165,7 @@ def lines_of(robot: Robot, pulls: Pulls) -> tuple[PeriodicError, ...]:
     return tuple(sorted(found, key=lambda error: error.joint))
 
 
-def _strongest(q: Array, pull: Array, weight: Array, noise: float) -> tuple[float, int, float, float]:
+def _strongest(q: Array, pull: Array, weight: Array, noise: float, fewest: int) -> tuple[float, int, float, float]:
     """Return what the best sine explains of the squared residuals [m^2], its periods, and its two amplitudes [rad].
 
     It explains nothing where the readings see none.
@@ -172,13 +178,16 @@ def _strongest(q: Array, pull: Array, weight: Array, noise: float) -> tuple[floa
         J'r [m^2] and J'J [m^2] of the joint, ``(n,)``.
     noise
         Variance of a coordinate of the residuals [m^2].
+    fewest
+        Periods in a turn that are looked for, at least.
     """
-    explained, a, b, least = _sines(q, pull, weight, _PERIODS)
-    passed = _PERIODS * math.sqrt(12.0) * q.std() / (2.0 * math.pi)  # of a range that is passed through evenly
+    among = _PERIODS[_PERIODS >= fewest]
+    explained, a, b, least = _sines(q, pull, weight, among)
+    passed = among * math.sqrt(12.0) * q.std() / (2.0 * math.pi)  # of a range that is passed through evenly
     seen = (least * _LARGEST_DEVIATION**2 > noise) & (passed > _LEAST_PERIODS)
     explained = np.where(seen, explained, 0.0)
     best = int(np.argmax(explained))
-    return float(explained[best]), int(_PERIODS[best]), float(a[best]), float(b[best])
+    return float(explained[best]), int(among[best]), float(a[best]), float(b[best])
 
 
 def _sines(q: Array, pull: Array, weight: Array, periods: NDArray[np.intp]) -> tuple[Array, Array, Array, Array]:

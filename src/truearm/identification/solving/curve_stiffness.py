@@ -1,0 +1,257 @@
+"""How large each sine and cosine of the joints' curves is expected to be, by restricted maximum likelihood.
+
+A curve with the same freedom for every period would follow noise; one that is stiff would miss what gears do. So the
+coefficients c of a linearised fit ``z = A u + F c + n`` have a normal prior of mean zero, whose variance v is the same
+for sine and cosine of a period of a joint, and the variances that make the residuals likeliest are taken (MacKay 1992,
+"Bayesian interpolation"; Tipping 2001, "Sparse Bayesian learning and the relevance vector machine"). With the
+parameters u of the arm integrated out under their own, wide, priors, what geometry and gravity can say themselves is
+theirs. With ``V = s^2 I + F diag(v) F'``, slopes of the likelihood in log v vanish where ``v = c^2 / g`` summed over sine
+and cosine: c is the likeliest coefficient and ``g = v f' V^-1 f`` what the data know of it, 0 to 1. Each step puts in
+the old v on the right.
+
+A gear makes a few lines, and little between them. The variances of neighbouring periods of a joint therefore have an
+inverse gamma distribution with one scale t, and few degrees of freedom: coefficients are then of Student's t, which
+leaves lines alone and shrinks the rest (Tipping and Lawrence 2005). Its likeliest values are
+``v = (c^2 + m t) / (g + m)``, and t the harmonic mean of the band's v. Periods that the data cannot tell apart, where a
+joint turned through a part of a turn only, keep t, and are as uncertain where the joint was not measured.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.modeling.chain import Array
+
+#: First periods in a turn of the bands whose variances are alike.
+BANDS: Final = (1, 3, 6, 11, 19, 33)
+#: Degrees of freedom of the variances of a band.
+_ALIKE: Final = 1.0
+#: Twice the gain in log-likelihood from which the curve of a joint is believed.
+_SIGNIFICANT: Final = 5.41
+#: Of the log-likelihood: a step that gains less is the last.
+_SETTLED: Final = 0.05
+_STEPS: Final = 40
+#: What the data would know of a coefficient that is left out, at most, if they were to tell it alone.
+_NEGLIGIBLE: Final = 1e-3
+#: Share of the best seen combination of coefficients below which one is not seen.
+_ALIKE_EQUATIONS: Final = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class CurveVariances:
+    """How stiff the curves are.
+
+    Attributes
+    ----------
+    variance
+        Of each coefficient [rad^2], ``(coefficients,)``; zero where it is left out.
+    noise
+        Variance of the residuals by the one assumed.
+    informed
+        What the data know of each coefficient, 0 to 1, ``(coefficients,)``.
+    likelihood
+        Logarithm of the restricted likelihood, up to a constant.
+    gains
+        What the curve of each joint gains in it, by the index of the joint.
+    """
+
+    variance: Array
+    noise: float
+    informed: Array
+    likelihood: float
+    gains: dict[int, float]
+
+
+def curve_variances(
+    residual: Array,
+    by_parameters: Array,
+    by_curve: Array,
+    offset: Array,
+    joint: NDArray[np.intp],
+    period: NDArray[np.intp],
+    before: Array | None = None,
+    least_noise: float = 0.0,
+) -> CurveVariances:
+    """Find the variances of the coefficients of the joints' curves.
+
+    Parameters
+    ----------
+    residual
+        Of independent equations, divided by the deviations assumed, ``(rows,)``, without any curve.
+    by_parameters
+        Its derivative by all other parameters, per prior, ``(rows, parameters)``.
+    by_curve
+        Its derivative by the coefficients [1/rad], ``(rows, coefficients)``.
+    offset
+        How far the other parameters are from the centres of their priors, in priors.
+    joint, period
+        Of each coefficient: the index of its joint, and its periods in a turn.
+    before
+        Variances to begin with [rad^2], ``(coefficients,)``: a zero stays one.
+    least_noise
+        What the variance of the residuals is at least, by the one assumed.
+    """
+    m = by_parameters.shape[1]
+    z = by_parameters @ offset - residual
+    stacked = np.zeros((len(z) + m, m + by_curve.shape[1] + 1))
+    stacked[: len(z)] = np.column_stack([by_parameters, by_curve, z])
+    stacked[len(z) :, :m] = np.eye(m)
+    triangle = np.asarray(np.linalg.qr(stacked, mode="r"), dtype=np.float64)[m:, m:]
+    return stiffness_of_triangle(triangle, len(z), joint, period, before, least_noise)
+
+
+def stiffness_of_triangle(
+    triangle: Array,
+    rows: int,
+    joint: NDArray[np.intp],
+    period: NDArray[np.intp],
+    before: Array | None = None,
+    least_noise: float = 0.0,
+) -> CurveVariances:
+    """Return :func:`curve_variances` from what is left of all equations behind the other parameters.
+
+    Parameters
+    ----------
+    triangle
+        Of coefficients and residual, ``(coefficients + 1, coefficients + 1)`` or fewer rows.
+    rows
+        Number of equations.
+    """
+    F, z, rest = _told_apart(triangle)
+    size = np.einsum("ij,ij->j", F, F)
+    variance = _start(F, joint, rows) if before is None else before.copy()
+    variance[size <= 0.0] = 0.0
+    group = np.unique(np.stack([joint, period]), axis=1, return_inverse=True)[1].reshape(-1)
+    band = np.unique(
+        np.stack([joint, np.searchsorted(BANDS, period, side="right")]), axis=1, return_inverse=True
+    )[1].reshape(-1)
+    climb = _Climb(group, band, least_noise)
+    state = climb.climbed(_Marginal(F, z, rows, variance, max((float(z @ z) + rest) / rows, least_noise), rest))
+    gains: dict[int, float] = {}
+    while state.variance.any():
+        gains = {i: state.likelihood - state.without(joint == i) for i in np.unique(joint[state.variance > 0]).tolist()}
+        weakest = min(gains, key=lambda i: gains[i])
+        if 2.0 * gains[weakest] >= _SIGNIFICANT:
+            break
+        left = np.where(joint == weakest, 0.0, state.variance)
+        state = climb.climbed(_Marginal(F, z, rows, left, state.noise, rest))
+    kept = state.variance * size > _NEGLIGIBLE * state.noise
+    return CurveVariances(
+        np.where(kept, state.variance, 0.0), state.noise, state.known, state.likelihood, gains if kept.any() else {}
+    )
+
+
+def _told_apart(triangle: Array) -> tuple[Array, Array, float]:
+    """Return equations that curves take part in, their right side, and the sum of squares of all others.
+
+    Through a part of a turn neighbouring periods look alike, so that these are far fewer than coefficients.
+    """
+    F, z = triangle[:, :-1], triangle[:, -1]
+    sizes, axes = np.linalg.eigh(F @ F.T)
+    kept = axes[:, sizes > _ALIKE_EQUATIONS * sizes[-1:]]
+    turned = kept.T @ z
+    return kept.T @ F, turned, max(float(z @ z - turned @ turned), 0.0)
+
+
+def _start(F: Array, joint: NDArray[np.intp], rows: int) -> Array:
+    """Return variances with which the curves of the joints would add as much to the residuals as there is noise."""
+    signal = np.einsum("ij,ij->j", F, F)
+    found = np.zeros(F.shape[1])
+    joints = np.unique(joint).tolist()
+    for i in joints:
+        mine = joint == i
+        found[mine] = rows / max(float(signal[mine].sum()), 1e-300) / len(joints)
+    return found
+
+
+class _Marginal:
+    """The likelihood at some variances, with what its slopes need."""
+
+    def __init__(self, F: Array, z: Array, rows: int, variance: Array, noise: float, rest: float) -> None:
+        self.F, self.z, self.rows, self.variance, self.noise, self.rest = F, z, rows, variance, noise, rest
+        used = variance > 0.0
+        part = F[:, used]
+        V = (part * variance[used]) @ part.T
+        V[np.diag_indices_from(V)] += noise
+        root = np.linalg.cholesky(V)
+        turned = np.linalg.solve(root, np.column_stack([part, z]))
+        left = turned[:, -1]
+        self.known, self.found = np.zeros(len(variance)), np.zeros(len(variance))
+        self.known[used] = variance[used] * np.einsum("ij,ij->j", turned[:, :-1], turned[:, :-1])
+        self.found[used] = variance[used] * (turned[:, :-1].T @ left)
+        residual = noise * np.linalg.solve(root.T, left)
+        self.left = float(residual @ residual) + rest
+        logs = 2.0 * float(np.log(np.diag(root)).sum()) + (rows - len(V)) * float(np.log(noise))
+        self.likelihood = -0.5 * (logs + float(left @ left) + rest / noise)
+
+    def at(self, variance: Array, noise: float) -> _Marginal:
+        """Return it at other variances."""
+        return _Marginal(self.F, self.z, self.rows, variance, noise, self.rest)
+
+    def without(self, coefficients: NDArray[np.bool_]) -> float:
+        """Return the likelihood without some coefficients."""
+        return self.at(np.where(coefficients, 0.0, self.variance), self.noise).likelihood
+
+
+class _Climb:
+    """The way to the likeliest variances, in their logarithms, one for each period of a joint and one of the noise."""
+
+    def __init__(self, group: NDArray[np.intp], band: NDArray[np.intp], least_noise: float) -> None:
+        self.group, self.least_noise = group, least_noise
+        self.of_group = np.zeros(group.max(initial=-1) + 1, dtype=np.intp)
+        self.of_group[group] = band
+        self.sizes = np.bincount(group)
+
+    def alike(self, v: Array) -> Array:
+        """Return the scale of each group's band."""
+        used = v > 0.0
+        inverse = np.bincount(self.of_group[used], 1.0 / v[used], minlength=self.of_group.max() + 1)
+        return np.asarray((np.bincount(self.of_group[used], minlength=len(inverse)) / np.maximum(inverse, 1e-300))[
+            self.of_group
+        ])
+
+    def objective(self, state: _Marginal) -> float:
+        """Return the likelihood with that of the variances."""
+        v = np.bincount(self.group, state.variance) / self.sizes
+        used = v > 0.0
+        share = self.alike(v)[used] / v[used]
+        return state.likelihood + 0.5 * _ALIKE * float(np.sum(np.log(share) - share))
+
+    def following(self, state: _Marginal) -> Array:
+        """Return where the next step leads: logarithms of the variances of the groups, and of the noise."""
+        v = np.bincount(self.group, state.variance) / self.sizes
+        squares, known = np.bincount(self.group, state.found**2), np.bincount(self.group, state.known)
+        new = (squares + _ALIKE * self.alike(v)) / (known + _ALIKE)
+        freedom = max(state.rows - float(state.known.sum()), 1e-3 * state.rows)
+        return np.log(np.maximum(np.append(np.where(v > 0.0, new, 0.0), state.left / freedom), 1e-300))
+
+    def at(self, state: _Marginal, place: Array) -> _Marginal:
+        """Return the state at such logarithms."""
+        v = np.exp(place[:-1])[self.group]
+        return state.at(np.where(state.variance > 0.0, v, 0.0), max(float(np.exp(place[-1])), self.least_noise))
+
+    def climbed(self, state: _Marginal) -> _Marginal:
+        """Climb: two steps, and a third as far as they lead together (Varadhan and Roland 2008)."""
+        here = np.log(np.maximum(np.append(np.bincount(self.group, state.variance) / self.sizes, state.noise), 1e-300))
+        height = self.objective(state)
+        for _ in range(_STEPS):
+            first = self.following(state)
+            second_state = self.at(state, first)
+            second = self.following(second_state)
+            way, bend = first - here, second - 2.0 * first + here
+            far = min(-float(np.linalg.norm(way) / max(np.linalg.norm(bend), 1e-300)), -1.0)
+            place = here - 2.0 * far * way + far**2 * bend
+            there = self.at(state, place)
+            reached = self.objective(there)
+            if not reached >= height:
+                place = second
+                there = self.at(state, second)
+                reached = self.objective(there)
+            gain, height, here, state = reached - height, reached, place, there
+            if gain < _SETTLED:
+                break
+        return state

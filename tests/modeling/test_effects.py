@@ -54,7 +54,7 @@ def circumstances(robot: Robot, count: int, seed: int) -> Postures:
     at = Postures(
         joints, approach=signs, temperature=rng.uniform(10, 40, count), wrench=wrench, number=np.arange(float(count))
     )
-    loads = replace(robot, effect_names=("compliance",), known={}).loaded(at).loads
+    loads = robot.with_effects(("compliance",)).loaded(at).loads  # of the arm as it has bent
     assert loads is not None
     seated = (np.abs(loads[:, 5]) > 20 * SEATED).all(axis=0)
     seated &= (np.hypot(loads[:, 3], loads[:, 4]) > 20 * SEATED).all(axis=0)

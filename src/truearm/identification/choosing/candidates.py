@@ -14,7 +14,7 @@ from truearm.identification.choosing.folds import Folds
 from truearm.identification.choosing.linear_cross_validation import LinearFit
 from truearm.identification.judging.transmission import Pulls
 from truearm.identification.solving.arrivals import Arrivals, Whitening
-from truearm.identification.solving.curve_stiffness import BANDS, stiffness_of_triangle
+from truearm.identification.solving.curve_stiffness import BANDS, curve_variances
 from truearm.identification.solving.problem import Problem
 from truearm.identification.solving.rounds import Solved, bound_by, in_the_middle
 from truearm.measurement.dataset import Dataset
@@ -111,10 +111,11 @@ class Ground:
         rows = rows * (self._root_weight[:, None] if rows.ndim == 2 else self._root_weight)
         return rows if self._whitening is None else self._whitening.applied(rows)
 
-    def _in_metres(self, rows: Array) -> Array:
-        """Return weighed rows as differences of what was read [m or rad], ``(rows,)``."""
+    def in_metres(self, rows: Array) -> Array:
+        """Return weighed rows as differences of what was read [m or rad], ``(rows,)`` or ``(rows, columns)``."""
         plain = rows if self._whitening is None else self._whitening.undone(rows)
-        return np.asarray(plain / self._root_weight * self._sigma)
+        scale = self._sigma / self._root_weight
+        return np.asarray(plain * (scale[:, None] if plain.ndim == 2 else scale))
 
     def pulls(self, rows: Array, spent: float, among: NDArray[np.bool_] | None = None) -> Pulls | None:
         """Return what weighed residuals ``(rows,)`` say of errors of the joints; None where no position was read.
@@ -132,7 +133,7 @@ class Ground:
         mine = compared if among is None else compared[among[compared]]
         used, of = np.unique(self.configuration[mine], return_inverse=True)
         sigma = self._sigma[mine]
-        r = self._in_metres(rows)[mine]
+        r = self.in_metres(rows)[mine]
         J = self._by_joints[mine] * sigma[:, None]
         n, k = len(used), J.shape[1]
         pull, weight = np.zeros((n, k)), np.zeros((n, k, k))
@@ -169,23 +170,27 @@ class Ground:
                 return np.concatenate(rows), components
         return np.zeros(0, dtype=np.intp), 1
 
-    def errors(self, held_out: Array) -> Array:
+    def by_configuration(self, left: Array) -> Array:
         """Return the mean error of each configuration [m], NaN where nothing is compared, ``(n,)``.
 
         Parameters
         ----------
-        held_out
-            Weighed residual of every row, ``(rows,)``.
+        left
+            Of the rows that are compared [m], ``(compared rows,)``.
         """
         rows, components = self.compared
-        left = self._in_metres(held_out)[rows].reshape(-1, components)
         of = self.configuration[rows][::components]
         count = np.bincount(of, minlength=len(self.folds.of))
-        total = np.bincount(of, np.linalg.norm(left, axis=1), minlength=len(self.folds.of))
+        sizes = np.sqrt(np.sum(left.reshape(-1, components) ** 2, axis=1))
+        total = np.bincount(of, sizes, minlength=len(self.folds.of))
         return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
-    def start(self, without: Sequence[str] = ()) -> LinearFit:
-        """Return the fit, linearised, without some joint effects."""
+    def errors(self, held_out: Array) -> Array:
+        """Return the same for the weighed residual of every row, ``(rows,)``."""
+        return self.by_configuration(self.in_metres(held_out)[self.compared[0]])
+
+    def linear(self, without: Sequence[str] = ()) -> tuple[Array, Array, Array, Array]:
+        """Return the fit, linearised, without some joint effects: what :meth:`LinearFit.of` takes, but the folds."""
         free, solution = self.problem.free, self.solved.solution
         offset = (solution.vector - free.nominal) / free.prior
         out = np.array([p.group in without for p in free.parameters], dtype=bool)
@@ -194,31 +199,46 @@ class Ground:
         residual = solution.residual - columns[:, out] @ offset[out]
         kept = ~out & ~fixed
         penalty = np.full(int(kept.sum()), 1.0 if self.problem.priors else _HARDLY)
-        return LinearFit.of(self._weighed(residual), self._weighed(columns[:, kept]), offset[kept], penalty, self.fold)
+        return self._weighed(residual), self._weighed(columns[:, kept]), offset[kept], penalty
 
-    def curve(self, fit: LinearFit) -> Array | None:
-        """Return the columns of the joints' curves per prior, weighed, ``(rows, k)``; None where there are none.
+    def start(self, without: Sequence[str] = ()) -> LinearFit:
+        """Return the fit, linearised, without some joint effects."""
+        return LinearFit.of(*self.linear(without), self.fold)
 
-        Parameters
-        ----------
-        fit
-            With all that the curves shall not say themselves.
-        """
+    @cached_property
+    def _curve(self) -> tuple[Array, NDArray[np.intp], NDArray[np.intp]]:
+        """Columns of the joints' curves [1/rad], and the joint and the periods of each coefficient."""
         robot = self.solved.robot.with_effects([JointCurve.name])
         free = FreeParameters(tuple(p for p in robot.parameters.values() if p.group == JointCurve.name))
-        if not free.parameters:
-            return None
-        columns = self.columns([JointCurve.name])[JointCurve.name] / free.prior
         terms = JointCurve(robot.layout).terms
         joint = np.concatenate([np.full(len(names), i) for i, names in terms.items()])
         period = np.concatenate([np.arange(len(names)) // 2 + 1 for names in terms.values()])
-        n = len(self.fold)
-        left = np.zeros((len(fit.Q), columns.shape[1] + 1))
-        left[:n, :-1], left[:, -1] = columns, -fit.residual
-        left[:, :-1] -= fit.Q @ (fit.Q[:n].T @ columns)
-        triangle = np.asarray(np.linalg.qr(left, mode="r"), dtype=np.float64)
-        found = stiffness_of_triangle(triangle, n, joint, period).variance
-        variance = _by_bands(found, joint, period)
+        return self.columns([JointCurve.name])[JointCurve.name] / free.prior, joint, period
+
+    def curve(self, without: Sequence[str], beside: Array, fold: int | None = None) -> Array | None:
+        """Return the columns of the joints' curves per prior, weighed, ``(rows, k)``; None where the data show none.
+
+        Their priors are the likeliest ones, band by band: so few numbers say little of the readings that they were
+        found from. Those of single lines would be praised for what they took from the folds that are held out.
+
+        Parameters
+        ----------
+        without
+            Effects of the fit that are left out of account.
+        beside
+            Columns of what the curves shall not say themselves, ``(rows, m)``.
+        fold
+            Held out while the priors are found; none if None.
+        """
+        columns, joint, period = self._curve
+        residual, base, offset, _ = self.linear(without)
+        mine = np.ones(len(residual), dtype=bool) if fold is None else self.fold != fold
+        others = np.concatenate([base, beside], axis=1)[mine]
+        further = np.concatenate([offset, np.zeros(beside.shape[1])])
+        found = curve_variances(residual[mine], others, columns[mine], further, joint, period).variance
+        bands = np.stack([joint, np.searchsorted(BANDS, period, side="right")])
+        of = np.unique(bands, axis=1, return_inverse=True)[1].reshape(-1)
+        variance = (np.bincount(of, found) / np.bincount(of))[of]
         kept = variance > 0.0
         return np.asarray(columns[:, kept] * np.sqrt(variance[kept])) if kept.any() else None
 
@@ -251,13 +271,3 @@ class Ground:
             first += len(group)
         return {name: columns for name, columns in found.items() if columns.shape[1]}
 
-
-def _by_bands(variance: Array, joint: NDArray[np.intp], period: NDArray[np.intp]) -> Array:
-    """Return the mean variance of the band of each coefficient of a curve.
-
-    So few numbers say little of the readings that they were found from: those of single lines would be praised for what
-    they took from the folds that are held out.
-    """
-    bands = np.stack([joint, np.searchsorted(BANDS, period, side="right")])
-    of = np.unique(bands, axis=1, return_inverse=True)[1].reshape(-1)
-    return np.asarray((np.bincount(of, variance) / np.bincount(of))[of])

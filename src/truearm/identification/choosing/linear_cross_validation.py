@@ -80,10 +80,10 @@ class LinearFit:
         """How many equations' worth of residual the columns use up: the trace of the hat matrix."""
         return float(np.sum(self.Q[: len(self.fold)] ** 2))
 
-    def held_out(self) -> Array:
-        """Return the residual of every row as the fit without its fold leaves it, ``(rows,)``."""
+    def held_out(self, only: int | None = None) -> Array:
+        """Return the residual of every row as the fit without its fold leaves it, ``(rows,)``; of one fold if asked."""
         found = self.residual[: len(self.fold)].copy()
-        for number in range(self.folds):
+        for number in range(self.folds) if only is None else [only]:
             mine = np.flatnonzero(self.fold == number)
             Q, e = self.Q[mine], self.residual[mine]
             if len(mine) <= Q.shape[1]:
@@ -94,7 +94,7 @@ class LinearFit:
 
 
 @dataclass(frozen=True, eq=False)
-class _Fold:
+class Fold:
     """A fold, with the fit's own columns taken out: all that a choice among the candidates needs.
 
     Attributes
@@ -150,7 +150,8 @@ class Extensions:
         return added
 
     @cached_property
-    def _folds(self) -> tuple[_Fold, ...]:
+    def folds(self) -> tuple[Fold, ...]:
+        """What each fold knows of the candidates."""
         C, n = self.apart, len(self.fit.fold)
         G, g = C.T @ C, C[: len(self.fit.Q)].T @ self.fit.residual
         found = []
@@ -165,14 +166,14 @@ class Extensions:
             pull = g - own.T @ (e + Q @ by_fit)
             if self.predicting is not None:
                 added = added + (self.predicting - self.columns)[mine]
-            found.append(_Fold(mine, e + Q @ by_fit, added, inner, pull, by_fit, by_own))
+            found.append(Fold(mine, e + Q @ by_fit, added, inner, pull, by_fit, by_own))
         return tuple(found)
 
     def held_out(self, chosen: Sequence[int] | NDArray[np.intp] = ()) -> Array:
         """Return the residual of every row as the fit without its fold leaves it, with some columns, ``(rows,)``."""
         found = self.fit.residual[: len(self.fit.fold)].copy()
         places = np.asarray(chosen, dtype=np.intp)
-        for fold in self._folds:
+        for fold in self.folds:
             left = fold.residual
             if len(places):
                 left = left + fold.columns[:, places] @ fold.values(places)
@@ -181,7 +182,7 @@ class Extensions:
 
     def without_fold(self, number: int, chosen: Sequence[int] | NDArray[np.intp] = ()) -> Array:
         """Return the residual of every row as the fit without a fold leaves it, with some columns, ``(rows,)``."""
-        fold, n, places = self._folds[number], len(self.fit.fold), np.asarray(chosen, dtype=np.intp)
+        fold, n, places = self.folds[number], len(self.fit.fold), np.asarray(chosen, dtype=np.intp)
         values = fold.values(places)
         moved = fold.by_fit + fold.by_columns[:, places] @ values
         return np.asarray(self.fit.residual[:n] + self.fit.Q[:n] @ moved + self.apart[:n, places] @ values)

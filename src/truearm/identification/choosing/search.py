@@ -80,6 +80,7 @@ class Search:
     columns: dict[str, Array]
     unordered: dict[str, Array] = field(default_factory=dict)
     _errors: dict[frozenset[str], Array] = field(default_factory=dict, init=False)
+    _means: dict[frozenset[str], float] = field(default_factory=dict, init=False)
 
     @cached_property
     def _extensions(self) -> Extensions:
@@ -111,12 +112,41 @@ class Search:
         """Return the mean held-out error of each configuration with some effects [m], ``(n,)``."""
         key = frozenset(chosen)
         if key not in self._errors:
-            self._errors[key] = self.ground.errors(self._extensions.held_out(self.places(key)))
+            self._errors[key] = self._found(self._extensions, self._shown, key)
         return self._errors[key]
 
     def errors_without_order(self, chosen: Sequence[str] | frozenset[str]) -> Array:
         """Return the same where the order of the held-out configurations is not known."""
-        return self.ground.errors(self._without_order.held_out(self.places(chosen)))
+        return self._found(self._without_order, self._shown_without_order, frozenset(chosen))
+
+    def _found(self, extensions: Extensions, shown: Array, chosen: frozenset[str]) -> Array:
+        places = self.places(chosen)
+        left = shown[:, -1].copy()
+        for fold, mine in zip(extensions.folds, self._of_fold, strict=True):
+            if len(places):
+                left[mine] += shown[np.ix_(mine, places)] @ fold.values(places)
+        return self.ground.by_configuration(left)
+
+    @cached_property
+    def _of_fold(self) -> tuple[NDArray[np.intp], ...]:
+        """Compared rows of each fold, among the compared ones."""
+        fold = self.fit.fold[self.ground.compared[0]]
+        return tuple(np.flatnonzero(fold == number) for number in range(self.fit.folds))
+
+    @cached_property
+    def _shown(self) -> Array:
+        return self._in_metres(self._extensions)
+
+    @cached_property
+    def _shown_without_order(self) -> Array:
+        return self._in_metres(self._without_order)
+
+    def _in_metres(self, extensions: Extensions) -> Array:
+        """Return what each held-out column adds and what is left without any [m], ``(compared rows, k + 1)``."""
+        rows = np.zeros((len(self.fit.fold), extensions.columns.shape[1] + 1))
+        for fold in extensions.folds:
+            rows[fold.rows, :-1], rows[fold.rows, -1] = fold.columns, fold.residual
+        return np.asarray(self.ground.in_metres(rows)[self.ground.compared[0]])
 
     def gain(self, before: Sequence[str] | frozenset[str], after: Sequence[str] | frozenset[str]) -> Gain:
         """Return what one choice gains over another."""
@@ -146,12 +176,15 @@ class Search:
         """
         looked_at = self._every(among) if 2 ** len(among) <= _ALL else self._one_by_one(among)
         lowest = min(looked_at, key=self._mean)
-        as_good = [chosen for chosen in looked_at if not self.gain(chosen, lowest).believed]
-        return min(as_good or [lowest], key=lambda chosen: (len(self.places(chosen)), self._mean(chosen)))
+        limit = self._mean(lowest)
+        fewest = sorted(looked_at, key=lambda chosen: (len(self.places(chosen)), self._mean(chosen)))
+        return next((one for one in fewest if self._mean(one) <= limit or not self.gain(one, lowest).believed), lowest)
 
     def _mean(self, chosen: frozenset[str]) -> float:
-        errors = self.errors(chosen)
-        return float(np.mean(errors[np.isfinite(errors)])) if np.isfinite(errors).any() else np.inf
+        if chosen not in self._means:
+            errors = self.errors(chosen)
+            self._means[chosen] = float(np.nanmean(errors)) if np.isfinite(errors).any() else np.inf
+        return self._means[chosen]
 
     @staticmethod
     def _every(among: Sequence[str]) -> list[frozenset[str]]:

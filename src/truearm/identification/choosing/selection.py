@@ -40,8 +40,9 @@ _IN_CURVE: Final = "fourier"
 #: Effects that follow the order of a campaign.
 ORDERED: Final = frozenset(effect.name for effect in EFFECTS if effect.ordered)
 #: A gain of fewer standard errors in closed form is looked at again by real fits.
-_SURE: Final = 3.0
+_SURE: Final = 2.0
 _MOST_REFITS: Final = 3
+_NOT_BORNE_OUT: Final = "what it gains is not borne out by fits in the folds"
 
 
 @dataclass(frozen=True)
@@ -233,6 +234,7 @@ class _Choice:
     progress: Callable[[str], None]
     reasons: dict[str, str] = field(default_factory=dict)
     lines: tuple[PeriodicError, ...] = ()
+    beside: Array | None = None
 
     @property
     def folds(self) -> Folds:
@@ -273,8 +275,8 @@ class _Choice:
             return None
         rest = {name: columns for name, columns in plain.columns.items() if name != _IN_CURVE}
         beside = plain.best([name for name in rest if name not in self.reasons])
-        fit = plain.fit.with_columns(plain.together({name: rest[name] for name in rest if name in beside}))
-        columns = self.ground.curve(fit)
+        self.beside = plain.together({name: rest[name] for name in rest if name in beside})
+        columns = self.ground.curve((_COMPLIANCE,), self.beside)
         if columns is None:
             self.reasons[CURVE] = "what is left over does not repeat with the joints' angles"
             return None
@@ -318,8 +320,17 @@ class _Choice:
         )
 
     def _confirmed(self, search: Choices, chosen: frozenset[str]) -> tuple[frozenset[str], list[Confirmation]]:
-        """Return the choice as far as real fits in the folds bear it out."""
+        """Return the choice as far as fits in the folds bear it out."""
         found: list[Confirmation] = []
+        if CURVE in chosen:
+            plain = search.best({*self.reasons, CURVE})
+            self.progress("choosing a model: curves in the folds")
+            errors, before = self._errors_of_curves(search, chosen), search.errors(plain)
+            found.append(_confirmation(chosen, plain, errors, before, self.folds))
+            if found[-1].gain.believed:
+                return chosen, found
+            self.reasons[CURVE] = _NOT_BORNE_OUT
+            chosen = plain
         refits = self._refits(search, chosen)
         start = self._start(search)
         for _ in range(_MOST_REFITS):
@@ -328,23 +339,43 @@ class _Choice:
             smaller = self._next_smaller(search, chosen)
             sure = search.gain(smaller, chosen)
             against = start if sure.mean > _SURE * sure.error and start < chosen else smaller
-            self.progress(f"choosing a model: fits with {', '.join(sorted(chosen))} in the folds")
-            errors, before = refits.errors(tuple(chosen)), refits.errors(tuple(against))
-            if errors is not None and before is not None:
-                real = gain(before, errors, self.folds)
-                found.append(
-                    Confirmation(_ordered(chosen), _ordered(against), _mean(errors), _mean(before), real)
-                )
-                if real.believed:
+            self.progress(f"choosing a model: fits with {', '.join(_listed(chosen))} in the folds")
+            refitted, before_refitted = refits.errors(tuple(chosen)), refits.errors(tuple(against))
+            if refitted is not None and before_refitted is not None:
+                found.append(_confirmation(chosen, against, refitted, before_refitted, self.folds))
+                if found[-1].gain.believed:
                     return chosen, found
             for name in chosen - smaller:
                 self.reasons[name] = (
-                    "there are too few readings in a fold to find it"
-                    if errors is None
-                    else "what it gains is not borne out by fits in the folds"
+                    "there are too few readings in a fold to find it" if refitted is None else _NOT_BORNE_OUT
                 )
             chosen = smaller
         return (chosen if chosen <= start else start & chosen), found
+
+    def _errors_of_curves(self, search: Choices, chosen: frozenset[str]) -> Array:
+        """Return held-out errors with curves and lines whose priors and periods are found without each fold.
+
+        It is the linear problem: with hundreds of coefficients real fits would take far longer than all the rest.
+        """
+        if search.curved is None or self.beside is None:
+            raise ValueError("there are no curves to choose")
+        held_out = np.zeros(len(self.ground.fold))
+        for number in range(FOLDS):
+            columns = {name: search.curved.columns[name] for name in search.curved.columns if name in chosen}
+            if self.lines and _TRANSMISSION in columns:
+                without = chosen - {_TRANSMISSION}
+                pulls = self.ground.pulls(
+                    search.left_without(number, without), search.spent(without), self.ground.fold != number
+                )
+                lines = () if pulls is None else self._lines_of(pulls, without)
+                there = with_lines(self.ground.solved.robot, lines)
+                columns |= self.ground.columns([_TRANSMISSION], there) if lines else {}
+            curve = self.ground.curve((_COMPLIANCE,), self.beside, number)
+            fit = search.plain.fit if curve is None else search.plain.fit.with_columns(curve)
+            mine = self.ground.fold == number
+            together = np.concatenate([np.zeros((len(mine), 0)), *columns.values()], axis=1)
+            held_out[mine] = fit.with_columns(together).held_out(number)[mine]
+        return self.ground.errors(held_out)
 
     def _start(self, search: Choices) -> frozenset[str]:
         """Return the better one of the geometric and the elastic model."""
@@ -391,7 +422,13 @@ class _Choice:
         )
 
 
-def _ordered(effects: frozenset[str]) -> tuple[str, ...]:
+def _confirmation(
+    chosen: frozenset[str], smaller: frozenset[str], errors: Array, before: Array, folds: Folds
+) -> Confirmation:
+    return Confirmation(_listed(chosen), _listed(smaller), _mean(errors), _mean(before), gain(before, errors, folds))
+
+
+def _listed(effects: frozenset[str]) -> tuple[str, ...]:
     return tuple(effect.name for effect in EFFECTS if effect.name in effects)
 
 

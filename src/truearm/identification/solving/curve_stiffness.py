@@ -30,8 +30,9 @@ from truearm.modeling.chain import Array
 BANDS: Final = (1, 3, 6, 11, 19, 33)
 #: Degrees of freedom of the variances of a band.
 _ALIKE: Final = 1.0
-#: Twice the gain in log-likelihood from which the curve of a joint is believed.
-_SIGNIFICANT: Final = 5.41
+#: Gain in log-likelihood from which the curve of a joint is believed: what half a dozen variances that mean nothing gain
+#: in the information criterion of Akaike (1974), and as much again, because the largest of many periods are looked at.
+_SIGNIFICANT: Final = 10.0
 #: Of the log-likelihood: a step that gains less is the last.
 _SETTLED: Final = 0.05
 _STEPS: Final = 40
@@ -67,10 +68,8 @@ class CurveVariances:
 
 
 def curve_variances(
-    residual: Array,
-    by_parameters: Array,
-    by_curve: Array,
-    offset: Array,
+    moments: Array,
+    rows: float,
     joint: NDArray[np.intp],
     period: NDArray[np.intp],
     before: Array | None = None,
@@ -80,48 +79,19 @@ def curve_variances(
 
     Parameters
     ----------
-    residual
-        Of independent equations, divided by the deviations assumed, ``(rows,)``, without any curve.
-    by_parameters
-        Its derivative by all other parameters, per prior, ``(rows, parameters)``.
-    by_curve
-        Its derivative by the coefficients [1/rad], ``(rows, coefficients)``.
-    offset
-        How far the other parameters are from the centres of their priors, in priors.
+    moments
+        From :func:`moments_without`, ``(coefficients + 1, coefficients + 1)``: of the derivatives of the equations by
+        the coefficients [1/rad], and of what the curves are to explain.
+    rows
+        How many independent equations there are.
     joint, period
         Of each coefficient: the index of its joint, and its periods in a turn.
     before
         Variances to begin with [rad^2], ``(coefficients,)``: a zero stays one.
     least_noise
-        What the variance of the residuals is at least, by the one assumed.
+        What the variance of the equations is at least, by the one assumed.
     """
-    m = by_parameters.shape[1]
-    z = by_parameters @ offset - residual
-    stacked = np.zeros((len(z) + m, m + by_curve.shape[1] + 1))
-    stacked[: len(z)] = np.column_stack([by_parameters, by_curve, z])
-    stacked[len(z) :, :m] = np.eye(m)
-    triangle = np.asarray(np.linalg.qr(stacked, mode="r"), dtype=np.float64)[m:, m:]
-    return stiffness_of_triangle(triangle, len(z), joint, period, before, least_noise)
-
-
-def stiffness_of_triangle(
-    triangle: Array,
-    rows: int,
-    joint: NDArray[np.intp],
-    period: NDArray[np.intp],
-    before: Array | None = None,
-    least_noise: float = 0.0,
-) -> CurveVariances:
-    """Return :func:`curve_variances` from what is left of all equations behind the other parameters.
-
-    Parameters
-    ----------
-    triangle
-        Of coefficients and residual, ``(coefficients + 1, coefficients + 1)`` or fewer rows.
-    rows
-        Number of equations.
-    """
-    F, z, rest = _told_apart(triangle)
+    F, z, rest = _told_apart(moments)
     size = np.einsum("ij,ij->j", F, F)
     variance = _start(F, joint, rows) if before is None else before.copy()
     variance[size <= 0.0] = 0.0
@@ -135,7 +105,7 @@ def stiffness_of_triangle(
     while state.variance.any():
         gains = {i: state.likelihood - state.without(joint == i) for i in np.unique(joint[state.variance > 0]).tolist()}
         weakest = min(gains, key=lambda i: gains[i])
-        if 2.0 * gains[weakest] >= _SIGNIFICANT:
+        if gains[weakest] >= _SIGNIFICANT:
             break
         left = np.where(joint == weakest, 0.0, state.variance)
         state = climb.climbed(_Marginal(F, z, rows, left, state.noise, rest))
@@ -145,19 +115,35 @@ def stiffness_of_triangle(
     )
 
 
-def _told_apart(triangle: Array) -> tuple[Array, Array, float]:
+def moments_without(moments: Array, others: int) -> Array:
+    """Return products of columns of equations with other parameters integrated out under their priors.
+
+    Parameters
+    ----------
+    moments
+        Products of the derivatives by the other parameters, per prior, of those by the coefficients and of the
+        residuals, ``(others + coefficients + 1, others + coefficients + 1)``.
+    others
+        How many other parameters there are.
+    """
+    root = np.linalg.cholesky(moments[:others, :others] + np.eye(others))
+    shared = np.linalg.solve(root, moments[:others, others:])
+    return np.asarray(moments[others:, others:] - shared.T @ shared)
+
+
+def _told_apart(moments: Array) -> tuple[Array, Array, float]:
     """Return equations that curves take part in, their right side, and the sum of squares of all others.
 
     Through a part of a turn neighbouring periods look alike, so that these are far fewer than coefficients.
     """
-    F, z = triangle[:, :-1], triangle[:, -1]
-    sizes, axes = np.linalg.eigh(F @ F.T)
-    kept = axes[:, sizes > _ALIKE_EQUATIONS * sizes[-1:]]
-    turned = kept.T @ z
-    return kept.T @ F, turned, max(float(z @ z - turned @ turned), 0.0)
+    sizes, axes = np.linalg.eigh(moments[:-1, :-1])
+    kept = sizes > _ALIKE_EQUATIONS * max(float(sizes[-1]), 1e-300)
+    root, axes = np.sqrt(sizes[kept]), axes[:, kept]
+    z = (axes.T @ moments[:-1, -1]) / root
+    return root[:, None] * axes.T, z, max(float(moments[-1, -1] - z @ z), 0.0)
 
 
-def _start(F: Array, joint: NDArray[np.intp], rows: int) -> Array:
+def _start(F: Array, joint: NDArray[np.intp], rows: float) -> Array:
     """Return variances with which the curves of the joints would add as much to the residuals as there is noise."""
     signal = np.einsum("ij,ij->j", F, F)
     found = np.zeros(F.shape[1])
@@ -171,7 +157,7 @@ def _start(F: Array, joint: NDArray[np.intp], rows: int) -> Array:
 class _Marginal:
     """The likelihood at some variances, with what its slopes need."""
 
-    def __init__(self, F: Array, z: Array, rows: int, variance: Array, noise: float, rest: float) -> None:
+    def __init__(self, F: Array, z: Array, rows: float, variance: Array, noise: float, rest: float) -> None:
         self.F, self.z, self.rows, self.variance, self.noise, self.rest = F, z, rows, variance, noise, rest
         used = variance > 0.0
         part = F[:, used]

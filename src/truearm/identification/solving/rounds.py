@@ -17,6 +17,7 @@ from truearm.identification.held import NOTHING_HELD, Held
 from truearm.identification.solving.arrivals import Arrivals, WhitenedProblem, Whitening
 from truearm.identification.solving.bounds import Bounds, bound_vectors
 from truearm.identification.solving.likelihood import Linearised
+from truearm.identification.solving.curves import Curves, with_stiffness
 from truearm.identification.solving.losses import Loss, meets_exactly, norms_of, scale_of, weighed_together
 from truearm.identification.solving.models import Model
 from truearm.identification.solving.problem import SETUP, Problem, check_circumstances, check_solvable
@@ -72,6 +73,8 @@ class Solved:
         Variances of the readings and of the joints' errors at the solution; None for losses other than the linear one.
     held
         Places that were known.
+    curves
+        The curves of the joints, where the model has them.
     """
 
     start: Robot
@@ -81,6 +84,7 @@ class Solved:
     limits: tuple[Array, Array] | None
     components: Components | None
     held: Held = NOTHING_HELD
+    curves: Curves = Curves()
 
     @property
     def robot(self) -> Robot:
@@ -156,7 +160,7 @@ def find_parameters(
             _check_dropped(out, free, check_bounds, bounds_file)
         kept = problem.free.without(out)
         limits = None if check_bounds is None else _limits_of(check_bounds, free, kept)
-        solution, reduced, components = _solve_with_noise(
+        solution, reduced, components, curves = _solve_with_noise(
             replace(problem, free=kept), loss, limits, small, shared=shared and redundancy != "none"
         )
         steps += solution.steps
@@ -172,7 +176,10 @@ def find_parameters(
     else:
         solution = replace(solution, converged=False)
         dropped = tuple(r for r in dropped if r.dropped in out)
-    return Solved(start, reduced, replace(solution, steps=steps), dropped, limits, components, held)
+    if limits is not None and check_bounds is not None:
+        limits = _limits_of(check_bounds, free, reduced.free)
+    start = start.with_parameters(curves.priors_of(start))
+    return Solved(start, reduced, replace(solution, steps=steps), dropped, limits, components, held, curves)
 
 
 def in_the_middle(robot: Robot, data: Dataset) -> Robot:
@@ -199,18 +206,24 @@ def _limits_of(limits: tuple[Array, Array], free: FreeParameters, kept: FreePara
 
 def _solve_with_noise(
     problem: Problem, loss: Loss, limits: tuple[Array, Array] | None, small: float, *, shared: bool
-) -> tuple[Solution, Problem, Components | None]:
-    """Solve; then again with what the solution says of deviations and of the loads at every joint.
+) -> tuple[Solution, Problem, Components | None, Curves]:
+    """Solve; then again with what the solution says of deviations, of the joints' curves and of the loads.
 
     Deviations are estimated where they are not declared. Declared ones are widened where the residuals are larger than
     they, and errors of the joints that an arrival's readings share, allow: believed to the letter, readings that the
-    model cannot follow would overrule every prior, for the sake of directions that they hardly observe.
+    model cannot follow would overrule every prior, for the sake of directions that they hardly observe. Curves of the
+    joints join in when the first solution has told how stiff they are.
     """
+    every, within = problem, limits
+    curves = Curves.none_of(problem)
+    if curves:
+        problem = replace(problem, free=problem.free.without(curves.names))
+        limits = _within(within, every.free, problem.free)
     solution = solve(problem, loss, limits, small)
     steps = solution.steps
     joints = np.zeros(len(problem.robot.joints))
     components = None
-    for _ in range(_ROUNDS):
+    for _ in range(_ROUNDS + (curves.rounds if curves else 0)):
         if loss == "linear" and shared:
             components = components_found(problem, solution, limits, components)
             there, change, joints = _with_components(problem, components, joints)
@@ -219,25 +232,56 @@ def _solve_with_noise(
         found = dict(zip(problem.free.names, map(float, solution.vector), strict=True))
         started = FreeParameters(tuple(replace(p, value=found[p.name]) for p in problem.free.parameters))
         there = replace(there, robot=problem.robot.with_values(found), free=started)
+        if curves.rounds:
+            there, curves = with_stiffness(there, every.free, curves, joints, solution.weight)
+            limits, change = _within(within, every.free, there.free), np.inf
         if change < _SETTLED and _load_shift(problem, there) < _LOADS_AGREE * small:
             break
+        if [*there.free.names] != [*problem.free.names]:
+            components = None  # whether the joints err, and how, is asked again
         problem = there
-        solution = solve_with_joints(problem, joints, loss, limits, small)
+        solution = solve_with_joints(problem, joints, loss, limits, small, curves.design_effect)
         steps += solution.steps
-    return replace(solution, steps=steps), problem, components
+    return replace(solution, steps=steps), problem, components, curves
+
+
+def _within(
+    limits: tuple[Array, Array] | None, free: FreeParameters, kept: FreeParameters
+) -> tuple[Array, Array] | None:
+    return None if limits is None else _limits_of(limits, free, kept)
 
 
 def solve_with_joints(
-    problem: Problem, joints: Array, loss: Loss, limits: tuple[Array, Array] | None, small: float
+    problem: Problem,
+    joints: Array,
+    loss: Loss,
+    limits: tuple[Array, Array] | None,
+    small: float,
+    design_effect: float = 1.0,
 ) -> Solution:
-    """Solve with the variances of the joints' errors as they are; residual and Jacobian are the readings' own."""
-    if not joints.any():
-        return solve(problem, loss, limits, small)
-    shared = problem.at(problem.free.start).by_joints * np.sqrt(joints)
-    whitening = Whitening(Arrivals(problem.arrivals), shared)
-    solution = solve(WhitenedProblem(problem, whitening), loss, limits, small)
-    residual, jacobian = whitening.undone(solution.residual), whitening.undone(solution.jacobian)
-    return replace(solution, residual=residual, jacobian=jacobian)
+    """Solve with the variances of the joints' errors as they are; residual and Jacobian are the readings' own.
+
+    Parameters
+    ----------
+    design_effect
+        How many times larger the variances of the readings are taken, because they hang together.
+    """
+    root = float(np.sqrt(design_effect))
+    if root != 1.0:
+        noise = {name: deviation * root for name, deviation in problem.noise.items()}
+        problem = replace(problem, noise=noise, widened=problem.widened * root)
+    if joints.any():
+        errors = joints * design_effect
+        plain = problem.at(problem.free.start).by_joints * np.sqrt(errors)
+        whitening = Whitening(Arrivals(problem.arrivals), plain)
+        solution = solve(WhitenedProblem(problem, whitening), loss, limits, small)
+        residual, jacobian = whitening.undone(solution.residual), whitening.undone(solution.jacobian)
+        solution = replace(solution, residual=residual, jacobian=jacobian)
+    else:
+        solution = solve(problem, loss, limits, small)
+    if root == 1.0:
+        return solution
+    return replace(solution, residual=root * solution.residual, jacobian=root * solution.jacobian)
 
 
 def components_found(

@@ -1,0 +1,154 @@
+"""Curves of the joints in a fit: which coefficients are free, and what is expected of each."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Final, Self
+
+import numpy as np
+
+from truearm.identification.solving.arrivals import Arrivals, Whitening
+from truearm.identification.solving.curve_stiffness import curve_variances, moments_without
+from truearm.identification.solving.problem import Problem
+from truearm.modeling.chain import Array
+from truearm.modeling.effects.joint_curve import JointCurve
+from truearm.modeling.parameters import FreeParameters, Parameter
+from truearm.modeling.robot import Robot
+
+#: How often stiffness is found: the noise that is left without a curve is not that with it.
+_ROUNDS: Final = 3
+#: Equations whose products are summed at once.
+_AT_ONCE: Final = 3000
+#: Coordinates that say where a target is.
+_COORDINATES: Final = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Curves:
+    """The curves of the joints in a fit.
+
+    Attributes
+    ----------
+    places
+        Joint (from 0) and periods in a turn of every coefficient that the model has, by its name.
+    variances
+        Of the coefficients that are free [rad^2].
+    design_effect
+        By what the variances of the readings are larger, for the curves' sake, than their residuals (Kish 1965): where
+        errors of the joints at an arrival explain nothing, its readings count as one of three coordinates, and hold
+        the curves no better.
+    gains
+        What the curve of each joint gains in log-likelihood, by the index of the joint.
+    rounds
+        How often stiffness is still to be found.
+    """
+
+    places: Mapping[str, tuple[int, int]] = field(default_factory=dict)
+    variances: Mapping[str, float] = field(default_factory=dict)
+    design_effect: float = 1.0
+    gains: Mapping[int, float] = field(default_factory=dict)
+    rounds: int = 0
+
+    def __bool__(self) -> bool:
+        return bool(self.places)
+
+    @classmethod
+    def none_of(cls, problem: Problem) -> Self:
+        """Return those that a problem has, of which nothing is known yet."""
+        wanted = {p.name for p in problem.free.parameters if p.group == JointCurve.name}
+        places = {
+            name: (joint, number // 2 + 1)
+            for effect in problem.robot.effects
+            if isinstance(effect, JointCurve)
+            for joint, names in effect.terms.items()
+            for number, name in enumerate(names)
+            if name in wanted
+        }
+        return cls(places, rounds=_ROUNDS if places else 0)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all coefficients."""
+        return tuple(self.places)
+
+    def priors_of(self, robot: Robot) -> list[Parameter]:
+        """Return a robot's coefficients with what is expected of them."""
+        return [
+            replace(robot.parameters[name], prior=math.sqrt(variance)) for name, variance in self.variances.items()
+        ]
+
+
+def with_stiffness(
+    problem: Problem, every: FreeParameters, curves: Curves, joints: Array, weight: Array
+) -> tuple[Problem, Curves]:
+    """Return a problem with the coefficients free that the data tell, each with what is expected of it.
+
+    Parameters
+    ----------
+    problem
+        At a solution, whose values its free parameters have.
+    every
+        All parameters that the model frees, in their order.
+    curves
+        What was found before.
+    joints
+        Variances of the joints' errors that readings are weighed by.
+    weight
+        What the loss leaves of each reading.
+    """
+    names = [name for name in curves.names if not curves.variances or name in curves.variances]
+    others = [p for p in problem.free.parameters if p.name not in curves.places]
+    robot = problem.robot
+    coefficients = [robot.parameters[name] for name in names]
+    whole = replace(problem, free=FreeParameters((*others, *coefficients)))
+    here = whole.at(whole.free.start)
+    nominal, m = whole.free.nominal, len(others)
+    prior = np.array([p.prior for p in others])
+    residual, jacobian = here.residual, here.jacobian
+    crowd = 1.0
+    if joints.any():
+        whitening = Whitening(Arrivals(whole.arrivals), here.by_joints * np.sqrt(joints))
+        residual, jacobian = whitening.applied(residual), whitening.applied(jacobian)
+    else:
+        crowd = max(1.0, whole.rows / (_COORDINATES * (int(whole.arrivals.max(initial=0)) + 1)))
+    root = np.sqrt(np.repeat(weight, whole.components) / crowd)
+    away = whole.free.start - nominal
+    moments = np.zeros((len(away) + 1, len(away) + 1))
+    scale = np.concatenate([prior, np.ones(len(names))])
+    for first in range(0, len(residual), _AT_ONCE):
+        rows = slice(first, first + _AT_ONCE)
+        part = np.column_stack([jacobian[rows] * scale, jacobian[rows] @ away - residual[rows]]) * root[rows, None]
+        moments += part.T @ part
+    place = np.array([curves.places[name] for name in names], dtype=np.intp).reshape(-1, 2)
+    before = np.array([curves.variances[name] for name in names]) if curves.variances else None
+    declared = all(block.declared for block in whole.blocks)
+    found = curve_variances(
+        moments_without(moments, m),
+        len(residual) / crowd,
+        place[:, 0],
+        place[:, 1],
+        before,
+        1.0 if declared else 0.0,
+    )
+    variances = {name: v for name, v in zip(names, found.variance.tolist(), strict=True) if v > 0.0}
+    now = {p.name: p for p in problem.free.parameters}
+    free = FreeParameters(
+        tuple(
+            now[p.name] if p.name not in curves.places else
+            replace(robot.parameters[p.name], nominal=p.nominal, prior=math.sqrt(variances[p.name]))
+            for p in every.parameters
+            if p.name in now and p.name not in curves.places or p.name in variances
+        )
+    )
+    held = {name: every_nominal for name, every_nominal in zip(names, nominal[m:].tolist(), strict=True) if name not in variances}
+    left = replace(problem, robot=robot.with_values(held), free=free)
+    known = replace(
+        curves,
+        variances=variances,
+        design_effect=crowd * found.noise,
+        gains=found.gains,
+        rounds=curves.rounds - 1 if variances else 0,
+    )
+    return left, known

@@ -10,11 +10,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.identification.choosing.folds import Folds
+from truearm.identification.choosing.folds import FOLDS, Folds
 from truearm.identification.choosing.linear_cross_validation import LinearFit
 from truearm.identification.judging.transmission import Pulls
 from truearm.identification.solving.arrivals import Arrivals, Whitening
-from truearm.identification.solving.curve_stiffness import BANDS, curve_variances
+from truearm.identification.solving.curve_stiffness import BANDS, curve_variances, moments_without
 from truearm.identification.solving.problem import Problem
 from truearm.identification.solving.rounds import Solved, bound_by, in_the_middle
 from truearm.measurement.dataset import Dataset
@@ -57,6 +57,55 @@ def closed_because(robot: Robot, data: Dataset, name: str) -> str | None:
 def loads_bend(robot: Robot, data: Dataset) -> bool:
     """Return whether there are loads that elastic joints could give way to."""
     return has_weight(robot) or data.wrench is not None
+
+
+@dataclass(frozen=True, eq=False)
+class CurveColumns:
+    """The columns of the joints' curves, and what is needed to find how stiff these are without a fold.
+
+    Attributes
+    ----------
+    columns
+        Weighed derivatives by the coefficients [1/rad], ``(rows, k)``.
+    joint, period
+        Of each coefficient: the index of its joint, and its periods in a turn.
+    moments
+        Products of the derivatives by other parameters and by the coefficients and of the residuals, for rows of no
+        fold and then fold by fold.
+    rows
+        How many rows those are.
+    others
+        How many other parameters there are.
+    """
+
+    columns: Array
+    joint: NDArray[np.intp]
+    period: NDArray[np.intp]
+    moments: Array
+    rows: NDArray[np.intp]
+    others: int
+
+    def scaled(self, without: int | None = None) -> Array | None:
+        """Return the columns per prior, ``(rows, k)``; None where the data show no curve.
+
+        The priors are the likeliest ones, band by band: so few numbers say little of the readings that they were found
+        from. Those of single lines would be praised for what they took from the folds that are held out.
+
+        Parameters
+        ----------
+        without
+            A fold that has no say in the priors.
+        """
+        kept = np.ones(len(self.rows), dtype=bool)
+        if without is not None:
+            kept[without + 1] = False
+        moments = moments_without(self.moments[kept].sum(axis=0), self.others)
+        found = curve_variances(moments, float(self.rows[kept].sum()), self.joint, self.period).variance
+        bands = np.stack([self.joint, np.searchsorted(BANDS, self.period, side="right")])
+        of = np.unique(bands, axis=1, return_inverse=True)[1].reshape(-1)
+        variance = (np.bincount(of, found) / np.bincount(of))[of]
+        used = variance > 0.0
+        return np.asarray(self.columns[:, used] * np.sqrt(variance[used])) if used.any() else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,11 +264,8 @@ class Ground:
         period = np.concatenate([np.arange(len(names)) // 2 + 1 for names in terms.values()])
         return self.columns([JointCurve.name])[JointCurve.name] / free.prior, joint, period
 
-    def curve(self, without: Sequence[str], beside: Array, fold: int | None = None) -> Array | None:
-        """Return the columns of the joints' curves per prior, weighed, ``(rows, k)``; None where the data show none.
-
-        Their priors are the likeliest ones, band by band: so few numbers say little of the readings that they were
-        found from. Those of single lines would be praised for what they took from the folds that are held out.
+    def curves(self, without: Sequence[str], beside: Array) -> CurveColumns:
+        """Return the columns of the joints' curves.
 
         Parameters
         ----------
@@ -227,20 +273,15 @@ class Ground:
             Effects of the fit that are left out of account.
         beside
             Columns of what the curves shall not say themselves, ``(rows, m)``.
-        fold
-            Held out while the priors are found; none if None.
         """
         columns, joint, period = self._curve
         residual, base, offset, _ = self.linear(without)
-        mine = np.ones(len(residual), dtype=bool) if fold is None else self.fold != fold
-        others = np.concatenate([base, beside], axis=1)[mine]
-        further = np.concatenate([offset, np.zeros(beside.shape[1])])
-        found = curve_variances(residual[mine], others, columns[mine], further, joint, period).variance
-        bands = np.stack([joint, np.searchsorted(BANDS, period, side="right")])
-        of = np.unique(bands, axis=1, return_inverse=True)[1].reshape(-1)
-        variance = (np.bincount(of, found) / np.bincount(of))[of]
-        kept = variance > 0.0
-        return np.asarray(columns[:, kept] * np.sqrt(variance[kept])) if kept.any() else None
+        others = np.concatenate([base, beside], axis=1)
+        every = np.column_stack([others, columns, base @ offset - residual])
+        parts = [every[self.fold == number] for number in range(-1, FOLDS)]
+        moments = np.stack([part.T @ part for part in parts])
+        rows = np.array([len(part) for part in parts])
+        return CurveColumns(columns, joint, period, moments, rows, others.shape[1])
 
     def columns(self, names: Sequence[str], robot: Robot | None = None, *, ordered: bool = True) -> dict[str, Array]:
         """Return the columns of joint effects per prior, weighed as the fit is, ``(rows, parameters)`` each.

@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 
 from truearm.errors import InputError
-from truearm.identification.choosing.candidates import SELECTABLE, Ground, closed_because, loads_bend
+from truearm.identification.choosing.candidates import SELECTABLE, CurveColumns, Ground, closed_because, loads_bend
 from truearm.identification.choosing.folds import FOLDS, Folds, folds_of
 from truearm.identification.choosing.refits import How, Refits
 from truearm.identification.choosing.search import CURVE, Choices, Gain, Search, gain
@@ -234,7 +234,7 @@ class _Choice:
     progress: Callable[[str], None]
     reasons: dict[str, str] = field(default_factory=dict)
     lines: tuple[PeriodicError, ...] = ()
-    beside: Array | None = None
+    curves: CurveColumns | None = None
 
     @property
     def folds(self) -> Folds:
@@ -275,8 +275,10 @@ class _Choice:
             return None
         rest = {name: columns for name, columns in plain.columns.items() if name != _IN_CURVE}
         beside = plain.best([name for name in rest if name not in self.reasons])
-        self.beside = plain.together({name: rest[name] for name in rest if name in beside})
-        columns = self.ground.curve((_COMPLIANCE,), self.beside)
+        self.curves = self.ground.curves(
+            (_COMPLIANCE,), plain.together({name: rest[name] for name in rest if name in beside})
+        )
+        columns = self.curves.scaled()
         if columns is None:
             self.reasons[CURVE] = "what is left over does not repeat with the joints' angles"
             return None
@@ -357,7 +359,7 @@ class _Choice:
 
         It is the linear problem: with hundreds of coefficients real fits would take far longer than all the rest.
         """
-        if search.curved is None or self.beside is None:
+        if search.curved is None or self.curves is None:
             raise ValueError("there are no curves to choose")
         held_out = np.zeros(len(self.ground.fold))
         for number in range(FOLDS):
@@ -370,7 +372,7 @@ class _Choice:
                 lines = () if pulls is None else self._lines_of(pulls, without)
                 there = with_lines(self.ground.solved.robot, lines)
                 columns |= self.ground.columns([_TRANSMISSION], there) if lines else {}
-            curve = self.ground.curve((_COMPLIANCE,), self.beside, number)
+            curve = self.curves.scaled(number)
             fit = search.plain.fit if curve is None else search.plain.fit.with_columns(curve)
             mine = self.ground.fold == number
             together = np.concatenate([np.zeros((len(mine), 0)), *columns.values()], axis=1)

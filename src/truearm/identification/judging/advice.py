@@ -155,6 +155,7 @@ def _check_effects(fit: Fit) -> list[Notice]:
         effect.name
         for effect in robot.effects
         if effect.parameters
+        and effect.name not in fit.model.effects
         and not any(p.name in fit.free.names for p in effect.parameters)
         and all(robot.values[p.name] == p.value for p in effect.parameters)
     ]
@@ -166,7 +167,8 @@ def _check_effects(fit: Fit) -> list[Notice]:
                 f"{fit.model.name} does not free them. Add `effects={idle[0]}`, or take them out of the file.",
             )
         )
-    effects = {p.name for effect in robot.effects for p in effect.parameters}
+    # What is expected of curves follows from the data: most of their many coefficients are meant to stay near zero.
+    effects = {p.name for effect in robot.effects if effect.name != JointCurve.name for p in effect.parameters}
     own = [name for name in fit.free.names if name in effects]
     unknown = [name for name in own if fit.parameter_status(name) == "uninformed"]
     unknown += [r.dropped for r in fit.redundancies if r.dropped in effects]

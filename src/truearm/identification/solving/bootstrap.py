@@ -70,7 +70,9 @@ def refit_draws(
         progress(f"bootstrap {_bar(number, count)} {number + 1} of {count}")
         drawn = problem.data.of_configurations(rng.integers(n, size=n))
         again = replace(problem, data=drawn, free=started)
-        found[number] = solve_with_joints(again, joints, loss, solved.limits, _SMALL).vector
+        found[number] = solve_with_joints(
+            again, joints, loss, solved.limits, _SMALL, solved.curves.design_effect
+        ).vector
     return found
 
 

@@ -36,8 +36,8 @@ _SIGNIFICANT: Final = 10.0
 #: Of the log-likelihood: a step that gains less is the last.
 _SETTLED: Final = 0.05
 _STEPS: Final = 40
-#: What the data would know of a coefficient that is left out, at most, if they were to tell it alone.
-_NEGLIGIBLE: Final = 1e-3
+#: Share of the variance of the readings that all coefficients which are left out may move them by together.
+_NEGLIGIBLE: Final = 0.01
 #: Share of the best seen combination of coefficients below which one is not seen.
 _ALIKE_EQUATIONS: Final = 1e-9
 
@@ -109,7 +109,11 @@ def curve_variances(
             break
         left = np.where(joint == weakest, 0.0, state.variance)
         state = climb.climbed(_Marginal(F, z, rows, left, state.noise, rest))
-    kept = state.variance * size > _NEGLIGIBLE * state.noise
+    moved = np.bincount(group, state.variance * size)
+    order = np.argsort(moved)
+    small = np.zeros(len(moved), dtype=bool)
+    small[order] = np.cumsum(moved[order]) <= _NEGLIGIBLE * state.noise * rows
+    kept = (state.variance > 0.0) & ~small[group]
     return CurveVariances(
         np.where(kept, state.variance, 0.0), state.noise, state.known, state.likelihood, gains if kept.any() else {}
     )

@@ -134,20 +134,19 @@ def with_stiffness(
     )
     variances = {name: v for name, v in zip(names, found.variance.tolist(), strict=True) if v > 0.0}
     now = {p.name: p for p in problem.free.parameters}
+    kept = [p for p in every.parameters if p.name in (variances if p.name in curves.places else now)]
     free = FreeParameters(
         tuple(
-            now[p.name] if p.name not in curves.places else
-            replace(robot.parameters[p.name], nominal=p.nominal, prior=math.sqrt(variances[p.name]))
-            for p in every.parameters
-            if p.name in now and p.name not in curves.places or p.name in variances
+            replace(robot.parameters[p.name], prior=math.sqrt(variances[p.name])) if p.name in variances else now[p.name]
+            for p in kept
         )
     )
-    held = {name: every_nominal for name, every_nominal in zip(names, nominal[m:].tolist(), strict=True) if name not in variances}
+    held = {p.name: p.nominal for p in coefficients if p.name not in variances}
     left = replace(problem, robot=robot.with_values(held), free=free)
     known = replace(
         curves,
         variances=variances,
-        design_effect=crowd * found.noise,
+        design_effect=crowd * found.noise if variances else 1.0,
         gains=found.gains,
         rounds=curves.rounds - 1 if variances else 0,
     )

@@ -274,7 +274,8 @@ def _fit(solved: Solved, model: Model, loss: Loss, draws: Array | None = None) -
     if components is not None and not scattered and draws is None:
         covariance, parts = components.covariance, components.parts
     else:
-        pull, rows = pulls(loss, solution.residual, solution.jacobian, problem.components)
+        root = np.sqrt(solved.curves.design_effect)
+        pull, rows = pulls(loss, solution.residual / root, solution.jacobian / root, problem.components)
         covariance, parts = cluster_covariance(
             rows * free.prior,
             pull * free.prior,
@@ -301,7 +302,8 @@ def _fit(solved: Solved, model: Model, loss: Loss, draws: Array | None = None) -
     ]
     robot = in_the_middle(start.with_parameters(identified), problem.data)
     held = tuple(robot.parameters[r.dropped] for r in solved.redundancies)
-    looked_at = FreeParameters((*(robot.parameters[n] for n in free.names), *held))
+    # What is expected of curves is found from the data, and their deviations say where nothing else is known.
+    looked_at = FreeParameters((*(robot.parameters[n] for n in free.names if n not in solved.curves.places), *held))
     unobservable = unobservable_parameters(robot, problem.data, looked_at, held=solved.held)
     unobservable = tuple(dict.fromkeys((*unobservable, *open_)))
     gauge = gauge_freedoms(problem.data, solved.held)

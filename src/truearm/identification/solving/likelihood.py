@@ -18,6 +18,10 @@ from truearm.modeling.chain import Array
 
 #: Share of the largest information that is added where a matrix is singular but for rounding, in turn.
 _MORE: Final = (0.0, 1e-15, 1e-13, 1e-11)
+#: How many parameters are so few that all directions are looked at.
+_FEW: Final = 100
+#: Of very many parameters: information of the readings on a direction, by that of the priors, that is none.
+_UNSEEN: Final = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,13 +54,29 @@ class Linearised:
     arrivals: Arrivals
     factor: NDArray[np.intp]
 
-    @cached_property
+    @property
     def directions(self) -> Array:
-        """Directions of the parameters, per prior, that the readings as assumed know to one, ``(parameters, p)``."""
+        """Directions of the parameters, per prior, that the readings as assumed know to one, ``(parameters, p)``.
+
+        Of very many parameters these are the directions that readings tell something about.
+        """
+        return self._directions[0]
+
+    @property
+    def unseen(self) -> Array:
+        """The other directions, per prior, of which the priors alone know something, ``(parameters, others)``."""
+        return self._directions[1]
+
+    @cached_property
+    def _directions(self) -> tuple[Array, Array]:
         A = self.by_parameters
         rows = np.concatenate([A, np.eye(A.shape[1])]) if self.priors else A
         _, s, Vt = np.linalg.svd(np.asarray(np.linalg.qr(rows, mode="r"), dtype=np.float64), full_matrices=False)
-        return np.asarray(Vt.T / np.maximum(s, 1e-12 * s[:1]))
+        every = np.asarray(Vt.T / np.maximum(s, 1e-12 * s[:1]))
+        if not self.priors or len(s) <= _FEW:
+            return every, every[:, :0]
+        seen = s**2 - 1.0 > _UNSEEN
+        return every[:, seen], every[:, ~seen]
 
 
 class Moments:

@@ -237,8 +237,8 @@ def _solve_with_noise(
             limits, change = _within(within, every.free, there.free), np.inf
         if change < _SETTLED and _load_shift(problem, there) < _LOADS_AGREE * small:
             break
-        if [*there.free.names] != [*problem.free.names]:
-            components = None  # whether the joints err, and how, is asked again
+        if len(there.free.names) > len(problem.free.names):
+            components = None  # with curves it is asked again whether the joints err
         problem = there
         solution = solve_with_joints(problem, joints, loss, limits, small, curves.design_effect)
         steps += solution.steps

@@ -252,6 +252,7 @@ def _covariance(
     directions = state.of.at.directions
     inverse = np.asarray(np.linalg.solve(state.L, np.eye(len(state.L))), dtype=np.float64)
     turned = directions @ inverse.T
+    unseen = state.of.at.unseen @ state.of.at.unseen.T
     kinds: list[NDArray[np.intp] | int] = [*taken, *noise]
     relative = _relative(state, kinds)
     changes = []
@@ -269,9 +270,9 @@ def _covariance(
     ]
     if state.of.at.priors:
         rest = np.eye(len(inverse)) - sum(changes)
-        parts.append(CovariancePart(turned @ rest @ turned.T, np.inf))
+        parts.append(CovariancePart(turned @ rest @ turned.T + unseen, np.inf))
     free = [changes[place] for place in known]
-    return turned @ _widened(free, relative, len(inverse)) @ turned.T, tuple(parts)
+    return turned @ _widened(free, relative, len(inverse)) @ turned.T + unseen, tuple(parts)
 
 
 def _with_and_without(

@@ -31,6 +31,8 @@ SELECTABLE: Final = tuple(effect.name for effect in EFFECTS if effect.selectable
 _HARDLY: Final = 1e-6
 #: A reading that a loss left no weight counts as if it had left this much, in the ranking.
 _LEAST_WEIGHT: Final = 1e-6
+#: Share of the largest variance at which that of a coefficient begins again that was nothing.
+_LEAST_BEFORE: Final = 1e-3
 
 
 def open_effects(
@@ -96,16 +98,25 @@ class CurveColumns:
         without
             A fold that has no say in the priors.
         """
-        kept = np.ones(len(self.rows), dtype=bool)
-        if without is not None:
-            kept[without + 1] = False
-        moments = moments_without(self.moments[kept].sum(axis=0), self.others)
-        found = curve_variances(moments, float(self.rows[kept].sum()), self.joint, self.period).variance
+        found = self._variance if without is None else self._found(without)
         bands = np.stack([self.joint, np.searchsorted(BANDS, self.period, side="right")])
         of = np.unique(bands, axis=1, return_inverse=True)[1].reshape(-1)
         variance = (np.bincount(of, found) / np.bincount(of))[of]
         used = variance > 0.0
         return np.asarray(self.columns[:, used] * np.sqrt(variance[used])) if used.any() else None
+
+    @cached_property
+    def _variance(self) -> Array:
+        """The likeliest variance of each coefficient from all rows [rad^2], ``(k,)``."""
+        return self._found(None)
+
+    def _found(self, without: int | None) -> Array:
+        kept = np.ones(len(self.rows), dtype=bool)
+        if without is not None:
+            kept[without + 1] = False
+        moments = moments_without(self.moments[kept].sum(axis=0), self.others)
+        before = None if without is None else np.maximum(self._variance, _LEAST_BEFORE * self._variance.max())
+        return curve_variances(moments, float(self.rows[kept].sum()), self.joint, self.period, before).variance
 
 
 @dataclass(frozen=True, eq=False)

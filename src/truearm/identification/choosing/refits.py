@@ -14,7 +14,7 @@ from truearm.identification.held import Held
 from truearm.identification.solving.bounds import Bounds
 from truearm.identification.solving.losses import Loss
 from truearm.identification.solving.models import Model
-from truearm.identification.solving.rounds import Redundant, find_parameters
+from truearm.identification.solving.rounds import Redundant, Solved, find_parameters
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of
 from truearm.modeling.chain import Array
@@ -33,8 +33,8 @@ class How:
     bounds_file: str
     held: Held
 
-    def find(self, robot: Robot, data: Dataset, model: Model, small: float) -> Robot:
-        """Return the robot with the parameters found."""
+    def find(self, robot: Robot, data: Dataset, model: Model, small: float, near: Solved | None) -> Solved:
+        """Return the parameters, as they are found when the search begins near others."""
         return find_parameters(
             robot,
             data,
@@ -45,7 +45,8 @@ class How:
             bounds_file=self.bounds_file,
             held=self.held,
             small=small,
-        ).robot
+            near=near,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,14 +87,17 @@ class Refits:
 
     def _found(self, effects: tuple[str, ...]) -> Array | None:
         found = np.full(self.data.configurations, np.nan)
+        solved, before = None, None
         for number in range(FOLDS):
             inside, outside = np.flatnonzero(self.folds.of != number), np.flatnonzero(self.folds.of == number)
             training = self.data.of_configurations(inside)
+            robot = self.robot_of(number, effects)
+            near = solved if robot == before and self.how.redundancy == "prior" else None
             try:
-                robot = self.how.find(self.robot_of(number, effects), training, self.model_of(effects), _TOLERANCE)
+                solved, before = self.how.find(robot, training, self.model_of(effects), _TOLERANCE, near), robot
             except InputError:  # too few equations in a fold, or a bound that a redundant one cannot keep
                 return None
-            found[outside] = _errors(robot, training, self.data.of_configurations(outside))
+            found[outside] = _errors(solved.robot, training, self.data.of_configurations(outside))
         return found
 
 

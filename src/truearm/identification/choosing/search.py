@@ -19,6 +19,8 @@ from truearm.modeling.chain import Array
 CURVE: Final = "joint-curve"
 #: So many choices are all looked at; of more, one effect after the other is added, or two.
 _ALL: Final = 1024
+#: Standard errors that curves have to gain in closed form.
+_CLEAR: Final = 3.0
 
 
 @dataclass(frozen=True)
@@ -269,9 +271,10 @@ class Choices:
         return search.left_without(number, effects)
 
     def best(self, without: Collection[str]) -> frozenset[str]:
-        """Return the best choice, with curves if they gain more than a standard error, but some effects."""
+        """Return the best choice without some effects; with curves, of hundreds of coefficients, if these gain clearly."""
         found = self.plain.best([name for name in self.plain.columns if name not in without])
         if self.curved is None or CURVE in without:
             return found
         curved = self.curved.best([name for name in self.curved.columns if name not in without]) | {CURVE}
-        return curved if self.gain(found, curved).believed else found
+        gained = self.gain(found, curved)
+        return curved if gained.mean > _CLEAR * gained.error else found

@@ -402,7 +402,7 @@ class _Choice:
                 harms = "it makes held-out errors larger"
                 reason = harms if tried.mean <= 0.0 else "it gains no more than chance may"
                 if tried.believed:
-                    reason = "without it the errors are the same to a standard error of the best model"
+                    reason = "it gains too little for all its parameters"
             rows.append(Candidate(name, name in chosen, tried, reason))
         smaller, now = [], chosen
         while now:

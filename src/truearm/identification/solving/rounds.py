@@ -105,6 +105,7 @@ def find_parameters(
     held: Held = NOTHING_HELD,
     small: float = SMALL,
     shared: bool = True,
+    near: Solved | None = None,
 ) -> Solved:
     """Find the free parameters of a robot from training data.
 
@@ -114,8 +115,11 @@ def find_parameters(
     ----------
     shared
         Whether errors of the joints that the readings of an arrival share are looked for, with the linear loss.
+    near
+        A solution of the same robot and model from other data: the search begins at its frames, values and variances.
+        What is found does not depend on it.
     """
-    start = start_from_readings(model.prepared(robot), data, held)
+    start = start_from_readings(model.prepared(robot), data, held) if near is None else near.start
     check_circumstances(start, data)
     free = held.free_of(unanchored(model.free(start), data), start)
     if redundancy != "prior":  # what is known of an instrument's scale is a prior: without any it is exact
@@ -149,6 +153,10 @@ def find_parameters(
             cure="Give `bounds`, `hold` what is known, or use `redundancy=drop`, which holds what is redundant.",
         )
     problem = Problem(start, data, free, dict(_FIRST_NOISE), priors=redundancy == "prior")
+    joints = None
+    if near is not None:
+        problem = _begun_at(problem, near)
+        joints = None if near.components is None else near.components.weighing.joints
     check_solvable(problem)
     dropped: tuple[Redundancy, ...] = ()
     if redundancy == "drop":
@@ -161,7 +169,7 @@ def find_parameters(
         kept = problem.free.without(out)
         limits = None if check_bounds is None else _limits_of(check_bounds, free, kept)
         solution, reduced, components, curves = _solve_with_noise(
-            replace(problem, free=kept), loss, limits, small, shared=shared and redundancy != "none"
+            replace(problem, free=kept), loss, limits, small, shared=shared and redundancy != "none", joints=joints
         )
         steps += solution.steps
         if redundancy != "drop":
@@ -180,6 +188,14 @@ def find_parameters(
         limits = _limits_of(check_bounds, free, reduced.free)
     start = start.with_parameters(curves.priors_of(start))
     return Solved(start, reduced, replace(solution, steps=steps), dropped, limits, components, held, curves)
+
+
+def _begun_at(problem: Problem, near: Solved) -> Problem:
+    """Return a problem that begins at the values and the noise of a solution."""
+    known = dict(zip(near.problem.free.names, map(float, near.solution.vector), strict=True))
+    there = {name: value for name, value in known.items() if name in problem.free.names}
+    started = FreeParameters(tuple(replace(p, value=there.get(p.name, p.value)) for p in problem.free.parameters))
+    return replace(problem, robot=problem.robot.with_values(there), free=started, noise=near.problem.noise)
 
 
 def in_the_middle(robot: Robot, data: Dataset) -> Robot:
@@ -205,7 +221,13 @@ def _limits_of(limits: tuple[Array, Array], free: FreeParameters, kept: FreePara
 
 
 def _solve_with_noise(
-    problem: Problem, loss: Loss, limits: tuple[Array, Array] | None, small: float, *, shared: bool
+    problem: Problem,
+    loss: Loss,
+    limits: tuple[Array, Array] | None,
+    small: float,
+    *,
+    shared: bool,
+    joints: Array | None = None,
 ) -> tuple[Solution, Problem, Components | None, Curves]:
     """Solve; then again with what the solution says of deviations, of the joints' curves and of the loads.
 
@@ -219,9 +241,9 @@ def _solve_with_noise(
     if curves:
         problem = replace(problem, free=problem.free.without(curves.names))
         limits = _within(within, every.free, problem.free)
-    solution = solve(problem, loss, limits, small)
+    joints = np.zeros(len(problem.robot.joints)) if joints is None else joints
+    solution = solve_with_joints(problem, joints, loss, limits, small)
     steps = solution.steps
-    joints = np.zeros(len(problem.robot.joints))
     components = None
     for _ in range(_ROUNDS + (curves.rounds if curves else 0)):
         if loss == "linear" and shared:

@@ -19,8 +19,10 @@ from truearm.modeling.chain import Array
 CURVE: Final = "joint-curve"
 #: So many choices are all looked at; of more, one effect after the other is added, or two.
 _ALL: Final = 1024
-#: Standard errors that curves have to gain in closed form.
-_CLEAR: Final = 3.0
+#: Standard errors, and share of the held-out error, that curves have to gain: hundreds of coefficients are looked at no
+#: further for less.
+CLEAR: Final = 3.0
+_WORTH_IT: Final = 0.05
 
 
 @dataclass(frozen=True)
@@ -277,4 +279,5 @@ class Choices:
             return found
         curved = self.curved.best([name for name in self.curved.columns if name not in without]) | {CURVE}
         gained = self.gain(found, curved)
-        return curved if gained.mean > _CLEAR * gained.error else found
+        least = max(CLEAR * gained.error, _WORTH_IT * float(np.nanmean(self.errors(found))))
+        return curved if gained.mean > least else found

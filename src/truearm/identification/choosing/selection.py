@@ -19,7 +19,7 @@ from truearm.errors import InputError
 from truearm.identification.choosing.candidates import SELECTABLE, CurveColumns, Ground, closed_because, loads_bend
 from truearm.identification.choosing.folds import FOLDS, Folds, folds_of
 from truearm.identification.choosing.refits import How, Refits
-from truearm.identification.choosing.search import CURVE, Choices, Gain, Search, gain
+from truearm.identification.choosing.search import CLEAR, CURVE, Choices, Gain, Search, gain
 from truearm.identification.held import NOTHING_HELD, Held
 from truearm.identification.judging.transmission import FEWEST, PeriodicError, Pulls, lines_of
 from truearm.identification.solving.bounds import Bounds
@@ -329,7 +329,7 @@ class _Choice:
             self.progress("choosing a model: curves in the folds")
             errors, before = self._errors_of_curves(search, chosen), search.errors(plain)
             found.append(_confirmation(chosen, plain, errors, before, self.folds))
-            if found[-1].gain.believed:
+            if found[-1].gain.mean > CLEAR * found[-1].gain.error:
                 return chosen, found
             self.reasons[CURVE] = _NOT_BORNE_OUT
             chosen = plain

@@ -10,6 +10,7 @@ from truearm.identification.judging.expected_error import ExpectedError
 from truearm.identification.solving.fit import Fit, Status
 from truearm.modeling.conventions import parallel_joints_without_beta
 from truearm.modeling.effects import EFFECTS, NON_NEGATIVE
+from truearm.modeling.effects.joint_curve import JointCurve
 from truearm.modeling.loads import has_weight
 from truearm.notices import Notice
 from truearm.shown import listed

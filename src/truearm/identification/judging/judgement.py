@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from truearm.identification.judging.advice import check_fit
 from truearm.identification.judging.arrival_lag import check_arrival_lag
 from truearm.identification.judging.changes import notices_of_change
+from truearm.identification.judging.curve_range import check_curves
 from truearm.identification.judging.expected_error import ExpectedError, as_residuals_allow, expected_error
 from truearm.identification.judging.implausible import check_plausible
 from truearm.identification.judging.large_remainder import check_remainder
@@ -114,6 +115,7 @@ def judge(
         *([] if doubted else check_separate_visits(left_over)),
         *explained,
         *check_transmission(fit, training),
+        *check_curves(fit, training),
     )
     steps = steps_after_fit(
         Judged(

@@ -50,6 +50,8 @@ class CurveVariances:
     ----------
     variance
         Of each coefficient [rad^2], ``(coefficients,)``; zero where it is left out.
+    full
+        The same before those are left out that move next to nothing.
     noise
         Variance of the residuals by the one assumed.
     informed
@@ -61,6 +63,7 @@ class CurveVariances:
     """
 
     variance: Array
+    full: Array
     noise: float
     informed: Array
     likelihood: float
@@ -96,9 +99,9 @@ def curve_variances(
     variance = _start(F, joint, rows) if before is None else before.copy()
     variance[size <= 0.0] = 0.0
     group = np.unique(np.stack([joint, period]), axis=1, return_inverse=True)[1].reshape(-1)
-    band = np.unique(
-        np.stack([joint, np.searchsorted(BANDS, period, side="right")]), axis=1, return_inverse=True
-    )[1].reshape(-1)
+    band = np.unique(np.stack([joint, np.searchsorted(BANDS, period, side="right")]), axis=1, return_inverse=True)[
+        1
+    ].reshape(-1)
     climb = _Climb(group, band, least_noise)
     state = climb.climbed(_Marginal(F, z, rows, variance, max((float(z @ z) + rest) / rows, least_noise), rest))
     gains: dict[int, float] = {}
@@ -115,7 +118,12 @@ def curve_variances(
     small[order] = np.cumsum(moved[order]) <= _NEGLIGIBLE * state.noise * rows
     kept = (state.variance > 0.0) & ~small[group]
     return CurveVariances(
-        np.where(kept, state.variance, 0.0), state.noise, state.known, state.likelihood, gains if kept.any() else {}
+        np.where(kept, state.variance, 0.0),
+        state.variance,
+        state.noise,
+        state.known,
+        state.likelihood,
+        gains if kept.any() else {},
     )
 
 
@@ -200,9 +208,9 @@ class _Climb:
         """Return the scale of each group's band."""
         used = v > 0.0
         inverse = np.bincount(self.of_group[used], 1.0 / v[used], minlength=self.of_group.max() + 1)
-        return np.asarray((np.bincount(self.of_group[used], minlength=len(inverse)) / np.maximum(inverse, 1e-300))[
-            self.of_group
-        ])
+        return np.asarray(
+            (np.bincount(self.of_group[used], minlength=len(inverse)) / np.maximum(inverse, 1e-300))[self.of_group]
+        )
 
     def objective(self, state: _Marginal) -> float:
         """Return the likelihood with that of the variances."""

@@ -75,9 +75,7 @@ class Curves:
 
     def priors_of(self, robot: Robot) -> list[Parameter]:
         """Return a robot's coefficients with what is expected of them."""
-        return [
-            replace(robot.parameters[name], prior=math.sqrt(variance)) for name, variance in self.variances.items()
-        ]
+        return [replace(robot.parameters[name], prior=math.sqrt(variance)) for name, variance in self.variances.items()]
 
 
 def with_stiffness(
@@ -137,7 +135,9 @@ def with_stiffness(
     kept = [p for p in every.parameters if p.name in (variances if p.name in curves.places else now)]
     free = FreeParameters(
         tuple(
-            replace(robot.parameters[p.name], prior=math.sqrt(variances[p.name])) if p.name in variances else now[p.name]
+            replace(robot.parameters[p.name], prior=math.sqrt(variances[p.name]))
+            if p.name in variances
+            else now[p.name]
             for p in kept
         )
     )
@@ -151,3 +151,7 @@ def with_stiffness(
         rounds=curves.rounds - 1 if variances else 0,
     )
     return left, known
+
+
+#: Of a model without any.
+NO_CURVES: Final = Curves()

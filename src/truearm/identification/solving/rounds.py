@@ -16,8 +16,8 @@ from truearm.errors import InputError
 from truearm.identification.held import NOTHING_HELD, Held
 from truearm.identification.solving.arrivals import Arrivals, WhitenedProblem, Whitening
 from truearm.identification.solving.bounds import Bounds, bound_vectors
+from truearm.identification.solving.curves import NO_CURVES, Curves, with_stiffness
 from truearm.identification.solving.likelihood import Linearised
-from truearm.identification.solving.curves import Curves, with_stiffness
 from truearm.identification.solving.losses import Loss, meets_exactly, norms_of, scale_of, weighed_together
 from truearm.identification.solving.models import Model
 from truearm.identification.solving.problem import SETUP, Problem, check_circumstances, check_solvable
@@ -33,6 +33,7 @@ from truearm.identification.start_values.from_readings import start_from_reading
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.observations import OBSERVATIONS
 from truearm.modeling.chain import Array
+from truearm.modeling.effects.joint_curve import JointCurve
 from truearm.modeling.effects.warm_up import LEFT, RATE, share_left
 from truearm.modeling.parameters import SCALE, FreeParameters
 from truearm.modeling.robot import Robot
@@ -84,7 +85,7 @@ class Solved:
     limits: tuple[Array, Array] | None
     components: Components | None
     held: Held = NOTHING_HELD
-    curves: Curves = Curves()
+    curves: Curves = NO_CURVES
 
     @property
     def robot(self) -> Robot:
@@ -125,6 +126,15 @@ def find_parameters(
     if redundancy != "prior":  # what is known of an instrument's scale is a prior: without any it is exact
         free = free.without([SCALE])
     check_bounds = None
+    if redundancy != "prior" and JointCurve.name in model.effects:
+        raise InputError(
+            "curves of joints are found with priors, whose size the data tell",
+            parameter="redundancy",
+            where=f"model {model.name}",
+            came=redundancy,
+            allowed="prior",
+            cure=f"Leave out `redundancy`, or the joint effect {JointCurve.name}.",
+        )
     if not free.names:
         raise InputError(
             "everything that this model frees is held, so there is nothing to find",

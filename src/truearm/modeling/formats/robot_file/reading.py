@@ -12,9 +12,11 @@ from truearm.errors import InputError, did_you_mean, name_place
 from truearm.files import read_yaml
 from truearm.modeling.conventions import convention
 from truearm.modeling.effects import EFFECTS, NON_NEGATIVE
+from truearm.modeling.effects.joint_curve import JointCurve
 from truearm.modeling.fixtures import Fixture
 from truearm.modeling.formats.balancer_entry import check_anchors
 from truearm.modeling.formats.controller_entry import STATED
+from truearm.modeling.formats.curve_entry import curve_parameters
 from truearm.modeling.formats.robot_file.schema import JointEntry, ProofEntry, RobotFile
 from truearm.modeling.parameters import SCALE, SCALE_GROUP, Parameter
 from truearm.modeling.parts import NO_PAYLOAD, Inertia, Joint, LinkMass, Payload, Target, Tool, Truth
@@ -207,7 +209,12 @@ def _with_values(robot: Robot, content: RobotFile, where: str) -> Robot:
                 informed=entry.informed,
             )
         )
-    robot = replace(robot, truths=truths, known={p.name: p for p in parameters})
+    effect = next((effect for effect in robot.effects if isinstance(effect, JointCurve)), None)
+    curves = curve_parameters(content.joint_curves, effect, content.units.angle, where)
+    twice = next((p.name for p in parameters if p.name in curves), None)
+    if twice is not None:
+        raise InputError("the parameter stands in joint_curves too", where=f"{where}, parameters", came=twice)
+    robot = replace(robot, truths=truths, known={p.name: p for p in parameters} | curves)
     return robot if content.proof is None else replace(robot, proof=_proof(robot, content.proof, shown, where))
 
 

@@ -13,6 +13,7 @@ from truearm.modeling.effects import EFFECTS
 from truearm.modeling.fixtures import FixtureKind
 from truearm.modeling.formats.balancer_entry import BalancerEntry
 from truearm.modeling.formats.controller_entry import ControllerEntry
+from truearm.modeling.formats.curve_entry import CurveEntry
 from truearm.modeling.formats.entries import STRICT, Name, NotNegative, Number, Place, Positive, Quaternion, Triple
 from truearm.modeling.parts import GRAVITY, POINT_MASS, Inertia
 from truearm.printable import is_one_line
@@ -223,5 +224,6 @@ class RobotFile(_Entry):
     targets: list[TargetEntry] = []
     fixtures: list[FixtureEntry] = []
     parameters: dict[str, ParameterEntry] = {}
+    joint_curves: list[CurveEntry] = []
     proof: ProofEntry | None = None
     history: list[str] = []

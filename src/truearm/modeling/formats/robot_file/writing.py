@@ -11,6 +11,7 @@ from typing import Any, Final
 from truearm.modeling.controller import AS_THE_MODEL
 from truearm.modeling.formats.balancer_entry import balancer_entry
 from truearm.modeling.formats.controller_entry import controller_entry
+from truearm.modeling.formats.curve_entry import curve_entries
 from truearm.modeling.formats.entries import NAME, place_entry
 from truearm.modeling.formats.robot_file.schema import SCHEMA
 from truearm.modeling.parameters import Parameter
@@ -198,10 +199,15 @@ def file_content(robot: Robot) -> dict[str, Any]:
             )
             for f in robot.fixtures
         ]
-    if robot.known:
-        content["parameters"] = {
-            text(name): flow(_parameter(robot.known[name], shown)) for name in robot.parameters if name in robot.known
-        }
+    curves, in_curves = curve_entries(robot.known, len(robot.joints))
+    single = [name for name in robot.parameters if name in robot.known and name not in in_curves]
+    if single:
+        content["parameters"] = {text(name): flow(_parameter(robot.known[name], shown)) for name in single}
+    if curves:
+        content["joint_curves"] = [
+            {key: DoubleQuotedScalarString(part) if isinstance(part, str) else part for key, part in entry.items()}
+            for entry in curves
+        ]
     if robot.proof is not None:
         content["proof"] = _proof(robot, robot.proof, flow, listed, text)
     if robot.history:

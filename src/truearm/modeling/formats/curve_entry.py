@@ -1,0 +1,161 @@
+"""The entry of a joint's curve in a robot file: one line each for what hundreds of parameters would be."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Final
+
+from pydantic import BaseModel, Field, StringConstraints
+
+from truearm.errors import InputError
+from truearm.modeling.effects.joint_curve import HIGHEST, JointCurve, curve_names
+from truearm.modeling.formats.entries import STRICT
+from truearm.modeling.parameters import Parameter
+from truearm.shown import counted
+from truearm.units import as_number, sized_si, written
+
+#: What may be left out where it is zero, or not known, for all terms of a joint.
+_OPTIONAL: Final = ("nominal", "deviation", "informed")
+_COLUMNS: Final = ("nominal", "value", "prior", "deviation", "informed")
+
+Numbers = Annotated[str, StringConstraints(strict=True)]
+
+
+class CurveEntry(BaseModel):
+    """The curve of a joint: its terms, and for each of them the numbers of a parameter in degrees or radians."""
+
+    model_config = STRICT
+    joint: Annotated[int, Field(strict=True)]
+    terms: Numbers
+    value: Numbers
+    prior: Numbers
+    nominal: Numbers | None = None
+    deviation: Numbers | None = None
+    informed: Numbers | None = None
+
+
+def curve_entries(known: Mapping[str, Parameter], joints: int) -> tuple[list[dict[str, object]], set[str]]:
+    """Return the entries of the curves of a robot, in degrees, and the names of the parameters that they hold.
+
+    Parameters
+    ----------
+    known
+        Parameters that differ from the plain nominal ones.
+    joints
+        How many joints there are.
+    """
+    made: list[dict[str, object]] = []
+    held: set[str] = set()
+    for number in range(1, joints + 1):
+        mine = [known[name] for name in curve_names(number) if name in known]
+        if not mine:
+            continue
+        entry: dict[str, object] = {
+            "joint": number,
+            "terms": " ".join(p.name.removeprefix("curve_").removesuffix(f"_{number}") for p in mine),
+        }
+        columns: dict[str, Sequence[float | None]] = {
+            "nominal": [written(p.nominal, "deg") for p in mine],
+            "value": [written(p.value, "deg") for p in mine],
+            "prior": [written(p.prior, "deg") for p in mine],
+            "deviation": [None if p.deviation is None else written(p.deviation, "deg") for p in mine],
+            "informed": [p.informed for p in mine],
+        }
+        if any(None in column and any(v is not None for v in column) for column in columns.values()):
+            continue  # such parameters stand one by one
+        if not any(columns["nominal"]):
+            del columns["nominal"]
+        entry |= {name: " ".join(map(repr, column)) for name, column in columns.items() if None not in column}
+        made.append(entry)
+        held |= {p.name for p in mine}
+    return made, held
+
+
+def curve_parameters(
+    entries: Sequence[CurveEntry], effect: JointCurve | None, angle: str, where: str
+) -> dict[str, Parameter]:
+    """Return the parameters that the entries of curves state.
+
+    Parameters
+    ----------
+    effect
+        Of the robot; None if it has no curves.
+    angle
+        Unit of angles in the file.
+    where
+        Names the file in messages.
+
+    Raises
+    ------
+    InputError
+        If there is no such joint or term, one stands twice, or a list has other numbers than it should.
+    """
+    found: dict[str, Parameter] = {}
+    for place, entry in enumerate(entries, 1):
+        here = f"{where}, joint_curves[{place}]"
+        if effect is None:
+            raise InputError(
+                "the robot has no curves of joints",
+                where=here,
+                cure=f"Add the joint effect {JointCurve.name} to the entry effects.",
+            )
+        turning = [joint + 1 for joint in effect.terms]
+        if entry.joint not in turning:
+            raise InputError(
+                "there is no such turning joint",
+                where=f"{here}.joint",
+                came=entry.joint,
+                allowed=", ".join(map(str, turning)) or "none",
+            )
+        plain = {p.name: p for p in effect.parameters}
+        names = [f"curve_{term}_{entry.joint}" for term in entry.terms.split()]
+        for name in names:
+            if name not in plain:
+                raise InputError(
+                    "there is no such term of a curve",
+                    where=f"{here}.terms",
+                    came=name.removeprefix("curve_").removesuffix(f"_{entry.joint}"),
+                    allowed=f"sin1, cos1 to sin{HIGHEST}, cos{HIGHEST}",
+                )
+            if name in found or names.count(name) > 1:
+                raise InputError("a term of a curve stands twice", where=f"{here}.terms", came=name)
+        columns = {
+            column: _numbers(getattr(entry, column), len(names), f"{here}.{column}", least=column in _POSITIVE)
+            for column in _COLUMNS
+            if getattr(entry, column) is not None
+        }
+        for number, name in enumerate(names):
+            stated = {
+                column: values[number]
+                if column == "informed"
+                else sized_si(values[number], angle, f"{here}.{column}", deviation=column in _POSITIVE)
+                for column, values in columns.items()
+            }
+            found[name] = Parameter(
+                name,
+                plain[name].unit,
+                plain[name].group,
+                nominal=stated.get("nominal", 0.0),
+                value=stated["value"],
+                prior=stated["prior"],
+                deviation=stated.get("deviation"),
+                informed=stated.get("informed"),
+            )
+    return found
+
+
+_POSITIVE: Final = ("prior", "deviation")
+
+
+def _numbers(text: str, count: int, where: str, *, least: bool) -> list[float]:
+    numbers = [as_number(word) for word in text.split()]
+    known = [v for v in numbers if v is not None and math.isfinite(v) and (v >= 0.0 or not least)]
+    if len(known) != len(numbers) or len(known) != count:
+        raise InputError(
+            f"{'numbers of 0 or more belong' if least else 'numbers belong'} here, one for each term",
+            where=where,
+            came=text if len(text) < 80 else f"{text[:77]}...",
+            allowed=counted(count, "number"),
+        )
+    return known

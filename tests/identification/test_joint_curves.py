@@ -1,0 +1,248 @@
+"""Curves of joints: their stiffness by restricted maximum likelihood, and what they do for twins whose gears err."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from truearm.errors import InputError
+from truearm.identification.judging.advice import check_fit
+from truearm.identification.judging.curve_range import check_curves
+from truearm.identification.judging.expected_error import expected_error
+from truearm.identification.solving.curve_stiffness import curve_variances, moments_without
+from truearm.identification.solving.fit import Fit, Status, identify
+from truearm.identification.solving.models import named_model
+from truearm.library import load_robot
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.statistics import errors_of
+from truearm.modeling.chain import Array
+from truearm.modeling.effects.joint_curve import curve_names, curve_waves
+from truearm.modeling.parts import Payload
+from truearm.modeling.robot import Robot
+from truearm.simulation.truths import truth_twin
+from truearm.simulation.twin import Twin, measure
+from truearm.simulation.twin_joint import PERFECT, JointTruth
+
+GEOMETRIC, ELASTIC = named_model("geometric"), named_model("elastic")
+CURVED = GEOMETRIC.also(["joint-curve"])
+NOISE = 2e-5
+#: Of three joints: an eccentric wheel, an oval one, teeth and an encoder.
+GEARS = {
+    1: ((1, 3e-4, 0.3), (13, 2e-4, 1.0)),
+    2: ((2, 2e-4, 2.0), (20, 2e-4, -1.0), (57, 1e-4, 0.5)),
+    4: ((1, 2e-4, -2.0), (3, 2e-4, 0.1), (31, 2e-4, 1.2)),
+}
+
+
+def geared(truth: str = "random", seed: int = 1) -> Twin:
+    twin = truth_twin(load_robot("irb120"), truth, np.random.default_rng(seed))
+    more = {number: replace(twin.joints.get(number, PERFECT), gear=gear) for number, gear in GEARS.items()}
+    return replace(twin, joints={**twin.joints, **more})
+
+
+def campaign(twin: Twin, count: int, seed: int, spread: float = 1.0) -> Dataset:
+    rng = np.random.default_rng(seed)
+    return measure(twin, spread * load_robot("irb120").random_configurations(count, rng), NOISE, rng)
+
+
+def mean_error(robot: Robot, data: Dataset) -> float:
+    spread = errors_of(robot, data).position
+    assert spread is not None
+    return spread.mean
+
+
+# -- stiffness
+
+
+def synthetic(
+    rows: int, joints: int, variance: Array, rng: np.random.Generator, arc: float = 2 * math.pi
+) -> tuple[Array, Array, Array, Array, Array]:
+    """Return derivatives by 5 other parameters and by curves, right sides, and joint and period of each coefficient."""
+    highest = len(variance) // (2 * joints)
+    F = np.column_stack(
+        [rng.normal(size=(rows, 1)) * curve_waves(rng.uniform(0, arc, rows), highest).T for _ in range(joints)]
+    )
+    A = 3.0 * rng.normal(size=(rows, 5))
+    z = A @ rng.normal(size=5) + F @ (np.sqrt(variance) * rng.normal(size=len(variance))) + rng.normal(size=rows)
+    joint = np.repeat(np.arange(joints), 2 * highest)
+    period = np.tile(np.repeat(np.arange(1, highest + 1), 2), joints)
+    return A, F, z, joint, period
+
+
+def moments_of(A: Array, F: Array, z: Array) -> Array:
+    columns = np.column_stack([A, F, z])
+    return moments_without(columns.T @ columns, A.shape[1])
+
+
+def test_likelihood_is_that_of_the_dense_covariance() -> None:
+    rng = np.random.default_rng(3)
+    variance = np.repeat([9.0, 0.0, 4.0, 0.5], 4)
+    A, F, z, joint, period = synthetic(120, 2, variance, rng)
+    found = curve_variances(moments_of(A, F, z), len(z), joint, period)
+    assert set(found.gains) == {0, 1}
+
+    def dense(v: Array) -> float:
+        V = found.noise * (np.eye(len(z)) + A @ A.T) + (F * v) @ F.T
+        return -0.5 * float(np.linalg.slogdet(V)[1] + z @ np.linalg.solve(V, z))
+
+    free = found.full
+    for i, gain in found.gains.items():
+        assert gain == pytest.approx(dense(free) - dense(np.where(joint == i, 0.0, free)), abs=1e-6)
+
+
+def test_variances_are_those_that_were_drawn() -> None:
+    rng = np.random.default_rng(4)
+    truth = np.tile(np.repeat([4.0, 1.0, 0.25], 20), 2)
+    truth[60:] = 0.0  # the other joint has no curve
+    ratios = []
+    for _ in range(5):
+        found = curve_variances(*_given(synthetic(1500, 2, truth, rng)))
+        assert set(found.gains) == {0}
+        assert not found.variance[60:].any()
+        assert found.noise == pytest.approx(1.0, abs=0.15)
+        ratios.append(found.full[:60].reshape(3, 20).mean(axis=1) / [4.0, 1.0, 0.25])
+    assert_allclose(np.mean(ratios, axis=0), 1.0, atol=0.3)
+
+
+def _given(made: tuple[Array, Array, Array, Array, Array]) -> tuple[Array, float, Array, Array]:
+    A, F, z, joint, period = made
+    return moments_of(A, F, z), float(len(z)), joint, period
+
+
+def test_noise_alone_has_no_curve() -> None:
+    rng = np.random.default_rng(5)
+    for rows in (60, 300, 1000):
+        found = curve_variances(*_given(synthetic(rows, 3, np.zeros(3 * 120), rng)))
+        assert not found.variance.any()
+        assert found.gains == {}
+        assert found.noise == pytest.approx(1.0, abs=0.4)
+
+
+def test_a_line_stands_out_and_what_is_beside_it_is_shrunk() -> None:
+    truth = np.zeros(120)
+    truth[2 * 16 : 2 * 17] = 4.0
+    found = curve_variances(*_given(synthetic(400, 1, truth, np.random.default_rng(6))))
+    assert found.full[32:34].mean() > 1.0
+    assert np.delete(found.full, [32, 33]).max() < 0.05
+    assert found.informed[32:34].min() > 0.9
+
+
+def test_units_and_the_order_of_the_joints_do_not_matter() -> None:
+    made = synthetic(300, 2, np.repeat([1.0, 0.2], 40), np.random.default_rng(7))
+    A, F, z, joint, period = made
+    plain = curve_variances(*_given(made))
+    swapped = np.r_[40:80, 0:40]
+    other = curve_variances(moments_of(A, 1e3 * F[:, swapped], z), len(z), 1 - joint[swapped], period)
+    assert_allclose(1e6 * other.variance, plain.variance[swapped], rtol=1e-4, atol=1e-12)
+
+
+# -- twins
+
+
+@pytest.fixture(scope="module")
+def fitted() -> tuple[Twin, Dataset, Fit]:
+    twin = geared()
+    data = campaign(twin, 200, 11)
+    return twin, data, identify(load_robot("irb120"), data, CURVED)
+
+
+def test_gears_and_encoders_that_err_are_found(fitted: tuple[Twin, Dataset, Fit]) -> None:
+    twin, data, fit = fitted
+    fresh = campaign(twin, 200, 12)
+    floor = 2.0 * math.sqrt(2.0 / math.pi) * NOISE  # mean length of noise in three coordinates
+    assert fit.status is Status.CONVERGED
+    assert mean_error(fit.robot, fresh) < 1.3 * floor
+    assert mean_error(identify(load_robot("irb120"), data, GEOMETRIC).robot, fresh) > 3.0 * floor
+    free = set(fit.free.names)
+    assert {number for number in range(1, 7) if free & {*curve_names(number)}} == set(GEARS)
+    assert len(free) < 400
+
+
+def test_deviations_of_predictions_cover(fitted: tuple[Twin, Dataset, Fit]) -> None:
+    twin, _, fit = fitted
+    fresh = load_robot("irb120").random_configurations(200, np.random.default_rng(13))
+    truth = np.array([posture.targets["1"][:3, 3] for posture in twin.postures(fresh)])
+    kinematics = fit.robot.forward_kinematics(fresh, "1")
+    J = fit.robot.position_jacobian(kinematics, fresh, fit.free.names)
+    deviation = np.sqrt(np.einsum("pan,pq,qan->na", J, fit.covariance, J))
+    off = np.abs(kinematics.position.T - truth) / deviation
+    assert 0.88 < (off < 1.96).mean() <= 1.0
+
+
+def test_nothing_is_said_of_single_coefficients(fitted: tuple[Twin, Dataset, Fit]) -> None:
+    codes = {notice.code for notice in check_fit(fitted[2], expected_error(fitted[2]))}
+    assert not codes & {"effects-uninformed", "too-many-effects", "effects-idle", "rank-loss"}
+
+
+def test_outside_the_measured_range_the_curve_is_uncertain() -> None:
+    twin = geared()
+    data = campaign(twin, 150, 21, spread=0.35)
+    fit = identify(load_robot("irb120"), data, CURVED)
+    told = {notice.code: notice.message for notice in check_curves(fit, data)}
+    assert "axis_1 from -57 to 58 deg" in told["curve-range"]
+    names = [name for name in curve_names(1) if name in fit.free.names]
+    places = [fit.free.names.index(name) for name in names]
+    angle = np.radians([-30.0, 0.0, 30.0, 120.0, 150.0, 180.0])
+    waves = curve_waves(angle, 60)[[curve_names(1).index(name) for name in names]]
+    # Up to a constant, which is the joint's zero: what the curve does between two angles is compared.
+    between = waves - waves[:, [1]]
+    deviation = np.sqrt(np.einsum("kn,kl,ln->n", between, fit.covariance[np.ix_(places, places)], between))
+    assert deviation[3:].min() > 3.0 * max(deviation[0], deviation[2])
+    wide = campaign(twin, 200, 22)
+    target = fit.robot.targets[0].name
+    kinematics = fit.robot.forward_kinematics(wide.postures, target)
+    J = fit.robot.position_jacobian(kinematics, wide.postures, fit.free.names)
+    spread = np.sqrt(np.einsum("pan,pq,qan->na", J, fit.covariance, J))
+    mine = wide.target == wide.targets.index(target)
+    off = np.abs(wide.position[mine] - kinematics.position.T[wide.configuration[mine]])
+    assert ((off < 1.96 * np.hypot(spread, NOISE)[wide.configuration[mine]]).mean()) > 0.85
+
+
+def test_without_errors_of_gears_there_are_no_curves() -> None:
+    twin = truth_twin(load_robot("irb120"), "random", np.random.default_rng(2))
+    data = campaign(twin, 40, 31)
+    plain, curved = (identify(load_robot("irb120"), data, model) for model in (GEOMETRIC, CURVED))
+    assert curved.free.names == plain.free.names
+    for name, value in plain.robot.values.items():
+        assert curved.robot.values[name] == pytest.approx(value, rel=1e-6, abs=1e-9)
+    notice = check_curves(curved, data)[0]
+    assert notice.code == "curve-left-out"
+    assert notice.level == "note"
+    assert "no error that follows the angle of axis_1 (" in notice.message
+    assert check_curves(plain, data) == []
+
+
+def test_a_joint_that_hardly_turned_has_no_curve() -> None:
+    twin, rng = geared(), np.random.default_rng(5)
+    joints = load_robot("irb120").random_configurations(120, rng)
+    joints[:, 3] = 0.1 + 0.05 * rng.normal(size=120)
+    data = measure(twin, joints, NOISE, rng)
+    fit = identify(load_robot("irb120"), data, CURVED)
+    message = next(notice.message for notice in check_curves(fit, data) if notice.code == "curve-left-out")
+    assert "axis_4 (1" in message
+    assert message.split("axis_4")[1].count("turned too little to tell such an error from geometry") == 1
+
+
+def test_under_another_payload_curves_do_no_harm() -> None:
+    heavy, light = Payload(2.7, (0.05, 0.025, 0.1)), Payload(0.3, (0.0, 0.0, 0.05))
+    for seed in (1, 2):
+        twin = geared("tracker-triangular", seed)
+        data = campaign(twin, 100, 40 + seed)
+        robot = load_robot("irb120").with_payload(heavy)
+        other = campaign(replace(twin, robot=replace(twin.robot, payload=light)), 100, 50 + seed)
+        plain, curved = (identify(robot, data, model).robot for model in (ELASTIC, ELASTIC.also(["joint-curve"])))
+        assert mean_error(curved.with_payload(light), other) < 0.7 * mean_error(plain.with_payload(light), other)
+
+
+@pytest.mark.parametrize("redundancy", ["drop", "none"])
+def test_curves_need_priors(redundancy: str) -> None:
+    with pytest.raises(InputError, match="curves of joints are found with priors.*allowed: prior"):
+        identify(load_robot("irb120"), campaign(geared(), 30, 1), CURVED, redundancy=redundancy)  # type: ignore[arg-type]
+
+
+def test_a_joint_truth_is_what_the_curve_says() -> None:
+    assert JointTruth(gear=((3, 1e-4, 0.2),)).turn(0.7, 0.0, 0.0) == pytest.approx(1e-4 * math.sin(3 * 0.7 + 0.2))

@@ -36,7 +36,7 @@ class Made:
         return np.asarray(np.linalg.lstsq(rows, -target, rcond=None)[0])
 
     def explicit(self, more: Array, elsewhere: Array) -> Array:
-        """Return held-out residuals by a fit without each fold, which predicts with other columns if they are others."""
+        """Return held-out residuals by a fit without each fold, which may predict with other columns."""
         everywhere = np.ones(ROWS, dtype=bool)
         found = self.residual + np.column_stack([self.columns, more]) @ self.solved(everywhere, more)
         for number in range(FOLDS):

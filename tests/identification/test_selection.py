@@ -14,9 +14,10 @@ import pytest
 from truearm.errors import InputError
 from truearm.identification.choosing import chosen_fit
 from truearm.identification.choosing.candidates import SELECTABLE
+from truearm.identification.choosing.choice import Selection
 from truearm.identification.choosing.chosen_fit import check_choice, identify_chosen
 from truearm.identification.choosing.search import Gain
-from truearm.identification.choosing.selection import Selection, select
+from truearm.identification.choosing.selection import select
 from truearm.identification.solving.bounds import Bounds
 from truearm.identification.solving.fit import Fit, Status, identify
 from truearm.identification.solving.models import MODELS
@@ -165,7 +166,8 @@ def test_what_needs_loads_is_not_tried_on_an_arm_that_nothing_loads() -> None:
 
 def test_what_loads_hardly_excite_is_not_chosen() -> None:
     light = replace(arm(), masses=(), payload=Payload(0.01))
-    chosen = select(light, seen(Twin(replace(twin_of().robot, masses=(), payload=Payload(0.01))), 20, 7), candidates=FEW)
+    twin = replace(twin_of().robot, masses=(), payload=Payload(0.01))
+    chosen = select(light, seen(Twin(twin), 20, 7), candidates=FEW)
     assert chosen.model.effects == ()
     assert reason(chosen, "hardening") == "the readings tell less of it than is known beforehand"
 
@@ -323,7 +325,7 @@ def test_a_smaller_model_is_taken_where_a_fit_ends_unsound(monkeypatch: pytest.M
     data = seen(twin_of(backlash=math.radians(0.05)), 40, 2)
     chosen = select(arm(), data, candidates=FEW)
     assert "backlash" in chosen.model.effects
-    real = chosen_fit.identify
+    real = identify
 
     def unsound(*given: Any, **named: Any) -> Fit:
         fit = real(*given, **named)

@@ -14,8 +14,9 @@ from truearm.errors import InputError, refusals_of
 from truearm.files import path_argument, read_bytes
 from truearm.identification.base_changes import with_one_base
 from truearm.identification.choosing.balancer_loads import refuse_balancers_that_are_not_there, without_unseen_balancers
+from truearm.identification.choosing.choice import AUTO
 from truearm.identification.choosing.chosen_fit import check_choice, identify_chosen
-from truearm.identification.choosing.selection import AUTO, select
+from truearm.identification.choosing.selection import select
 from truearm.identification.judging.held_places import check_held
 from truearm.identification.judging.judgement import judge
 from truearm.identification.solving.bootstrap import LEAST_FITS

@@ -199,8 +199,8 @@ def _of_another_session(robot: Robot, data: Dataset) -> tuple[Dataset, list[Noti
     if data.number is None or LEFT not in robot.parameters:
         return data, []
     words = (
-        "The robot grew while it warmed up in the session that it was calibrated in. How warm it was in this one nobody "
-        "knows, so it is judged as in the middle of that session."
+        "The robot grew while it warmed up in the session that it was calibrated in. How warm it was in this one "
+        "nobody knows, so it is judged as in the middle of that session."
     )
     return replace(data, number=None), [Notice("other-session", words, "note")]
 

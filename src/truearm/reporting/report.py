@@ -21,6 +21,12 @@ from truearm.reporting.drawing import Figure
 from truearm.reporting.figures import correlation_map, expected_error_map, histogram, residuals, workspace
 from truearm.reporting.monte_carlo_figure import coverage_figure, interval_rows
 from truearm.reporting.page import page
+from truearm.reporting.selection_figure import (
+    candidate_rows,
+    candidates_figure,
+    choice_sentence,
+    confirmation_rows,
+)
 from truearm.reporting.tables import (
     SpreadRow,
     expected_rows,
@@ -31,12 +37,6 @@ from truearm.reporting.tables import (
     parameter_sentence,
     spread_rows,
     strongest_pairs,
-)
-from truearm.reporting.selection_figure import (
-    candidate_rows,
-    candidates_figure,
-    choice_sentence,
-    confirmation_rows,
 )
 from truearm.reporting.zones_figure import zone_rows, zones_figure
 from truearm.results.calibration import Calibration

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from truearm.identification.choosing.choice import Selection
 from truearm.identification.choosing.folds import FOLDS
-from truearm.identification.choosing.selection import Selection
 from truearm.reporting.drawing import AFTER, BEFORE, Figure, axis, figure
 from truearm.reporting.numbers import rounded
 from truearm.results.summaries import LAYOUT
@@ -47,11 +47,11 @@ def choice_sentence(selection: Selection) -> str:
     )
     elastic = "" if selection.elastic is None else f", that of the elastic model {selection.elastic * 1e3:.4f} mm"
     return (
-        f"By {FOLDS}-fold cross-validation on the training configurations alone, holding out {held_out}. The mean error "
-        f"of the geometric model there is {selection.geometric * 1e3:.4f} mm{elastic}, that of the chosen model "
+        f"By {FOLDS}-fold cross-validation on the training configurations alone, holding out {held_out}. The mean "
+        f"error of the geometric model there is {selection.geometric * 1e3:.4f} mm{elastic}, that of the chosen model "
         f"{selection.error * 1e3:.4f} mm. Errors of every choice follow in closed form from one fit; of those that are "
-        "not worse than the best one by a standard error, the one with the fewest parameters was taken. Gains are those "
-        "over the chosen model without the effect, or what it would gain with it."
+        "not worse than the best one by a standard error, the one with the fewest parameters was taken. Gains are "
+        "those over the chosen model without the effect, or what it would gain with it."
     )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.errors import InputError, did_you_mean
-from truearm.identification.choosing.selection import Selection
+from truearm.identification.choosing.choice import Selection
 from truearm.identification.choosing.zone_boxes import flange_places
 from truearm.identification.choosing.zones import ZoneVerdict
 from truearm.identification.judging.error_budget import ErrorBudget, error_budget

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any, Final
 
-from truearm.identification.choosing.selection import Selection
+from truearm.identification.choosing.choice import Selection
 from truearm.identification.judging.expected_error import Expectation, ExpectedError
 from truearm.identification.judging.repeatability import Repeatability
 from truearm.identification.refit import Refit
@@ -72,7 +72,9 @@ def selection_lines(selection: Selection) -> list[str]:
     """Return how a model was chosen, as the command prints it."""
     text = [f"Chosen model: {selection.model.summary}"]
     if selection.blocks:
-        text.append(f"  judged on {selection.blocks} blocks of neighbours: the configurations {LAYOUT[selection.layout]}")
+        text.append(
+            f"  judged on {selection.blocks} blocks of neighbours: the configurations {LAYOUT[selection.layout]}"
+        )
     return text
 
 

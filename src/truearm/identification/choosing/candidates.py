@@ -165,11 +165,11 @@ class Ground:
     def _root_weight(self) -> Array:
         """Square root of what the loss left of each row, ``(rows,)``."""
         weight = np.maximum(self.solved.solution.weight, _LEAST_WEIGHT)
-        return np.sqrt(np.repeat(weight, self.problem.components))
+        return np.asarray(np.sqrt(np.repeat(weight, self.problem.components)))
 
     def _weighed(self, rows: Array) -> Array:
-        rows = rows * (self._root_weight[:, None] if rows.ndim == 2 else self._root_weight)
-        return rows if self._whitening is None else self._whitening.applied(rows)
+        rows = np.asarray(rows * (self._root_weight[:, None] if rows.ndim == 2 else self._root_weight))
+        return np.asarray(rows if self._whitening is None else self._whitening.applied(rows))
 
     def in_metres(self, rows: Array) -> Array:
         """Return weighed rows as differences of what was read [m or rad], ``(rows,)`` or ``(rows, columns)``."""
@@ -322,4 +322,3 @@ class Ground:
             found[name] = J[:, first : first + len(group)]
             first += len(group)
         return {name: columns for name, columns in found.items() if columns.shape[1]}
-

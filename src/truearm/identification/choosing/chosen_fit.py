@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from truearm.identification.choosing.selection import ORDERED, Selection
+from truearm.identification.choosing.choice import ORDERED, Selection
 from truearm.identification.held import NOTHING_HELD, Held
 from truearm.identification.solving.bounds import Bounds
 from truearm.identification.solving.fit import Fit, Status, identify

@@ -108,7 +108,8 @@ class Fold:
     inner, pull
         Normal equations of the candidates on the other rows, with their priors, ``(k, k)`` and ``(k,)``.
     by_fit, by_columns
-        How the solution moves in the basis of the fit's own columns: ``(p,)``, and ``(p, k)`` for one of each candidate.
+        How the solution moves in the basis of the fit's own columns, ``(p,)``, and ``(p, k)`` with one of each
+        candidate.
     """
 
     rows: NDArray[np.intp]
@@ -121,7 +122,7 @@ class Fold:
 
     def values(self, chosen: NDArray[np.intp]) -> Array:
         """Return the values that some candidates get from the other rows, ``(chosen,)``."""
-        return -np.linalg.solve(self.inner[np.ix_(chosen, chosen)], self.pull[chosen])
+        return np.asarray(-np.linalg.solve(self.inner[np.ix_(chosen, chosen)], self.pull[chosen]))
 
 
 @dataclass(frozen=True, eq=False)

@@ -87,7 +87,8 @@ class Refits:
 
     def _found(self, effects: tuple[str, ...]) -> Array | None:
         found = np.full(self.data.configurations, np.nan)
-        solved, before = None, None
+        solved: Solved | None = None
+        before: Robot | None = None
         for number in range(FOLDS):
             inside, outside = np.flatnonzero(self.folds.of != number), np.flatnonzero(self.folds.of == number)
             training = self.data.of_configurations(inside)

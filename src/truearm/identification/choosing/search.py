@@ -1,4 +1,4 @@
-"""The search among joint effects by cross-validation in closed form: every choice, or one by one where they are many."""
+"""The search among joint effects by cross-validation in closed form: every choice, or one by one of many."""
 
 from __future__ import annotations
 
@@ -273,7 +273,7 @@ class Choices:
         return search.left_without(number, effects)
 
     def best(self, without: Collection[str]) -> frozenset[str]:
-        """Return the best choice without some effects; with curves, of hundreds of coefficients, if these gain clearly."""
+        """Return the best choice without some effects; with curves if these gain clearly."""
         found = self.plain.best([name for name in self.plain.columns if name not in without])
         if self.curved is None or CURVE in without:
             return found

@@ -17,14 +17,25 @@ import numpy as np
 
 from truearm.errors import InputError
 from truearm.identification.choosing.candidates import SELECTABLE, CurveColumns, Ground, closed_because, loads_bend
+from truearm.identification.choosing.choice import (
+    AUTO,
+    COMPLIANCE,
+    ORDERED,
+    TRANSMISSION,
+    Candidate,
+    Confirmation,
+    Selection,
+    model_with,
+    with_lines,
+)
 from truearm.identification.choosing.folds import FOLDS, Folds, folds_of
 from truearm.identification.choosing.refits import How, Refits
-from truearm.identification.choosing.search import CLEAR, CURVE, Choices, Gain, Search, gain
+from truearm.identification.choosing.search import CLEAR, CURVE, Choices, Search, gain
 from truearm.identification.held import NOTHING_HELD, Held
 from truearm.identification.judging.transmission import FEWEST, PeriodicError, Pulls, lines_of
 from truearm.identification.solving.bounds import Bounds
 from truearm.identification.solving.losses import Loss
-from truearm.identification.solving.models import Model, named_model
+from truearm.identification.solving.models import named_model
 from truearm.identification.solving.rounds import Redundant, find_parameters
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
@@ -32,116 +43,12 @@ from truearm.modeling.effects import EFFECTS
 from truearm.modeling.effects.joint_curve import HIGHEST
 from truearm.modeling.robot import Robot
 
-AUTO: Final = "auto"
-_COMPLIANCE: Final = "compliance"
-_TRANSMISSION: Final = "transmission-error"
 #: What a curve contains.
 _IN_CURVE: Final = "fourier"
-#: Effects that follow the order of a campaign.
-ORDERED: Final = frozenset(effect.name for effect in EFFECTS if effect.ordered)
 #: A gain of fewer standard errors in closed form is looked at again by real fits.
 _SURE: Final = 2.0
 _MOST_REFITS: Final = 3
 _NOT_BORNE_OUT: Final = "what it gains is not borne out by fits in the folds"
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A joint effect that could have been chosen.
-
-    Attributes
-    ----------
-    effect
-        Its name.
-    taken
-        Whether it was.
-    gain
-        What the chosen model gains by it, or would; None if it was not tried.
-    reason
-        Why it was left out; empty if it was not.
-    """
-
-    effect: str
-    taken: bool
-    gain: Gain | None
-    reason: str = ""
-
-
-@dataclass(frozen=True)
-class Confirmation:
-    """A model that was fitted in every fold, held against a smaller one.
-
-    Attributes
-    ----------
-    effects, smaller
-        The effects of both.
-    error, smaller_error
-        Mean held-out errors [m].
-    gain
-        Of the paired differences.
-    """
-
-    effects: tuple[str, ...]
-    smaller: tuple[str, ...]
-    error: float
-    smaller_error: float
-    gain: Gain
-
-
-@dataclass(frozen=True)
-class Selection:
-    """How a model was chosen.
-
-    Attributes
-    ----------
-    model
-        What was chosen.
-    layout, blocks
-        How the configurations lie, see :data:`truearm.identification.choosing.folds.Layout`, and in how many blocks of
-        neighbours they were held out; 0 where one by one.
-    geometric, elastic, error
-        Mean held-out errors of these models and of the chosen one, in closed form [m]; the second is None where no
-        loads bend the joints.
-    candidates
-        Every joint effect that can be chosen.
-    confirmations
-        What was fitted in every fold.
-    lines
-        Periodic errors that were found, whose numbers of periods nobody had given.
-    smaller
-        Smaller models, the next one first.
-    passed_over
-        Models that were chosen first and whose fits were not sound, with the statuses.
-    """
-
-    model: Model
-    layout: str
-    blocks: int
-    geometric: float
-    elastic: float | None
-    error: float
-    candidates: tuple[Candidate, ...]
-    confirmations: tuple[Confirmation, ...] = ()
-    lines: tuple[PeriodicError, ...] = ()
-    smaller: tuple[Model, ...] = ()
-    passed_over: tuple[tuple[tuple[str, ...], str], ...] = ()
-
-    def prepared(self, robot: Robot) -> Robot:
-        """Return the robot with the numbers of periods that were found, if the chosen model needs them."""
-        return with_lines(robot, self.lines) if _TRANSMISSION in self.model.effects else robot
-
-    def instead(self, status: str) -> Selection:
-        """Return the choice of the next smaller model, because a fit of this one ended so."""
-        model, *smaller = self.smaller
-        out = set(self.model.effects) - set(model.effects)
-        candidates = tuple(
-            replace(one, taken=False, reason=f"the fit with it ended in {status}") if one.effect in out else one
-            for one in self.candidates
-        )
-        passed_over = (*self.passed_over, (self.model.effects, status))
-        return replace(
-            self, model=model, smaller=tuple(smaller), candidates=candidates, passed_over=passed_over
-        )
 
 
 def select(
@@ -183,9 +90,9 @@ def select(
             allowed=f"at least {2 * FOLDS}",
             cure="Measure more, or name a model.",
         )
-    names = tuple(name for name in SELECTABLE if name in candidates or name == _COMPLIANCE)
+    names = tuple(name for name in SELECTABLE if name in candidates or name == COMPLIANCE)
     how = How(loss, redundancy, bounds, bounds_file, held)
-    start = (_COMPLIANCE,) if loads_bend(robot, data) else ()
+    start = (COMPLIANCE,) if loads_bend(robot, data) else ()
     progress("choosing a model: one fit for all")
     solved = find_parameters(
         robot,
@@ -199,27 +106,6 @@ def select(
     )
     choice = _Choice(robot, data, names, how, Ground(solved, folds_of(data, seed)), progress)
     return choice.made()
-
-
-def with_lines(robot: Robot, lines: Sequence[PeriodicError]) -> Robot:
-    """Return a robot whose gears err as often in a turn as was found."""
-    periods = {line.joint: line.periods for line in lines}
-    joints = tuple(
-        replace(joint, transmission_periods=periods.get(number, joint.transmission_periods))
-        for number, joint in enumerate(robot.joints, 1)
-    )
-    return replace(robot, joints=joints) if periods else robot
-
-
-def model_with(effects: Sequence[str], candidates: Sequence[str] = SELECTABLE) -> Model:
-    """Return the model with some joint effects, which bounds may name the others of."""
-    names = tuple(effect.name for effect in EFFECTS if effect.name in effects)
-    added = [name for name in names if name != _COMPLIANCE]
-    rigid = "" if _COMPLIANCE in names else "geometric"
-    start = rigid or "elastic"
-    summary = f"{start}, and what cross-validation added: {', '.join(added) or 'nothing'}"
-    groups = named_model("geometric").groups
-    return Model(AUTO, summary, groups, names, tuple(name for name in candidates if name not in names))
 
 
 @dataclass(eq=False)
@@ -257,13 +143,15 @@ class _Choice:
         self.reasons = {}
         for name in self.names:
             reason = closed_because(robot, self.data, name)
+            if name == CURVE and self.how.redundancy != "prior":
+                reason = "it is found with priors only"
             if reason is not None:
                 self.reasons[name] = reason
         open_ = [name for name in self.names if name not in self.reasons and name != CURVE]
         there = with_lines(self.ground.solved.robot, self.lines)
         columns = self.ground.columns(open_, there)
         unordered = self.ground.columns([name for name in open_ if name in ORDERED], there, ordered=False)
-        plain = Search(self.ground, self.ground.start((_COMPLIANCE,)), columns, unordered)
+        plain = Search(self.ground, self.ground.start((COMPLIANCE,)), columns, unordered)
         for name in columns:
             if not plain.excited(name):
                 self.reasons[name] = "the readings tell less of it than is known beforehand"
@@ -276,7 +164,7 @@ class _Choice:
         rest = {name: columns for name, columns in plain.columns.items() if name != _IN_CURVE}
         beside = plain.best([name for name in rest if name not in self.reasons])
         self.curves = self.ground.curves(
-            (_COMPLIANCE,), plain.together({name: rest[name] for name in rest if name in beside})
+            (COMPLIANCE,), plain.together({name: rest[name] for name in rest if name in beside})
         )
         columns = self.curves.scaled()
         if columns is None:
@@ -297,7 +185,7 @@ class _Choice:
 
     def _found_lines(self, search: Choices, chosen: frozenset[str]) -> bool:
         """Look for periodic errors in what a choice leaves; return whether there are any."""
-        if _TRANSMISSION not in self.names:
+        if TRANSMISSION not in self.names:
             return False
         pulls = self.ground.pulls(search.left(chosen), search.spent(chosen))
         self.lines = () if pulls is None else self._lines_of(pulls, chosen)
@@ -308,10 +196,10 @@ class _Choice:
         return lines_of(self.robot, pulls, HIGHEST + 1 if CURVE in chosen else FEWEST)
 
     def _refits(self, search: Choices, chosen: frozenset[str]) -> Refits:
-        without = chosen - {_TRANSMISSION}
+        without = chosen - {TRANSMISSION}
 
         def robot_of(number: int, effects: Sequence[str]) -> Robot:
-            if not self.lines or _TRANSMISSION not in effects:
+            if not self.lines or TRANSMISSION not in effects:
                 return self.robot
             left = search.left_without(number, without)
             pulls = self.ground.pulls(left, search.spent(without), self.ground.fold != number)
@@ -364,14 +252,14 @@ class _Choice:
         held_out = np.zeros(len(self.ground.fold))
         for number in range(FOLDS):
             columns = {name: search.curved.columns[name] for name in search.curved.columns if name in chosen}
-            if self.lines and _TRANSMISSION in columns:
-                without = chosen - {_TRANSMISSION}
+            if self.lines and TRANSMISSION in columns:
+                without = chosen - {TRANSMISSION}
                 pulls = self.ground.pulls(
                     search.left_without(number, without), search.spent(without), self.ground.fold != number
                 )
                 lines = () if pulls is None else self._lines_of(pulls, without)
                 there = with_lines(self.ground.solved.robot, lines)
-                columns |= self.ground.columns([_TRANSMISSION], there) if lines else {}
+                columns |= self.ground.columns([TRANSMISSION], there) if lines else {}
             curve = self.curves.scaled(number)
             fit = search.plain.fit if curve is None else search.plain.fit.with_columns(curve)
             mine = self.ground.fold == number
@@ -381,23 +269,23 @@ class _Choice:
 
     def _start(self, search: Choices) -> frozenset[str]:
         """Return the better one of the geometric and the elastic model."""
-        elastic = frozenset({_COMPLIANCE})
-        return elastic if _COMPLIANCE in search.names and search.gain(frozenset(), elastic).believed else frozenset()
+        elastic = frozenset({COMPLIANCE})
+        return elastic if COMPLIANCE in search.names and search.gain(frozenset(), elastic).believed else frozenset()
 
     @staticmethod
     def _next_smaller(search: Choices, chosen: frozenset[str]) -> frozenset[str]:
         """Return a choice without the effect that it gains least by."""
         return min((chosen - {name} for name in chosen), key=lambda one: _mean(search.errors(one)))
 
-    def _selection(
-        self, search: Choices, chosen: frozenset[str], confirmations: list[Confirmation]
-    ) -> Selection:
+    def _selection(self, search: Choices, chosen: frozenset[str], confirmations: list[Confirmation]) -> Selection:
         rows = []
         for name in self.names:
             tried = None
             if name in search.names:
                 tried = search.gain(chosen - {name}, chosen | {name})
             reason = "" if name in chosen else self.reasons.get(name, "")
+            if name == _IN_CURVE and CURVE in chosen:
+                tried, reason = None, "the curves contain it"
             if name not in chosen and not reason and tried is not None:
                 harms = "it makes held-out errors larger"
                 reason = harms if tried.mean <= 0.0 else "it gains no more than chance may"
@@ -409,7 +297,7 @@ class _Choice:
             now = self._next_smaller(search, now)
             smaller.append(model_with(tuple(now), self.names))
         smaller.append(replace(named_model("offsets"), name=AUTO))
-        elastic = _mean(search.errors(frozenset({_COMPLIANCE}))) if _COMPLIANCE in search.names else None
+        elastic = _mean(search.errors(frozenset({COMPLIANCE}))) if COMPLIANCE in search.names else None
         return Selection(
             model_with(tuple(chosen), self.names),
             self.folds.layout,
@@ -419,7 +307,7 @@ class _Choice:
             _mean(search.errors(chosen)),
             tuple(rows),
             tuple(confirmations),
-            self.lines if _TRANSMISSION in chosen else (),
+            self.lines if TRANSMISSION in chosen else (),
             tuple(smaller),
         )
 

@@ -75,5 +75,5 @@ def share_left(number: Array, rate: float | Array) -> Array:
 def _left(at: Postures, values: Mapping[str, float | Array]) -> Array:
     """Return the share of the growth that is still to come at postures."""
     if at.number is None:
-        return np.zeros(len(at)) + np.asarray(values[LEFT])
+        return np.asarray(np.zeros(len(at)) + np.asarray(values[LEFT]))
     return share_left(at.number, values[RATE])

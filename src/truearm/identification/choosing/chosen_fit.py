@@ -1,4 +1,4 @@
-"""A fit of the model that was chosen, or of a smaller one where that fit is not sound; and what to know of the choice."""
+"""A fit of the model that was chosen, or of a smaller one where that is not sound; and what to know of the choice."""
 
 from __future__ import annotations
 
@@ -92,9 +92,9 @@ def check_choice(selection: Selection) -> list[Notice]:
         found.append(
             Notice(
                 "order-in-the-model",
-                f"The model contains {listed(ordered)}, which follows the order of this campaign. That cleans the other "
-                "parameters. Predictions whose place in an order is not known, of other sessions for example, are those "
-                "of the middle of this one.",
+                f"The model follows the order of this campaign ({listed(ordered)}). That cleans the other parameters. "
+                "Predictions whose place in an order is not known, of other sessions for example, are those of the "
+                "middle of this one.",
                 "note",
             )
         )

@@ -4,9 +4,9 @@ A problem with the residual r, its derivative A and Gaussian priors is one of le
 priors, stacked. Let ``Q R`` be the stack and e its residual at the solution. If the rows F of a fold are left out, the
 solution moves by ``R^-1 d`` with ``(I - Q_F' Q_F) d = Q_F' e_F``, and the held-out residual is ``e_F + Q_F d``. That is
 ``(I - H_F)^-1 e_F`` with the block ``H_F = Q_F Q_F'`` of the hat matrix: Cook and Weisberg 1982, "Residuals and
-Influence in Regression", section 3.6, for groups of cases; Golub, Heath and Wahba 1979, "Generalized cross-validation as
-a method for choosing a good ridge parameter", section 1, for a penalty, which is a row that no fold leaves out. It is
-exact for a linear problem with weights and penalties that stay as they are.
+Influence in Regression", section 3.6, for groups of cases; Golub, Heath and Wahba 1979, "Generalized cross-validation
+as a method for choosing a good ridge parameter", section 1, for a penalty, which is a row that no fold leaves out. It
+is exact for a linear problem with weights and penalties that stay as they are.
 
 Candidates are further columns C with priors at zero. What the fit's own columns can take of them is taken out fold by
 fold, once (Frisch and Waugh 1933, "Partial time regressions as compared with individual trends"). Any choice among them

@@ -181,7 +181,7 @@ def _strongest(q: Array, pull: Array, weight: Array, noise: float, fewest: int) 
     fewest
         Periods in a turn that are looked for, at least.
     """
-    among = _PERIODS[_PERIODS >= fewest]
+    among = _PERIODS[fewest - FEWEST :]
     explained, a, b, least = _sines(q, pull, weight, among)
     passed = among * math.sqrt(12.0) * q.std() / (2.0 * math.pi)  # of a range that is passed through evenly
     seen = (least * _LARGEST_DEVIATION**2 > noise) & (passed > _LEAST_PERIODS)

@@ -31,7 +31,7 @@ def check_curves(fit: Fit, training: Dataset) -> list[Notice]:
     robot, joints = fit.robot, training.postures.joints
     effect = next(effect for effect in robot.effects if isinstance(effect, JointCurve))
     free = set(fit.free.names)
-    little, none, partly = [], [], []
+    little, none, partly = list[str](), list[str](), list[str]()
     for i, names in effect.terms.items():
         low, high = float(joints[:, i].min()), float(joints[:, i].max())
         name = robot.joints[i].name

@@ -5,9 +5,9 @@ coefficients c of a linearised fit ``z = A u + F c + n`` have a normal prior of 
 for sine and cosine of a period of a joint, and the variances that make the residuals likeliest are taken (MacKay 1992,
 "Bayesian interpolation"; Tipping 2001, "Sparse Bayesian learning and the relevance vector machine"). With the
 parameters u of the arm integrated out under their own, wide, priors, what geometry and gravity can say themselves is
-theirs. With ``V = s^2 I + F diag(v) F'``, slopes of the likelihood in log v vanish where ``v = c^2 / g`` summed over sine
-and cosine: c is the likeliest coefficient and ``g = v f' V^-1 f`` what the data know of it, 0 to 1. Each step puts in
-the old v on the right.
+theirs. With ``V = s^2 I + F diag(v) F'``, slopes of the likelihood in log v vanish where ``v = c^2 / g``, summed over
+sine and cosine: c is the likeliest coefficient and ``g = v f' V^-1 f`` what the data know of it, 0 to 1. Each step puts
+in the old v on the right.
 
 A gear makes a few lines, and little between them. The variances of neighbouring periods of a joint therefore have an
 inverse gamma distribution with one scale t, and few degrees of freedom: coefficients are then of Student's t, which
@@ -30,9 +30,11 @@ from truearm.modeling.chain import Array
 BANDS: Final = (1, 3, 6, 11, 19, 33)
 #: Degrees of freedom of the variances of a band.
 _ALIKE: Final = 1.0
-#: Gain in log-likelihood from which the curve of a joint is believed: what half a dozen variances that mean nothing gain
-#: in the information criterion of Akaike (1974), and as much again, because the largest of many periods are looked at.
-_SIGNIFICANT: Final = 10.0
+#: Gain in log-likelihood from which the curve of a joint is believed. A sine of noise alone gains so much at one of
+#: 300 000 periods, and a robot has hundreds of periods to look at.
+_SIGNIFICANT: Final = 12.5
+#: Information of the readings on a coefficient, by that of its variance, that is none.
+_NOTHING: Final = 1e-5
 #: Of the log-likelihood: a step that gains less is the last.
 _SETTLED: Final = 0.05
 _STEPS: Final = 40
@@ -94,16 +96,14 @@ def curve_variances(
     least_noise
         What the variance of the equations is at least, by the one assumed.
     """
-    F, z, rest = _told_apart(moments)
-    size = np.einsum("ij,ij->j", F, F)
-    variance = _start(F, joint, rows) if before is None else before.copy()
-    variance[size <= 0.0] = 0.0
+    of = _Equations(*_told_apart(moments), rows)
+    variance = _start(of, joint) if before is None else before.copy()
     group = np.unique(np.stack([joint, period]), axis=1, return_inverse=True)[1].reshape(-1)
     band = np.unique(np.stack([joint, np.searchsorted(BANDS, period, side="right")]), axis=1, return_inverse=True)[
         1
     ].reshape(-1)
     climb = _Climb(group, band, least_noise)
-    state = climb.climbed(_Marginal(F, z, rows, variance, max((float(z @ z) + rest) / rows, least_noise), rest))
+    state = climb.climbed(_Marginal(of, variance, max(of.squares / rows, least_noise)))
     gains: dict[int, float] = {}
     while state.variance.any():
         gains = {i: state.likelihood - state.without(joint == i) for i in np.unique(joint[state.variance > 0]).tolist()}
@@ -111,8 +111,8 @@ def curve_variances(
         if gains[weakest] >= _SIGNIFICANT:
             break
         left = np.where(joint == weakest, 0.0, state.variance)
-        state = climb.climbed(_Marginal(F, z, rows, left, state.noise, rest))
-    moved = np.bincount(group, state.variance * size)
+        state = climb.climbed(_Marginal(of, left, state.noise))
+    moved = np.bincount(group, state.variance * of.size)
     order = np.argsort(moved)
     small = np.zeros(len(moved), dtype=bool)
     small[order] = np.cumsum(moved[order]) <= _NEGLIGIBLE * state.noise * rows
@@ -155,40 +155,61 @@ def _told_apart(moments: Array) -> tuple[Array, Array, float]:
     return root[:, None] * axes.T, z, max(float(moments[-1, -1] - z @ z), 0.0)
 
 
-def _start(F: Array, joint: NDArray[np.intp], rows: float) -> Array:
+def _start(of: _Equations, joint: NDArray[np.intp]) -> Array:
     """Return variances with which the curves of the joints would add as much to the residuals as there is noise."""
-    signal = np.einsum("ij,ij->j", F, F)
-    found = np.zeros(F.shape[1])
+    found = np.zeros(len(joint))
     joints = np.unique(joint).tolist()
     for i in joints:
         mine = joint == i
-        found[mine] = rows / max(float(signal[mine].sum()), 1e-300) / len(joints)
+        found[mine] = of.rows / max(float(of.size[mine].sum()), 1e-300) / len(joints)
     return found
 
 
-class _Marginal:
-    """The likelihood at some variances, with what its slopes need."""
+class _Equations:
+    """What is left of the equations: derivatives by the coefficients, right side, and what no curve can explain."""
 
-    def __init__(self, F: Array, z: Array, rows: float, variance: Array, noise: float, rest: float) -> None:
-        self.F, self.z, self.rows, self.variance, self.noise, self.rest = F, z, rows, variance, noise, rest
-        used = variance > 0.0
-        part = F[:, used]
-        V = (part * variance[used]) @ part.T
-        V[np.diag_indices_from(V)] += noise
-        root = np.linalg.cholesky(V)
-        turned = np.linalg.solve(root, np.column_stack([part, z]))
-        left = turned[:, -1]
+    def __init__(self, F: Array, z: Array, rest: float, rows: float) -> None:
+        self.F, self.z, self.rows = F, z, rows
+        self.H, self.b, self.squares = F.T @ F, F.T @ z, float(z @ z) + rest
+        self.size = np.diag(self.H).copy()
+
+
+class _Marginal:
+    """The likelihood at some variances, with what its slopes need.
+
+    All of it follows from a matrix of coefficients, or from one of equations where these are fewer.
+    """
+
+    def __init__(self, of: _Equations, variance: Array, noise: float) -> None:
+        self.of, self.noise = of, noise
+        self.variance = np.where(variance * of.size > _NOTHING * noise, variance, 0.0)
+        used = self.variance > 0.0
+        v, b = self.variance[used], of.b[used]
         self.known, self.found = np.zeros(len(variance)), np.zeros(len(variance))
-        self.known[used] = variance[used] * np.einsum("ij,ij->j", turned[:, :-1], turned[:, :-1])
-        self.found[used] = variance[used] * (turned[:, :-1].T @ left)
-        residual = noise * np.linalg.solve(root.T, left)
-        self.left = float(residual @ residual) + rest
-        logs = 2.0 * float(np.log(np.diag(root)).sum()) + (rows - len(V)) * float(np.log(noise))
-        self.likelihood = -0.5 * (logs + float(left @ left) + rest / noise)
+        if used.sum() <= len(of.F):
+            root = np.sqrt(v)
+            H = of.H[np.ix_(used, used)]
+            M = np.eye(len(v)) + root[:, None] * H * (root / noise)
+            inverse = np.linalg.inv(M)
+            self.found[used] = root * (inverse @ (root * b)) / noise
+            self.known[used] = 1.0 - np.diag(inverse)
+            logs = 2.0 * float(np.log(np.diag(np.linalg.cholesky(M))).sum())
+        else:
+            part = of.F[:, used]
+            V = np.eye(len(part)) + (part * (v / noise)) @ part.T
+            turned = np.linalg.solve(V, np.column_stack([part, of.z]))
+            self.found[used] = v * (part.T @ turned[:, -1]) / noise
+            self.known[used] = v * np.einsum("ij,ij->j", part, turned[:, :-1]) / noise
+            logs = 2.0 * float(np.log(np.diag(np.linalg.cholesky(V))).sum())
+        c = self.found[used]
+        explained = float(b @ c)
+        moved = of.F[:, used] @ c
+        self.left = max(of.squares - 2.0 * explained + float(moved @ moved), 0.0)
+        self.likelihood = -0.5 * (logs + of.rows * float(np.log(noise)) + max(of.squares - explained, 0.0) / noise)
 
     def at(self, variance: Array, noise: float) -> _Marginal:
         """Return it at other variances."""
-        return _Marginal(self.F, self.z, self.rows, variance, noise, self.rest)
+        return _Marginal(self.of, variance, noise)
 
     def without(self, coefficients: NDArray[np.bool_]) -> float:
         """Return the likelihood without some coefficients."""
@@ -224,8 +245,8 @@ class _Climb:
         v = np.bincount(self.group, state.variance) / self.sizes
         squares, known = np.bincount(self.group, state.found**2), np.bincount(self.group, state.known)
         new = (squares + _ALIKE * self.alike(v)) / (known + _ALIKE)
-        freedom = max(state.rows - float(state.known.sum()), 1e-3 * state.rows)
-        return np.log(np.maximum(np.append(np.where(v > 0.0, new, 0.0), state.left / freedom), 1e-300))
+        freedom = max(state.of.rows - float(state.known.sum()), 1e-3 * state.of.rows)
+        return np.asarray(np.log(np.maximum(np.append(np.where(v > 0.0, new, 0.0), state.left / freedom), 1e-300)))
 
     def at(self, state: _Marginal, place: Array) -> _Marginal:
         """Return the state at such logarithms."""
@@ -241,7 +262,7 @@ class _Climb:
             second_state = self.at(state, first)
             second = self.following(second_state)
             way, bend = first - here, second - 2.0 * first + here
-            far = min(-float(np.linalg.norm(way) / max(np.linalg.norm(bend), 1e-300)), -1.0)
+            far = min(-float(np.linalg.norm(way)) / max(float(np.linalg.norm(bend)), 1e-300), -1.0)
             place = here - 2.0 * far * way + far**2 * bend
             there = self.at(state, place)
             reached = self.objective(there)

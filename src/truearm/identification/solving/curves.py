@@ -80,8 +80,11 @@ class Curves:
 
 def with_stiffness(
     problem: Problem, every: FreeParameters, curves: Curves, joints: Array, weight: Array
-) -> tuple[Problem, Curves]:
+) -> tuple[Problem, Curves, Array]:
     """Return a problem with the coefficients free that the data tell, each with what is expected of it.
+
+    The deviations of its readings, and the variances of the joints' errors, which are returned too, are those with the
+    curves.
 
     Parameters
     ----------
@@ -121,14 +124,14 @@ def with_stiffness(
         moments += part.T @ part
     place = np.array([curves.places[name] for name in names], dtype=np.intp).reshape(-1, 2)
     before = np.array([curves.variances[name] for name in names]) if curves.variances else None
-    declared = all(block.declared for block in whole.blocks)
+    declared = any(block.declared for block in whole.blocks)
     found = curve_variances(
         moments_without(moments, m),
         len(residual) / crowd,
         place[:, 0],
         place[:, 1],
         before,
-        1.0 if declared else 0.0,
+        problem.widened**-2 if declared else 0.0,
     )
     variances = {name: v for name, v in zip(names, found.variance.tolist(), strict=True) if v > 0.0}
     now = {p.name: p for p in problem.free.parameters}
@@ -142,15 +145,22 @@ def with_stiffness(
         )
     )
     held = {p.name: p.nominal for p in coefficients if p.name not in variances}
-    left = replace(problem, robot=robot.with_values(held), free=free)
+    ratio = math.sqrt(found.noise) if variances else 1.0
+    left = replace(
+        problem,
+        robot=robot.with_values(held),
+        free=free,
+        noise={name: ratio * deviation for name, deviation in problem.noise.items()},
+        widened=max(1.0, problem.widened * ratio) if declared else problem.widened,
+    )
     known = replace(
         curves,
         variances=variances,
-        design_effect=crowd * found.noise if variances else 1.0,
+        design_effect=crowd if variances else 1.0,
         gains=found.gains,
         rounds=curves.rounds - 1 if variances else 0,
     )
-    return left, known
+    return left, known, joints * ratio**2
 
 
 #: Of a model without any.

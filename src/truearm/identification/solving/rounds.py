@@ -265,7 +265,7 @@ def _solve_with_noise(
         started = FreeParameters(tuple(replace(p, value=found[p.name]) for p in problem.free.parameters))
         there = replace(there, robot=problem.robot.with_values(found), free=started)
         if curves.rounds:
-            there, curves = with_stiffness(there, every.free, curves, joints, solution.weight)
+            there, curves, joints = with_stiffness(there, every.free, curves, joints, solution.weight)
             limits, change = _within(within, every.free, there.free), np.inf
         if change < _SETTLED and _load_shift(problem, there) < _LOADS_AGREE * small:
             break

@@ -22,6 +22,7 @@ from truearm.identification.solving.bounds import Bounds
 from truearm.identification.solving.fit import Fit, Status, identify
 from truearm.identification.solving.models import MODELS
 from truearm.jobs.calibrate import calibrate
+from truearm.jobs.validate import validate
 from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import errors_of
@@ -247,6 +248,13 @@ def test_warm_up_stays_in_the_fit_and_other_sessions_get_its_middle() -> None:
     assert notice.code == "order-in-the-model"
     assert notice.level == "note"
     assert "middle" in notice.message
+    told = validate(fit.robot, data)
+    assert [(notice.code, notice.level) for notice in told.warnings if notice.code == "other-session"] == [
+        ("other-session", "note")
+    ]
+    middle = errors_of(fit.robot, replace(data, number=None)).position
+    assert middle is not None
+    assert told.errors.position == middle
     # Some of the session without their numbers: better than by the elastic model, worse than with them.
     again = warming(60, 15)
     blind = replace(again, number=None, approach=None)

@@ -26,7 +26,7 @@ from truearm.planning.choosing import prediction
 from truearm.planning.choosing.measurement_plan import plan_measurements, with_targets
 from truearm.results.calibration import Calibration
 
-SEEDS = range(5)
+SEEDS = range(3)
 #: The end-effector of the campaign, after Nubiola's triangular artefact, which it resembles.
 PAYLOAD = Payload(2.7, (0.05, 0.025, 0.1))
 
@@ -61,7 +61,7 @@ def mean_mm(calibration: Calibration) -> float:
 
 @pytest.mark.parametrize(("train", "median", "worst"), [(300, 0.22, 0.24), (50, 0.28, 0.30)])
 def test_the_geometric_model_on_the_irb120(calibrated: Run, train: int, median: float, worst: float) -> None:
-    runs = [calibrated("geometric", train, seed) for seed in SEEDS]
+    runs = [calibrated("geometric", train, seed) for seed in range(5)]
     held_out = [mean_mm(run) for run in runs]
     nominal = [1e3 * float(run.nominal.position_norms.mean()) for run in runs]
     assert np.median(held_out) <= median

@@ -8,7 +8,7 @@ from tests.simulated import campaign
 
 from truearm.errors import InputError
 from truearm.identification.solving.fit import place
-from truearm.identification.start_values.frames import initial_frames
+from truearm.identification.start_values.frames import initial_frames, placed_errors
 from truearm.library import library, load_robot
 from truearm.measurement.statistics import errors_of
 from truearm.modeling.transform import Transform, quaternion_from_rotation
@@ -88,3 +88,16 @@ def test_data_without_positions_are_refused() -> None:
     _, data = campaign("irb120", 5, 0.0, 0)
     with pytest.raises(InputError, match=r"twin: there is no position reading.*Fill in x, y and z"):
         initial_frames(load_robot("irb120"), replace(data, position=np.full_like(data.position, np.nan)))
+
+
+def test_data_that_are_tried_together_are_placed_as_each_alone() -> None:
+    robot = load_robot("irb120").with_frames(Transform(), {})
+    tried = [campaign("irb120", poses, 1e-4, seed)[1] for seed, poses in enumerate((12, 40, 7))]
+    together = placed_errors(robot, tried)
+    for data, errors in zip(tried, together, strict=True):
+        np.testing.assert_allclose(errors, placed_errors(robot, [data])[0], rtol=1e-9, atol=1e-12)
+        placed = initial_frames(robot, data)
+        at = np.array([placed.world_poses(data.postures, name)[0] for name in data.targets])
+        off = np.linalg.norm(at[data.target, data.configuration] - data.position, axis=1)
+        np.testing.assert_allclose(errors, off, atol=1e-9)
+    assert placed_errors(robot, []) == []

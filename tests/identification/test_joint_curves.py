@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -247,3 +248,26 @@ def test_curves_need_priors(redundancy: str) -> None:
 
 def test_a_joint_truth_is_what_the_curve_says() -> None:
     assert JointTruth(gear=((3, 1e-4, 0.2),)).turn(0.7, 0.0, 0.0) == pytest.approx(1e-4 * math.sin(3 * 0.7 + 0.2))
+
+
+# -- a measured robot
+
+
+def measured_ur5(folder: Path, name: str) -> Dataset:
+    rows = np.genfromtxt(folder / "ur5-tracker" / name, delimiter=",", skip_header=1)
+    return Dataset.of(np.radians(rows[:, 7:]), 1e-3 * (rows[:, 1:4] + rows[:, 4:7]))
+
+
+def test_a_measured_ur5_has_curves(measured_data: Path) -> None:
+    grid, others = (measured_ur5(measured_data, name) for name in ("grid.csv", "random.csv"))
+    order = np.random.default_rng(0).permutation(grid.configurations)
+    training, held_out = grid.of_configurations(order[:700]), grid.of_configurations(order[700:])
+    robot = load_robot("ur5")
+    plain, curved = (identify(robot, training, model) for model in (GEOMETRIC, CURVED))
+    assert curved.status is Status.CONVERGED
+    assert mean_error(plain.robot, held_out) > 0.1e-3
+    assert mean_error(curved.robot, held_out) < 0.055e-3
+    assert mean_error(curved.robot, others) < 0.062e-3
+    told = {notice.code: notice.message for notice in check_curves(curved, training)}
+    assert "shoulder from -105 to" in told["curve-range"]
+    assert "wrist_3 (50 deg)" in told["curve-left-out"]

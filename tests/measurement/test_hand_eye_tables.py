@@ -222,12 +222,15 @@ def test_pictures_that_do_not_show_the_board_are_refused(tmp_path: Path) -> None
     refused(r"9\.png: .*(there is no such file|No such file)", count=9)
     refused(r"1\.png: this is another board: its markers are of another dictionary; got '4X4_", "8x6,40mm,30mm,6X6_50")
     refused(r"1\.png: (too few corners|the corners do not fit the board|the board is not seen)", "7x9,40mm,30mm,4X4_50")
+    refused(r"1\.png: columns and rows of the board are exchanged; got '6x8'; allowed: 8x6", "6x8,40mm,30mm,4X4_50")
     kept = {k: (tmp_path / f"{k}.png").read_bytes() for k in (1, 2, 3)}
     small = cv2.imdecode(np.frombuffer(kept[2], np.uint8), cv2.IMREAD_GRAYSCALE)
     cv2.imwrite(str(tmp_path / "2.png"), small[:300])
     refused(r"2\.png: the pictures are not of one size; got '480 x 300 px'; allowed: 480 x 360 px, as 1\.png")
     cv2.imwrite(str(tmp_path / "2.png"), np.full_like(small, 128))
     refused(r"2\.png: the board is not seen in this picture; allowed: markers of 4X4_50")
+    cv2.imwrite(str(tmp_path / "2.png"), np.ascontiguousarray(small[:, ::-1]))
+    refused(r"2\.png: this picture is mirrored; got 'markers of 4X4_50 in its mirror image'\. Switch off")
     cropped = np.full_like(small, 128)
     cropped[:, :190] = small[:, :190]
     cv2.imwrite(str(tmp_path / "2.png"), cropped)

@@ -65,6 +65,8 @@ def test_joint_positions_of_the_controller_stay_the_controllers(tmp_path: Path) 
         ("apart", "200mm,0.02", r"no unit that fits is given; got '0\.02'"),
         ("apart", "200mm", r"a distance and its standard deviation belong here; got '200mm'; allowed: 200mm,0\.02mm"),
         ("apart", "200mm,0mm", r"the number is too small to be plausible"),
+        ("apart", "200mm,500mm", r"hardly known.*got '200 mm with a standard deviation of 500 mm'.*up to 10%"),
+        ("apart", (0.2, 0.021), r"hardly known"),
         ("apart", "far,0.02mm", r"a number with its unit belongs here; got 'far'"),
         ("apart", [0.2], r"2 numbers belong here; got 1"),
         ("apart", (0.2, -1e-5), r"the number is too small to be plausible"),

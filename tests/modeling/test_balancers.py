@@ -255,6 +255,14 @@ def test_balancer_that_cannot_be_is_refused(tmp_path: Path, old: str, new: str, 
         assert part in str(caught.value)
 
 
+def test_two_balancers_of_one_name_are_refused(tmp_path: Path) -> None:
+    text = ARM.replace("PULL", PULL)
+    twice = text + text.splitlines(keepends=True)[-1]
+    with pytest.raises(InputError, match=r"balancers\[2\].*same name; got 'spring'.*balancers\[1\] has it too"):
+        arm(tmp_path, twice)
+    assert len(arm(tmp_path, text + text.splitlines()[-1].replace("name: spring, ", "")).balancers) == 2
+
+
 def test_trial_values_of_a_strength_are_each_what_they_are_alone(tmp_path: Path) -> None:
     robot = arm(tmp_path).with_effects(["compliance", "balancer"]).with_values({"compliance_2": 1e-6})
     at = robot.loaded(robot.random_configurations(6, np.random.default_rng(6)))

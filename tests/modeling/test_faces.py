@@ -90,7 +90,7 @@ CASES = [*((name, ()) for name in library()), *((name, EXACT) for name in librar
 @pytest.mark.parametrize(("name", "effects"), CASES, ids=lambda v: v if isinstance(v, str) else f"{len(v)} effects")
 def test_inverse_of_forward_is_where_the_joints_are(name: str, effects: tuple[str, ...]) -> None:
     robot = calibrated(name, effects) if effects else load_robot(name)
-    count = 300 if effects else 1000
+    count = 100 if effects else 400
     q = regular(robot, count)
     assert len(q) == count
     pose = robot.forward(q)

@@ -144,6 +144,11 @@ def with_effect(effect: str, name: str, unit: str, nominal: float = 0.0, value: 
             id="list of periods",
         ),
         pytest.param(
+            changed("limits: [-165, 165]", "limits: [-165, 165], bearing: -1e9"),
+            ["joints[1].bearing", "farther along its axis", "got '-1e+06 m'", "up to 10 m either way"],
+            id="bearing",
+        ),
+        pytest.param(
             changed("limits: [-165, 165]", "limits: [-165, 165], transmission_periods: 0"),
             ["joints[1].transmission_periods", "too small", "got 0", "allowed: 1 or more"],
             id="no periods",
@@ -453,7 +458,7 @@ def test_number_of_a_file_is_written_as_it_stood(size: float, sign: float) -> No
         assert written(to_si(short, unit), unit) == short
 
 
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=20)
 @given(
     lengths=st.lists(st.floats(-5, 5), min_size=3, max_size=3),
     angles=st.lists(st.floats(-4, 4), min_size=2, max_size=2),
@@ -624,7 +629,7 @@ def test_two_targets_of_one_name_are_refused(tmp_path: Path) -> None:
 ONE_LINE = st.text(st.characters(exclude_categories=["Cc", "Cs", "Zl", "Zp"]), min_size=1).filter(str.strip)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=30)
 @given(st.sampled_from(["smr 1", "?0", "<b>", "Träger", "# 1", "a: b", "- x", "'", '"', "null", "1e3", "~"]) | ONE_LINE)
 def test_targets_are_called_what_the_data_call_them(name: str) -> None:
     robot = load_robot("li3").with_frames(Transform(), {name: (0.0, 0.0, 0.1)})

@@ -26,7 +26,7 @@ from truearm.simulation import twin as twin_module
 from truearm.simulation import twin_body, twin_joint
 from truearm.simulation.devices import measured_with, named_device
 from truearm.simulation.truths import joint_truths, truth_twin
-from truearm.simulation.twin import Posture, Twin, directions, measure
+from truearm.simulation.twin import Conditions, Posture, Twin, directions, measure
 from truearm.simulation.twin_joint import Contact, JointTruth
 
 G = 9.80665
@@ -304,7 +304,9 @@ def test_exact_contact_has_the_whole_tilt_and_no_preferred_direction() -> None:
     for angle in np.linspace(0.1, 6.2, 7):
         moment = math.cos(angle), math.sin(angle)
         assert loose.tilt(*moment, "exact") == pytest.approx([4e-4 * m for m in moment], rel=1e-6)
-    assert loose.tilt(0.0, 0.0, "exact") == loose.tilt(0.0, 0.0, "document") == (0.0, 0.0)
+    contact: Contact
+    for contact in ("exact", "document"):
+        assert_allclose(loose.tilt(0.0, 0.0, contact), 0.0)
 
 
 def test_every_joint_of_the_katana_tilts_with_the_load() -> None:
@@ -474,3 +476,39 @@ def test_an_effect_that_the_twin_does_not_compute_is_refused(monkeypatch: pytest
     monkeypatch.setattr("truearm.modeling.robot_data.EFFECTS", (Wobble,))
     with pytest.raises(InputError, match=r"does not compute this joint effect; got 'wobble_1'"):
         joint_truths(replace(load_robot("irb120"), effect_names=("wobble",)))
+
+
+def test_a_configuration_stands_alone_as_it_does_among_others() -> None:
+    """Configurations are followed together, and each comes to rest in a round of its own."""
+    rng, count = np.random.default_rng(5), 20
+    robot = load_robot("katana450")
+    loose = JointTruth(
+        compliance=1e-3, backlash=1e-3, clearance=4e-4, gear=((2, 1e-4, 0.3),), growth=1e-5, warm_up=1e-4
+    )
+    twin = Twin(robot, {2: loose, 3: JointTruth(bearing=1e-4, hysteresis=1e-4), 4: JointTruth(backlash=2e-3)})
+    joints = robot.random_configurations(count, rng)
+    conditions: Conditions = {
+        "approach": np.sign(rng.normal(size=joints.shape)),
+        "number": np.arange(float(count)),
+        "temperature": np.where(np.arange(count) < 3, 20.0, 20.0 + rng.normal(size=count)),
+        "wrench": rng.normal(size=(count, 6)),
+        "velocity": np.where(np.arange(count)[:, None] < 10, 0.0, rng.normal(size=joints.shape)),
+        "acceleration": rng.normal(size=joints.shape),
+    }
+    together = twin.postures(joints, **conditions)
+    for row in range(count):
+        own = {name: np.asarray(values)[row : row + 1] for name, values in conditions.items()}
+        (alone,) = twin.postures(joints[row : row + 1], **own)
+        for field in ("links", "loads", "deflection", "wrench"):
+            assert_allclose(getattr(together[row], field), getattr(alone, field), rtol=1e-12, atol=1e-12)
+        for name, at in alone.targets.items():
+            assert_allclose(together[row].targets[name], at, rtol=1e-12, atol=1e-12)
+
+
+def test_more_configurations_than_are_followed_at_a_time() -> None:
+    twin = Twin(load_robot("li3"))
+    joints = twin.robot.random_configurations(1030, np.random.default_rng(0))
+    found = np.array([posture.links for posture in twin.postures(joints)])
+    one_by_one = np.array([twin.postures(joints[[row]])[0].links for row in (0, 511, 512, 1023, 1024, 1029)])
+    assert_allclose(found[[0, 511, 512, 1023, 1024, 1029]], one_by_one, rtol=1e-13, atol=1e-15)
+    assert len(found) == 1030

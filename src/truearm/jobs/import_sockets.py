@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Final
 
 from truearm.errors import InputError, refusals_of
 from truearm.files import path_argument
@@ -13,6 +14,9 @@ from truearm.measurement.readers.sockets import Apart, read_sockets
 from truearm.results.imported import Imported
 from truearm.units import quantity_si
 from truearm.writing import write_text
+
+#: A distance with a larger share of doubt was not measured: a tape measure leaves one in a hundred.
+_VAGUEST: Final = 0.1
 
 
 def import_sockets(
@@ -50,6 +54,14 @@ def import_sockets(
     else:
         distance, deviation = numbers_argument(apart, "apart", 2, "200mm,0.02mm, or two numbers in m")
         known = Apart(length_argument(distance, "apart", 0.0), deviation_argument(deviation, "apart"))
+    if known.sigma > _VAGUEST * known.distance:
+        raise InputError(
+            "the distance of the sockets is hardly known, and nothing else says how long anything is",
+            parameter="apart",
+            came=f"{1e3 * known.distance:g} mm with a standard deviation of {1e3 * known.sigma:g} mm",
+            allowed=f"a standard deviation of up to {_VAGUEST:.0%} of the distance",
+            cure="Measure the distance with a caliper, and give its deviation second: 200mm,0.02mm.",
+        )
     if isinstance(ball, str):
         diameter = quantity_si(ball, ("mm", "m", "um", "in"), "ball", "25", "25mm")
     else:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import accumulate
 from typing import Final
 
@@ -42,8 +43,9 @@ class AxialSlides:
     links: tuple[tuple[tuple[Direction, tuple[Offset, ...]], ...], ...]
 
     @classmethod
-    def of(cls, links: Sequence[Sequence[Element]]) -> AxialSlides:
-        """Return those of the links of a robot, without its joint effects."""
+    @lru_cache(maxsize=64)
+    def of(cls, links: tuple[tuple[Element, ...], ...]) -> AxialSlides:
+        """Return those of the links of a robot, without its joint effects; robots of one make share them."""
         elements = [element for link in links for element in link]
         kinematics = Chain(tuple(elements)).forward_kinematics(np.zeros((len(links), 1)))
         along = [kinematics.axis(place)[:, 0] for place in range(len(elements))]

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import accumulate
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, cast
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from truearm.errors import InputError
 from truearm.modeling.balancers import Wrench, balancer_wrenches
 from truearm.modeling.chain import (
     Array,
+    Axes,
     Coordinates,
     Direction,
     Element,
@@ -173,26 +174,31 @@ def _carried(
     size: int,
 ) -> Array:
     """Return the loads ``(joints, 6, size)`` of what is applied behind elements, and on the flange."""
-    (force, moment), count = flange, len(robot.joints)
+    count = len(robot.joints)
+    # x, y and z of force and moment, ``(2, size)`` each: both go through the same turns
+    x, y, z = (np.array([np.broadcast_to(part, size) for part in pair]) for pair in zip(*flange, strict=True))
+    carried: Axes = x, y, z
     loads = np.empty((count, 6, size))
     bearings = robot.bearings
     for place in range(len(elements), 0, -1):
         element, move = elements[place - 1], moves[place - 1]
-        for pull, turn in applied.get(place, ()):
-            force, moment = _plus(force, pull), _plus(moment, turn)
+        for wrench in applied.get(place, ()):
+            for both, *pair in zip(carried, *wrench, strict=True):
+                both[0] += pair[0]
+                both[1] += pair[1]
         if element.variable is not None and element.variable < count:
             for k, axis in enumerate((*across(element), axis_of(element))):
-                loads[element.variable, k] = _along(axis, force)
-                loads[element.variable, 3 + k] = _along(axis, moment)
+                loads[element.variable, k::3] = _along(axis, carried)
             away = bearings[element.variable]
             if away:
-                x, y = loads[element.variable, :2]
-                loads[element.variable, 3] += away * y
-                loads[element.variable, 4] -= away * x
+                loads[element.variable, 3] += away * loads[element.variable, 1]
+                loads[element.variable, 4] -= away * loads[element.variable, 0]
         if move and element.turns:
-            force, moment = in_frame_before(force, element, move), in_frame_before(moment, element, move)
+            carried = cast("Axes", in_frame_before(carried, element, move))  # of arrays it makes arrays
         elif move:
-            moment = _plus(moment, cross(_scaled(axis_of(element), move[0]), force))
+            force = carried[0][0], carried[1][0], carried[2][0]
+            for both, moment in zip(carried, cross(_scaled(axis_of(element), move[0]), force), strict=True):
+                both[1] += moment
     return loads
 
 
@@ -223,4 +229,6 @@ def _less(a: Coordinates, b: Coordinates) -> Coordinates:
 
 
 def _along(axis: Direction, vector: Coordinates) -> Number:
+    if axis.count(0.0) == 2 and 1.0 in axis:
+        return vector[axis.index(1.0)]
     return axis[0] * vector[0] + axis[1] * vector[1] + axis[2] * vector[2]

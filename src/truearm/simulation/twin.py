@@ -1,8 +1,8 @@
 """The digital twin: a robot whose truth is known, seen only through its readings.
 
-It follows a path of its own: frames, motions and masses are 4x4 matrices, one configuration after the other, and the
-arm is let sag until moments and deflections agree. Nothing here calls the chain, the loads or the joint effects
-of the models, so a mistake there cannot hide by appearing on both sides.
+It follows a path of its own: frames, motions and masses are 4x4 matrices, and the arm is let sag until moments and
+deflections agree. Nothing here calls the chain, the loads or the joint effects of the models, so a mistake there cannot
+hide by appearing on both sides.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Final, TypedDict, Unpack
 import numpy as np
 
 from truearm.errors import InputError
-from truearm.measurement.dataset import Dataset
+from truearm.measurement.dataset import Dataset, IntArray
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import LinkMass
 from truearm.modeling.robot import Robot
@@ -27,6 +27,7 @@ from truearm.simulation.twin_body import (
     moved,
     product,
     second_moments,
+    stacked,
     tilt,
     weight,
     wrench_at,
@@ -40,6 +41,8 @@ _ROUNDS: Final = 50
 _SETTLED: Final = 1e-13
 #: No arm begins this many powers of e away from where it ends.
 _LARGEST_POWER: Final = 30.0
+#: Configurations that are followed at a time; more of them gain nothing and fill the memory.
+_BLOCK: Final = 512
 
 
 class Conditions(TypedDict, total=False):
@@ -93,6 +96,16 @@ class Posture:
     loads: Array
     deflection: Array
     wrench: Array
+
+    def of_row(self, row: int) -> Posture:
+        """Return one of the configurations that all arrays of this posture have a row for."""
+        return Posture(
+            links=self.links[row],
+            targets={name: at[row] for name, at in self.targets.items()},
+            loads=self.loads[row],
+            deflection=self.deflection[row],
+            wrench=self.wrench[row],
+        )
 
 
 @dataclass(frozen=True)
@@ -154,8 +167,9 @@ class Twin:
         wrench = _shaped("wrench", conditions.get("wrench", np.zeros((n, 6))), (n, 6))
         velocity = _shaped("velocity", conditions.get("velocity", rest), (n, count))
         acceleration = _shaped("acceleration", conditions.get("acceleration", rest), (n, count))
-        rows = zip(joints, approach, temperature, cold, wrench, velocity, acceleration, strict=True)
-        return tuple(self._settled(*row) for row in rows)
+        given = (joints, approach, temperature - REFERENCE_TEMPERATURE, cold, wrench, velocity, acceleration)
+        blocks = (slice(first, first + _BLOCK) for first in range(0, n, _BLOCK))
+        return tuple(posture for block in blocks for posture in self._settled(*(values[block] for values in given)))
 
     def _cold_share(self, number: Array) -> Array:
         """Return how much of the growth is still to come behind some configurations: ``exp(-rate number)``, bounded."""
@@ -166,36 +180,40 @@ class Twin:
         self,
         joints: Array,
         approach: Array,
-        temperature: float,
-        cold: float,
+        warmer: Array,
+        cold: Array,
         wrench: Array,
         velocity: Array,
         acceleration: Array,
-    ) -> Posture:
-        links = self._links(temperature - REFERENCE_TEMPERATURE, cold)
-        numbers = range(1, len(links) + 1)
-        truths = [self.joints.get(number, PERFECT) for number in numbers]
-        geared = np.array([self.robot.values.get(f"gain_{number}", 1.0) for number in numbers]) * joints
+    ) -> list[Posture]:
+        """Return the postures of some configurations, each in the round in which it comes to rest."""
+        links = self._links(warmer, cold)
+        truths = [self.joints.get(number, PERFECT) for number in range(1, len(links) + 1)]
+        geared = joints * [self.robot.values.get(f"gain_{number}", 1.0) for number in range(1, len(links) + 1)]
 
-        def deflections(loads: Array) -> Array:
-            rows = zip(truths, joints, approach, loads, links, strict=True)
-            return np.array(
-                [
-                    (*t.tilt(load[3], load[4], self.contact), t.turn(q, a, load[5 if link.turns else 2]))
-                    for t, q, a, load, link in rows
-                ]
-            )
+        def deflections(rows: IntArray, loads: Array) -> Array:
+            found = np.zeros((len(rows), len(links), 3))
+            for j, (truth, link) in enumerate(zip(truths, links, strict=True)):
+                if truth is not PERFECT:
+                    found[:, j, :2] = np.transpose(truth.tilt(loads[:, j, 3], loads[:, j, 4], self.contact))
+                    along = loads[:, j, 5 if link.turns else 2]
+                    found[:, j, 2] = truth.turn(joints[rows, j], approach[rows, j], along)
+            return found
 
-        settled = deflections(np.zeros((len(links), 6)))
-        for _ in range(_ROUNDS):
-            deflection = settled
-            posture = self._posture(links, geared, deflection, wrench, velocity, acceleration)
-            settled = deflections(posture.loads)
-            if np.abs(settled - deflection).max() < _SETTLED:
+        left = np.arange(len(joints))
+        settled, found = deflections(left, np.zeros((len(left), len(links), 6))), dict[int, Posture]()
+        for last in (*[False] * (_ROUNDS - 1), True):
+            deflection, own = settled, tuple(link.of_rows(left) for link in links)
+            standing = self._standing(own, geared[left], deflection, wrench[left], velocity[left], acceleration[left])
+            settled = deflections(left, standing.loads)
+            rests = (np.abs(settled - deflection).max(axis=(1, 2)) < _SETTLED) | last
+            found |= {int(left[row]): standing.of_row(row) for row in np.flatnonzero(rests).tolist()}
+            left, settled = left[~rests], settled[~rests]
+            if len(left) == 0:
                 break
-        return posture
+        return [found[row] for row in range(len(joints))]
 
-    def _posture(
+    def _standing(
         self,
         links: tuple[Link, ...],
         geared: Array,
@@ -204,63 +222,61 @@ class Twin:
         velocity: Array,
         acceleration: Array,
     ) -> Posture:
-        gravity = np.array(self.robot.gravity)
-        moving = velocity.any() or acceleration.any()
-        T = np.stack([np.eye(4), np.zeros((4, 4)), np.zeros((4, 4))]) if moving else np.eye(4)[None]
+        """Return where the arm stands at `n` configurations, one row of every array for each."""
+        gravity, n = np.array(self.robot.gravity), len(geared)
+        T = np.zeros((3 if velocity.any() or acceleration.any() else 1, n, 4, 4))
+        T[0] = np.eye(4)
         axes, frames, ways = [], [], []
-        for link, q, (alpha, beta, gamma), qd, qdd in zip(
-            links, geared.tolist(), deflection.tolist(), velocity, acceleration, strict=True
-        ):
-            T = moved(T, link, q + gamma, qd, qdd)
+        for j, link in enumerate(links):
+            T = moved(T, link, geared[:, j] + deflection[:, j, 2], velocity[:, j], acceleration[:, j])
             axes.append(T[0] @ link.axes)
-            if alpha or beta:
-                T = T @ link.axes @ tilt(alpha, beta) @ np.linalg.inv(link.axes)
+            if deflection[:, j, :2].any():
+                T = T @ (link.axes @ tilt(deflection[:, j, 0], deflection[:, j, 1]) @ np.linalg.inv(link.axes))
             T = T @ link.after
             frames.append(T[0])
             ways.append(T)
         flange = T @ self._flange
         bodies = np.array([*(link.body for link in links), self._payload])
-        weights = weight(bodies, np.stack([*ways, flange], axis=1), gravity)
+        weights = weight(bodies, np.stack([*ways, flange], axis=2), gravity)
         for (lower, upper), pulls in self._balanced(frames):
             if lower:
-                weights[lower - 1] += pulls[0]
-            weights[upper - 1] += pulls[1]
-        pushed = forces_of(wrench, flange[0, :3, 3])
+                weights[:, lower - 1] += pulls[0]
+            weights[:, upper - 1] += pulls[1]
+        pushed = forces_of(wrench, flange[0, :, :3, 3])
         if self.robot.wrench is not None:
-            pushed = pushed + forces_on_tool(self.robot.wrench, flange[0], self._wrench_axes)
-        weights[-1] += pushed
-        carried = np.cumsum(weights[::-1], axis=0)[::-1][:-1]  # by a joint: its own link and all behind it
-        world, at_flange = self._base @ flange[0], np.eye(4)
-        at_flange[:3, 3] = flange[0, :3, 3]
+            pushed = pushed + [forces_on_tool(self.robot.wrench, at, self._wrench_axes) for at in flange[0]]
+        weights[:, -1] += pushed
+        carried = np.cumsum(weights[:, ::-1], axis=1)[:, ::-1][:, :-1]  # by a joint: its own link and all behind it
+        world, at_flange = self._base @ flange[0], np.tile(np.eye(4), (n, 1, 1))
+        at_flange[:, :3, 3] = flange[0, :, :3, 3]
         return Posture(
-            links=np.stack(frames),
+            links=np.stack(frames, axis=1),
             targets={name: world @ place for name, place in self._targets.items()},
-            loads=wrench_at(carried, np.stack(axes)),
+            loads=wrench_at(carried, np.stack(axes, axis=1)),
             deflection=deflection,
             wrench=wrench_at(pushed, at_flange),
         )
 
     def _balanced(self, frames: Sequence[Array]) -> Iterator[tuple[tuple[int, int], tuple[Array, Array]]]:
-        """Give the links of each balancer, and what it does to both as sums of ``p f^T``."""
-        every = [np.eye(4), *frames]
+        """Give the links of each balancer, and what it does to both as sums of ``p f^T`` ``(n, 4, 4)``."""
+        every = [np.broadcast_to(np.eye(4), frames[0].shape), *frames]
         for number, balancer in enumerate(self.robot.balancers, 1):
             ends = (balancer.fixed, balancer.moving)
-            one, other = ((every[end.link] @ [*self._stayed(end.link, end.point), 1.0])[:3] for end in ends)
-            length = math.dist(one, other)
+            one, other = ((every[end.link] @ [*self._stayed(end.link, end.point), 1.0])[:, :3] for end in ends)
+            length = np.linalg.norm(one - other, axis=1)[:, None]
             pull = balancer.force + balancer.stiffness * (length - balancer.length)
-            pull *= self.robot.values.get(f"balancer_{number}", 1.0)
-            towards = np.concatenate([pull / length * (one - other), np.zeros(3)])
+            pull = pull * self.robot.values.get(f"balancer_{number}", 1.0)
+            towards = np.concatenate([pull / length * (one - other), np.zeros(one.shape)], axis=1)
             yield (ends[0].link, ends[1].link), (forces_of(-towards, one), forces_of(towards, other))
 
-    def _links(self, warmer: float, cold: float) -> tuple[Link, ...]:
+    def _links(self, warmer: Array, cold: Array) -> tuple[Link, ...]:
         """Return the links of an arm some kelvin warmer than the reference, a share of whose warming up is to come."""
-        growths = {number: truth.growth * warmer - truth.warm_up * cold for number, truth in self.joints.items()}
-        grown = {number: growth for number, growth in growths.items() if growth}
-        if not grown:
-            return self._plain
-        return tuple(
-            self._link(number, grown[number]) if number in grown else link for number, link in enumerate(self._plain, 1)
-        )
+        links = list(self._plain)
+        for number, truth in self.joints.items():
+            growths, which = np.unique(truth.growth * warmer - truth.warm_up * cold, return_inverse=True)
+            if growths.any():
+                links[number - 1] = stacked([self._link(number, growth) for growth in growths.tolist()], which)
+        return tuple(links)
 
     def _link(self, number: int, growth: float) -> Link:
         bearing, masses = self._places[number - 1]

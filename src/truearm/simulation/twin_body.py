@@ -10,18 +10,18 @@ matrices", the same in Paul 1981, "Robot Manipulators", chapter 6).
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
+from truearm.measurement.dataset import IntArray
 from truearm.modeling.chain import Array, Element
 from truearm.modeling.parts import LinkMass
 from truearm.modeling.wrench import Wrench
 
-#: A frame with its first and second derivative by time, (3, 4, 4); of an arm at rest the frame alone, (1, 4, 4).
+#: Frames with their first and second derivative by time, (3, n, 4, 4); of arms at rest the frames alone, (1, n, 4, 4).
 Moving = Array
 _IDENTITY: Final = np.eye(4)
 
@@ -30,10 +30,12 @@ _IDENTITY: Final = np.eye(4)
 class Link:
     """One link: the way to its joint, the joint, the way on to the link's frame.
 
+    Where the arm is warmer at one configuration than at another, `before`, `after` and `zero` have a row for each.
+
     Attributes
     ----------
     before, after
-        Constant matrices ``(4, 4)``.
+        Matrices that no joint changes ``(4, 4)`` or ``(n, 4, 4)``.
     generator
         Derivative of the joint's matrix by its variable at zero ``(4, 4)``.
     square
@@ -41,7 +43,7 @@ class Link:
     turns
         Whether the joint turns.
     zero
-        Value of the joint's own element [rad or m].
+        Value of the joint's own element [rad or m], or ``(n,)`` of them.
     axes
         The joint's axes in the frame behind its element, z along the joint, at its bearing ``(4, 4)``.
     body
@@ -52,7 +54,7 @@ class Link:
     generator: Array
     square: Array
     turns: bool
-    zero: float
+    zero: float | Array
     axes: Array
     after: Array
     body: Array
@@ -84,6 +86,19 @@ class Link:
             body=sum((second_moments(mass.mass, mass.cog, mass.inertia) for mass in masses), np.zeros((4, 4))),
         )
 
+    def of_rows(self, rows: IntArray) -> Link:
+        """Return the link at some of its configurations."""
+        if self.before.ndim == 2:
+            return self
+        zero = np.asarray(self.zero)
+        return replace(self, before=self.before[rows], after=self.after[rows], zero=zero[rows])
+
+
+def stacked(links: Sequence[Link], which: IntArray) -> Link:
+    """Return one link that is at each configuration the one of those links that `which` names."""
+    before, after = (np.array([getattr(link, side) for link in links])[which] for side in ("before", "after"))
+    return replace(links[0], before=before, after=after, zero=np.array([link.zero for link in links])[which])
+
 
 def product(elements: Sequence[Element], values: Mapping[str, float], growth: float = 0.0) -> Array:
     """Return the matrix of some elements with no joint among them."""
@@ -110,11 +125,15 @@ def generator(element: Element) -> Array:
     return S
 
 
-def exponential(S: Array, amount: float, turns: bool, square: Array | None = None) -> Array:
-    """Return the matrix of a turn or a slide by its generator, whose square may be at hand."""
+def exponential(S: Array, amount: float | Array, turns: bool, square: Array | None = None) -> Array:
+    """Return the matrix of a turn or a slide by its generator, whose square may be at hand.
+
+    Of ``(n,)`` amounts it returns ``(n, 4, 4)``.
+    """
+    by = np.asarray(amount)[..., None, None]
     if turns:
-        return _IDENTITY + math.sin(amount) * S + (1 - math.cos(amount)) * (S @ S if square is None else square)
-    return _IDENTITY + amount * S
+        return np.asarray(_IDENTITY + np.sin(by) * S + (1 - np.cos(by)) * (S @ S if square is None else square))
+    return np.asarray(_IDENTITY + by * S)
 
 
 def second_moments(
@@ -129,31 +148,32 @@ def second_moments(
     return J + mass * np.outer(centre, centre)
 
 
-def moved(T: Moving, link: Link, variable: float, velocity: float, acceleration: float) -> Moving:
-    """Return the frame right behind a link's joint."""
+def moved(T: Moving, link: Link, variable: Array, velocity: Array, acceleration: Array) -> Moving:
+    """Return the frames right behind a link's joint, whose variable and derivatives are ``(n,)``."""
     S = link.generator
     A = exponential(S, link.zero + variable, link.turns, link.square)
     if len(T) == 1:
         return np.asarray(T @ link.before @ A)
-    A1 = velocity * A @ S
-    A2 = acceleration * A @ S + velocity * A1 @ S
+    rate_of, change_of = velocity[:, None, None], acceleration[:, None, None]
+    A1 = rate_of * A @ S
+    A2 = change_of * A @ S + rate_of * A1 @ S
     at, rate, change = T @ link.before
     return np.stack([at @ A, rate @ A + at @ A1, change @ A + 2 * rate @ A1 + at @ A2])
 
 
 def weight(bodies: Array, T: Moving, gravity: Array) -> Array:
-    """Return weight and inertial forces on bodies: the sum of ``p f^T`` over the points of each ``(n, 4, 4)``.
+    """Return weight and inertial forces on bodies: the sum of ``p f^T`` over the points of each ``(n, bodies, 4, 4)``.
 
     Parameters
     ----------
     bodies
-        Second moments ``(n, 4, 4)``.
+        Second moments ``(bodies, 4, 4)``.
     T
-        Their frames with first and second derivative, ``(3, n, 4, 4)``, or alone, ``(1, n, 4, 4)``.
+        Their frames with first and second derivative, ``(3, n, bodies, 4, 4)``, or alone, ``(1, n, bodies, 4, 4)``.
     """
-    pull = -T[2] if len(T) > 1 else np.zeros(bodies.shape)
-    pull[:, :3, 3] += gravity
-    return np.asarray(T[0] @ bodies @ np.swapaxes(pull, 1, 2))
+    pull = -T[2] if len(T) > 1 else np.zeros(T.shape[1:])
+    pull[..., :3, 3] += gravity
+    return np.asarray(T[0] @ bodies @ np.swapaxes(pull, -1, -2))
 
 
 def wrench_at(carried: Array, frame: Array) -> Array:
@@ -165,11 +185,14 @@ def wrench_at(carried: Array, frame: Array) -> Array:
 
 
 def forces_of(wrench: Array, point: Array) -> Array:
-    """Return a sum of ``p f^T`` that acts as a force and a moment about a point ``(3,)`` do."""
-    force, (x, y, z) = wrench[:3], wrench[3:] / 2
-    carried = np.zeros((4, 4))
-    carried[3, :3] = force
-    carried[:3, :3] = np.outer(point, force) + np.array([[0, z, -y], [-z, 0, x], [y, -x, 0]])
+    """Return sums of ``p f^T`` ``(n, 4, 4)`` that act as forces and moments ``(n, 6)`` about points ``(n, 3)`` do."""
+    force, (x, y, z) = wrench[:, :3], wrench[:, 3:].T / 2
+    carried = np.zeros((len(wrench), 4, 4))
+    carried[:, 3, :3] = force
+    carried[:, :3, :3] = point[:, :, None] * force[:, None, :]
+    for row, column, half in ((0, 1, z), (1, 2, x), (2, 0, y)):
+        carried[:, row, column] += half
+        carried[:, column, row] -= half
     return carried
 
 
@@ -196,8 +219,8 @@ def forces_on_tool(wrench: Wrench, flange: Array, turned: Array) -> Array:
     return carried
 
 
-def tilt(alpha: float, beta: float) -> Array:
-    """Return ``Rx(alpha) Ry(beta)``."""
+def tilt(alpha: Array, beta: Array) -> Array:
+    """Return ``Rx(alpha) Ry(beta)`` ``(n, 4, 4)``."""
     about_x, about_y = generator(Element("Rx")), generator(Element("Ry"))
     return exponential(about_x, alpha, turns=True) @ exponential(about_y, beta, turns=True)
 

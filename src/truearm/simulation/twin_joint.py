@@ -6,6 +6,10 @@ import math
 from dataclasses import dataclass
 from typing import Final, Literal
 
+import numpy as np
+
+from truearm.modeling.chain import Array
+
 #: Loads below this [N or N m] are rounding: no shaft leans on its housing for them.
 _NO_LOAD: Final = 1e-9
 
@@ -53,37 +57,36 @@ class JointTruth:
     growth: float = 0.0
     warm_up: float = 0.0
 
-    def turn(self, position: float, approach: float, load: float) -> float:
-        """Return what the joint turns, or slides, beyond its commanded position [rad or m].
+    def turn(self, position: Array | float, approach: Array | float, load: Array | float) -> Array:
+        """Return what the joint turns, or slides, beyond its commanded positions ``(n,)`` [rad or m].
 
         Parameters
         ----------
         position
-            [rad or m].
+            [rad or m], ``(n,)``.
         approach
-            Direction of the last move, +1 or -1, 0 if it is not known.
+            Direction of the last move, +1 or -1, 0 if it is not known, ``(n,)``.
         load
-            Moment about the axis [N m], or force along it [N].
+            Moment about the axis [N m], or force along it [N], ``(n,)``.
         """
-        geared = sum(amplitude * math.sin(k * position + phase) for k, amplitude, phase in self.gear)
-        sprung = self.compliance * load + self.quadratic * load * abs(load) + self.cubic * load**3
-        return geared + self.hysteresis * approach + sprung + self.backlash / 2 * _sign(load)
+        geared = sum((amplitude * np.sin(k * position + phase) for k, amplitude, phase in self.gear), np.zeros(()))
+        sprung = self.compliance * load + self.quadratic * load * np.abs(load) + self.cubic * load**3
+        return np.asarray(geared + self.hysteresis * approach + sprung + self.backlash / 2 * _sign(load))
 
-    def tilt(self, x: float, y: float, contact: Contact) -> tuple[float, float]:
-        """Return how the shaft leans about x and y of the joint [rad] under the moments about them [N m].
+    def tilt(self, x: Array | float, y: Array | float, contact: Contact) -> tuple[Array, Array]:
+        """Return how the shaft leans about x and y of the joint [rad] under the moments about them [N m], ``(n,)``.
 
         Source: Patel, equations 5.16 to 5.18, with radius ``(L/2) tan C`` and a sign (his 5.15 is inverted, and the
         shaft's length L cancels).
         """
-        sign_x, sign_y = _sign(x), _sign(y)
-        if not (self.clearance and (sign_x or sign_y)):
-            return self.bearing * x, self.bearing * y
+        if not self.clearance:
+            return np.asarray(self.bearing * x), np.asarray(self.bearing * y)
         if contact == "exact":
-            gamma = math.atan2(abs(x), abs(y))
+            gamma = np.arctan2(np.abs(x), np.abs(y))
         else:
-            gamma = math.pi / 2 * abs(x) / (abs(x) + abs(y))
-        across, along = math.tan(self.clearance) * math.sin(gamma), math.tan(self.clearance) * math.cos(gamma)
-        laid_x, laid_y = sign_x * across / math.hypot(1.0, across), sign_y * along / math.hypot(1.0, along)
+            gamma = np.pi / 2 * np.abs(x) / np.maximum(np.abs(x) + np.abs(y), _NO_LOAD)
+        across, along = math.tan(self.clearance) * np.sin(gamma), math.tan(self.clearance) * np.cos(gamma)
+        laid_x, laid_y = _sign(x) * across / np.hypot(1.0, across), _sign(y) * along / np.hypot(1.0, along)
         return laid_x + self.bearing * x, laid_y + self.bearing * y
 
 
@@ -91,5 +94,5 @@ class JointTruth:
 PERFECT: Final = JointTruth()
 
 
-def _sign(load: float) -> float:
-    return 0.0 if abs(load) < _NO_LOAD else math.copysign(1.0, load)
+def _sign(load: Array | float) -> Array:
+    return np.where(np.abs(load) < _NO_LOAD, 0.0, np.copysign(1.0, load))

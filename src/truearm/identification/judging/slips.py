@@ -7,7 +7,7 @@ one slip mended; the simplest slip that makes them fit several times better is w
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Final
@@ -75,7 +75,9 @@ def slips_in_positions(robot: Robot, data: Dataset) -> list[Notice]:
     turned = _quaternion_slips(robot, data)
     some, rest = _some(data), replace(data, quaternion=None, sigma_rot=None)
     some = replace(some, quaternion=None, sigma_rot=None)
-    misfit = {t: _misfit(robot, _only(some, t)) for t in range(len(some.targets)) if _seen(some, t)}
+    seen = [t for t in range(len(some.targets)) if _seen(some, t)]
+    errors = placed_errors(robot, [_only(some, t) for t in seen])
+    misfit = {t: float(np.median(off)) for t, off in zip(seen, errors, strict=True)}
     least = min(misfit.values())
     bad = [t for t, size in misfit.items() if size > max(_PLACED_WITHIN, _LEAST_IMPROVEMENT * least)]
     if not bad:
@@ -125,14 +127,20 @@ def _best(robot: Robot, data: Dataset, slips: Iterable[Slip], several: Callable[
     if not tried:
         return None
     given = _misfit(robot, data) / _spread(data)
-    shares = [_misfit(robot, slip.data) / _spread(slip.data) for slip in tried]
+    shares = _shares(robot, tried)
     if min(shares) * _PLAIN_IMPROVEMENT > given:
         more = several()
         tried += more
-        shares += [_misfit(robot, slip.data) / _spread(slip.data) for slip in more]
+        shares += _shares(robot, more)
     least = min(shares)
     best = next(slip for slip, share in zip(tried, shares, strict=True) if share <= _AS_GOOD * least)
     return best if least * _LEAST_IMPROVEMENT < given else None
+
+
+def _shares(robot: Robot, slips: Sequence[Slip]) -> list[float]:
+    """Return how badly each slip fits in proportion to how far its readings lie apart."""
+    errors = placed_errors(robot, [slip.data for slip in slips])
+    return [float(np.median(off)) / _spread(slip.data) for off, slip in zip(errors, slips, strict=True)]
 
 
 def slips_in_lengths(robot: Robot, data: Dataset) -> list[Notice]:
@@ -195,7 +203,7 @@ def _fitted_misfit(robot: Robot, data: Dataset) -> float:
 def _misfit(robot: Robot, data: Dataset) -> float:
     """Return the median distance that the placed nominal robot leaves [m]; infinite if it cannot be placed."""
     if data.fixture is None:
-        return float(np.median(placed_errors(robot, data)))
+        return float(np.median(placed_errors(robot, [data])[0]))
     try:
         return float(np.nanmedian(off_by(errors_of(start_from_readings(robot, data), data))))
     except InputError:

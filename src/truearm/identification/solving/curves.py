@@ -18,7 +18,7 @@ from truearm.modeling.parameters import FreeParameters, Parameter
 from truearm.modeling.robot import Robot
 
 #: How often stiffness is found: the noise that is left without a curve is not that with it.
-_ROUNDS: Final = 3
+_ROUNDS: Final = 2
 #: Equations whose products are summed at once.
 _AT_ONCE: Final = 3000
 #: Coordinates that say where a target is.

@@ -96,7 +96,8 @@ class Moments:
             mine = every if factors == 1 else np.where((at.factor == index)[:, None], every, 0.0)
             by_arrival.append(at.arrivals.products(mine[:, :k], mine))
             whole.append(mine[:, k:].T @ mine[:, k:])
-        products, sums = np.stack(by_arrival), np.stack(whole)
+        products = np.stack(by_arrival) if factors > 1 else by_arrival[0][None]
+        sums = np.stack(whole)
         self.M = products[..., :k]  # (factors, arrivals, joints, joints)
         self.T = products[..., k:-1]  # (factors, arrivals, joints, parameters)
         self.t = products[..., -1]

@@ -11,6 +11,7 @@ No start needs to be given by hand, and the number of joints does not matter.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -64,23 +65,69 @@ def initial_frames(robot: Robot, data: Dataset, held: Held = NOTHING_HELD) -> Ro
     InputError
         If no target has a position.
     """
-    placement = _placement(robot.with_frames(Transform(), {}), data, held)
+    placement = _placements(robot.with_frames(Transform(), {}), [data], held)[0]
     return robot.with_frames(placement.base, placement.targets)  # type: ignore[arg-type]
 
 
-def placed_errors(robot: Robot, data: Dataset) -> Array:
-    """Return how far each position reading is from the robot placed by :func:`initial_frames` [m], ``(readings,)``.
+def placed_errors(robot: Robot, tried: Sequence[Dataset]) -> list[Array]:
+    """Return how far position readings are from the robot placed by :func:`initial_frames` [m], ``(readings,)`` each.
 
     Parameters
     ----------
     robot
         At the origin, with no targets.
+    tried
+        Data that the robot is placed by one after the other; many of them together take little longer than one.
     """
-    return np.asarray(np.linalg.norm(_placement(robot, data, NOTHING_HELD).left_over, axis=1))
+    placements = _placements(robot, tried, NOTHING_HELD)
+    return [np.asarray(np.linalg.norm(placement.left_over, axis=1)) for placement in placements]
 
 
-def _placement(placed: Robot, data: Dataset, held: Held) -> _Placement:
-    """Return where the data say that a robot stands that is at the origin and has no targets."""
+def _placements(placed: Robot, tried: Sequence[Dataset], held: Held) -> list[_Placement]:
+    """Return where each of the data say that a robot stands that is at the origin and has no targets."""
+    rows = [_rows(placed, data, held) for data in tried]
+    if not rows:
+        return []
+    if held.base is not None:
+        return [_placed(own, held.base.rotation, data, held) for own, data in zip(rows, tried, strict=True)]
+    G, g = np.array([own.M.T @ own.M for own in rows]), np.array([own.M.T @ own.m for own in rows])
+    bases = _nearest_rotations(G, g)
+    return [_placed(own, base, data, held) for own, base, data in zip(rows, bases, tried, strict=True)]
+
+
+@dataclass(frozen=True, eq=False)
+class _Rows:
+    """What the readings of some data say of the base's rotation, and with it of the places.
+
+    Attributes
+    ----------
+    M, m
+        ``M vec(R) = m`` for the rotation alone, ``(rows, 9)`` and ``(rows,)``.
+    turned, left, known
+        ``turned vec(R) = left + known x`` for targets and base x.
+    centre
+        Mean of the readings [m].
+    R
+        Of the flange ``(configurations, 3, 3)``.
+    seen, found
+        Targets that were read, and those whose place is not known.
+    rotations
+        Configurations and rotations of the orientation readings of each target.
+    """
+
+    M: Array
+    m: Array
+    turned: Array
+    left: Array
+    known: Array
+    centre: Array
+    R: Array
+    seen: list[int]
+    found: list[int]
+    rotations: Mapping[int, tuple[IntArray, Array]]
+
+
+def _rows(placed: Robot, data: Dataset, held: Held) -> _Rows:
     p, R = placed.world_poses(data.postures)
     with_position = data.has_position
     if not with_position.any():
@@ -128,18 +175,24 @@ def _placement(placed: Robot, data: Dataset, held: Held) -> _Placement:
         M = np.concatenate([M, _ARM * rows.reshape(-1, 9)])
         m = np.concatenate([m, _ARM * after.reshape(-1)])
 
-    base = _nearest_rotation(M.T @ M, M.T @ m) if held.base is None else held.base.rotation
-    right = turned @ base.reshape(-1) - left
+    return _Rows(M, m, turned, left, known, centre, R, seen, found, rotations)
+
+
+def _placed(rows: _Rows, base: Array, data: Dataset, held: Held) -> _Placement:
+    """Return the places that go best with a rotation of the base."""
+    known, centre, R, rotations = rows.known, rows.centre, rows.R, rows.rotations
+    right = rows.turned @ base.reshape(-1) - rows.left
     if held.base is not None:  # u = R' (p - centre) with p known: it goes to the right side
-        right -= np.tile(base.T @ (np.array(held.base.translation) - centre), len(readings))
+        right -= np.tile(base.T @ (np.array(held.base.translation) - centre), len(right) // 3)
         known = known[:, :-3]
     solution = np.zeros(0)
     if known.shape[1]:
         solution = np.asarray(np.linalg.lstsq(known, right, rcond=1e-10)[0], dtype=np.float64)
     places: dict[str, Transform | Array] = {}
-    for t, place in given.items():
+    for t in set(rows.seen) - set(rows.found):
+        place = held.targets[data.targets[t]]
         places[data.targets[t]] = place if len(rotations[t][0]) else np.array(place.translation)
-    for column, t in enumerate(found):
+    for column, t in enumerate(rows.found):
         point = solution[3 * column : 3 * column + 3]
         where_t, Y = rotations[t]
         if len(where_t):
@@ -148,7 +201,7 @@ def _placement(placed: Robot, data: Dataset, held: Held) -> _Placement:
             places[data.targets[t]] = Transform.from_matrix(U @ np.diag([1, 1, np.linalg.det(U @ Vt)]) @ Vt, point)
         else:
             places[data.targets[t]] = point
-    places = {name: places[name] for name in (data.targets[t] for t in seen)}
+    places = {name: places[name] for name in (data.targets[t] for t in rows.seen)}
     stands = held.base or Transform.from_matrix(base, base @ solution[-3:] + centre)
     return _Placement(stands, places, (right - known @ solution).reshape(-1, 3))
 
@@ -187,24 +240,28 @@ def _turn_axes(R: Array) -> Array:
     )
 
 
-def _nearest_rotation(G: Array, g: Array) -> Array:
-    """Minimise r' G r - 2 g' r over the rotations, r = vec(R) row by row."""
+def _nearest_rotations(G: Array, g: Array) -> Array:
+    """Minimise r' G r - 2 g' r over the rotations, r = vec(R) row by row, for every G ``(n, 9, 9)``: ``(n, 3, 3)``."""
     candidates = _even_rotations(1500)
-    best = candidates[np.argsort(_cost(G, g, candidates))[:24]]
+    best = candidates[np.argsort(_cost(G, g, candidates), axis=1)[:, :24]]
     costs = _cost(G, g, best)
+    left = np.arange(len(G))  # those that have not come to rest
     for _ in range(50):
-        step = _newton_step(G, g, best)
-        size = np.linalg.norm(step, axis=1, keepdims=True)
+        step = _newton_step(G[left], g[left], best[left])
+        size = np.linalg.norm(step, axis=2, keepdims=True)
         step *= np.minimum(1.0, 0.5 / np.maximum(size, 1e-300))
-        moved = best @ _rotations(step)
-        moved_costs = _cost(G, g, moved)
-        better = moved_costs <= costs
-        best, costs = np.where(better[:, None, None], moved, best), np.where(better, moved_costs, costs)
-        if not better.any() or size[better].max() < 1e-12:
+        moved = best[left] @ _rotations(step)
+        moved_costs = _cost(G[left], g[left], moved)
+        better = moved_costs <= costs[left]
+        best[left] = np.where(better[..., None, None], moved, best[left])
+        costs[left] = np.where(better, moved_costs, costs[left])
+        left = left[np.where(better, size[..., 0], 0.0).max(axis=1) >= 1e-12]
+        if len(left) == 0:
             break
-    found = best[[np.argmin(costs)]]
+    found = best[np.arange(len(G)), np.argmin(costs, axis=1)][:, None]
     last = _newton_step(G, g, found)  # the cost is flat to rounding where the slope is not yet
-    return np.asarray((found @ _rotations(last) if np.linalg.norm(last) < _FLAT else found)[0])
+    flat = np.linalg.norm(last, axis=2)[..., None, None] < _FLAT
+    return np.asarray(np.where(flat, found @ _rotations(last), found)[:, 0])
 
 
 #: Angle about a minimum within which rounding hides how the cost changes, amply [rad].
@@ -212,22 +269,22 @@ _FLAT = 1e-6
 
 
 def _newton_step(G: Array, g: Array, R: Array) -> Array:
-    """Return rotation vectors w, ``(n, 3)``, that lead from rotations R by R exp(w) to where the slope is zero.
+    """Return rotation vectors w, ``(n, k, 3)``, that lead from rotations R by R exp(w) to where the slope is zero.
 
     With ``A = R' mat(G r - g)`` half the second derivative of the cost by w is ``D' G D + sym(A) - tr(A) I``, D the
     columns of d vec(R) / dw. Where it is not positive, its eigenvalues are taken without their signs, so that every
     step goes downhill.
     """
     # R exp(w): the columns of d vec(R) / dw are vec(R [e_k]x)
-    D = np.ascontiguousarray((R[:, None] @ _GENERATORS).reshape(-1, 3, 9).swapaxes(1, 2))
-    Dt = D.swapaxes(1, 2)
-    slope = R.reshape(-1, 9) @ G - g
-    A = R.swapaxes(1, 2) @ slope.reshape(-1, 3, 3)
-    bend = (A + A.swapaxes(1, 2)) / 2 - np.trace(A, axis1=1, axis2=2)[:, None, None] * _IDENTITY
-    curvature, V = np.linalg.eigh(Dt @ (G @ D) + bend)
+    D = np.ascontiguousarray((R[:, :, None] @ _GENERATORS).reshape(*R.shape[:2], 3, 9).swapaxes(2, 3))
+    Dt = D.swapaxes(2, 3)
+    slope = R.reshape(*R.shape[:2], 9) @ G - g[:, None]
+    A = R.swapaxes(2, 3) @ slope.reshape(R.shape)
+    bend = (A + A.swapaxes(2, 3)) / 2 - np.trace(A, axis1=2, axis2=3)[..., None, None] * _IDENTITY
+    curvature, V = np.linalg.eigh(Dt @ (G[:, None] @ D) + bend)
     curvature = np.abs(curvature)
-    curvature += 1e-9 * curvature.sum(axis=1, keepdims=True) + 1e-300
-    return np.asarray(-(V @ ((V.swapaxes(1, 2) @ (Dt @ slope[:, :, None])) / curvature[:, :, None]))[:, :, 0])
+    curvature += 1e-9 * curvature.sum(axis=2, keepdims=True) + 1e-300
+    return np.asarray(-(V @ ((V.swapaxes(2, 3) @ (Dt @ slope[..., None])) / curvature[..., None]))[..., 0])
 
 
 _IDENTITY = np.eye(3)
@@ -241,14 +298,15 @@ _GENERATORS = np.array(
 
 
 def _cost(G: Array, g: Array, R: Array) -> Array:
-    r = R.reshape(-1, 9)
-    return np.asarray(((r @ G - 2 * g) * r).sum(axis=1))
+    """Return the cost of rotations ``(k, 3, 3)``, or ``(n, k, 3, 3)``, for every G: ``(n, k)``."""
+    r = R.reshape(*R.shape[:-2], 9)
+    return np.asarray(((r @ G - 2 * g[:, None]) * r).sum(axis=2))
 
 
 def _rotations(w: Array) -> Array:
-    """Return the rotations with rotation vectors `w`, ``(n, 3)``."""
-    angle = np.linalg.norm(w, axis=1, keepdims=True)
-    q = np.concatenate([np.cos(angle / 2), 0.5 * np.sinc(angle / (2 * np.pi)) * w], axis=1)
+    """Return the rotations with rotation vectors `w`, ``(..., 3)``."""
+    angle = np.linalg.norm(w, axis=-1, keepdims=True)
+    q = np.concatenate([np.cos(angle / 2), 0.5 * np.sinc(angle / (2 * np.pi)) * w], axis=-1)
     return rotation_from_quaternion(q)
 
 

@@ -91,12 +91,31 @@ def _image(cv2: Any, path: Path) -> Any:
 def _corners(cv2: Any, image: Any, board: Charuco, path: Path) -> Seen:
     """Return the corners that a picture shows [px], ``(k, 2)``, and where they are on the board [m], ``(k, 3)``."""
     names = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, f"DICT_{board.dictionary}"))
-    made = cv2.aruco.CharucoBoard((board.columns, board.rows), board.square, board.marker, names)
-    corners, numbers, _, markers = cv2.aruco.CharucoDetector(made).detectBoard(image)
-    count = 0 if numbers is None else len(numbers)
+
+    def detected(columns: int, rows: int) -> tuple[Any, Any, int, int]:
+        made = cv2.aruco.CharucoBoard((columns, rows), board.square, board.marker, names)
+        corners, numbers, _, markers = cv2.aruco.CharucoDetector(made).detectBoard(image)
+        return corners, numbers, 0 if numbers is None else len(numbers), 0 if markers is None else len(markers)
+
+    corners, numbers, count, many = detected(board.columns, board.rows)
     if count >= LEAST_CORNERS:
         return np.asarray(corners, float).reshape(-1, 2), board.places[np.asarray(numbers).ravel()]
-    many = 0 if markers is None else len(markers)
+    mirrored = _markers(cv2, np.ascontiguousarray(image[:, ::-1]), board.dictionary)
+    if mirrored >= max(LEAST_CORNERS, 2 * many):  # a few are taken for others as they are
+        raise InputError(
+            "this picture is mirrored",
+            where=str(path),
+            came=f"markers of {board.dictionary} in its mirror image",
+            cure="Switch off mirroring in the camera's software, and take the pictures anew or mirror them back.",
+        )
+    if many and board.columns != board.rows and detected(board.rows, board.columns)[2] >= LEAST_CORNERS:
+        raise InputError(
+            "columns and rows of the board are exchanged",
+            where=str(path),
+            came=f"{board.columns}x{board.rows}",
+            allowed=f"{board.rows}x{board.columns}",
+            cure="Count the squares along the edge on which the markers' numbers go up by one first.",
+        )
     if many:
         raise InputError(
             "too few corners of the board are seen",

@@ -65,6 +65,16 @@ def _robot(content: RobotFile, where: str) -> Robot:
                 came=name,
                 cure=f"joints[{names.index(name) + 1}] has it too: rename one of them.",
             )
+    given = [balancer.name for balancer in content.balancers]
+    for number, called in enumerate(given, 1):
+        if called is not None and called in given[: number - 1]:
+            raise InputError(
+                "two balancers have the same name",
+                where=f"{where}, balancers[{number}]",
+                came=called,
+                cure=f"balancers[{given.index(called) + 1}] has it too, and both would pull: rename one of them, "
+                "or take it out if it is the same one.",
+            )
     numbered = [("link", "masses", mass.link) for mass in content.masses]
     for name, truth in content.truths.items():
         for kind in ("compliance", "backlash", "clearance"):
@@ -307,6 +317,8 @@ def _row(text: str, count: int, where: str, cure: str) -> tuple[float, ...]:
 
 
 #: Entries of a joint in every convention.
+#: No joint's bearing is farther from the joint's origin [m].
+_FARTHEST_BEARING: Final = 10.0
 _OF_ANY_JOINT: Final = ("name", "type", "limits", "transmission_periods", "bearing")
 
 
@@ -358,6 +370,14 @@ def _joint(content: RobotFile, number: int, entry: JointEntry, where: str) -> Jo
                 cure="Take the entry out: moments across a slide are taken where it stands.",
             )
         bearing = sized_si(entry.bearing, content.units.length, f"{where}.bearing")
+        if abs(bearing) > _FARTHEST_BEARING:
+            raise InputError(
+                "the bearing lies farther along its axis than any arm is large",
+                where=f"{where}.bearing",
+                came=f"{bearing:g} m",
+                allowed=f"up to {_FARTHEST_BEARING:g} m either way",
+                cure="Give the distance from the joint's origin in the file's unit of length.",
+            )
     return Joint(entry.name or f"joint_{number}", entry.type, row, limits, entry.transmission_periods, bearing)
 
 

@@ -348,8 +348,8 @@ def choices() -> str:
 
 CHOICES = """\
 Mean held-out errors [mm], medians over splits (`benchmarks/choosing.py`); worst: of `auto` over the splits; no order:
-of `auto` where the place of a configuration in the campaign is not known; and the processor's time of the choice and its
-fit, by that of one elastic `identify` on the same data.
+of `auto` where the place of a configuration in the campaign is not known; and the processor's time of the choice and
+its fit, by that of one elastic `identify` on the same data.
 
 | robot, training configurations | splits | geometric | elastic | auto | worst | no order | times an elastic fit |
 |---|---|---|---|---|---|---|---|"""

@@ -165,6 +165,8 @@ def test_an_arm_that_warms_up_is_one_that_was_colder() -> None:
 @pytest.mark.parametrize("effect", ["approach", "thermal-growth", "warm-up"])
 def test_what_is_not_known_does_nothing(effect: str) -> None:
     robot = loaded_arm((effect,), 7)
+    if effect == "warm-up":  # what a session's middle leaves of it
+        robot = robot.with_values({"warm_up_left": 0.0})
     q = robot.random_configurations(5, np.random.default_rng(8))
     for actual, expected in zip(robot.world_poses(q), replace(robot, effect_names=()).world_poses(q), strict=True):
         assert_array_equal(actual, expected)
@@ -178,7 +180,7 @@ def test_the_group_of_its_parameters_is_its_name(effect: type[Effect]) -> None:
     robot = loaded_arm((effect.name,), 3)
     own = next(each for each in robot.effects if each.name == effect.name)
     assert own.parameters
-    assert {p.group for p in own.parameters} == {effect.name}
+    assert {p.group for p in own.parameters if p.group != "session"} == {effect.name}
     assert len({e.name for e in EFFECTS}) == len(EFFECTS)
 
 

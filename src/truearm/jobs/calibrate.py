@@ -14,7 +14,9 @@ from truearm.errors import InputError, refusals_of
 from truearm.files import path_argument, read_bytes
 from truearm.identification.base_changes import with_one_base
 from truearm.identification.choosing.balancer_loads import refuse_balancers_that_are_not_there, without_unseen_balancers
-from truearm.identification.choosing.selection import AUTO, select
+from truearm.identification.choosing.choice import AUTO
+from truearm.identification.choosing.chosen_fit import check_choice, identify_chosen
+from truearm.identification.choosing.selection import select
 from truearm.identification.judging.held_places import check_held
 from truearm.identification.judging.judgement import judge
 from truearm.identification.solving.bootstrap import LEAST_FITS
@@ -280,28 +282,22 @@ def calibrate(
         readings = steady
         first = readings.of_configurations(training)
         second = readings.of_configurations(held_out) if len(held_out) else None
-        selection = None
-        if named is None:
-            selection = select(
-                nominal_robot,
-                first,
-                loss=loss,
-                redundancy=redundancy,
-                bounds=bounds,
-                bounds_file=bounds_file,
-                held=held,
-                seed=seed,
-                progress=progress,
-            )
-        chosen: Model = selection.model if named is None and selection is not None else named.also(effects)  # type: ignore[union-attr]
-        chosen, held_effects = without_unseen_balancers(chosen, first)
         progress("placing the nominal robot")
         placed = place(nominal_robot, first, loss, held)
-        progress(f"identifying the {chosen.name} model on {count} configurations")
         how = _How(loss=loss, redundancy=redundancy, bounds=bounds, bounds_file=bounds_file)
-        fit = identify(
-            nominal_robot, first, chosen, **how, held=held, bootstrap=bootstrap, seed=seed, progress=progress
-        )
+        selection, held_effects = None, list[Notice]()
+        if named is None:
+            selection = select(nominal_robot, first, **how, held=held, seed=seed, progress=progress)
+            selection, fit = identify_chosen(
+                nominal_robot, first, selection, **how, held=held, bootstrap=bootstrap, seed=seed, progress=progress
+            )
+            nominal_robot, chosen = selection.prepared(nominal_robot), selection.model
+        else:
+            chosen, held_effects = without_unseen_balancers(named.also(effects), first)
+            progress(f"identifying the {chosen.name} model on {count} configurations")
+            fit = identify(
+                nominal_robot, first, chosen, **how, held=held, bootstrap=bootstrap, seed=seed, progress=progress
+            )
         contradicted = check_held(nominal_robot, fit, first, **how)
     progress("judging it")
     judges = first if second is None else second
@@ -315,6 +311,7 @@ def calibrate(
         *check_trained_before(nominal_robot, as_read, sha256, (count, n, seed), without_words(without)),
         *moved,
         *held_effects,
+        *(() if selection is None else check_choice(selection)),
     )
     judged = judge(
         fit, readings, first, validation or train_errors, noticed, of_split, loss, held_out=second is not None

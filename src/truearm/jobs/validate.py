@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -39,6 +39,7 @@ from truearm.jobs.zones import zoned_robot
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.repeats import readings_digest
 from truearm.measurement.statistics import errors_of
+from truearm.modeling.effects.warm_up import LEFT
 from truearm.modeling.parts import Payload
 from truearm.modeling.proof import BASE
 from truearm.modeling.robot import Robot
@@ -132,6 +133,7 @@ def validate(
     as_calibrated = robot_argument(robot)
     robot, data = as_measured(robot, data, payload, gravity)
     robot = _pushed(robot, data, pushed, wrench_at)
+    data, other_session = _of_another_session(robot, data)
     as_calibrated = as_calibrated.with_wrench(robot.wrench)
     identified = {p.group for p in robot.parameters.values() if p.deviation is not None}
     found_or_held = "base" in identified or (robot.proof is not None and BASE in robot.proof.held)
@@ -166,6 +168,7 @@ def validate(
     warnings = (
         *changed,
         *mistaken,
+        *other_session,
         *check_payload(robot),
         *check_force([(robot, data.postures)]),
         *_seen_in_training(robot, data, digest),
@@ -189,6 +192,17 @@ def validate(
     if folder is not None:
         validation.save(folder)
     return validation
+
+
+def _of_another_session(robot: Robot, data: Dataset) -> tuple[Dataset, list[Notice]]:
+    """Return readings without their numbers, where these would say how warm the arm was in the session of the fit."""
+    if data.number is None or LEFT not in robot.parameters:
+        return data, []
+    words = (
+        "The robot grew while it warmed up in the session that it was calibrated in. How warm it was in this one "
+        "nobody knows, so it is judged as in the middle of that session."
+    )
+    return replace(data, number=None), [Notice("other-session", words, "note")]
 
 
 def measure_farther(distances: RegionDistances | None) -> tuple[NextStep, ...]:

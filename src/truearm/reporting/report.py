@@ -22,6 +22,12 @@ from truearm.reporting.drawing import Figure
 from truearm.reporting.figures import correlation_map, expected_error_map, histogram, residuals, workspace
 from truearm.reporting.monte_carlo_figure import coverage_figure, interval_rows
 from truearm.reporting.page import page
+from truearm.reporting.selection_figure import (
+    candidate_rows,
+    candidates_figure,
+    choice_sentence,
+    confirmation_rows,
+)
 from truearm.reporting.tables import (
     SpreadRow,
     expected_rows,
@@ -128,6 +134,8 @@ class Report:
             drawn[curve_name(curve)] = curve_figure(curve)
         if run.zones is not None and any(verdict.zone is not None for verdict in run.zones.verdicts):
             drawn["zone-errors"] = zones_figure(run.zones)
+        if run.selection is not None:
+            drawn["candidates"] = candidates_figure(run.selection)
         drawn["correlations"] = correlation_map(run.fit)
         return drawn
 
@@ -161,6 +169,9 @@ def report_html(calibration: Calibration) -> str:
         expected=calibration.expected,
         budget=calibration.budget,
         zone_lines=[] if calibration.zones is None else calibration.zones.lines(),
+        choice_sentence="" if calibration.selection is None else choice_sentence(calibration.selection),
+        candidate_rows=() if calibration.selection is None else candidate_rows(calibration.selection),
+        confirmation_rows=() if calibration.selection is None else confirmation_rows(calibration.selection),
         zone_rows=() if calibration.zones is None else zone_rows(calibration.zones),
         simulated=calibration.monte_carlo,
         simulated_line="".join(simulated_lines(calibration.monte_carlo, fit.robot)),

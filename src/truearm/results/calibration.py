@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.errors import InputError, did_you_mean
-from truearm.identification.choosing.selection import Selection
+from truearm.identification.choosing.choice import Selection
 from truearm.identification.choosing.zone_boxes import flange_places
 from truearm.identification.choosing.zones import ZoneVerdict
 from truearm.identification.judging.error_budget import ErrorBudget, error_budget
@@ -43,6 +43,7 @@ from truearm.results.summaries import (
     expected_summary,
     noise_lines,
     noise_summary,
+    selection_lines,
     selection_summary,
 )
 from truearm.results.zones import ZONES_FILE, ZoneChoice, robot_file_of, zone_files
@@ -220,7 +221,7 @@ class Calibration(Record):
         text += simulated_lines(self.monte_carlo, self.robot)
         text += [] if self.zones is None else self.zones.lines()
         if self.selection is not None:
-            text.append(f"Chosen model: {self.fit.model.summary}")
+            text += selection_lines(self.selection)
         if self.fit.model.name == "frames":
             text += self._target_lines()
         text.append(f"Status: {self.status.value}. {self.advice}".rstrip())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any, Final
 
-from truearm.identification.choosing.selection import Selection
+from truearm.identification.choosing.choice import Selection
 from truearm.identification.judging.expected_error import Expectation, ExpectedError
 from truearm.identification.judging.repeatability import Repeatability
 from truearm.identification.refit import Refit
@@ -16,6 +16,12 @@ from truearm.modeling.parts import Payload
 from truearm.shown import counted, degrees, listed, millimetres
 from truearm.units import from_si
 
+#: How configurations lie that are held out in blocks, in words.
+LAYOUT: Final = {
+    "path": "follow a path",
+    "grid": "lie on a grid",
+    "close": "lie close to each other",
+}
 #: What deviations of a bootstrap follow from, after their number.
 BOOTSTRAPPED: Final = "fits to configurations drawn anew (bootstrap)"
 
@@ -23,19 +29,53 @@ BOOTSTRAPPED: Final = "fits to configurations drawn anew (bootstrap)"
 def selection_summary(selection: Selection) -> dict[str, Any]:
     """Return how a model was chosen, as JSON holds it: errors in mm."""
     return {
-        "elastic_mm": selection.start * 1e3,
-        "attempts": [
+        "geometric_mm": selection.geometric * 1e3,
+        "elastic_mm": None if selection.elastic is None else selection.elastic * 1e3,
+        "error_mm": selection.error * 1e3,
+        "layout": selection.layout,
+        "blocks": selection.blocks,
+        "candidates": [
             {
-                "round": attempt.round,
-                "effect": attempt.effect,
-                "error_mm": attempt.error * 1e3,
-                "gain_mm": attempt.gain * 1e3,
-                "standard_error_mm": attempt.standard_error * 1e3,
-                "taken": attempt.taken,
+                "effect": one.effect,
+                "taken": one.taken,
+                "gain_mm": None if one.gain is None else one.gain.mean * 1e3,
+                "standard_error_mm": None if one.gain is None else one.gain.error * 1e3,
+                "reason": one.reason,
             }
-            for attempt in selection.attempts
+            for one in selection.candidates
         ],
+        "confirmations": [
+            {
+                "effects": list(one.effects),
+                "smaller": list(one.smaller),
+                "error_mm": one.error * 1e3,
+                "smaller_error_mm": one.smaller_error * 1e3,
+                "gain_mm": one.gain.mean * 1e3,
+                "standard_error_mm": one.gain.error * 1e3,
+            }
+            for one in selection.confirmations
+        ],
+        "lines": [
+            {
+                "joint": line.joint,
+                "periods": line.periods,
+                "aliases": list(line.aliases),
+                "amplitude_mdeg": math.degrees(line.amplitude) * 1e3,
+            }
+            for line in selection.lines
+        ],
+        "passed_over": [{"effects": list(effects), "status": status} for effects, status in selection.passed_over],
     }
+
+
+def selection_lines(selection: Selection) -> list[str]:
+    """Return how a model was chosen, as the command prints it."""
+    text = [f"Chosen model: {selection.model.summary}"]
+    if selection.blocks:
+        text.append(
+            f"  judged on {selection.blocks} blocks of neighbours: the configurations {LAYOUT[selection.layout]}"
+        )
+    return text
 
 
 def errors_summary(errors: Errors) -> dict[str, Any]:

@@ -116,6 +116,7 @@ def joint_truths(robot: Robot) -> dict[int, JointTruth]:
     values = robot.values
     known = {
         "warm_up_rate",
+        "warm_up_left",
         *(f"gain_{number}" for number in range(1, len(robot.joints) + 1)),
         *(f"balancer_{number}" for number in range(1, len(robot.balancers) + 1)),
     }  # read by the twin itself

@@ -1,85 +1,54 @@
-"""Which joint effects the data can carry: added one by one while cross-validation says that they help.
+"""Which joint effects the data can carry, chosen by cross-validation on the training part.
 
-It begins with the elastic model. Each round adds, one at a time, every effect that is not there yet, and judges by
-5-fold cross-validation on the training part. An effect is tried if it is selectable, if the robot has what it moves,
-and if the data tell what it depends on: the order of the configurations, the temperature, loads. The best of those
-whose gain is larger than its own standard error, over the paired differences of the folds, stays; the search ends where
-there is none (the rule of one standard error: Breiman and others 1984, "Classification and Regression Trees", section
-3.4.3).
+One fit is linearised, and every effect that the robot and the data say something about is a few columns more
+(:mod:`truearm.identification.choosing.candidates`). Held-out errors of any choice among them then follow in closed form
+(:mod:`truearm.identification.choosing.linear_cross_validation`): of all that are not worse than the best one by a
+standard error, the choice with the fewest parameters is taken. What is taken has to hold in real fits, whose weights,
+penalties and periods are found inside the training folds (:mod:`truearm.identification.choosing.refits`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
 
 from truearm.errors import InputError
+from truearm.identification.choosing.candidates import SELECTABLE, CurveColumns, Ground, closed_because, loads_bend
+from truearm.identification.choosing.choice import (
+    AUTO,
+    COMPLIANCE,
+    ORDERED,
+    TRANSMISSION,
+    Candidate,
+    Confirmation,
+    Selection,
+    model_with,
+    with_lines,
+)
+from truearm.identification.choosing.folds import FOLDS, Folds, folds_of
+from truearm.identification.choosing.refits import How, Refits
+from truearm.identification.choosing.search import CLEAR, CURVE, Choices, Search, gain
 from truearm.identification.held import NOTHING_HELD, Held
+from truearm.identification.judging.transmission import FEWEST, PeriodicError, Pulls, lines_of
 from truearm.identification.solving.bounds import Bounds
 from truearm.identification.solving.losses import Loss
-from truearm.identification.solving.models import MODELS, Model
+from truearm.identification.solving.models import named_model
 from truearm.identification.solving.rounds import Redundant, find_parameters
 from truearm.measurement.dataset import Dataset
-from truearm.measurement.statistics import errors_of
 from truearm.modeling.chain import Array
 from truearm.modeling.effects import EFFECTS
-from truearm.modeling.loads import has_weight
+from truearm.modeling.effects.joint_curve import HIGHEST
 from truearm.modeling.robot import Robot
 
-AUTO: Final = "auto"
-FOLDS: Final = 5
-_FOLD_TOLERANCE: Final = 1e-3  # priors; errors of folds are not compared more closely
-_START: Final = next(model for model in MODELS if model.name == "elastic")
-#: Joint effects that are tried, in this order.
-SELECTABLE: Final = tuple(effect.name for effect in EFFECTS if effect.selectable)
-
-
-@dataclass(frozen=True)
-class Attempt:
-    """An effect that was tried.
-
-    Attributes
-    ----------
-    round
-        From 1.
-    effect
-        Its name.
-    error
-        Mean position error with it [m], over the folds of the cross-validation.
-    gain, standard_error
-        Mean of the folds' gains over the model of the round before, and its standard error [m].
-    taken
-        Whether it stayed.
-    """
-
-    round: int
-    effect: str
-    error: float
-    gain: float
-    standard_error: float
-    taken: bool = False
-
-
-@dataclass(frozen=True)
-class Selection:
-    """The way to a model.
-
-    Attributes
-    ----------
-    model
-        Where it ended.
-    start
-        Mean position error of the elastic model in cross-validation [m].
-    attempts
-        All that was tried, in order.
-    """
-
-    model: Model
-    start: float
-    attempts: tuple[Attempt, ...]
+#: What a curve contains.
+_IN_CURVE: Final = "fourier"
+#: A gain of fewer standard errors in closed form is looked at again by real fits.
+_SURE: Final = 2.0
+_MOST_REFITS: Final = 3
+_NOT_BORNE_OUT: Final = "what it gains is not borne out by fits in the folds"
 
 
 def select(
@@ -104,7 +73,7 @@ def select(
     seed
         Of the folds.
     candidates
-        Joint effects that may be tried.
+        Joint effects that may be chosen besides compliance.
     progress
         Called with a few words at each step.
 
@@ -121,88 +90,238 @@ def select(
             allowed=f"at least {2 * FOLDS}",
             cure="Measure more, or name a model.",
         )
-    order = np.random.default_rng(seed).permutation(data.configurations)
-    folds = [
-        _fold(data.of_configurations(np.setdiff1d(order, part)), data.of_configurations(part))
-        for part in np.array_split(order, FOLDS)
-    ]
-
-    def judged(effects: tuple[str, ...]) -> Array:
-        model = _model(effects, candidates)
-        errors = []
-        for training, held_out in folds:
-            found = find_parameters(
-                robot,
-                training,
-                model,
-                loss=loss,
-                redundancy=redundancy,
-                bounds=bounds,
-                bounds_file=bounds_file,
-                held=held,
-                small=_FOLD_TOLERANCE,
-            )
-            judged = errors_of(found.robot, held_out)
-            spread = judged.position or judged.length
-            errors.append(np.nan if spread is None else spread.mean)
-        return np.array(errors)
-
-    effects = _START.effects
-    progress("choosing a model: elastic")
-    now = judged(effects)
-    start = float(np.nanmean(now))
-    attempts: list[Attempt] = []
-    for number in range(1, len(candidates) + 1):
-        tried: list[tuple[Attempt, Array]] = []
-        for name in open_effects(robot, effects, data, candidates):
-            progress(f"choosing a model: {', '.join(effects)} and {name}?")
-            try:
-                errors = judged((*effects, name))
-            except InputError:  # too few equations in a fold, or a bound that a redundant one cannot keep
-                continue
-            gains = (now - errors)[np.isfinite(errors)]
-            standard_error = float(gains.std(ddof=1) / np.sqrt(len(gains)))
-            tried.append(
-                (Attempt(number, name, float(np.nanmean(errors)), float(gains.mean()), standard_error), errors)
-            )
-        better = [pair for pair in tried if pair[0].gain > pair[0].standard_error]
-        best = min(better, key=lambda pair: pair[0].error, default=None)
-        attempts += [replace(attempt, taken=best is not None and attempt is best[0]) for attempt, _ in tried]
-        if best is None:
-            break
-        effects, now = (*effects, best[0].effect), best[1]
-    return Selection(_model(effects, candidates), start, tuple(attempts))
+    names = tuple(name for name in SELECTABLE if name in candidates or name == COMPLIANCE)
+    how = How(loss, redundancy, bounds, bounds_file, held)
+    start = (COMPLIANCE,) if loads_bend(robot, data) else ()
+    progress("choosing a model: one fit for all")
+    solved = find_parameters(
+        robot,
+        data,
+        model_with(start, names),
+        loss=loss,
+        redundancy=redundancy,
+        bounds=bounds,
+        bounds_file=bounds_file,
+        held=held,
+    )
+    choice = _Choice(robot, data, names, how, Ground(solved, folds_of(data, seed)), progress)
+    return choice.made()
 
 
-def _fold(training: Dataset, held_out: Dataset) -> tuple[Dataset, Dataset]:
-    """Return both parts, without those held-out positions whose target the training part does not place."""
-    read = training.has_position if training.fixture is None else training.has_reading
-    placed = np.isin(held_out.target, training.target[read]) & np.isin(held_out.against, training.against[read])
-    return training, replace(held_out.of_readings(placed), quaternion=None)
+@dataclass(eq=False)
+class _Choice:
+    """The way from one fit to a model."""
+
+    robot: Robot
+    data: Dataset
+    names: tuple[str, ...]
+    how: How
+    ground: Ground
+    progress: Callable[[str], None]
+    reasons: dict[str, str] = field(default_factory=dict)
+    lines: tuple[PeriodicError, ...] = ()
+    curves: CurveColumns | None = None
+
+    @property
+    def folds(self) -> Folds:
+        return self.ground.folds
+
+    def made(self) -> Selection:
+        """Return the choice."""
+        self.progress("choosing a model: every choice in closed form")
+        search = self._searched()
+        chosen = self._settled(search)
+        if self._found_lines(search, chosen):
+            search = self._searched()
+            chosen = self._settled(search)
+        chosen, confirmations = self._confirmed(search, chosen)
+        return self._selection(search, chosen, confirmations)
+
+    def _searched(self) -> Choices:
+        """Return the choices among all effects that robot, data and lines say something about."""
+        robot = with_lines(self.robot, self.lines)
+        self.reasons = {}
+        for name in self.names:
+            reason = closed_because(robot, self.data, name)
+            if name == CURVE and self.how.redundancy != "prior":
+                reason = "it is found with priors only"
+            if reason is not None:
+                self.reasons[name] = reason
+        open_ = [name for name in self.names if name not in self.reasons and name != CURVE]
+        there = with_lines(self.ground.solved.robot, self.lines)
+        columns = self.ground.columns(open_, there)
+        unordered = self.ground.columns([name for name in open_ if name in ORDERED], there, ordered=False)
+        plain = Search(self.ground, self.ground.start((COMPLIANCE,)), columns, unordered)
+        for name in columns:
+            if not plain.excited(name):
+                self.reasons[name] = "the readings tell less of it than is known beforehand"
+        return Choices(plain, self._curved(plain))
+
+    def _curved(self, plain: Search) -> Search | None:
+        """Return the search among what curves do not contain, if the data show curves."""
+        if CURVE not in self.names or CURVE in self.reasons:
+            return None
+        rest = {name: columns for name, columns in plain.columns.items() if name != _IN_CURVE}
+        beside = plain.best([name for name in rest if name not in self.reasons])
+        self.curves = self.ground.curves(
+            (COMPLIANCE,), plain.together({name: rest[name] for name in rest if name in beside})
+        )
+        columns = self.curves.scaled()
+        if columns is None:
+            self.reasons[CURVE] = "what is left over does not repeat with the joints' angles"
+            return None
+        return Search(self.ground, plain.fit.with_columns(columns), rest, plain.unordered)
+
+    def _settled(self, search: Choices) -> frozenset[str]:
+        """Return the best choice among effects that the data show and that do not harm predictions without order."""
+        while True:
+            chosen = search.best(self.reasons)
+            ordered = chosen & ORDERED
+            now = search.errors_without_order(chosen)
+            if not ordered or not gain(search.errors_without_order(chosen - ordered), now, self.folds).harms:
+                return chosen
+            worst = min(sorted(ordered), key=lambda name: _mean(search.errors_without_order(chosen - {name})))
+            self.reasons[worst] = "it makes predictions worse whose place in the order is not known"
+
+    def _found_lines(self, search: Choices, chosen: frozenset[str]) -> bool:
+        """Look for periodic errors in what a choice leaves; return whether there are any."""
+        if TRANSMISSION not in self.names:
+            return False
+        pulls = self.ground.pulls(search.left(chosen), search.spent(chosen))
+        self.lines = () if pulls is None else self._lines_of(pulls, chosen)
+        return bool(self.lines)
+
+    def _lines_of(self, pulls: Pulls, chosen: frozenset[str]) -> tuple[PeriodicError, ...]:
+        """Return the lines that no curve among the chosen effects could take out."""
+        return lines_of(self.robot, pulls, HIGHEST + 1 if CURVE in chosen else FEWEST)
+
+    def _refits(self, search: Choices, chosen: frozenset[str]) -> Refits:
+        without = chosen - {TRANSMISSION}
+
+        def robot_of(number: int, effects: Sequence[str]) -> Robot:
+            if not self.lines or TRANSMISSION not in effects:
+                return self.robot
+            left = search.left_without(number, without)
+            pulls = self.ground.pulls(left, search.spent(without), self.ground.fold != number)
+            return self.robot if pulls is None else with_lines(self.robot, self._lines_of(pulls, without))
+
+        return Refits(
+            self.robot, self.data, self.folds, self.how, lambda effects: model_with(effects, self.names), robot_of
+        )
+
+    def _confirmed(self, search: Choices, chosen: frozenset[str]) -> tuple[frozenset[str], list[Confirmation]]:
+        """Return the choice as far as fits in the folds bear it out."""
+        found: list[Confirmation] = []
+        if CURVE in chosen:
+            plain = search.best({*self.reasons, CURVE})
+            self.progress("choosing a model: curves in the folds")
+            errors, before = self._errors_of_curves(search, chosen), search.errors(plain)
+            found.append(_confirmation(chosen, plain, errors, before, self.folds))
+            if found[-1].gain.mean > CLEAR * found[-1].gain.error:
+                return chosen, found
+            self.reasons[CURVE] = _NOT_BORNE_OUT
+            chosen = plain
+        refits = self._refits(search, chosen)
+        start = self._start(search)
+        for _ in range(_MOST_REFITS):
+            if chosen <= start:
+                return chosen, found
+            smaller = self._next_smaller(search, chosen)
+            sure = search.gain(smaller, chosen)
+            against = start if sure.mean > _SURE * sure.error and start < chosen else smaller
+            self.progress(f"choosing a model: fits with {', '.join(_listed(chosen))} in the folds")
+            refitted, before_refitted = refits.errors(tuple(chosen)), refits.errors(tuple(against))
+            if refitted is not None and before_refitted is not None:
+                found.append(_confirmation(chosen, against, refitted, before_refitted, self.folds))
+                if found[-1].gain.believed:
+                    return chosen, found
+            for name in chosen - smaller:
+                self.reasons[name] = (
+                    "there are too few readings in a fold to find it" if refitted is None else _NOT_BORNE_OUT
+                )
+            chosen = smaller
+        return (chosen if chosen <= start else start & chosen), found
+
+    def _errors_of_curves(self, search: Choices, chosen: frozenset[str]) -> Array:
+        """Return held-out errors with curves and lines whose priors and periods are found without each fold.
+
+        It is the linear problem: with hundreds of coefficients real fits would take far longer than all the rest.
+        """
+        if search.curved is None or self.curves is None:
+            raise ValueError("there are no curves to choose")
+        held_out = np.zeros(len(self.ground.fold))
+        for number in range(FOLDS):
+            columns = {name: search.curved.columns[name] for name in search.curved.columns if name in chosen}
+            if self.lines and TRANSMISSION in columns:
+                without = chosen - {TRANSMISSION}
+                pulls = self.ground.pulls(
+                    search.left_without(number, without), search.spent(without), self.ground.fold != number
+                )
+                lines = () if pulls is None else self._lines_of(pulls, without)
+                there = with_lines(self.ground.solved.robot, lines)
+                columns |= self.ground.columns([TRANSMISSION], there) if lines else {}
+            curve = self.curves.scaled(number)
+            fit = search.plain.fit if curve is None else search.plain.fit.with_columns(curve)
+            mine = self.ground.fold == number
+            together = np.concatenate([np.zeros((len(mine), 0)), *columns.values()], axis=1)
+            held_out[mine] = fit.with_columns(together).held_out(number)[mine]
+        return self.ground.errors(held_out)
+
+    def _start(self, search: Choices) -> frozenset[str]:
+        """Return the better one of the geometric and the elastic model."""
+        elastic = frozenset({COMPLIANCE})
+        return elastic if COMPLIANCE in search.names and search.gain(frozenset(), elastic).believed else frozenset()
+
+    @staticmethod
+    def _next_smaller(search: Choices, chosen: frozenset[str]) -> frozenset[str]:
+        """Return a choice without the effect that it gains least by."""
+        return min((chosen - {name} for name in chosen), key=lambda one: _mean(search.errors(one)))
+
+    def _selection(self, search: Choices, chosen: frozenset[str], confirmations: list[Confirmation]) -> Selection:
+        rows = []
+        for name in self.names:
+            tried = None
+            if name in search.names:
+                tried = search.gain(chosen - {name}, chosen | {name})
+            reason = "" if name in chosen else self.reasons.get(name, "")
+            if name == _IN_CURVE and CURVE in chosen:
+                tried, reason = None, "the curves contain it"
+            if name not in chosen and not reason and tried is not None:
+                harms = "it makes held-out errors larger"
+                reason = harms if tried.mean <= 0.0 else "it gains no more than chance may"
+                if tried.believed:
+                    reason = "it gains too little for all its parameters"
+            rows.append(Candidate(name, name in chosen, tried, reason))
+        smaller, now = [], chosen
+        while now:
+            now = self._next_smaller(search, now)
+            smaller.append(model_with(tuple(now), self.names))
+        smaller.append(replace(named_model("offsets"), name=AUTO))
+        elastic = _mean(search.errors(frozenset({COMPLIANCE}))) if COMPLIANCE in search.names else None
+        return Selection(
+            model_with(tuple(chosen), self.names),
+            self.folds.layout,
+            self.folds.blocks,
+            _mean(search.errors(frozenset())),
+            elastic,
+            _mean(search.errors(chosen)),
+            tuple(rows),
+            tuple(confirmations),
+            self.lines if TRANSMISSION in chosen else (),
+            tuple(smaller),
+        )
 
 
-def open_effects(
-    robot: Robot, effects: Sequence[str], data: Dataset, candidates: Sequence[str] = SELECTABLE
-) -> list[str]:
-    """Return the effects that are not there yet and that the robot and the data say something about."""
-    ordered = data.approach is not None and data.number is not None
-    warmed = data.temperature is not None
-    loaded = has_weight(robot) or data.wrench is not None
-    return [
-        effect.name
-        for effect in EFFECTS
-        if effect.name in candidates
-        and effect.name not in effects
-        and effect(robot.layout).parameters
-        and (ordered or not effect.ordered)
-        and (warmed or not effect.warmed)
-        and (loaded or not effect.loaded)
-    ]
+def _confirmation(
+    chosen: frozenset[str], smaller: frozenset[str], errors: Array, before: Array, folds: Folds
+) -> Confirmation:
+    return Confirmation(_listed(chosen), _listed(smaller), _mean(errors), _mean(before), gain(before, errors, folds))
 
 
-def _model(effects: tuple[str, ...], candidates: Sequence[str]) -> Model:
-    names = [effect.name for effect in EFFECTS if effect.name in effects]
-    added = [name for name in names if name not in _START.effects]
-    tried = tuple(name for name in candidates if name not in effects)
-    summary = f"elastic, and what cross-validation added: {', '.join(added) or 'nothing'}"
-    return Model(AUTO, summary, _START.groups, tuple(names), tried)
+def _listed(effects: frozenset[str]) -> tuple[str, ...]:
+    return tuple(effect.name for effect in EFFECTS if effect.name in effects)
+
+
+def _mean(errors: Array) -> float:
+    known = errors[np.isfinite(errors)]
+    return float(known.mean()) if len(known) else float("nan")

@@ -13,14 +13,18 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truearm.identification.solving.fit import Fit
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.chain import Array
+from truearm.modeling.robot import Robot
 from truearm.notices import Notice
+from truearm.shown import listed
 
 #: Periods in a turn that are looked at; fewer than the first are the Fourier series' business.
-_PERIODS: Final = np.arange(20, 401)
+FEWEST: Final = 20
+_PERIODS: Final = np.arange(FEWEST, 401)
 #: A periodic error is believed if chance would show one as strong in any joint less often than this.
 _LARGEST_CHANCE: Final = 1e-3
 _LEAST_CONFIGURATIONS: Final = 60  # configurations
@@ -28,6 +32,11 @@ _LEAST_CONFIGURATIONS: Final = 60  # configurations
 _LARGEST_DEVIATION: Final = 5e-4
 #: Periods that a joint must pass through, or else a sine is the same as an offset or a gain.
 _LEAST_PERIODS: Final = 4.0
+#: Periods in a turn that are looked at for others that would look the same.
+_ALIASES: Final = np.arange(1, 1001)
+#: Share of a sine that another one has to follow to look the same, and how many are named.
+_SAME_WAVE: Final = 0.9
+_MOST_ALIASES: Final = 3
 
 
 @dataclass(frozen=True)
@@ -46,6 +55,8 @@ class PeriodicError:
         Of the squared residuals that it explains.
     chance
         Probability that noise alone shows one as strong anywhere.
+    aliases
+        Other numbers of periods that look nearly the same at the positions that were measured, the nearest first.
     """
 
     joint: int
@@ -53,6 +64,39 @@ class PeriodicError:
     amplitude: float
     share: float
     chance: float
+    aliases: tuple[int, ...] = ()
+
+    @property
+    def words(self) -> str:
+        """What it is, in words."""
+        also = f" ({listed([str(n) for n in self.aliases])} would look the same)" if self.aliases else ""
+        return (
+            f"joint {self.joint} {self.periods} times in a turn{also}, "
+            f"by {np.rad2deg(self.amplitude) * 1e3:.1f} millidegrees"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Pulls:
+    """What residuals say of errors of the joints, summed over the readings of each configuration.
+
+    Attributes
+    ----------
+    joints
+        Positions of the joints [rad or m], ``(n, joints)``.
+    pull, weight
+        J'r [m^2] and J'J [m^2], J the derivative by the joints, ``(n, joints)`` and ``(n, joints, joints)``.
+    total
+        Sum of the squared residuals [m^2].
+    free
+        Equations beyond the parameters: targets of a configuration share its errors, and count as one.
+    """
+
+    joints: Array
+    pull: Array
+    weight: Array
+    total: float
+    free: int
 
 
 def periodic_errors(fit: Fit, data: Dataset) -> tuple[PeriodicError, ...]:
@@ -83,30 +127,45 @@ def periodic_errors(fit: Fit, data: Dataset) -> tuple[PeriodicError, ...]:
         np.add.at(weight, where, np.einsum("jan,kan->njk", rate, rate))
         np.add.at(left, where, (residual**2).sum(0))
         np.add.at(readings, where, 1.0)
-    # The targets of a configuration share its errors, so that it counts as one reading of three coordinates.
     free = 3 * int((readings > 0).sum()) - len(fit.free.names)
+    return lines_of(robot, Pulls(at.joints, pull, weight, float(left.sum()), free))
+
+
+def lines_of(robot: Robot, pulls: Pulls, fewest: int = FEWEST) -> tuple[PeriodicError, ...]:
+    """Return the periodic errors of a robot's joints whose gear it does not know, one a joint at most.
+
+    Fewer than 60 configurations say nothing.
+
+    Parameters
+    ----------
+    fewest
+        Periods in a turn that are looked for, at least.
+    """
+    if len(pulls.joints) < _LEAST_CONFIGURATIONS:
+        return ()
+    q, pull, weight, total, free = pulls.joints, pulls.pull.copy(), pulls.weight, pulls.total, pulls.free
     open_joints = [
         i for i, joint in enumerate(robot.joints) if joint.kind == "revolute" and joint.transmission_periods is None
     ]
     found: list[PeriodicError] = []
-    total = float(left.sum())
     while open_joints:
         noise = total / max(free, 1)
-        tried = [(*_strongest(at.joints[:, i], pull[:, i], weight[:, i, i], noise), i) for i in open_joints]
+        tried = [(*_strongest(q[:, i], pull[:, i], weight[:, i, i], noise, fewest), i) for i in open_joints]
         explained, periods, a, b, joint = max(tried)
-        agreement = min(free * explained / total, _agreement(periods * at.joints[:, joint], pull[:, joint]))
+        agreement = min(free * explained / total, _agreement(periods * q[:, joint], pull[:, joint]))
         chance = len(open_joints) * len(_PERIODS) * math.exp(-0.5 * agreement)
         if chance >= _LARGEST_CHANCE:
             break
-        found.append(PeriodicError(joint + 1, periods, math.hypot(a, b), explained / total, chance))
-        wave = a * np.sin(periods * at.joints[:, joint]) + b * np.cos(periods * at.joints[:, joint])
+        wave = a * np.sin(periods * q[:, joint]) + b * np.cos(periods * q[:, joint])
+        aliases = _aliases(q[:, joint], wave, weight[:, joint, joint], periods)
+        found.append(PeriodicError(joint + 1, periods, math.hypot(a, b), explained / total, chance, aliases))
         pull -= weight[:, :, joint] * wave[:, None]
         total -= explained
         open_joints.remove(joint)
     return tuple(sorted(found, key=lambda error: error.joint))
 
 
-def _strongest(q: Array, pull: Array, weight: Array, noise: float) -> tuple[float, int, float, float]:
+def _strongest(q: Array, pull: Array, weight: Array, noise: float, fewest: int) -> tuple[float, int, float, float]:
     """Return what the best sine explains of the squared residuals [m^2], its periods, and its two amplitudes [rad].
 
     It explains nothing where the readings see none.
@@ -119,19 +178,48 @@ def _strongest(q: Array, pull: Array, weight: Array, noise: float) -> tuple[floa
         J'r [m^2] and J'J [m^2] of the joint, ``(n,)``.
     noise
         Variance of a coordinate of the residuals [m^2].
+    fewest
+        Periods in a turn that are looked for, at least.
     """
-    angle = _PERIODS[:, None] * q
+    among = _PERIODS[fewest - FEWEST :]
+    explained, a, b, least = _sines(q, pull, weight, among)
+    passed = among * math.sqrt(12.0) * q.std() / (2.0 * math.pi)  # of a range that is passed through evenly
+    seen = (least * _LARGEST_DEVIATION**2 > noise) & (passed > _LEAST_PERIODS)
+    explained = np.where(seen, explained, 0.0)
+    best = int(np.argmax(explained))
+    return float(explained[best]), int(among[best]), float(a[best]), float(b[best])
+
+
+def _sines(q: Array, pull: Array, weight: Array, periods: NDArray[np.intp]) -> tuple[Array, Array, Array, Array]:
+    """Return what a sine of each number of periods explains [m^2], its two amplitudes [rad], and what is known of it.
+
+    The last is that of the phase that is known least [m^2]; where it is nothing, nothing is explained.
+    """
+    angle = periods[:, None] * q
     s, c = np.sin(angle), np.cos(angle)
     ss, sc, cc = (s * s) @ weight, (s * c) @ weight, (c * c) @ weight
     ys, yc = s @ pull, c @ pull
-    least = 0.5 * (ss + cc) - np.hypot(0.5 * (ss - cc), sc)  # what is known of the sine of the phase known least [m^2]
-    passed = _PERIODS * math.sqrt(12.0) * q.std() / (2.0 * math.pi)  # of a range that is passed through evenly
-    seen = (least * _LARGEST_DEVIATION**2 > noise) & (passed > _LEAST_PERIODS)
-    safe = np.where(seen, ss * cc - sc * sc, 1.0)
+    least = 0.5 * (ss + cc) - np.hypot(0.5 * (ss - cc), sc)
+    known = least > 1e-9 * (ss + cc)
+    safe = np.where(known, ss * cc - sc * sc, 1.0)
     a, b = (cc * ys - sc * yc) / safe, (ss * yc - sc * ys) / safe
-    explained = np.where(seen, a * ys + b * yc, 0.0)
-    best = int(np.argmax(explained))
-    return float(explained[best]), int(_PERIODS[best]), float(a[best]), float(b[best])
+    return np.where(known, a * ys + b * yc, 0.0), a, b, least
+
+
+def _aliases(q: Array, wave: Array, weight: Array, periods: int) -> tuple[int, ...]:
+    """Return other numbers of periods whose sines pass through nearly the same values at the positions measured.
+
+    Parameters
+    ----------
+    wave
+        What was found, ``(n,)``.
+    periods
+        In a turn; its neighbours, which the range of the joint does not tell from it, are not others.
+    """
+    explained = _sines(q, weight * wave, weight, _ALIASES)[0] / float(weight @ wave**2)
+    near = math.ceil(2.0 * math.pi / max(float(np.ptp(q)), 1e-3))
+    places = np.flatnonzero((explained >= _SAME_WAVE) & (np.abs(_ALIASES - periods) > near))
+    return tuple(_ALIASES[places[np.argsort(-explained[places], kind="stable")][:_MOST_ALIASES]].tolist())
 
 
 def _agreement(angle: Array, pull: Array) -> float:
@@ -151,15 +239,12 @@ def check_transmission(fit: Fit, data: Dataset) -> list[Notice]:
     found = periodic_errors(fit, data)
     if not found:
         return []
-    listed = "; ".join(
-        f"joint {error.joint} {error.periods} times in a turn, by {np.rad2deg(error.amplitude) * 1e3:.1f} millidegrees"
-        for error in found
-    )
+    told = "; ".join(error.words for error in found)
     return [
         Notice(
             "transmission-error",
-            f"What is left over repeats with the joints' angles: {listed}. Strain wave gears do that, twice in a turn "
-            "of their wave generator. Write transmission_periods to these joints in the robot file, and `model=auto` "
-            "will try to take the error out.",
+            f"What is left over repeats with the joints' angles: {told}. Strain wave gears do that, twice in a turn "
+            "of their wave generator. `model=auto` tries to take the error out; any other model does with the effect "
+            "transmission-error, and transmission_periods of these joints in the robot file.",
         )
     ]

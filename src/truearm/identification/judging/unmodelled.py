@@ -22,7 +22,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.identification.choosing.selection import open_effects
+from truearm.identification.choosing.candidates import open_effects
 from truearm.identification.judging.left_over import LeftOver, chi_squared_tail
 from truearm.identification.solving.problem import Problem
 from truearm.measurement.observations import OBSERVATIONS

@@ -31,6 +31,7 @@ from truearm.identification.solving.rounds import (
     excess_of,
     factors_of,
     find_parameters,
+    in_the_middle,
     noise_found,
 )
 from truearm.identification.solving.solver import SMALL
@@ -299,7 +300,7 @@ def _fit(solved: Solved, model: Model, loss: Loss, draws: Array | None = None) -
         else replace(start.parameters[n], value=float(v), deviation=float(d), informed=float(i))
         for n, v, d, i, bound in zip(free.names, x, deviation, informed, at_bound, strict=True)
     ]
-    robot = start.with_parameters(identified)
+    robot = in_the_middle(start.with_parameters(identified), problem.data)
     held = tuple(robot.parameters[r.dropped] for r in solved.redundancies)
     # What is expected of curves is found from the data, and their deviations say where nothing else is known.
     looked_at = FreeParameters((*(robot.parameters[n] for n in free.names if n not in solved.curves.places), *held))

@@ -34,6 +34,7 @@ from truearm.measurement.dataset import Dataset
 from truearm.measurement.observations import OBSERVATIONS
 from truearm.modeling.chain import Array
 from truearm.modeling.effects.joint_curve import JointCurve
+from truearm.modeling.effects.warm_up import LEFT, RATE, share_left
 from truearm.modeling.parameters import SCALE, FreeParameters
 from truearm.modeling.robot import Robot
 
@@ -89,7 +90,8 @@ class Solved:
     @property
     def robot(self) -> Robot:
         """The robot with the values found."""
-        return self.start.with_values(dict(zip(self.problem.free.names, self.solution.vector.tolist(), strict=True)))
+        values = dict(zip(self.problem.free.names, self.solution.vector.tolist(), strict=True))
+        return in_the_middle(self.start.with_values(values), self.problem.data)
 
 
 def find_parameters(
@@ -104,6 +106,7 @@ def find_parameters(
     held: Held = NOTHING_HELD,
     small: float = SMALL,
     shared: bool = True,
+    near: Solved | None = None,
 ) -> Solved:
     """Find the free parameters of a robot from training data.
 
@@ -113,8 +116,11 @@ def find_parameters(
     ----------
     shared
         Whether errors of the joints that the readings of an arrival share are looked for, with the linear loss.
+    near
+        A solution of the same robot and model from other data: the search begins at its frames, values and variances.
+        What is found does not depend on it.
     """
-    start = start_from_readings(model.prepared(robot), data, held)
+    start = start_from_readings(model.prepared(robot), data, held) if near is None else near.start
     check_circumstances(start, data)
     free = held.free_of(unanchored(model.free(start), data), start)
     if redundancy != "prior":  # what is known of an instrument's scale is a prior: without any it is exact
@@ -157,6 +163,10 @@ def find_parameters(
             cure="Give `bounds`, `hold` what is known, or use `redundancy=drop`, which holds what is redundant.",
         )
     problem = Problem(start, data, free, dict(_FIRST_NOISE), priors=redundancy == "prior")
+    joints = None
+    if near is not None:
+        problem = _begun_at(problem, near)
+        joints = None if near.components is None else near.components.weighing.joints
     check_solvable(problem)
     dropped: tuple[Redundancy, ...] = ()
     if redundancy == "drop":
@@ -169,7 +179,7 @@ def find_parameters(
         kept = problem.free.without(out)
         limits = None if check_bounds is None else _limits_of(check_bounds, free, kept)
         solution, reduced, components, curves = _solve_with_noise(
-            replace(problem, free=kept), loss, limits, small, shared=shared and redundancy != "none"
+            replace(problem, free=kept), loss, limits, small, shared=shared and redundancy != "none", joints=joints
         )
         steps += solution.steps
         if redundancy != "drop":
@@ -190,6 +200,21 @@ def find_parameters(
     return Solved(start, reduced, replace(solution, steps=steps), dropped, limits, components, held, curves)
 
 
+def _begun_at(problem: Problem, near: Solved) -> Problem:
+    """Return a problem that begins at the values and the noise of a solution."""
+    known = dict(zip(near.problem.free.names, map(float, near.solution.vector), strict=True))
+    there = {name: value for name, value in known.items() if name in problem.free.names}
+    started = FreeParameters(tuple(replace(p, value=there.get(p.name, p.value)) for p in problem.free.parameters))
+    return replace(problem, robot=problem.robot.with_values(there), free=started, noise=near.problem.noise)
+
+
+def in_the_middle(robot: Robot, data: Dataset) -> Robot:
+    """Return a robot that predicts what has no place in an order as in the middle of the session that was measured."""
+    if data.number is None or LEFT not in robot.parameters:
+        return robot
+    return robot.with_values({LEFT: float(share_left(data.number, robot.values[RATE]).mean())})
+
+
 def _check_dropped(dropped: list[str], free: FreeParameters, limits: tuple[Array, Array], where: str) -> None:
     for name, p, low, high in zip(free.names, free.parameters, *limits, strict=True):
         if name in dropped and not low <= p.nominal <= high:
@@ -206,7 +231,13 @@ def _limits_of(limits: tuple[Array, Array], free: FreeParameters, kept: FreePara
 
 
 def _solve_with_noise(
-    problem: Problem, loss: Loss, limits: tuple[Array, Array] | None, small: float, *, shared: bool
+    problem: Problem,
+    loss: Loss,
+    limits: tuple[Array, Array] | None,
+    small: float,
+    *,
+    shared: bool,
+    joints: Array | None = None,
 ) -> tuple[Solution, Problem, Components | None, Curves]:
     """Solve; then again with what the solution says of deviations, of the joints' curves and of the loads.
 
@@ -220,9 +251,9 @@ def _solve_with_noise(
     if curves:
         problem = replace(problem, free=problem.free.without(curves.names))
         limits = _within(within, every.free, problem.free)
-    solution = solve(problem, loss, limits, small)
+    joints = np.zeros(len(problem.robot.joints)) if joints is None else joints
+    solution = solve_with_joints(problem, joints, loss, limits, small)
     steps = solution.steps
-    joints = np.zeros(len(problem.robot.joints))
     components = None
     for _ in range(_ROUNDS + (curves.rounds if curves else 0)):
         if loss == "linear" and shared:

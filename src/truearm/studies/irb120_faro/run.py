@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 
 from truearm.errors import InputError
+from truearm.identification.choosing.chosen_fit import identify_chosen
 from truearm.identification.choosing.selection import select
 from truearm.identification.solving.fit import identify
 from truearm.identification.solving.models import FRAMES, Model, named_model
@@ -252,9 +253,10 @@ def _split(
         if seed.number < most:
             seed.step(f"auto chooses from {count} configurations")
             start = PLAIN.of(robot)
-            model = select(start, data.of_configurations(order[:count]), seed=seed.number).model
-            errors = _held_out(start, data, order, count, model)
-            chosen.append(Chosen(count, seed.number, model, errors))
+            training, rest = (data.of_configurations(part) for part in (order[:count], order[count:]))
+            choice, fit = identify_chosen(start, training, select(start, training, seed=seed.number))
+            errors = Spread.of(errors_of(fit.robot, rest).position_norms * 1e3)
+            chosen.append(Chosen(count, seed.number, choice.model, errors))
     return Outcome(document, few, plenty, left_in, tuple(chosen))
 
 

@@ -1,0 +1,114 @@
+"""What `auto` chooses, how well that predicts, and how long it takes: the measured IRB 120 and UR5, over ten seeds.
+
+The time is that of the choice and of the fit of what was chosen, over that of one elastic fit to the same data, in one
+process. Argument: seeds (10). Writes benchmarks/choosing.json. The measured data are found at TRUEARM_DATA.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from truearm.identification.choosing.chosen_fit import identify_chosen
+from truearm.identification.choosing.selection import select
+from truearm.identification.solving.fit import identify
+from truearm.identification.solving.models import named_model
+from truearm.library import load_robot
+from truearm.measurement.dataset import Dataset
+from truearm.measurement.readers.matrices import read_matrices
+from truearm.measurement.statistics import errors_of
+from truearm.modeling.parts import Payload
+from truearm.modeling.robot import Robot
+
+DATA = Path(os.environ.get("TRUEARM_DATA", Path(__file__).parents[2] / "shared" / "data"))
+PAYLOAD = Payload(2.7, (0.05, 0.025, 0.1))
+
+
+def irb120() -> Dataset:
+    """Return the readings of the IRB 120, three targets."""
+    folder = DATA / "irb120-faro"
+    targets = {str(i): folder / f"target_{i}.txt" for i in (1, 2, 3)}
+    return read_matrices(folder / "joints_commanded.txt", targets, {}, "deg", "mm")[0]
+
+
+def ur5(name: str) -> Dataset:
+    """Return readings of the UR5, one target."""
+    rows = np.genfromtxt(DATA / "ur5-tracker" / f"{name}.csv", delimiter=",", skip_header=1)
+    reached = 1e-3 * (rows[:, 1:4] + rows[:, 4:7])
+    return Dataset.of(np.radians(rows[:, 7:13]), reached, order=np.arange(len(rows)))
+
+
+def mean_mm(robot: Robot, data: Dataset) -> float:
+    """Return the mean error [mm]."""
+    return 1e3 * float(errors_of(robot, data).position_norms.mean())
+
+
+def timed(make: Callable[[], Any]) -> tuple[Any, float]:
+    """Return what is made, and the processor's time for it [s]."""
+    start = time.process_time()
+    return make(), time.process_time() - start
+
+
+def one(robot: Robot, data: Dataset, count: int, seed: int, elsewhere: Dataset | None) -> dict[str, Any]:
+    """Return the figures of one split."""
+    order = np.random.default_rng(seed).permutation(data.configurations)
+    training, rest = data.of_configurations(order[:count]), data.of_configurations(order[count:])
+    identify(robot, training, named_model("geometric"))
+    elastic, of_elastic = timed(lambda: identify(robot, training, named_model("elastic")))
+    (choice, fit), of_auto = timed(
+        lambda: identify_chosen(robot, training, select(robot, training, seed=seed), seed=seed)
+    )
+    geometric = identify(robot, training, named_model("geometric"))
+    found: dict[str, Any] = {
+        "seed": seed,
+        "effects": list(choice.model.effects),
+        "status": fit.status.value,
+        "lines": [[line.joint, line.periods] for line in choice.lines],
+        "seconds": of_auto,
+        "ratio": of_auto / of_elastic,
+    }
+    unordered = replace(rest, number=None, approach=None)
+    for name, model in (("geometric", geometric), ("elastic", elastic), ("auto", fit)):
+        found[name] = mean_mm(model.robot, rest)
+        found[f"{name}, no order"] = mean_mm(model.robot, unordered)
+        if elsewhere is not None:
+            sizes = 1e3 * errors_of(model.robot, replace(elsewhere, number=None, approach=None)).position_norms
+            found[f"{name}, random"] = float(sizes.mean())
+            found[f"{name}, random, standard error"] = float(sizes.std(ddof=1) / np.sqrt(len(sizes)))
+    return found
+
+
+def main() -> None:
+    """Run all splits, print and write them."""
+    seeds = int(sys.argv[1]) if len(sys.argv) > 1 else 10
+    robot, arm = load_robot("irb120").with_payload(PAYLOAD), load_robot("ur5")
+    unknown = replace(robot, joints=tuple(replace(joint, transmission_periods=None) for joint in robot.joints))
+    cases = {
+        "IRB 120, 40": (robot, irb120(), 40, None),
+        "IRB 120, 300": (robot, irb120(), 300, None),
+        "IRB 120, 300, periods not given": (unknown, irb120(), 300, None),
+        "UR5, 700 of the grid": (arm, ur5("grid"), 700, ur5("random")),
+    }
+    found: dict[str, list[dict[str, Any]]] = {}
+    for name, (nominal, data, count, elsewhere) in cases.items():
+        found[name] = []
+        for seed in range(seeds):
+            found[name].append(one(nominal, data, count, seed, elsewhere))
+            sys.stdout.write(f"{name}: {json.dumps(found[name][-1])}\n")
+            sys.stdout.flush()
+        keys = [key for key, value in found[name][0].items() if isinstance(value, float)]
+        medians = {key: round(float(np.median([row[key] for row in found[name]])), 4) for key in keys}
+        sys.stdout.write(f"{name}, medians: {medians}\n")
+        Path(__file__).with_suffix(".json").write_text(json.dumps(found, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()

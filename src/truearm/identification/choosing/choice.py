@@ -1,0 +1,138 @@
+"""What was chosen, and why: the record of a choice among joint effects."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+from truearm.identification.choosing.candidates import SELECTABLE
+from truearm.identification.choosing.search import Gain
+from truearm.identification.judging.transmission import PeriodicError
+from truearm.identification.solving.models import Model, named_model
+from truearm.modeling.effects import EFFECTS
+from truearm.modeling.robot import Robot
+
+AUTO: Final = "auto"
+COMPLIANCE: Final = "compliance"
+TRANSMISSION: Final = "transmission-error"
+#: Effects that follow the order of a campaign.
+ORDERED: Final = frozenset(effect.name for effect in EFFECTS if effect.ordered)
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A joint effect that could have been chosen.
+
+    Attributes
+    ----------
+    effect
+        Its name.
+    taken
+        Whether it was.
+    gain
+        What the chosen model gains by it, or would; None if it was not tried.
+    reason
+        Why it was left out; empty if it was not.
+    """
+
+    effect: str
+    taken: bool
+    gain: Gain | None
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Confirmation:
+    """A model that was fitted in every fold, held against a smaller one.
+
+    Attributes
+    ----------
+    effects, smaller
+        The effects of both.
+    error, smaller_error
+        Mean held-out errors [m].
+    gain
+        Of the paired differences.
+    """
+
+    effects: tuple[str, ...]
+    smaller: tuple[str, ...]
+    error: float
+    smaller_error: float
+    gain: Gain
+
+
+@dataclass(frozen=True)
+class Selection:
+    """How a model was chosen.
+
+    Attributes
+    ----------
+    model
+        What was chosen.
+    layout, blocks
+        How the configurations lie, see :data:`truearm.identification.choosing.folds.Layout`, and in how many blocks of
+        neighbours they were held out; 0 where one by one.
+    geometric, elastic, error
+        Mean held-out errors of these models and of the chosen one, in closed form [m]; the second is None where no
+        loads bend the joints.
+    candidates
+        Every joint effect that can be chosen.
+    confirmations
+        What was fitted in every fold.
+    lines
+        Periodic errors that were found, whose numbers of periods nobody had given.
+    smaller
+        Smaller models, the next one first.
+    passed_over
+        Models that were chosen first and whose fits were not sound, with the statuses.
+    """
+
+    model: Model
+    layout: str
+    blocks: int
+    geometric: float
+    elastic: float | None
+    error: float
+    candidates: tuple[Candidate, ...]
+    confirmations: tuple[Confirmation, ...] = ()
+    lines: tuple[PeriodicError, ...] = ()
+    smaller: tuple[Model, ...] = ()
+    passed_over: tuple[tuple[tuple[str, ...], str], ...] = ()
+
+    def prepared(self, robot: Robot) -> Robot:
+        """Return the robot with the numbers of periods that were found, if the chosen model needs them."""
+        return with_lines(robot, self.lines) if TRANSMISSION in self.model.effects else robot
+
+    def instead(self, status: str) -> Selection:
+        """Return the choice of the next smaller model, because a fit of this one ended so."""
+        model, *smaller = self.smaller
+        out = set(self.model.effects) - set(model.effects)
+        candidates = tuple(
+            replace(one, taken=False, reason=f"the fit with it ended in {status}") if one.effect in out else one
+            for one in self.candidates
+        )
+        passed_over = (*self.passed_over, (self.model.effects, status))
+        return replace(self, model=model, smaller=tuple(smaller), candidates=candidates, passed_over=passed_over)
+
+
+def with_lines(robot: Robot, lines: Sequence[PeriodicError]) -> Robot:
+    """Return a robot whose gears err as often in a turn as was found."""
+    periods = {line.joint: line.periods for line in lines}
+    joints = tuple(
+        replace(joint, transmission_periods=periods.get(number, joint.transmission_periods))
+        for number, joint in enumerate(robot.joints, 1)
+    )
+    return replace(robot, joints=joints) if periods else robot
+
+
+def model_with(effects: Sequence[str], candidates: Sequence[str] = SELECTABLE) -> Model:
+    """Return the model with some joint effects, which bounds may name the others of."""
+    names = tuple(effect.name for effect in EFFECTS if effect.name in effects)
+    added = [name for name in names if name != COMPLIANCE]
+    rigid = "" if COMPLIANCE in names else "geometric"
+    start = rigid or "elastic"
+    summary = f"{start}, and what cross-validation added: {', '.join(added) or 'nothing'}"
+    groups = named_model("geometric").groups
+    return Model(AUTO, summary, groups, names, tuple(name for name in candidates if name not in names))

@@ -9,7 +9,7 @@ from typing import Any, Final, get_args
 
 from truearm.errors import InputError, did_you_mean, refusals_at
 from truearm.files import exists
-from truearm.identification.choosing.selection import AUTO
+from truearm.identification.choosing.choice import AUTO
 from truearm.identification.solving.losses import LOSSES
 from truearm.identification.solving.models import FRAMES, MODELS
 from truearm.identification.solving.rounds import Redundant

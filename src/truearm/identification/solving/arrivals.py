@@ -102,6 +102,10 @@ class Whitening:
         root = np.sqrt(1.0 + self._inner[0])
         return self._times(rows, -1.0 / (root * (1.0 + root)))
 
+    def undone(self, rows: Array) -> Array:
+        """Return ``V^1/2`` times equations ``(rows,)`` or ``(rows, columns)``."""
+        return self._times(rows, 1.0 / (1.0 + np.sqrt(1.0 + self._inner[0])))
+
     def _times(self, rows: Array, factor: Array) -> Array:
         flat = rows.reshape(len(rows), -1)
         vectors = self._inner[1]

@@ -77,7 +77,6 @@ def curve_variances(
     rows: float,
     joint: NDArray[np.intp],
     period: NDArray[np.intp],
-    before: Array | None = None,
     least_noise: float = 0.0,
 ) -> CurveVariances:
     """Find the variances of the coefficients of the joints' curves.
@@ -91,19 +90,16 @@ def curve_variances(
         How many independent equations there are.
     joint, period
         Of each coefficient: the index of its joint, and its periods in a turn.
-    before
-        Variances to begin with [rad^2], ``(coefficients,)``: a zero stays one.
     least_noise
         What the variance of the equations is at least, by the one assumed.
     """
     of = _Equations(*_told_apart(moments), rows)
-    variance = _start(of, joint) if before is None else before.copy()
     group = np.unique(np.stack([joint, period]), axis=1, return_inverse=True)[1].reshape(-1)
     band = np.unique(np.stack([joint, np.searchsorted(BANDS, period, side="right")]), axis=1, return_inverse=True)[
         1
     ].reshape(-1)
     climb = _Climb(group, band, least_noise)
-    state = climb.climbed(_Marginal(of, variance, max(of.squares / rows, least_noise)))
+    state = climb.climbed(_Marginal(of, _start(of, joint), max(of.squares / rows, least_noise)))
     gains: dict[int, float] = {}
     while state.variance.any():
         gains = {i: state.likelihood - state.without(joint == i) for i in np.unique(joint[state.variance > 0]).tolist()}

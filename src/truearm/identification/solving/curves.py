@@ -99,7 +99,7 @@ def with_stiffness(
     weight
         What the loss leaves of each reading.
     """
-    names = [name for name in curves.names if not curves.variances or name in curves.variances]
+    names = curves.names  # all of them again: what is weak shows only where the strong curves are known
     others = [p for p in problem.free.parameters if p.name not in curves.places]
     robot = problem.robot
     coefficients = [robot.parameters[name] for name in names]
@@ -127,15 +127,13 @@ def with_stiffness(
             part *= weights[rows, None]
             moments += part.T @ part
     place = np.array([curves.places[name] for name in names], dtype=np.intp).reshape(-1, 2)
-    before = np.array([curves.variances[name] for name in names]) if curves.variances else None
     declared = any(block.declared for block in whole.blocks)
     found = curve_variances(
         moments_without(moments, m),
         whole.rows / crowd,
         place[:, 0],
         place[:, 1],
-        before,
-        problem.widened**-2 if declared else 0.0,
+        least_noise=problem.widened**-2 if declared else 0.0,
     )
     variances = {name: v for name, v in zip(names, found.variance.tolist(), strict=True) if v > 0.0}
     now = {p.name: p for p in problem.free.parameters}

@@ -2,8 +2,8 @@
 
 Link lengths approach those of the warm arm as ``1 - warm_up_i exp(-warm_up_rate k)``, k being the number of
 configurations since the first. The parameters of the robot are then those of the warm arm. Where the number is not
-known, in another session for one, predictions are those of an arm with the share ``warm_up_left`` of the growth still to
-come: a calibration sets it to the mean of its session, so that they are of the session's middle.
+known, in another session for one, predictions are those of an arm with the share ``warm_up_left`` of the growth still
+to come: a calibration sets it to the mean of its session, so that they are of the session's middle.
 """
 
 from __future__ import annotations

@@ -263,10 +263,10 @@ class Robot(RobotData):
     def tilted(self, variables: Array) -> Array:
         """Return variables ``(joints or more, n)`` with the tilts that the loads of the arm make as it stands there.
 
-        What was tilted before counts for the loads alone; asked again for what came out, they are a thousandth nearer
-        to equilibrium.
+        So with what lengths have grown where nothing but the joint positions is known. What was tilted before counts
+        for the loads alone; asked again for what came out, they are a thousandth nearer to equilibrium.
         """
-        tilting = [effect for effect in self.effects if effect.tilts]
+        tilting = [effect for effect in self.effects if effect.tilts or effect.stretches]
         if not tilting:
             return variables
         joints = variables[: len(self.joints)]

@@ -32,7 +32,6 @@ _HARDLY: Final = 1e-6
 #: A reading that a loss left no weight counts as if it had left this much, in the ranking.
 _LEAST_WEIGHT: Final = 1e-6
 #: Share of the largest variance at which that of a coefficient begins again that was nothing.
-_LEAST_BEFORE: Final = 1e-3
 
 
 def open_effects(
@@ -115,8 +114,7 @@ class CurveColumns:
         if without is not None:
             kept[without + 1] = False
         moments = moments_without(self.moments[kept].sum(axis=0), self.others)
-        before = None if without is None else np.maximum(self._variance, _LEAST_BEFORE * self._variance.max())
-        return curve_variances(moments, float(self.rows[kept].sum()), self.joint, self.period, before).variance
+        return curve_variances(moments, float(self.rows[kept].sum()), self.joint, self.period).variance
 
 
 @dataclass(frozen=True, eq=False)

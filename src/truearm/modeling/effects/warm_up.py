@@ -56,14 +56,16 @@ class WarmUp(Effect):
         }
 
     def derivative(self, at: Postures, values: Mapping[str, float | Array]) -> Rates:
-        """Return how the lengths follow each growth, and the rate where the number is known."""
+        """Return how the lengths follow each growth, and the rate where the number is known, else what is left."""
         cold = _left(at, values)
-        rates: dict[str, dict[int, Array]] = {RATE: {}}
+        rates: dict[str, dict[int, Array]] = {RATE: {}, LEFT: {}}
         for k, (joint, length) in enumerate(self.layout.lengths):
             name, variable = f"warm_up_{joint + 1}", self.layout.length(k)
             rates.setdefault(name, {})[variable] = -length * cold
             if at.number is not None:
                 rates[RATE][variable] = length * np.asarray(values[name]) * cold * at.number
+            else:
+                rates[LEFT][variable] = -length * np.asarray(values[name]) * np.ones(len(at))
         return rates
 
 

@@ -10,7 +10,6 @@ calibration left it: base and first joint can share an offset in many ways, and 
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import pairwise
 from typing import Final
 
@@ -217,9 +216,7 @@ def _task(
             p = p - R @ np.array(tip.translation)
         p, R = p @ base.rotation.T + np.array(base.translation), base.rotation @ R
     x, y, z = np.ascontiguousarray(R.transpose(2, 1, 0))
-    # Without the temperature or the number of a configuration no length is known to have changed.
-    known = replace(robot, effect_names=tuple(effect.name for effect in robot.effects if not effect.stretches))
-    return PoseTask(known, target, orientation, np.ascontiguousarray(p.T), (x, y, z), reach(robot, target))
+    return PoseTask(robot, target, orientation, np.ascontiguousarray(p.T), (x, y, z), reach(robot, target))
 
 
 def _array(given: ArrayLike, parameter: str, *shape: int) -> Array:

@@ -31,7 +31,6 @@ SELECTABLE: Final = tuple(effect.name for effect in EFFECTS if effect.selectable
 _HARDLY: Final = 1e-6
 #: A reading that a loss left no weight counts as if it had left this much, in the ranking.
 _LEAST_WEIGHT: Final = 1e-6
-#: Share of the largest variance at which that of a coefficient begins again that was nothing.
 
 
 def open_effects(

@@ -135,6 +135,7 @@ def _axis_runs(folder: Path) -> Path:
 def _joint_errors(folder: Path) -> Path:
     path = folder / "axes" / "joint-errors.yaml"
     if not path.exists():
+        _axis_runs(folder)
         path.parent.mkdir(exist_ok=True)
         for name, content in _axes_result().items():
             (path.parent / name).write_bytes(content)

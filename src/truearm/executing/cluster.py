@@ -117,7 +117,7 @@ class Cluster:
                     "the scheduler has no workers",
                     parameter="scheduler",
                     came=self._address,
-                    cure=f"Start some with 'dask worker {self._address} --nthreads 1'.",
+                    cure=f"Start some with 'dask worker {self._address}'.",
                 )
             time.sleep(0.1)
         return found

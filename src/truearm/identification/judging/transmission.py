@@ -219,7 +219,8 @@ def _aliases(q: Array, wave: Array, weight: Array, periods: int) -> tuple[int, .
     explained = _sines(q, weight * wave, weight, _ALIASES)[0] / float(weight @ wave**2)
     near = math.ceil(2.0 * math.pi / max(float(np.ptp(q)), 1e-3))
     places = np.flatnonzero((explained >= _SAME_WAVE) & (np.abs(_ALIASES - periods) > near))
-    return tuple(_ALIASES[places[np.argsort(-explained[places], kind="stable")][:_MOST_ALIASES]].tolist())
+    likest = np.argsort(-explained[places].round(6), kind="stable")  # of those that are the same the fewest periods
+    return tuple(_ALIASES[places[likest][:_MOST_ALIASES]].tolist())
 
 
 def _agreement(angle: Array, pull: Array) -> float:

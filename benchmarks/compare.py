@@ -91,7 +91,7 @@ PROGRAMS = """
 |---|---|---|---|---|---|
 {languages}
 """
-CURVES = """
+LARGE_FITS = """
 ## Geometric fit with a curve of every joint: one target, coefficients up to 60 periods a turn
 
 | configurations | time | memory of the process |
@@ -274,7 +274,7 @@ def page(record: dict[str, Any]) -> str:
             over(("figaroh_fit", fit), lambda a, b: 10 * median(a["simulated"]["fit"]) / b["monte_carlo_1000"]),
         ),
     ]
-    curves = ""
+    large_fits = ""
     if "truearm_curves" in rounds[0]:
         large = ("truearm_curves",)
         goals += [
@@ -294,7 +294,7 @@ def page(record: dict[str, Any]) -> str:
             f"| {(over(large, lambda a, n=n: a[n]['memory']) or 0.0) / 1e6:.0f} MB |"
             for n in rounds[0]["truearm_curves"]["figures"]
         ]
-        curves = CURVES.format(rows="\n".join(rows))
+        large_fits = LARGE_FITS.format(rows="\n".join(rows))
     goals.append(
         goal(
             "inverse of 10 000 poses: times faster than Pinocchio's documented damped Newton",
@@ -403,7 +403,7 @@ at 200 configurations without noise. Measured: a FARO tracker, commanded joints,
 configurations.
 
 1000 Monte-Carlo calibrations of the same size take {shown(trials)}{ten}.
-{curves}
+{large_fits}
 ## Would a compiled kernel be worth it?
 
 How much of whole jobs is spent in the sweeps through the chain, Jacobian included, and what a kernel that took no time

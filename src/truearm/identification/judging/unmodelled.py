@@ -188,9 +188,7 @@ def _is_enough(left: LeftOver, freedom: int) -> bool:
     return bool(freedom >= max(_LEAST_FREEDOM, _LEAST_SHARE * left.basis.shape[1]))
 
 
-def _some(
-    left: LeftOver, without: Sequence[int], groups: Mapping[str, tuple[Parameter, ...]]
-) -> NDArray[np.intp]:
+def _some(left: LeftOver, without: Sequence[int], groups: Mapping[str, tuple[Parameter, ...]]) -> NDArray[np.intp]:
     """Return the configurations looked at: no more than the derivatives by all that is tried have room for."""
     kept = np.setdiff1d(np.unique(left.configuration), np.array(without, dtype=np.intp))
     tried = max(1, sum(len(parameters) for parameters in groups.values()))

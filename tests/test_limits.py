@@ -383,3 +383,37 @@ def test_what_is_simulated_at_the_limit_can_be_read_again() -> None:
     header, row = csv_text(data).splitlines()[:2]
     assert limit("readings") * len(header.split(",")) <= limit("cells")
     assert limit("readings") * (len(row) + 2) <= limit("file_size")
+
+
+# -- fits with more derivatives than there may be at once ---------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("most", "told"),
+    [
+        (3_000, None),
+        (12_000, {"compared-in-part", "judged-in-part"}),
+        (50_000, {"compared-in-part"}),
+    ],
+)
+@pytest.mark.parametrize("how", [{}, {"loss": "huber", "redundancy": "drop"}, {"bootstrap": 20}])
+def test_a_large_campaign_is_calibrated_to_the_end_or_refused_first(
+    most: int, told: set[str] | None, how: dict[str, object], allowing: Callable[[str], None]
+) -> None:
+    _, data = campaign("irb120", 60, 0.05e-3, 3)
+    steps: list[str] = []
+    allowing(f"derivatives={most}")
+    if told is None:
+        assert "too many readings for so many parameters" in refused(
+            lambda: truearm.calibrate("irb120", data, progress=steps.append, **how)  # type: ignore[arg-type]
+        )
+        assert not any(step.startswith("identifying") for step in steps)
+        return
+    result = truearm.calibrate("irb120", data, progress=steps.append, **how)  # type: ignore[arg-type]
+    parts = {"compared-in-part", "judged-in-part"}
+    assert {notice.code for notice in result.warnings} & parts == told
+    allowing("derivatives=10000000")
+    whole = truearm.calibrate("irb120", data, **how)  # type: ignore[arg-type]
+    for name in result.fit.free.names:
+        assert result.fit.robot.values[name] == pytest.approx(whole.fit.robot.values[name], abs=1e-9)
+    np.testing.assert_allclose(result.fit.covariance, whole.fit.covariance, atol=1e-6 * whole.fit.covariance.max())

@@ -116,7 +116,9 @@ def test_scatter_of_equal_arrivals_is_that_of_their_means() -> None:
     y = readings.reshape(-1)
     rows = np.ones((len(y), 1))
     arrivals = Arrivals(np.repeat(np.arange(ARRIVALS), READINGS))
-    covariance, parts = cluster_covariance(rows, (y - y.mean())[:, None], arrivals, np.array([True]), np.zeros(1))
+    covariance, parts = cluster_covariance(
+        lambda: [(slice(None), rows, (y - y.mean())[:, None])], arrivals, np.array([True]), np.zeros(1)
+    )
     variance = np.var(readings.mean(axis=1), ddof=1) / ARRIVALS
     assert covariance[0, 0] == pytest.approx(variance * (stdtrit(ARRIVALS - 1, 0.975) / 1.959964) ** 2, rel=1e-6)
     assert parts[0].covariance[0, 0] == pytest.approx(variance, rel=1e-6)

@@ -22,8 +22,12 @@ from truearm.identification.judging.left_over import LeftOver
 from truearm.identification.solving.fit import identify
 from truearm.identification.solving.losses import Loss
 from truearm.identification.solving.models import Model
+from truearm.identification.solving.problem import Problem
 from truearm.identification.start_values.frames import initial_frames
+from truearm.identification.start_values.from_readings import start_from_readings
+from truearm.limits import refuse_beyond
 from truearm.measurement.dataset import Dataset, IntArray
+from truearm.measurement.observations import OBSERVATIONS
 from truearm.modeling.chain import Array
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import Transform, quaternion_from_rotation, rotation_from_quaternion, rotation_vector
@@ -145,6 +149,9 @@ def with_one_base(
 
 def _steps(robot: Robot, data: Dataset, part: NDArray[np.intp], model: Model, loss: Loss, held: Held) -> list[Motion]:
     """Return the motion that takes each part's readings nearer to the frame of the first, one step of Gauss-Newton."""
+    start = start_from_readings(model.prepared(robot), data, held)
+    problem = Problem(start, data, model.free(start), {observation.name: 1.0 for observation in OBSERVATIONS})
+    refuse_beyond("derivatives", problem.rows * len(problem.free.names), where=data.source)  # all are needed at once
     fit = identify(robot, data, model, loss=loss, held=held)
     left = LeftOver.of(fit, data)
     base = [i for i, p in enumerate(fit.free.parameters) if p.group == "base"]

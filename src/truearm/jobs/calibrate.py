@@ -14,11 +14,13 @@ from truearm.errors import InputError, refusals_of
 from truearm.files import path_argument, read_bytes
 from truearm.identification.base_changes import with_one_base
 from truearm.identification.choosing.balancer_loads import refuse_balancers_that_are_not_there, without_unseen_balancers
+from truearm.identification.choosing.candidates import compared_with
 from truearm.identification.choosing.choice import AUTO
-from truearm.identification.choosing.chosen_fit import check_choice, identify_chosen
+from truearm.identification.choosing.chosen_fit import check_choice, check_part, identify_chosen
 from truearm.identification.choosing.selection import select
 from truearm.identification.judging.held_places import check_held
 from truearm.identification.judging.judgement import judge
+from truearm.identification.judging.simulated_calibrations import refuse_too_many
 from truearm.identification.solving.bootstrap import LEAST_FITS
 from truearm.identification.solving.bounds import Bounds, read_bounds
 from truearm.identification.solving.fit import identify, place
@@ -284,10 +286,13 @@ def calibrate(
         second = readings.of_configurations(held_out) if len(held_out) else None
         progress("placing the nominal robot")
         placed = place(nominal_robot, first, loss, held)
+        if trials is not None:
+            refuse_too_many(placed, first, named_model("geometric") if named is None else named.also(effects))
         how = _How(loss=loss, redundancy=redundancy, bounds=bounds, bounds_file=bounds_file)
-        selection, held_effects = None, list[Notice]()
+        selection, compared, held_effects = None, first, list[Notice]()
         if named is None:
-            selection = select(nominal_robot, first, **how, held=held, seed=seed, progress=progress)
+            compared = compared_with(nominal_robot, first)
+            selection = select(nominal_robot, compared, **how, held=held, seed=seed, progress=progress)
             selection, fit = identify_chosen(
                 nominal_robot, first, selection, **how, held=held, bootstrap=bootstrap, seed=seed, progress=progress
             )
@@ -311,7 +316,7 @@ def calibrate(
         *check_trained_before(nominal_robot, as_read, sha256, (count, n, seed), without_words(without)),
         *moved,
         *held_effects,
-        *(() if selection is None else check_choice(selection)),
+        *(() if selection is None else (*check_choice(selection), *check_part(compared, first))),
     )
     judged = judge(
         fit, readings, first, validation or train_errors, noticed, of_split, loss, held_out=second is not None

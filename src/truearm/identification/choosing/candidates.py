@@ -17,7 +17,9 @@ from truearm.identification.solving.arrivals import Arrivals, Whitening
 from truearm.identification.solving.curve_stiffness import BANDS, curve_variances, moments_without
 from truearm.identification.solving.problem import Problem
 from truearm.identification.solving.rounds import Solved, bound_by, in_the_middle
+from truearm.limits import limit, refuse_beyond
 from truearm.measurement.dataset import Dataset
+from truearm.measurement.thinning import PARAMETERS_OF_A_PLACE, equations_of, evenly
 from truearm.modeling.chain import Array
 from truearm.modeling.effects import EFFECTS
 from truearm.modeling.effects.joint_curve import JointCurve
@@ -52,6 +54,17 @@ def closed_because(robot: Robot, data: Dataset, name: str) -> str | None:
     if effect.loaded and not (has_weight(robot) or data.wrench is not None):
         return "nothing loads the joints"
     return None
+
+
+def compared_with(robot: Robot, data: Dataset, candidates: Sequence[str] = SELECTABLE) -> Dataset:
+    """Return the data that effects are chosen by: as many configurations as the derivatives by all have room for."""
+    wanted = robot.with_effects([name for name in candidates if closed_because(robot, data, name) is None])
+    places = PARAMETERS_OF_A_PLACE * (1 + len(data.targets) + len(data.fixtures))
+    parameters = len(wanted.parameters) + places
+    part = evenly(data, parameters, limit("derivatives"))
+    if part.configurations < min(2 * FOLDS, data.configurations):
+        refuse_beyond("derivatives", equations_of(data) * parameters, where=data.source)
+    return part
 
 
 def loads_bend(robot: Robot, data: Dataset) -> bool:

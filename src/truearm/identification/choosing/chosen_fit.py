@@ -14,7 +14,7 @@ from truearm.identification.solving.rounds import Redundant
 from truearm.measurement.dataset import Dataset
 from truearm.modeling.robot import Robot
 from truearm.notices import Notice
-from truearm.shown import listed
+from truearm.shown import counted, listed
 
 #: How a fit ends that a smaller model may do without.
 _UNSOUND: Final = (Status.RANK_LOSS, Status.NOT_CONVERGED)
@@ -72,6 +72,20 @@ def identify_chosen(
         if not selection.smaller:
             return first
         selection = selection.instead(fit.status.value)
+
+
+def check_part(compared: Dataset, data: Dataset) -> list[Notice]:
+    """Say if a model was chosen by a part of the data."""
+    if compared.configurations == data.configurations:
+        return []
+    return [
+        Notice(
+            "chosen-in-part",
+            f"The data are large for so many effects: the model was chosen by {compared.configurations} of "
+            f"{counted(data.configurations, 'training configuration')}, evenly spaced, and fitted to all of them.",
+            "note",
+        )
+    ]
 
 
 def check_choice(selection: Selection) -> list[Notice]:

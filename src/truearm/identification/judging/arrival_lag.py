@@ -62,7 +62,9 @@ def arrival_lag(left_over: LeftOver) -> ArrivalLag | None:
     if data.number is None:
         return None
     here = problem.at(np.array([problem.robot.values[name] for name in problem.free.names]))
-    H = here.by_joints * _last_moves(data, data.number)[left_over.configuration]
+    given = left_over.given
+    assert given.number is not None
+    H = here.by_joints * _last_moves(given, given.number)[left_over.chosen][left_over.configuration]
     free = left_over.freedom
     if free < 4 * H.shape[1]:
         return None

@@ -28,6 +28,7 @@ from truearm.identification.solving.losses import Loss
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.statistics import Errors
 from truearm.notices import Notice, has_error
+from truearm.shown import counted
 
 
 @dataclass(frozen=True)
@@ -116,6 +117,7 @@ def judge(
         *explained,
         *check_transmission(fit, training),
         *check_curves(fit, training),
+        *_in_part(left_over),
     )
     steps = steps_after_fit(
         Judged(
@@ -131,3 +133,18 @@ def judge(
         )
     )
     return Judgement(expected, warnings, steps)
+
+
+def _in_part(left: LeftOver) -> list[Notice]:
+    """Say if what the fit leaves was looked at in part of the configurations alone."""
+    if len(left.chosen) == left.given.configurations:
+        return []
+    return [
+        Notice(
+            "judged-in-part",
+            f"The data are large for so many parameters: what the fit leaves was looked at in {len(left.chosen)} of "
+            f"{counted(left.given.configurations, 'configuration')}, evenly spaced. What is off or changed at others "
+            "alone is not told. Parameters and errors are those of all configurations.",
+            "note",
+        )
+    ]

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from truearm.identification.solving.fit import Fit
 from truearm.identification.solving.problem import Problem
+from truearm.limits import limit
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.observations import OBSERVATIONS
 from truearm.modeling.chain import Array
@@ -40,6 +41,11 @@ class LeftOver:
         Singular values of the Jacobian per prior, of those directions, ``(rank,)``.
     turns
         Directions of the parameters per prior that belong to them, ``(rank, parameters)``.
+    given
+        The readings asked about.
+    chosen
+        Which of their configurations these are: all, or of very many as many as the limit of derivatives has room for,
+        evenly spaced.
     """
 
     fit: Fit
@@ -49,19 +55,21 @@ class LeftOver:
     basis: Array
     strength: Array
     turns: Array
+    given: Dataset
+    chosen: NDArray[np.intp]
 
     @classmethod
     def of(cls, fit: Fit, data: Dataset) -> LeftOver:
         """Linearise a fit on readings, those it was not made from too."""
         noise = {observation.name: fit.sigma.get(observation.name, 1.0) for observation in OBSERVATIONS}
-        problem = Problem(fit.robot, replace(data, setup=None), fit.free, noise)
+        problem, chosen = _in_part(Problem(fit.robot, replace(data, setup=None), fit.free, noise))
         r, J = problem.linearised(np.array([fit.robot.values[name] for name in fit.free.names]))
         # Of the square triangle, which is small, instead of the whole Jacobian.
         Q, R = np.linalg.qr(J * fit.free.prior)
         R = _without_size(R, Q.T @ r, float(r @ r)) if len(r) > len(fit.free.names) else R
         U, s, Vt = np.linalg.svd(R, full_matrices=False)
         kept = s > 1e-8 * s[0]
-        return cls(fit, problem, r, J, Q @ U[:, kept], s[kept], Vt[kept])
+        return cls(fit, problem, r, J, Q @ U[:, kept], s[kept], Vt[kept], data, chosen)
 
     def without(self, configurations: Sequence[int]) -> LeftOver:
         """Return what is left without some configurations; the parameters stay, and take what they can of the rest."""
@@ -76,6 +84,7 @@ class LeftOver:
             residual=self.residual[rows],
             jacobian=self.jacobian[rows],
             basis=np.linalg.qr(self.basis[rows])[0],
+            chosen=self.chosen[kept],
         )
 
     @property
@@ -96,6 +105,17 @@ class LeftOver:
                 for block in self.problem.blocks
             ]
         )
+
+
+def _in_part(problem: Problem) -> tuple[Problem, NDArray[np.intp]]:
+    """Return a problem with as many of its configurations as the limit of derivatives has room for, and which."""
+    n = room = problem.data.configurations
+    chosen, part, most = np.arange(n), problem, limit("derivatives")
+    while room > 1 and (count := part.rows * len(part.free.names)) > most:
+        room = max(1, min(room - 1, room * most // count))
+        chosen = np.linspace(0, n - 1, room).round().astype(np.intp)
+        part = replace(problem, data=problem.data.of_configurations(chosen))
+    return part, chosen
 
 
 def _without_size(R: Array, c: Array, square: float) -> Array:

@@ -22,11 +22,14 @@ from numpy.typing import NDArray
 from truearm.identification.judging.expected_error import PositionErrors, moved_lengths
 from truearm.identification.solving.arrivals import Arrivals, Whitening
 from truearm.identification.solving.fit import Fit
+from truearm.identification.solving.models import Model
 from truearm.identification.solving.problem import Problem
+from truearm.limits import limit, refuse_beyond
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.observations import OBSERVATIONS
 from truearm.modeling.chain import Array
 from truearm.modeling.parameters import PLACES, FreeParameters
+from truearm.modeling.robot import Robot
 from truearm.notices import Notice
 from truearm.shown import listed
 
@@ -161,7 +164,7 @@ def simulated_calibrations(
     rng = np.random.default_rng((seed, 4))
     problem, whitening, scatter = _of_itself(fit, training, priors=priors)
     linear = np.sqrt(np.diag(fit.covariance))
-    size = max(1, min(trials, _TOGETHER // max(problem.rows * len(problem.free.names), 1)))
+    size = max(1, min(trials, min(_TOGETHER, limit("derivatives")) // max(problem.rows * len(problem.free.names), 1)))
     truth = problem.free.start
     at_truth = problem.at(truth).residual
     drawn = np.array([priors and p.group not in PLACES for p in problem.free.parameters])
@@ -274,6 +277,19 @@ def _predicted(fit: Fit, joints: Array, names: tuple[str, ...], error: Array) ->
         float(end) for values in (by_trials, linear) for end in np.percentile(values, _INTERVAL_90)
     )
     return PredictedError(float(by_trials.mean()), (low, high), float(linear.mean()), (linear_low, linear_high))
+
+
+def refuse_too_many(robot: Robot, training: Dataset, model: Model) -> None:
+    """Refuse readings whose derivatives one trial would not have room for, before anything is fitted.
+
+    Parameters
+    ----------
+    robot
+        In the frames of the readings.
+    """
+    start = model.prepared(robot)
+    problem = Problem(start, training, model.free(start), {observation.name: 1.0 for observation in OBSERVATIONS})
+    refuse_beyond("derivatives", problem.rows * len(problem.free.names), where=training.source)
 
 
 def check_linear(fit: Fit, found: SimulatedCalibrations) -> list[Notice]:

@@ -14,7 +14,7 @@ unknowns that a few steps on sums of products cost nothing.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final
@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from truearm.identification.choosing.candidates import open_effects
 from truearm.identification.judging.left_over import LeftOver, chi_squared_tail
 from truearm.identification.solving.problem import Problem
+from truearm.limits import limit
 from truearm.measurement.observations import OBSERVATIONS
 from truearm.modeling.chain import Array
 from truearm.modeling.loads import has_weight, joint_loads
@@ -87,10 +88,18 @@ class Explanation:
 
 
 def with_causes(left: LeftOver, *causes: str) -> LeftOver:
-    """Return what a fit leaves whose free parameters could also take what causes explain, as far as they are open."""
+    """Return what a fit leaves whose free parameters could also take what causes explain, as far as they are open.
+
+    Causes of more derivatives than there may be are left out.
+    """
     problem = replace(left.problem, free=FreeParameters(()))
     robot, groups = _candidates(left, problem, causes)
-    free = FreeParameters(tuple(p for cause in dict.fromkeys(causes) for p in groups.get(cause, ())))
+    most = min(limit("parameters"), limit("derivatives") // problem.rows)
+    taken: list[Parameter] = []
+    for cause in dict.fromkeys(causes):
+        more = groups.get(cause, ())
+        taken += more if len(taken) + len(more) <= most else ()
+    free = FreeParameters(tuple(taken))
     if not free.parameters:
         return left
     J = replace(problem, robot=robot, free=free).at(free.start).jacobian * free.prior
@@ -136,7 +145,8 @@ def explanation(left: LeftOver, without: Sequence[int] = ()) -> Explanation | No
     without
         Configurations of the dataset that are left out of account.
     """
-    some = _some(left, without)
+    robot, groups = _candidates(left, left.problem)
+    some = _some(left, without, groups)
     freedom = _freedom(left, some)
     if not _is_enough(left, freedom):
         return None
@@ -144,18 +154,17 @@ def explanation(left: LeftOver, without: Sequence[int] = ()) -> Explanation | No
     total = float(rest.residual @ rest.residual)
     if total <= 0.0:
         return None
-    robot, groups = _candidates(left, rest.problem)
     found = []
-    if groups:
-        free = FreeParameters(tuple(p for group in groups.values() for p in group))
+    for together in _at_once(groups):
+        free = FreeParameters(tuple(p for cause in together for p in groups[cause]))
         problem = replace(rest.problem, robot=robot, free=free)
         if rest.problem.postures.loads is not None:  # effects that do nothing yet leave the loads as they are
             problem.__dict__["postures"] = rest.problem.postures
         J = problem.at(free.start).jacobian * free.prior
         columns = rest.without_parameters(J)
         places = {p.name: i for i, p in enumerate(free.parameters)}
-        for cause, parameters in groups.items():
-            found.append((cause, columns[:, [places[p.name] for p in parameters]], 0.0))
+        for cause in together:
+            found.append((cause, columns[:, [places[p.name] for p in groups[cause]]], 0.0))
     found += _payload(left, rest)
     judged = [e for e in (_judged(rest, *tried, freedom, len(found)) for tried in found) if e is not None]
     if not judged:
@@ -167,7 +176,7 @@ def explanation(left: LeftOver, without: Sequence[int] = ()) -> Explanation | No
 
 def can_explain(left: LeftOver) -> bool:
     """Return whether there are enough readings to tell what would explain what a fit leaves."""
-    return _is_enough(left, _freedom(left, _some(left, ())))
+    return _is_enough(left, _freedom(left, _some(left, (), _candidates(left, left.problem)[1])))
 
 
 def _freedom(left: LeftOver, some: NDArray[np.intp]) -> int:
@@ -179,10 +188,27 @@ def _is_enough(left: LeftOver, freedom: int) -> bool:
     return bool(freedom >= max(_LEAST_FREEDOM, _LEAST_SHARE * left.basis.shape[1]))
 
 
-def _some(left: LeftOver, without: Sequence[int]) -> NDArray[np.intp]:
-    """Return the configurations looked at."""
+def _some(left: LeftOver, without: Sequence[int], groups: Mapping[str, tuple[Parameter, ...]]) -> NDArray[np.intp]:
+    """Return the configurations looked at: no more than the derivatives by all that is tried have room for."""
     kept = np.setdiff1d(np.unique(left.configuration), np.array(without, dtype=np.intp))
-    return kept if len(kept) <= _MOST else kept[np.linspace(0, len(kept) - 1, _MOST).round().astype(np.intp)]
+    tried = max(1, sum(len(parameters) for parameters in groups.values()))
+    most = min(_MOST, limit("derivatives") // (tried * int(np.bincount(left.configuration).max())))
+    return kept if len(kept) <= most else kept[np.linspace(0, len(kept) - 1, most).round().astype(np.intp)]
+
+
+def _at_once(groups: Mapping[str, tuple[Parameter, ...]]) -> Iterator[list[str]]:
+    """Go through causes in parts of no more parameters than may be free together; one of more is left out."""
+    most, part, count = limit("parameters"), list[str](), 0
+    for cause, parameters in groups.items():
+        if len(parameters) > most:
+            continue
+        if part and count + len(parameters) > most:
+            yield part
+            part, count = [], 0
+        part.append(cause)
+        count += len(parameters)
+    if part:
+        yield part
 
 
 def _remainder(left: LeftOver, some: NDArray[np.intp]) -> _Remainder:

@@ -95,19 +95,19 @@ class Lengths:
             return cls((), np.zeros((0, 0)), np.zeros(0))
         noise = {observation.name: fit.sigma.get(observation.name, 1.0) for observation in OBSERVATIONS}
         problem = Problem(robot, data, free, noise)
-        r, J = problem.linearised(free.start)
         weight = np.sqrt(np.concatenate([_weights(fit, problem, i) for i in range(len(problem.blocks))])) / fit.excess
         count = len(lengths)
         # What is known of an instrument's scale is known of lengths.
         wider = [not _is_length(p) and p.name != SCALE for p in free.parameters]
         prior = free.prior * np.where(wider, _WIDER, 1.0)
-        J = J * (weight[:, None] * prior)
         # The controller computes with the table of the robot file, whatever earlier calibrations have found.
         table = replace(robot, known={}).parameters
         centre = [table[p.name].nominal if p.group in _TABLE else p.value for p in free.parameters]
-        wanted = J @ ((free.start - centre) / prior) - r * weight
-        rows = np.block([[J, wanted[:, None]], [np.eye(len(names)), np.zeros((len(names), 1))]])
-        triangle = np.asarray(np.linalg.qr(rows, mode="r"))
+        triangle = np.column_stack([np.eye(len(names)), np.zeros(len(names))])
+        for rows, part in problem.at(free.start).portions():
+            J = part.jacobian * (weight[rows, None] * prior)
+            wanted = J @ ((free.start - centre) / prior) - part.residual * weight[rows]
+            triangle = np.asarray(np.linalg.qr(np.block([[J, wanted[:, None]], [triangle]]), mode="r"))
         own = slice(len(names) - count, len(names))
         U, s, Vt = np.linalg.svd(triangle[own, own])
         known = 1.0 - 1.0 / s**2 >= _LEAST_INFORMED

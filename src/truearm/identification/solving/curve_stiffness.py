@@ -30,6 +30,8 @@ from truearm.modeling.chain import Array
 BANDS: Final = (1, 3, 6, 11, 19, 33)
 #: Degrees of freedom of the variances of a band.
 _ALIKE: Final = 1.0
+#: Sum of the variances of a joint's coefficients that no curve has [rad^2, m^2 of a prismatic joint].
+_LARGEST: Final = 0.1**2
 #: Gain in log-likelihood from which the curve of a joint is believed. A sine of noise alone gains so much at one of
 #: 300 000 periods, and a robot has hundreds of periods to look at.
 _SIGNIFICANT: Final = 12.5
@@ -102,6 +104,11 @@ def curve_variances(
     state = climb.climbed(_Marginal(of, _start(of, joint), max(of.squares / rows, least_noise)))
     gains: dict[int, float] = {}
     while state.variance.any():
+        sizes = np.bincount(joint, state.variance)
+        if sizes.max() > _LARGEST:  # of a joint on whose axis the targets lie, any curve is as likely
+            left = np.where(joint == int(sizes.argmax()), 0.0, state.variance)
+            state = climb.climbed(_Marginal(of, left, state.noise))
+            continue
         gains = {i: state.likelihood - state.without(joint == i) for i in np.unique(joint[state.variance > 0]).tolist()}
         weakest = min(gains, key=lambda i: gains[i])
         if gains[weakest] >= _SIGNIFICANT:
@@ -158,6 +165,8 @@ def _start(of: _Equations, joint: NDArray[np.intp]) -> Array:
     for i in joints:
         mine = joint == i
         found[mine] = of.rows / max(float(of.size[mine].sum()), 1e-300) / len(joints)
+        if float(found[mine].sum()) > _LARGEST:  # the readings do not see the joint turn
+            found[mine] = 0.0
     return found
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Final, Literal
@@ -14,9 +14,9 @@ from truearm.identification.solving.arrivals import Arrivals
 from truearm.identification.solving.bootstrap import refit_draws
 from truearm.identification.solving.bounds import Bounds
 from truearm.identification.solving.cluster_covariance import cluster_covariance
-from truearm.identification.solving.losses import ABSOLUTE, Loss, pulls
+from truearm.identification.solving.losses import ABSOLUTE, Loss, pulls, scales_of_pulls
 from truearm.identification.solving.models import FRAMES, Model
-from truearm.identification.solving.problem import SETUP, Problem
+from truearm.identification.solving.problem import SETUP, Problem, Rows
 from truearm.identification.solving.redundancy import (
     Redundancy,
     find_redundancies,
@@ -28,13 +28,14 @@ from truearm.identification.solving.rounds import (
     Redundant,
     Solved,
     bound_by,
+    evaluated,
     excess_of,
     factors_of,
     find_parameters,
     in_the_middle,
     noise_found,
 )
-from truearm.identification.solving.solver import SMALL
+from truearm.identification.solving.solver import SMALL, Solution
 from truearm.identification.solving.variance_components import CovariancePart, widening
 from truearm.identification.start_values.from_readings import start_from_readings, unanchored
 from truearm.measurement.dataset import Dataset
@@ -274,11 +275,8 @@ def _fit(solved: Solved, model: Model, loss: Loss, draws: Array | None = None) -
     if components is not None and not scattered and draws is None:
         covariance, parts = components.covariance, components.parts
     else:
-        root = np.sqrt(solved.curves.design_effect)
-        pull, rows = pulls(loss, solution.residual / root, solution.jacobian / root, problem.components)
         covariance, parts = cluster_covariance(
-            rows * free.prior,
-            pull * free.prior,
+            lambda: _pulled(problem, solution, loss, solved.curves.design_effect),
             Arrivals(problem.arrivals),
             ~at_bound,
             _beforehand(problem, limits, open_),
@@ -358,6 +356,17 @@ def _fit(solved: Solved, model: Model, loss: Loss, draws: Array | None = None) -
         held=solved.held,
         bootstrap=0 if draws is None else len(draws),
     )
+
+
+def _pulled(
+    problem: Problem, solution: Solution, loss: Loss, design_effect: float
+) -> Iterator[tuple[Rows, Array, Array]]:
+    """Go through the equations, with what each tells of the parameters and pulls them with, per prior."""
+    root, prior = np.sqrt(design_effect), problem.free.prior
+    scales = scales_of_pulls(loss, solution.residual / root, problem.components, len(prior))
+    for rows, part in evaluated(problem, solution).portions():
+        pull, told = pulls(loss, part.residual / root, part.jacobian / root, part.problem.components, scales)
+        yield rows, told * prior, pull * prior
 
 
 def _beforehand(problem: Problem, limits: tuple[Array, Array] | None, left_open: Sequence[str]) -> Array:

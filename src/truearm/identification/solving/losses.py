@@ -103,7 +103,23 @@ def weights(loss: Loss, norms: Array, scale: float) -> Array:
     return np.ones_like(norms)
 
 
-def pulls(loss: Loss, residual: Array, jacobian: Array, components: NDArray[np.intp]) -> tuple[Array, Array]:
+def scales_of_pulls(loss: Loss, residual: Array, components: NDArray[np.intp], parameters: int) -> tuple[float, float]:
+    """Return the robust deviation of one coordinate, and the norm below which a reading counts as met, of readings."""
+    if loss == "linear":
+        return 1.0, 1.0
+    components = weighed_together(loss, components)
+    norms = norms_of(residual, components)
+    scale = max(scale_of(loss, norms, components, parameters), 1e-300)
+    return scale, scale if loss not in ABSOLUTE else _L1_MET * float(np.median(norms)) + 1e-300
+
+
+def pulls(
+    loss: Loss,
+    residual: Array,
+    jacobian: Array,
+    components: NDArray[np.intp],
+    scales: tuple[float, float] | None = None,
+) -> tuple[Array, Array]:
     """Return what each equation pulls the parameters with, and the square root of what it tells of them.
 
     The first is its residual times its weight times its derivative. The second squared is the derivative of that
@@ -118,6 +134,8 @@ def pulls(loss: Loss, residual: Array, jacobian: Array, components: NDArray[np.i
         Whitened, ``(rows,)`` and ``(rows, parameters)``.
     components
         Number of consecutive rows of each reading.
+    scales
+        Those of :func:`scales_of_pulls` of all readings, where these are a part of them.
 
     Returns
     -------
@@ -126,10 +144,10 @@ def pulls(loss: Loss, residual: Array, jacobian: Array, components: NDArray[np.i
     """
     if loss == "linear":
         return residual[:, None] * jacobian, jacobian
+    scale, met = scales or scales_of_pulls(loss, residual, components, jacobian.shape[1])
     components = weighed_together(loss, components)
     norms = norms_of(residual, components)
-    scale = max(scale_of(loss, norms, components, jacobian.shape[1]), 1e-300)
-    across = weights(loss, norms, scale if loss not in ABSOLUTE else _L1_MET * float(np.median(norms)) + 1e-300)
+    across = weights(loss, norms, met)
     if loss == "huber":
         along = np.where(norms < _HUBER * scale, 1.0, 0.0)
     elif loss == "cauchy":

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.errors import InputError
-from truearm.limits import refuse_beyond
+from truearm.limits import limit, refuse_beyond
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.observations import Observation, compared
 from truearm.measurement.sighting import Sighting
@@ -174,7 +174,8 @@ class Problem:
         first.
         """
         n = self.data.configurations
-        count = min(-(-self.rows * len(self.free.names) // _AT_ONCE), n)
+        most = max(1, min(_AT_ONCE, limit("derivatives") // 2))  # a portion of whole configurations is a little larger
+        count = min(-(-self.rows * len(self.free.names) // most), n)
         if count < 2:
             return ((slice(None), self),)
         edges = np.linspace(0, n, count + 1).astype(int).tolist()

@@ -82,7 +82,7 @@ def find_redundancies(problem: Linearisable, vector: Array, held: Sequence[str] 
     held
         Parameters that are redundant elsewhere. If as many are redundant here, these stay the ones that are held.
     """
-    A = problem.linearised(vector)[1] * problem.free.prior
+    A = _columns(problem, vector)
     names = problem.free.names
     kept = independent_columns(A, range(len(names)), problem.free)
     dropped = [i for i in _in_order(problem.free) if i not in kept]
@@ -95,8 +95,15 @@ def find_redundancies(problem: Linearisable, vector: Array, held: Sequence[str] 
     # The direction bends: a parameter may take part only away from `vector`, so one prior along it is looked at too.
     here = _combinations(A, dropped, kept)
     along = vector + problem.free.prior * here.sum(axis=0)
-    away = _combinations(problem.linearised(along)[1] * problem.free.prior, dropped, kept)
+    away = _combinations(_columns(problem, along), dropped, kept)
     return tuple(_redundancy(problem.free, i, at, there) for i, at, there in zip(dropped, here, away, strict=True))
+
+
+def _columns(problem: Linearisable, vector: Array) -> Array:
+    """Return the derivative per prior, or its triangle where the problem comes in portions: their angles are alike."""
+    if isinstance(problem, Problem) and len(problem.portions) > 1:
+        return problem.at(vector).triangle * problem.free.prior
+    return problem.linearised(vector)[1] * problem.free.prior
 
 
 def _in_order(free: FreeParameters) -> list[int]:

@@ -91,6 +91,17 @@ class Fleet(Record):
                     f"({names}); the first: {failed[0][1]}",
                 )
             )
+        wrong = [look for look in self.analysis.looks if any(reason.why == "error" for reason in look.reasons)]
+        if wrong:
+            found.append(
+                Notice(
+                    "robots-in-error",
+                    f"The {'result' if len(wrong) == 1 else 'results'} of {counted(len(wrong), 'robot')} "
+                    f"({listed([look.robot for look in wrong])}) should not be used: calibrated alone, each ends "
+                    "with an error. The figures of the series contain them. Look at their reports first, mend their "
+                    "data and run this again with another folder.",
+                )
+            )
         return (*found, *analysis_notices(self.analysis))
 
     @cached_property

@@ -61,8 +61,11 @@ class ParameterSpread:
 
     @property
     def proposed(self) -> float | None:
-        """The prior that follows: the spread, or the most it may be where it is not told from none; None if unknown."""
-        if self.spread is None or self.low is None or self.high is None:
+        """The prior that follows: the spread, or the most it may be where it is not told from none; None if unknown.
+
+        None too where values scatter so much less than their deviations say that not even the most is above zero.
+        """
+        if self.spread is None or self.low is None or self.high is None or self.high <= 0.0:
             return None
         return self.spread if self.low > 0.0 else self.high
 

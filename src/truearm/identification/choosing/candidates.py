@@ -14,7 +14,7 @@ from truearm.identification.choosing.folds import FOLDS, Folds
 from truearm.identification.choosing.linear_cross_validation import LinearFit
 from truearm.identification.judging.transmission import Pulls
 from truearm.identification.solving.arrivals import Arrivals, Whitening
-from truearm.identification.solving.curve_stiffness import BANDS, curve_variances, moments_without
+from truearm.identification.solving.curve_stiffness import BANDS, LARGEST, curve_variances, moments_without
 from truearm.identification.solving.problem import Problem
 from truearm.identification.solving.rounds import Solved, bound_by, in_the_middle
 from truearm.limits import limit, refuse_beyond
@@ -126,7 +126,8 @@ class CurveColumns:
         if without is not None:
             kept[without + 1] = False
         moments = moments_without(self.moments[kept].sum(axis=0), self.others)
-        return curve_variances(moments, float(self.rows[kept].sum()), self.joint, self.period).variance
+        rows = float(self.rows[kept].sum())
+        return curve_variances(moments, rows, self.joint, self.period, most=LARGEST).variance
 
 
 @dataclass(frozen=True, eq=False)

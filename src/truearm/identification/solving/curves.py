@@ -10,7 +10,7 @@ from typing import Final, Self
 import numpy as np
 
 from truearm.identification.solving.arrivals import Arrivals, Whitening
-from truearm.identification.solving.curve_stiffness import curve_variances, moments_without
+from truearm.identification.solving.curve_stiffness import LARGEST, curve_variances, moments_without
 from truearm.identification.solving.problem import Problem
 from truearm.modeling.chain import Array
 from truearm.modeling.effects.joint_curve import JointCurve
@@ -134,8 +134,11 @@ def with_stiffness(
         place[:, 0],
         place[:, 1],
         least_noise=problem.widened**-2 if declared else 0.0,
+        most=LARGEST,
     )
     variances = {name: v for name, v in zip(names, found.variance.tolist(), strict=True) if v > 0.0}
+    if {curves.places[name][0] for name in curves.variances} - {curves.places[name][0] for name in variances}:
+        return problem, replace(curves, rounds=0), joints  # the curve of a joint that was found once is not lost again
     now = {p.name: p for p in problem.free.parameters}
     kept = [p for p in every.parameters if p.name in (variances if p.name in curves.places else now)]
     free = FreeParameters(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Sequence
+from dataclasses import replace
 from importlib import resources
 from textwrap import wrap
 from typing import Final
@@ -81,7 +82,8 @@ def _constants(robot: Robot) -> dict[str, str]:
     ]
     places, masses, balancers = _bodies(robot)
     q = np.round(robot.random_configurations(_STORED, np.random.default_rng(0)), 4)
-    position, rotation = robot.world_poses(q)
+    written = replace(robot, effect_names=tuple(effect.name for effect in effects))
+    position, rotation = written.world_poses(q)
     return {
         "JOINTS": repr(tuple(names)),
         "SLIDING": repr(tuple(joint.kind == "prismatic" for joint in robot.joints)),

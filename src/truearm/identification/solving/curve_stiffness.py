@@ -30,8 +30,6 @@ from truearm.modeling.chain import Array
 BANDS: Final = (1, 3, 6, 11, 19, 33)
 #: Degrees of freedom of the variances of a band.
 _ALIKE: Final = 1.0
-#: Sum of the variances of a joint's coefficients that no curve has [rad^2, m^2 of a prismatic joint].
-_LARGEST: Final = 0.1**2
 #: Gain in log-likelihood from which the curve of a joint is believed. A sine of noise alone gains so much at one of
 #: 300 000 periods, and a robot has hundreds of periods to look at.
 _SIGNIFICANT: Final = 12.5
@@ -80,6 +78,7 @@ def curve_variances(
     joint: NDArray[np.intp],
     period: NDArray[np.intp],
     least_noise: float = 0.0,
+    largest: float = np.inf,
 ) -> CurveVariances:
     """Find the variances of the coefficients of the joints' curves.
 
@@ -94,6 +93,9 @@ def curve_variances(
         Of each coefficient: the index of its joint, and its periods in a turn.
     least_noise
         What the variance of the equations is at least, by the one assumed.
+    largest
+        Sum of the variances of a joint's coefficients that no curve has: a joint that seems to have more is one that
+        the readings do not see turn.
     """
     of = _Equations(*_told_apart(moments), rows)
     group = np.unique(np.stack([joint, period]), axis=1, return_inverse=True)[1].reshape(-1)
@@ -101,11 +103,11 @@ def curve_variances(
         1
     ].reshape(-1)
     climb = _Climb(group, band, least_noise)
-    state = climb.climbed(_Marginal(of, _start(of, joint), max(of.squares / rows, least_noise)))
+    state = climb.climbed(_Marginal(of, _start(of, joint, largest), max(of.squares / rows, least_noise)))
     gains: dict[int, float] = {}
     while state.variance.any():
         sizes = np.bincount(joint, state.variance)
-        if sizes.max() > _LARGEST:  # of a joint on whose axis the targets lie, any curve is as likely
+        if sizes.max() > largest:  # of a joint on whose axis the targets lie, any curve is as likely
             left = np.where(joint == int(sizes.argmax()), 0.0, state.variance)
             state = climb.climbed(_Marginal(of, left, state.noise))
             continue
@@ -158,14 +160,14 @@ def _told_apart(moments: Array) -> tuple[Array, Array, float]:
     return root[:, None] * axes.T, z, max(float(moments[-1, -1] - z @ z), 0.0)
 
 
-def _start(of: _Equations, joint: NDArray[np.intp]) -> Array:
+def _start(of: _Equations, joint: NDArray[np.intp], largest: float) -> Array:
     """Return variances with which the curves of the joints would add as much to the residuals as there is noise."""
     found = np.zeros(len(joint))
     joints = np.unique(joint).tolist()
     for i in joints:
         mine = joint == i
         found[mine] = of.rows / max(float(of.size[mine].sum()), 1e-300) / len(joints)
-        if float(found[mine].sum()) > _LARGEST:  # the readings do not see the joint turn
+        if float(found[mine].sum()) > largest:  # the readings do not see the joint turn
             found[mine] = 0.0
     return found
 

@@ -21,6 +21,8 @@ from truearm.modeling.robot import Robot
 _ROUNDS: Final = 2
 #: Equations whose products are summed at once.
 _AT_ONCE: Final = 3000
+#: Sum of the variances of a joint's coefficients that no curve has [rad^2, m^2 of a prismatic joint].
+_LARGEST: Final = 0.1**2
 #: Coordinates that say where a target is.
 _COORDINATES: Final = 3
 
@@ -134,6 +136,7 @@ def with_stiffness(
         place[:, 0],
         place[:, 1],
         least_noise=problem.widened**-2 if declared else 0.0,
+        largest=_LARGEST,
     )
     variances = {name: v for name, v in zip(names, found.variance.tolist(), strict=True) if v > 0.0}
     now = {p.name: p for p in problem.free.parameters}

@@ -151,6 +151,17 @@ def test_units_and_the_order_of_the_joints_do_not_matter() -> None:
     assert_allclose(1e6 * other.variance, plain.variance[swapped], rtol=1e-4, atol=1e-12)
 
 
+def test_a_joint_that_readings_do_not_see_has_no_curve() -> None:
+    A, F, z, joint, period = synthetic(400, 2, np.repeat([1.0, 4.0], 40), np.random.default_rng(8))
+    every = curve_variances(*_given((A, F, z, joint, period)), most=1000.0)
+    assert set(every.gains) == {0, 1}
+    seen = curve_variances(*_given((A, F, z, joint, period)), most=80.0)  # the second has 160
+    assert set(seen.gains) == {0}
+    assert not seen.full[joint == 1].any()
+    small = np.where(joint == 1, 1e-4, 1.0)  # the noise seems to be a curve of 1e4 times the size
+    assert set(curve_variances(*_given((A, F * small, z, joint, period)), most=1000.0).gains) == {0}
+
+
 # -- twins
 
 

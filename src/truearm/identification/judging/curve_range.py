@@ -43,9 +43,7 @@ def check_curves(fit: Fit, training: Dataset) -> list[Notice]:
     if little or none:
         words = []
         if none:
-            words.append(
-                f"the readings are too few to show an error that follows the angle of {', '.join(none)}, or it has none"
-            )
+            words.append(f"these readings show no error that follows the angle of {', '.join(none)}")
         if little:
             words.append(f"{', '.join(little)} turned too little to tell such an error from geometry")
         sentence = "; ".join(words)

@@ -111,7 +111,7 @@ def test_notices_say_what_figures_do_not() -> None:
     assert "r2-again" in notices["robots-differ"].message
     assert "6 machines" in notices["robots-drift"].message
     assert "a_3" in notices["drift-alike"].message
-    assert "`date`" in notices["drift-undated"].message
+    assert "Correct the dates" in notices["drift-undated"].message
 
 
 def test_json_holds_figures_in_mm_and_deg() -> None:

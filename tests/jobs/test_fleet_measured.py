@@ -76,6 +76,16 @@ def test_a_fleet_calibrates_every_robot_and_says_what_they_say_together(measured
     assert not (out / "priors.yaml").exists()  # of three robots none follow
 
 
+def test_a_robot_whose_result_ends_with_an_error_is_named(measured: Path, tmp_path: Path) -> None:
+    lines = (measured / "a.csv").read_text("utf-8").splitlines()
+    (tmp_path / "metres.csv").write_text("\n".join([lines[0].replace("[mm]", "[m]"), *lines[1:]]) + "\n", "utf-8")
+    manifest = "truearm: truearm-fleet/1\nrobots: [{name: one, robot: irb120, data: metres.csv}]\n"
+    (tmp_path / "fleet.yaml").write_text(manifest, "utf-8")
+    found = truearm.fleet(tmp_path / "fleet.yaml", out=tmp_path / "out", workers=1)
+    told = {notice.code: notice.message for notice in found.warnings}
+    assert told["robots-in-error"].startswith("The result of 1 robot (one) should not be used")
+
+
 def test_a_row_holds_the_arm_alone_with_its_covariance(measured: Path) -> None:
     row = calibrated_row(RobotEntry("one", "irb120", measured / "a.csv", {"train": 15}))
     assert row.status == "calibrated"

@@ -210,7 +210,7 @@ def _check_name(name: str, where: str, seen: dict[str, str]) -> None:
             "two robots have the same name",
             where=where,
             came=name,
-            cure=f"{other} has it too. Give each a name of its own: measurements of one machine say so by `of`.",
+            cure=f"{other} has it too. Give each a name of its own: measurements of one machine have the same 'of'.",
         )
 
 

@@ -245,7 +245,7 @@ def analysis_notices(found: Analysis) -> list[Notice]:
             Notice(
                 "another-machine",
                 f"Most parameters of {listed(others)} changed from one campaign to the next by as much as robots "
-                "differ from one another. Check whether `of` names the same machine.",
+                "differ from one another. Check whether the entry 'of' names the same machine.",
             )
         )
     undated = [name for kind in found.kinds for name in kind.drifts.undated]
@@ -254,7 +254,7 @@ def analysis_notices(found: Analysis) -> list[Notice]:
             Notice(
                 "drift-undated",
                 f"{listed(undated)} {'was' if len(undated) == 1 else 'were'} measured several times, but not at two "
-                "known dates, so no change is told. Write `date` beside them.",
+                "different known dates, so no change is told. Correct the dates beside them.",
                 "note",
             )
         )

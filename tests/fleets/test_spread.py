@@ -10,7 +10,7 @@ from tests.fleets.simulated_series import calibrations, campaign, kind_of, rows
 
 from truearm.fleets.analysis.differing import differences
 from truearm.fleets.analysis.priors import with_proposed
-from truearm.fleets.analysis.spread import spreads
+from truearm.fleets.analysis.spread import ParameterSpread, spreads
 from truearm.library import load_robot
 from truearm.modeling.formats.robot_file import read_robot, robot_text
 
@@ -109,3 +109,8 @@ def test_too_few_robots_propose_nothing() -> None:
     made, proposed = with_proposed(nominal, spreads(kind_of(rows(rng.standard_normal((5, COUNT)), rng))))
     assert not proposed
     assert made is nominal
+
+
+def test_no_prior_is_proposed_where_values_scatter_less_than_they_are_uncertain_by() -> None:
+    found = ParameterSpread("a_2", "m", 0.0, 1e-3, 1.0, 12, "narrower", spread=0.0, low=0.0, high=0.0)
+    assert found.proposed is None

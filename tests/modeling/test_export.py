@@ -327,6 +327,14 @@ def test_curves_are_arrays_of_the_python_file() -> None:
     assert module(load_robot("ur5"))["CURVES"] == ((),) * 6
 
 
+def test_the_python_file_is_tested_with_poses_that_it_can_compute() -> None:
+    """Warm-up is left out of it, and so it is of the poses that it compares itself with."""
+    cold = load_robot("irb120").with_effects(["compliance"])
+    warm = cold.with_effects(["warm-up"]).with_values({"warm_up_3": 1e-3, "warm_up_left": 0.5})
+    of_cold, of_warm = (exported(robot, "python").text.split("POSITIONS")[1] for robot in (cold, warm))
+    assert of_warm == of_cold
+
+
 def test_json_says_that_simulation_is_left_out() -> None:
     robot = replace(load_robot("li3"), tools={"pin": Tool({"1": (0.0, 0.0, 0.1)})}, truths={})
     assert says(robot, "json", "Left out, because it is for simulation alone: tools.")

@@ -1,0 +1,154 @@
+"""What was measured in tests of performance, each file as one record of arrays.
+
+A test has up to a million samples, so texts are numbers into a list of names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.modeling.chain import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Names:
+    """A column of names.
+
+    Attributes
+    ----------
+    names
+        Those that occur, in the order of their first row.
+    code
+        Of each row: which of them, ``(n,)``.
+    """
+
+    names: tuple[str, ...]
+    code: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, texts: Iterable[str]) -> Self:
+        """Return the column of these texts."""
+        seen: dict[str, int] = {}
+        code = np.array([seen.setdefault(text, len(seen)) for text in texts], dtype=np.intp)
+        return cls(tuple(seen), code)
+
+    def are(self, name: str) -> NDArray[np.bool_]:
+        """Return which rows have a name, ``(n,)``."""
+        if name not in self.names:
+            return np.zeros(len(self.code), dtype=bool)
+        return np.asarray(self.code == self.names.index(name))
+
+    def rows(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> Names:
+        """Return some rows."""
+        return Names(self.names, self.code[rows])
+
+
+@dataclass(frozen=True, eq=False)
+class AttainedPoses:
+    """Rows of ``poses.csv``: one attained pose each, in the instrument's frame.
+
+    Attributes
+    ----------
+    criterion
+        Id of the test: a key of :data:`truearm.planning.iso9283.criteria.TESTS`.
+    robot, pose, approach
+        Names; the robot's is empty where one robot was measured, the approach's where there is one alone.
+    cycle
+        From 1, ``(n,)``.
+    velocity, load
+        Shares of the rated ones, 0 to 1, ``(n,)``.
+    time
+        [s], ``(n,)``; NaN where it is not given.
+    position
+        [m], ``(n, 3)``.
+    rotation
+        ``(n, 3, 3)``; None where the file has no orientations.
+    line
+        In the file, ``(n,)``.
+    source
+        The file, for messages.
+    """
+
+    criterion: Names
+    robot: Names
+    pose: Names
+    approach: Names
+    cycle: NDArray[np.intp]
+    velocity: Array
+    load: Array
+    time: Array
+    position: Array
+    rotation: Array | None
+    line: NDArray[np.intp]
+    source: str
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Rows of ``paths.csv`` or ``settling.csv``: samples over time, in the instrument's frame.
+
+    Attributes
+    ----------
+    criterion
+        Id of the test.
+    place
+        Name of the path, or of the pose.
+    cycle
+        From 1, ``(n,)``; 0 where a stream of a whole test has no cycles, which then are found.
+    velocity, load
+        Shares of the rated ones, 0 to 1, ``(n,)``.
+    time
+        [s], ``(n,)``.
+    position
+        [m], ``(n, 3)``.
+    rotation
+        ``(n, 3, 3)``; None where the file has no orientations.
+    line
+        In the file, ``(n,)``.
+    source
+        The file, for messages.
+    """
+
+    criterion: Names
+    place: Names
+    cycle: NDArray[np.intp]
+    velocity: Array
+    load: Array
+    time: Array
+    position: Array
+    rotation: Array | None
+    line: NDArray[np.intp]
+    source: str
+
+
+@dataclass(frozen=True, eq=False)
+class Pushes:
+    """Rows of ``forces.csv``: where the tip is while it is pushed, in the instrument's frame.
+
+    Attributes
+    ----------
+    direction
+        Of the force, along the robot's base axes: ``+x``, ``-x`` to ``-z``.
+    force
+        [N], ``(n,)``.
+    cycle
+        From 1, ``(n,)``.
+    position
+        [m], ``(n, 3)``.
+    line
+        In the file, ``(n,)``.
+    source
+        The file, for messages.
+    """
+
+    direction: Names
+    force: Array
+    cycle: NDArray[np.intp]
+    position: Array
+    line: NDArray[np.intp]
+    source: str

@@ -1,0 +1,1 @@
+"""The criteria of ISO 9283:1998, evaluated from measurements, each with an interval."""

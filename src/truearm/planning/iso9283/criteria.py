@@ -15,7 +15,7 @@ Readings = Literal["poses", "paths", "settling", "forces"]
 
 
 @dataclass(frozen=True)
-class Test:
+class PerformanceTest:
     """A test: measurements that are evaluated together, and never with those of another.
 
     Attributes
@@ -46,18 +46,18 @@ _ALL_POSES: Final = ("P1", "P2", "P3", "P4", "P5")
 _PATHS: Final = ("line", "rectangle", "large-circle", "small-circle")
 
 #: Every test by what its rows have in the column ``criterion``.
-TESTS: Final[Mapping[str, Test]] = {
+TESTS: Final[Mapping[str, PerformanceTest]] = {
     test.id: test
     for test in (
-        Test("AP", "pose accuracy and repeatability", ("AP", "RP"), "poses", 30, _ALL_POSES),
-        Test("vAP", "multi-directional pose accuracy variation", ("vAP",), "poses", 30, ("P1", "P2", "P4")),
-        Test("AD", "distance accuracy and repeatability", ("AD", "RD"), "poses", 30, ("P2", "P4")),
-        Test("dAP", "drift of pose accuracy and repeatability", ("dAP", "dRP"), "poses", 10, ("P1",)),
-        Test("E", "exchangeability", ("E",), "poses", 30, _ALL_POSES),
-        Test("t", "position stabilisation time and overshoot", ("t", "OV"), "settling", 3, ("P1",)),
-        Test("posing-time", "minimum posing time", ("posing-time",), "settling", 3, ("P1",)),
-        Test("AT", "path accuracy and repeatability", ("AT", "RT"), "paths", 10, _PATHS),
-        Test(
+        PerformanceTest("AP", "pose accuracy and repeatability", ("AP", "RP"), "poses", 30, _ALL_POSES),
+        PerformanceTest("vAP", "multi-directional pose accuracy variation", ("vAP",), "poses", 30, ("P1", "P2", "P4")),
+        PerformanceTest("AD", "distance accuracy and repeatability", ("AD", "RD"), "poses", 30, ("P2", "P4")),
+        PerformanceTest("dAP", "drift of pose accuracy and repeatability", ("dAP", "dRP"), "poses", 10, ("P1",)),
+        PerformanceTest("E", "exchangeability", ("E",), "poses", 30, _ALL_POSES),
+        PerformanceTest("t", "position stabilisation time and overshoot", ("t", "OV"), "settling", 3, ("P1",)),
+        PerformanceTest("posing-time", "minimum posing time", ("posing-time",), "settling", 3, ("P1",)),
+        PerformanceTest("AT", "path accuracy and repeatability", ("AT", "RT"), "paths", 10, _PATHS),
+        PerformanceTest(
             "AT-reorientation",
             "path accuracy and repeatability on reorientation",
             ("AT-reorientation", "RT-reorientation"),
@@ -65,10 +65,10 @@ TESTS: Final[Mapping[str, Test]] = {
             10,
             ("line",),
         ),
-        Test("CR", "cornering deviations", ("CR", "CO"), "paths", 3, ("rectangle",)),
-        Test("AV", "path velocity characteristics", ("AV", "RV", "FV"), "paths", 10, ("line",)),
-        Test("WS", "weaving deviations", ("WS", "WF"), "paths", 3, ("weave",)),
-        Test("compliance", "static compliance", ("compliance",), "forces", 3, ("P1",)),
+        PerformanceTest("CR", "cornering deviations", ("CR", "CO"), "paths", 3, ("rectangle",)),
+        PerformanceTest("AV", "path velocity characteristics", ("AV", "RV", "FV"), "paths", 10, ("line",)),
+        PerformanceTest("WS", "weaving deviations", ("WS", "WF"), "paths", 3, ("weave",)),
+        PerformanceTest("compliance", "static compliance", ("compliance",), "forces", 3, ("P1",)),
     )
 }
 #: The test in which each criterion is measured, in the order of the standard's table.

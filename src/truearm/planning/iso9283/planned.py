@@ -40,8 +40,8 @@ class PlannedPath:
     name
         ``line``, ``rectangle``, ``large-circle``, ``small-circle``, ``weave``.
     kind
-        ``polyline`` through :attr:`points`; ``circle`` about :attr:`points` [0] that begins, and ends, at :attr:`points`
-        [1], counter-clockwise about :attr:`normal`; ``weave`` along the line between two points.
+        ``polyline`` through :attr:`points`; ``circle`` about the first of them that begins, and ends, at the second,
+        counter-clockwise about :attr:`normal`; ``weave`` along the line between two points.
     points
         [m], ``(k, 3)``. Those of a closed polyline end with the first.
     normal
@@ -96,7 +96,7 @@ class PlannedTest:
 
 
 @dataclass(frozen=True, eq=False)
-class TestPlan:
+class PerformancePlan:
     """What is commanded in the tests of a robot, by ISO 9283.
 
     Attributes

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-#: ``too-few-cycles``: fewer than planned, the value stands nevertheless. ``instrument-too-coarse``: what is not known of
-#: the readings is more than a quarter of the value.
+#: ``too-few-cycles``: fewer than planned, the value stands nevertheless. ``instrument-too-coarse``: what the instrument
+#: does not know is more than a quarter of the value.
 Status = Literal["measured", "not-measured", "too-few-cycles", "instrument-too-coarse"]
 #: Of a pose or a path: its position as a whole, an axis of the base, or an angle about one.
 Component = Literal["position", "x", "y", "z", "a", "b", "c"]

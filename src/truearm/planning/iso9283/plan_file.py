@@ -67,6 +67,11 @@ class _Units(BaseModel):
     mass: Literal["kg"]
 
 
+class _LengthUnit(BaseModel):
+    model_config = STRICT
+    length: Literal["mm", "m", "um", "in"]
+
+
 class _Rated(BaseModel):
     model_config = STRICT
     load: NotNegative
@@ -117,6 +122,16 @@ class _Test(BaseModel):
     velocities: Annotated[tuple[Percent, ...], Field(min_length=1)] = (100.0,)
     loads: Annotated[tuple[Share, ...], Field(min_length=1)] = (100.0,)
     approaches: tuple[Approach, ...] = ()
+
+
+class CubeFile(BaseModel):
+    """Schema ``truearm-cube/1``."""
+
+    model_config = STRICT
+    truearm: Literal["truearm-cube/1"]
+    units: _LengthUnit
+    centre: Triple
+    side: Positive
 
 
 class PlanFile(BaseModel):
@@ -254,6 +269,23 @@ def read_plan(path: Path) -> PerformancePlan:
     )
 
 
+def read_cube(path: Path) -> Cube:
+    """Read a cube with edges along the axes of the robot's base frame.
+
+    ::
+
+        truearm: truearm-cube/1
+        units: {length: mm}
+        centre: [350, 0, 350]
+        side: 300
+    """
+    content = read_yaml(path, CubeFile)
+    length = content.units.length
+    centre = [sized_si(value, length, f"{path}, centre") for value in content.centre]
+    with refusals_at(f"{path}, side"):
+        return Cube(centre, sized_si(content.side, length, f"{path}, side"))
+
+
 def _check_approaches(
     test: _Test, poses: Mapping[str, PlannedPose], starts: Mapping[tuple[str, str], PlannedPose], where: str
 ) -> None:
@@ -337,7 +369,7 @@ def _lengths(values: Array) -> list[float]:
 
 
 def _turned(rotation: Array) -> list[float]:
-    return [v + 0.0 for v in quaternion_from_rotation(rotation[None])[0].tolist()]
+    return [round(v, 12) + 0.0 for v in quaternion_from_rotation(rotation[None])[0].tolist()]
 
 
 def _pose(pose: PlannedPose, robot: Robot) -> str:
@@ -351,7 +383,7 @@ def _path(path: PlannedPath) -> str:
         f"name: {path.name}",
         f"kind: {path.kind}",
         f"points: {[_lengths(point) for point in path.points]}",
-        f"normal: {[v + 0.0 for v in path.normal.tolist()]}",
+        f"normal: {[round(v, 12) + 0.0 for v in path.normal.tolist()]}",
         f"quaternion: {_turned(path.rotation)}",
     ]
     if path.other is not None:

@@ -26,7 +26,7 @@ from truearm.planning.iso9283.plan import VELOCITIES, performance_plan
 from truearm.planning.iso9283.plan_file import PLAN, read_cube
 from truearm.planning.poses.iso9283 import PLANES
 from truearm.planning.poses.largest_cube import DIRECTIONS, Direction
-from truearm.results.performance_plan import PLAN_FILES, PlannedTests
+from truearm.results.iso9283_plan import PLAN_FILES, Iso9283Plan
 
 #: What the tip of a robot is called whose target is given by its place alone.
 TIP = "tip"
@@ -55,7 +55,7 @@ def iso9283_plan(
     floor: float = 0.0,
     out: str | Path | None = None,
     command: str | None = None,
-) -> PlannedTests:
+) -> Iso9283Plan:
     """Plan the tests of a robot's performance by ISO 9283.
 
     Parameters
@@ -166,7 +166,7 @@ def iso9283_plan(
             nearest=near,
             floor=low,
         )
-    found = PlannedTests(plan, call, tuple(warnings), inputs)
+    found = Iso9283Plan(plan, call, tuple(warnings), inputs)
     if folder is not None:
         found.save(folder)
     return found

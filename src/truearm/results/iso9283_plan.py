@@ -21,7 +21,7 @@ PLAN_FILES: Final = (PLAN, ROBOT, SHEET)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PlannedTests(Record):
+class Iso9283Plan(Record):
     """Tests of a robot's performance, planned.
 
     Attributes
@@ -87,9 +87,9 @@ class PlannedTests(Record):
 
     def contents(self) -> dict[str, str]:
         """Return the texts of all files by their names."""
-        from truearm.reporting.performance_plan_page import performance_plan_page
+        from truearm.reporting.iso9283_sheet import iso9283_sheet
 
-        return {PLAN: plan_text(self.plan), ROBOT: robot_text(self.plan.robot), SHEET: performance_plan_page(self)}
+        return {PLAN: plan_text(self.plan), ROBOT: robot_text(self.plan.robot), SHEET: iso9283_sheet(self)}
 
     def save(self, folder: str | Path) -> tuple[Path, ...]:
         """Write all files into a folder; return them."""

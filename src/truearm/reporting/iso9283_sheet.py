@@ -12,7 +12,7 @@ from truearm.planning.poses.pose_plan import PosePlan
 from truearm.reporting.drawing import Figure
 from truearm.reporting.picture_page import Drawing, Figures, picture_page
 from truearm.reporting.planning_figures import pose_cube
-from truearm.results.performance_plan import PlannedTests
+from truearm.results.iso9283_plan import Iso9283Plan
 
 #: What the standard asks to be noted with the results, and what a reader of them needs.
 _NOTED = (
@@ -27,7 +27,7 @@ _NOTED = (
 )
 
 
-def performance_plan_page(planned: PlannedTests) -> str:
+def iso9283_sheet(planned: Iso9283Plan) -> str:
     """Return the sheet."""
     plan = planned.plan
     return picture_page(

@@ -16,7 +16,9 @@ rare the interval begins at zero, and is an upper bound alone. The test that giv
 chance of so small an estimate at zero, as Read (2002) does for signals near a background, so that an estimate that is
 small by luck does not give an interval that is empty.
 
-These tests are in :mod:`truearm.validation.iso9283.inverted_tests`. RP has no bias to speak of, but its scatter depends on the distribution, half as large for a uniform ball as for a
+These tests are in :mod:`truearm.validation.iso9283.inverted_tests`.
+
+RP has no bias to speak of, but its scatter depends on the distribution, half as large for a uniform ball as for a
 Gaussian. So the logarithm of RP is divided by its standard error, from the influence of each cycle (Efron and
 Tibshirani 1993, chapter 21), and the quotient is compared with that of simulated Gaussian campaigns with the
 covariance that was found.
@@ -97,7 +99,7 @@ def spread_interval(deviation: float, cycles: int) -> Interval | None:
 def repeatability(points: Array) -> Array:
     """Return ``mean l + 3 S``, l the distances of points from their barycentre, S with n - 1.
 
-    The formula is the issue's table after secondary sources (Nubiola, section 2.6).
+    The formula is that of Nubiola (section 2.6) for ISO 9283; the standard's text was not at hand.
 
     Parameters
     ----------

@@ -91,9 +91,7 @@ def _found_columns(cells: Cells, shown: Mapping[str, str], units: Mapping[str, t
     return columns
 
 
-def _complete(
-    cells: Cells, columns: Columns, shown: Mapping[str, str], optional: Sequence[str], *more: str
-) -> Columns:
+def _complete(cells: Cells, columns: Columns, shown: Mapping[str, str], optional: Sequence[str], *more: str) -> Columns:
     """Return columns if none is missing that may not be."""
     for name in shown:
         if name not in columns and name not in optional:

@@ -21,8 +21,8 @@ from truearm.units import LENGTH_UNITS
 DRIFT: Final = "dAP"
 _POSITION: Final = ("x", "y", "z")
 _QUATERNION: Final = ("qw", "qx", "qy", "qz")
-_LENGTHS: Final = dict.fromkeys(_POSITION, LENGTH_UNITS)
-_POSE_UNITS: Final = {"velocity": ("%",), "load": ("%",), "time": ("s",)} | _LENGTHS
+_LENGTHS: Final[dict[str, tuple[str, ...]]] = dict.fromkeys(_POSITION, LENGTH_UNITS)
+_POSE_UNITS: Final[dict[str, tuple[str, ...]]] = {"velocity": ("%",), "load": ("%",), "time": ("s",)} | _LENGTHS
 _POSES: Final = (
     {name: name for name in ("criterion", "robot", "pose", "cycle", "approach")}
     | {"velocity": "velocity [%]", "load": "load [%]", "time": "time [s]"}
@@ -30,6 +30,7 @@ _POSES: Final = (
     | {part: part for part in _QUATERNION}
 )
 _OPTIONAL: Final = ("robot", "approach", "time")
+_PUSH_UNITS: Final[dict[str, tuple[str, ...]]] = {"force": ("N",)} | _LENGTHS
 _PUSHES: Final = {"direction": "direction", "force": "force [N]", "cycle": "cycle"} | {
     axis: f"{axis} [mm]" for axis in _POSITION
 }
@@ -100,7 +101,7 @@ def read_pushes(path: Path) -> Pushes:
         direction that is not known, a force below zero, or cycles that are not whole.
     """
     cells = read_named(path)
-    columns = named_columns(cells, _PUSHES, {"force": ("N",)} | _LENGTHS)
+    columns = named_columns(cells, _PUSHES, _PUSH_UNITS)
     place = columns["direction"][0]
     directions = cells.texts(place)
     for row, direction in enumerate(directions):
@@ -144,7 +145,9 @@ def _share(cells: Cells, columns: Columns, name: str, what: str) -> Array:
     lowest_too = name == "velocity"
     wrong = (percent > 100.0) | (percent < 0.0) | ((percent == 0.0) & lowest_too)
     allowed = f"{'above 0' if lowest_too else '0'} to 100 %"
-    _refuse_first(cells, columns, name, wrong, what, allowed, "Tests go up to the rated one: correct or remove the row.")
+    _refuse_first(
+        cells, columns, name, wrong, what, allowed, "Tests go up to the rated one: correct or remove the row."
+    )
     return percent / 100.0
 
 

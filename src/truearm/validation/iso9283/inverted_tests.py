@@ -6,14 +6,14 @@ measured in ``benchmarks/iso9283_coverage.py``.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Final
 
 import numpy as np
 
 from truearm.modeling.chain import Array
-from truearm.validation.iso9283.intervals import TAIL, Interval
+from truearm.validation.iso9283.intervals import LEAST_CYCLES, TAIL, Interval
 
 #: Barycentres simulated for a test.
 _DRAWS: Final = 2000
@@ -185,3 +185,41 @@ def _root(covariance: Array) -> Array:
     """Return a square root of a covariance, which may be singular, ``(d, d)``."""
     variances, axes = np.linalg.eigh(covariance)
     return np.asarray(axes * np.sqrt(np.maximum(variances, 0.0)))
+
+
+def largest_difference(places: Sequence[Array], pairs: Sequence[tuple[int, int]]) -> tuple[float, Interval | None]:
+    """Return the largest distance between barycentres, and its interval.
+
+    Parameters
+    ----------
+    places
+        The cycles at each place, ``(n, d)``.
+    pairs
+        Between which places, one pair or more.
+
+    Returns
+    -------
+    tuple
+        The interval is None where a place has fewer than :data:`LEAST_CYCLES` cycles, or nothing scatters.
+    """
+    one, other = np.array(pairs, dtype=np.intp).T
+    found = np.array([place.mean(axis=0) for place in places])
+
+    def largest(simulated: Array) -> Array:
+        return np.asarray(np.linalg.norm(simulated[:, one] - simulated[:, other], axis=-1).max(axis=-1))
+
+    value = float(largest(found[None])[0])
+    if min(map(len, places)) < LEAST_CYCLES:
+        return value, None
+    covariances = [np.atleast_2d(np.cov(place.T)) for place in places]
+    noise, shapes = (
+        np.stack(
+            [
+                barycentre_scatter(covariance, len(place), None, 2 * k + which)
+                for k, (covariance, place) in enumerate(zip(covariances, places, strict=True))
+            ],
+            axis=1,
+        )
+        for which in (1, 2)
+    )
+    return value, largest_interval(largest, found - found.mean(axis=0), noise, shapes)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -62,7 +63,7 @@ def groups_of(one: Cycles) -> list[Cycles]:
         begins = begins | (between > _PAUSE * max(float(np.median(between)), 1e-9))
     ends = [0, *(np.flatnonzero(begins) + 1).tolist(), len(one)]
     made = []
-    for a, b in zip(ends[:-1], ends[1:], strict=True):
+    for a, b in pairwise(ends):
         angles = None if one.angles is None else one.angles[a:b]
         made.append(replace(one, cycle=one.cycle[a:b], time=one.time[a:b], points=one.points[a:b], angles=angles))
     return made

@@ -34,7 +34,7 @@ from truearm.validation.iso9283.intervals import (
 from truearm.validation.iso9283.inverted_tests import largest_difference, norm_interval
 from truearm.validation.iso9283.pose_rows import Cycles, cycles_of
 from truearm.validation.iso9283.pose_values import ANGLES, AXES, valued
-from truearm.validation.iso9283.values import Conditions, Instrument, Value
+from truearm.validation.iso9283.values import Component, Conditions, Instrument, Value
 
 #: Robots that are exchanged.
 ROBOTS: Final = 5
@@ -190,8 +190,7 @@ def _pose_accuracy(test: PlannedTest, cycles: list[Cycles], judge: _Judge) -> _M
             yield _accuracy(one, common, judge)
             interval = repeatability_interval(one.points)
             rp = float(repeatability(one.points)) if n > 1 else _NOTHING
-            for angle in _angles_of(one, "AP", common, judge, judge.alignment.sigma_rot):
-                yield angle
+            yield from _angles_of(one, "AP", common, judge, judge.alignment.sigma_rot)
             yield valued("RP", "position", *common, rp, "length", interval, judge.sigma)
             yield from _spreads_of(one.angles, "RP", common, judge.sigma_rot)
 
@@ -296,23 +295,25 @@ def _distances(test: PlannedTest, cycles: list[Cycles], judge: _Judge) -> _Made:
         command = b.command - a.command
         apart = b.points[rows[1]] - a.points[rows[0]]
         sense = np.where(command < 0, -1.0, 1.0)
-        lengths = {"position": (np.linalg.norm(apart, axis=1), float(np.linalg.norm(command)), 0.0)}
+        lengths: list[tuple[Component, Array, float, float]] = [
+            ("position", np.linalg.norm(apart, axis=1), float(np.linalg.norm(command)), 0.0)
+        ]
         for k, axis in enumerate(AXES):
             tie = judge.alignment.sigma_rot**2 * float(command @ command - command[k] ** 2)
-            lengths[axis] = (sense[k] * apart[:, k], abs(float(command[k])), tie)
+            lengths.append((axis, sense[k] * apart[:, k], abs(float(command[k])), tie))
         turned = None if a.angles is None or b.angles is None else b.angles[rows[1]] - a.angles[rows[0]]
         unknown, unknown_angle = math.sqrt(2.0) * judge.sigma, math.sqrt(2.0) * judge.sigma_rot
-        for part, (length, commanded, tie) in lengths.items():
+        for part, length, commanded, tie in lengths:
             off = length - commanded
             u = math.sqrt(unknown**2 + tie)
-            yield valued("AD", part, *common, float(off.mean()), "length", mean_interval(off, tie), u)  # type: ignore[arg-type]
+            yield valued("AD", part, *common, float(off.mean()), "length", mean_interval(off, tie), u)
         for k, angle in enumerate(ANGLES):
             mean = _NOTHING if turned is None else float(turned[:, k].mean())
             interval = None if turned is None else mean_interval(turned[:, k])
             yield valued("AD", angle, *common, mean, "angle", interval, unknown_angle)
-        for part, (length, _, _) in lengths.items():
+        for part, length, _, _ in lengths:
             spread, interval = _spread(length)
-            yield valued("RD", part, *common, spread, "length", interval, unknown)  # type: ignore[arg-type]
+            yield valued("RD", part, *common, spread, "length", interval, unknown)
         yield from _spreads_of(turned, "RD", common, unknown_angle)
 
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
 from truearm.modeling.chain import Array
-from truearm.modeling.transform import rotation_from_vector, rotation_vector
 from truearm.planning.iso9283.planned import PlannedPath
+from truearm.planning.iso9283.way import Way
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +27,8 @@ class CommandedPath:
         Ends of the sides [m], ``(k, 3)``, and the arc length at each [m], ``(k,)``. A circle has one side.
     centre, radius
         Of a circle [m]; the radius is 0 of others.
+    reoriented
+        Whether the orientation alternates on the way.
     """
 
     path: PlannedPath
@@ -33,16 +36,17 @@ class CommandedPath:
     starts: Array
     centre: Array
     radius: float
+    reoriented: bool = False
 
     @classmethod
-    def of(cls, path: PlannedPath) -> CommandedPath:
-        """Return the path of a plan."""
+    def of(cls, path: PlannedPath, *, reoriented: bool = False) -> Self:
+        """Return the path of a plan, and whether the orientation alternates on it."""
         if path.kind == "circle":
             centre, first = path.points[0], path.points[1]
             radius = float(np.linalg.norm(first - centre))
-            return cls(path, np.stack([first, first]), np.array([0.0, 2 * math.pi * radius]), centre, radius)
+            return cls(path, np.stack([first, first]), np.array([0.0, 2 * math.pi * radius]), centre, radius, reoriented)
         steps = np.linalg.norm(np.diff(path.points, axis=0), axis=1)
-        return cls(path, path.points, np.concatenate([[0.0], np.cumsum(steps)]), np.zeros(3), 0.0)
+        return cls(path, path.points, np.concatenate([[0.0], np.cumsum(steps)]), np.zeros(3), 0.0, reoriented)
 
     @property
     def length(self) -> float:
@@ -89,17 +93,8 @@ class CommandedPath:
         return self._side(along)[1]
 
     def rotations(self, along: Array) -> Array:
-        """Return the commanded orientations at arc lengths ``(n,)``, ``(n, 3, 3)``.
-
-        Where the path has two, the orientation turns from the first at the begin to the other in the middle and back to
-        the first at the end, in proportion to the arc length and about one axis.
-        """
-        path = self.path
-        if path.other is None:
-            return np.broadcast_to(path.rotation, (len(along), 3, 3))
-        turn = rotation_vector(path.other @ path.rotation.T)
-        share = 1.0 - np.abs(2.0 * np.clip(along / self.length, 0.0, 1.0) - 1.0)
-        return np.asarray(rotation_from_vector(share[:, None] * turn) @ path.rotation)
+        """Return the commanded orientations at arc lengths ``(n,)``, ``(n, 3, 3)``."""
+        return Way(self.path, self.reoriented).rotation(along)
 
     def feet(self, points: Array, near: Array, within: float) -> Array:
         """Return the arc length of the foot of each point ``(n, 3)`` on the path, ``(n,)`` [m].

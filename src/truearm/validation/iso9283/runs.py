@@ -150,7 +150,7 @@ def runs_of(plan: PerformancePlan, samples: Samples, transform: Array, test: str
     known = () if planned is None else planned.places
     for part in parts_of(samples, test, known):
         assert planned is not None
-        path = CommandedPath.of(plan.paths[part.place])
+        path = CommandedPath.of(plan.paths[part.place], reoriented=test == "AT-reorientation")
         velocity = plan.rated_velocity * (part.conditions.velocity or 1.0)
         cycles: list[Cycle] = []
         found = None

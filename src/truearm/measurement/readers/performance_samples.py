@@ -161,9 +161,7 @@ def _columns(headings: Sequence[str], header: str, place: Place) -> dict[str, tu
         columns[name] = (number, unit or "1")
     for name in (*needed, *(_QUATERNION if any(part in columns for part in _QUATERNION) else ())):
         if name not in columns:
-            raise InputError(
-                f"the column {name} is missing", where=header, allowed=allowed, cure=f"Add {known[name]}."
-            )
+            raise InputError(f"the column {name} is missing", where=header, allowed=allowed, cure=f"Add {known[name]}.")
     return columns
 
 

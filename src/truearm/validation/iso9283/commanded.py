@@ -44,7 +44,9 @@ class CommandedPath:
         if path.kind == "circle":
             centre, first = path.points[0], path.points[1]
             radius = float(np.linalg.norm(first - centre))
-            return cls(path, np.stack([first, first]), np.array([0.0, 2 * math.pi * radius]), centre, radius, reoriented)
+            return cls(
+                path, np.stack([first, first]), np.array([0.0, 2 * math.pi * radius]), centre, radius, reoriented
+            )
         steps = np.linalg.norm(np.diff(path.points, axis=0), axis=1)
         return cls(path, path.points, np.concatenate([[0.0], np.cumsum(steps)]), np.zeros(3), 0.0, reoriented)
 
@@ -80,7 +82,9 @@ class CommandedPath:
         if self.radius:
             out, onward = self._axes()
             angle = along / self.radius
-            return np.asarray(self.centre + self.radius * (np.outer(np.cos(angle), out) + np.outer(np.sin(angle), onward)))
+            return np.asarray(
+                self.centre + self.radius * (np.outer(np.cos(angle), out) + np.outer(np.sin(angle), onward))
+            )
         side, direction = self._side(along)
         return np.asarray(self.vertices[side] + (along - self.starts[side])[:, None] * direction)
 

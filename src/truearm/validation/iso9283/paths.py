@@ -23,7 +23,7 @@ from truearm.validation.iso9283.synchronise import Cycle
 from truearm.validation.iso9283.values import COARSE, Component, Instrument, Value
 
 #: Stations along a path.
-STATIONS = 100
+STATIONS = 50
 #: An intersection is the straight line through the samples so near to the plane, as a share of the way between two
 #: stations.
 _HALF = 0.5

@@ -32,8 +32,9 @@ def local_lines(at: Array, values: Array, places: Array, half: float) -> tuple[A
     Returns
     -------
     value, rate, count
-        ``(m, d)``, ``(m, d)`` and how many samples each window has, ``(m,)``. With fewer than two samples, or all of
-        them at one place, both are those of the straight line between the samples before and after the place.
+        ``(m, d)``, ``(m, d)`` and how many samples each window has, ``(m,)``. Where the samples of a window would not
+        tell the value better than one of them alone, both are those of the straight line between the samples before and
+        after the place.
     """
     value, rate = np.empty((len(places), values.shape[1])), np.empty((len(places), values.shape[1]))
     low = np.searchsorted(at, places - half, side="left")
@@ -57,19 +58,19 @@ def local_lines(at: Array, values: Array, places: Array, half: float) -> tuple[A
         spread = inside[:, 1] - n * mean * mean
         mean_y = inside[:, 2 : 2 + y.shape[1]] / n[:, None]
         along = inside[:, 2 + y.shape[1] :] - mean[:, None] * inside[:, 2 : 2 + y.shape[1]]
-        usable = (count[part] >= 2) & (spread > 1e-9 * half**2 * n)
+        away = places[part] - origin - mean
+        # no value is less certain than a single sample: a cluster of samples does not tell what is beside it
+        usable = (count[part] >= 2) & (spread > 1e-9 * half**2 * n) & (away**2 <= spread * (1.0 - 1.0 / n))
         with np.errstate(invalid="ignore", divide="ignore"):
             slope = along / spread[:, None]
-        value[part] = offset + mean_y + slope * (places[part] - origin - mean)[:, None]
+        value[part] = offset + mean_y + slope * away[:, None]
         rate[part] = slope
         if not usable.all():
             _between(at, values, places[part], ~usable, value[part], rate[part])
     return value, rate, count
 
 
-def _between(
-    at: Array, values: Array, places: Array, chosen: NDArray[np.bool_], value: Array, rate: Array
-) -> None:
+def _between(at: Array, values: Array, places: Array, chosen: NDArray[np.bool_], value: Array, rate: Array) -> None:
     """Fill in values and rates between the samples before and after some places."""
     after = np.clip(np.searchsorted(at, places[chosen], side="right"), 1, len(at) - 1)
     step = at[after] - at[after - 1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,8 +19,9 @@ _LEAST_SAMPLES = 5
 _MOVES = 0.04
 #: So many standard deviations of the speed of noise alone are no motion.
 _NOISE = 6.0
-#: A dwell or a motion is at least so long [s], or it belongs to what is around it.
-_SHORTEST = 0.1
+#: A dwell or a motion is seen at least so long [s], or it belongs to what is around it. A dwell is seen less long than
+#: it takes, by the window of the speed.
+_SHORTEST = {False: 0.03, True: 0.1}
 #: Within this share of the length of a path from one of its ends the tip is said to be there; of its extent at most.
 _AT_END, _AT_END_OF_EXTENT = 0.05, 0.1
 #: A cycle is no further from the path than this share of its extent, for all but a tenth of its way.
@@ -90,8 +92,7 @@ def spans_of(moving: NDArray[np.bool_]) -> list[Span]:
 def motion(time: Array, position: Array, velocity: float) -> tuple[Array, float, NDArray[np.bool_]]:
     """Return the speed [m/s], the threshold, and at which samples the tip moves.
 
-    It begins to move where it gets faster than the threshold and stands where it gets slower than half of it; what
-    is shorter than a tenth of a second is no dwell and no motion.
+    It begins to move where it gets faster than the threshold and stands where it gets slower than half of it.
 
     Parameters
     ----------
@@ -107,7 +108,7 @@ def motion(time: Array, position: Array, velocity: float) -> tuple[Array, float,
     for state in (False, True):  # short dwells first: a motion broken by noise is one
         for first, final in spans_of(moving == state):
             inner = first > 0 and final < len(moving) - 1
-            if inner and time[final] - time[first] < _SHORTEST:
+            if inner and time[final] - time[first] < _SHORTEST[state]:
                 moving[first : final + 1] = not state
     return speed, threshold, moving
 
@@ -140,7 +141,7 @@ def _cycles(path: CommandedPath, position: Array, speed: Array, moving: NDArray[
     visits += [] if path.closed else [(*span, "end") for span in spans_of(at_end < radius)]
     visits.sort()
     cycles: list[Span] = []
-    for before, after in zip(visits, visits[1:], strict=False):
+    for before, after in itertools.pairwise(visits):
         if before[2] != "begin" or after[2] != ("begin" if path.closed else "end"):
             continue
         if not _runs(path, position[before[1] : after[0] + 1]):

@@ -165,7 +165,7 @@ def _values(curve: VelocityCurves, instrument: Instrument) -> list[Value]:
         interval_rv = (3 * spread / v * low, 3 * spread / v * high)
         few, many = _largest_of(ranges)
         interval_fv = (max(few - noise_range, 0.0), many)
-    made = [
+    return [
         Value(
             "AV",
             "position",
@@ -202,7 +202,6 @@ def _values(curve: VelocityCurves, instrument: Instrument) -> list[Value]:
             fluctuation,
         ),
     ]
-    return made
 
 
 def _largest_of(ranges: Array) -> tuple[float, float]:

@@ -6,6 +6,7 @@ the commanded velocity over the wavelength (the issue's table; the standard's te
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -140,7 +141,7 @@ def _read(cycle: Cycle, across: Array, stroke: float, source: str) -> tuple[floa
         peak = first + int((sign * across[first : final + 1]).argmax())
         outermost[sign].append(_top(time, sign * across, peak))
     passages = []
-    for (_, final, _), (first, _, _) in zip(turns[1:], turns[2:], strict=False):
+    for (_, final, _), (first, _, _) in itertools.pairwise(turns):
         # sides keep their sign until the other side is reached: from the last sample beyond one to the first beyond
         before = final - int((state[final::-1] != 0).argmax())
         part = slice(before, first + 1)

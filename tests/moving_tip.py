@@ -37,7 +37,9 @@ def plan_of(*, velocity: float = 0.25, cycles: dict[str, int] | None = None) -> 
 
     paths = [
         path("line", "polyline", [CENTRE - u - v, CENTRE + u + v], other=other),
-        path("rectangle", "polyline", [CENTRE + a * u + b * v for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1))]),
+        path(
+            "rectangle", "polyline", [CENTRE + a * u + b * v for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1))]
+        ),
         path("large-circle", "circle", [CENTRE, CENTRE + u]),
         path("small-circle", "circle", [CENTRE, CENTRE + 0.125 * u]),
         path("weave", "weave", [CENTRE - u, CENTRE + u], stroke=0.02, wavelength=0.04),
@@ -45,7 +47,9 @@ def plan_of(*, velocity: float = 0.25, cycles: dict[str, int] | None = None) -> 
     P1 = PlannedPose("P1", CENTRE, rotation, np.zeros(6))
     D100 = PlannedPose("D100", CENTRE + 0.1 * ALONG, rotation, np.zeros(6))
     tests = [
-        PlannedTest(t.id, t.places, (cycles or {}).get(t.id, t.cycles), approaches=("D100",) if t.id == "posing-time" else ())
+        PlannedTest(
+            t.id, t.places, (cycles or {}).get(t.id, t.cycles), approaches=("D100",) if t.id == "posing-time" else ()
+        )
         for t in TESTS.values()
     ]
     return PerformancePlan(
@@ -126,7 +130,9 @@ def stream_of(
     length, duration = way.length, duration_of(way.length, velocity)
     closed = name != "line"
     begin, motions, now = [], [], rng.uniform(0.5, 1.5)
-    back = duration_of(float(np.linalg.norm(way.position(np.array([length])) - way.position(np.array([0.0])))), velocity)
+    back = duration_of(
+        float(np.linalg.norm(way.position(np.array([length])) - way.position(np.array([0.0])))), velocity
+    )
     for _ in range(cycles):
         begin.append(now)
         now += duration + rng.choice([0.3, 0.8, 3.0])

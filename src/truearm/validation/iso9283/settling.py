@@ -143,7 +143,7 @@ def _cycle(
     time = samples.time[rows] - samples.time[rows[0]]
     position = in_base(transform, samples.position[rows])
     band = plan.limit_band
-    distance = _from_final(position)
+    distance = np.asarray(np.linalg.norm(position - _final(position), axis=1))
     outside = distance > band
     last = max(int(_FINAL * len(rows)), 5)
     if outside[-last:].any():
@@ -162,22 +162,25 @@ def _cycle(
             allowed=f"a first sample further away than {1e3 * band:g} mm",
             cure="Record from before the move on.",
         )
-    inside = int((~outside).argmax())
-    final = int(np.flatnonzero(outside)[-1]) + 1
-    entry, stay = (_crossing(time, distance, band, k) for k in (inside, final))
-    later = distance[inside:]
-    overshoot = float(later.max()) if final > inside else 0.0
+    passing = _passings(position, _final(position), band)
+    entered = int(np.flatnonzero(passing[:, 0] <= 1.0)[0])
+    final = int(np.flatnonzero(outside)[-1])
+    entry = float(time[entered] + (time[entered + 1] - time[entered]) * passing[entered, 0])
+    stay = _crossing(time, distance, band, final + 1)
+    later = distance[entered + 1 :]
+    settles = not (outside[entered + 1 :].any())
+    overshoot = 0.0 if settles else float(later.max())
     step = float(np.median(np.diff(time)))
-    speed = (distance[inside - 1] - distance[inside]) / (time[inside] - time[inside - 1])
-    passing = 2 * band / max(float(speed), 1e-12)
-    start = _start(time, np.linalg.norm(position - position[:5].mean(axis=0), axis=1), band)
+    speed = (distance[entered] - distance[entered + 1]) / (time[entered + 1] - time[entered])
+    start = _start(time, position, band)
     settled = stay - entry
     posing = stay - start
     if test == "posing-time":
         coarse = (step > COARSE * posing, False)
     else:
-        slow = step > COARSE * max(settled, passing if final == inside else 0.0)
-        few = final > inside and int(outside[inside:].sum()) < _LEAST_OUTSIDE
+        crossing = 2 * band / max(float(speed), 1e-12)
+        slow = step > COARSE * (crossing if settles else settled)
+        few = not settles and _excursion(passing, entered + 1 + int(later.argmax())) < _LEAST_OUTSIDE
         coarse = (slow, slow or few)
     where = part.place
     if test == "posing-time":
@@ -201,12 +204,34 @@ def _cycle(
     )
 
 
-def _from_final(position: Array) -> Array:
-    """Return the distance of each sample from the final attained pose [m], ``(n,)``."""
-    last = max(int(_FINAL * len(position)), 5)
-    final = position[-last:].mean(axis=0)
-    distance = np.linalg.norm(position - final, axis=1)
-    return np.asarray(distance)
+def _final(position: Array) -> Array:
+    """Return the final attained position [m], ``(3,)``."""
+    return np.asarray(position[-max(int(_FINAL * len(position)), 5) :].mean(axis=0))
+
+
+def _passings(position: Array, final: Array, band: float) -> Array:
+    """Return where, as shares of it, the stretch between each two samples enters and leaves the band, ``(n - 1, 2)``.
+
+    A tip that is fast is in the band between two samples and in none of them. Infinite where the band is not met.
+    """
+    begin, step = position[:-1] - final, np.diff(position, axis=0)
+    a, b, c = (step**2).sum(axis=1), (begin * step).sum(axis=1), (begin**2).sum(axis=1) - band**2
+    root = b * b - a * c
+    with np.errstate(divide="ignore", invalid="ignore"):
+        low, high = (-b - np.sqrt(root)) / a, (-b + np.sqrt(root)) / a
+    met = (root >= 0.0) & (a > 0.0) & (high >= 0.0) & (low <= 1.0)
+    within = c <= 0.0
+    ends = np.column_stack([np.where(within, 0.0, low), np.where(within & ~met, 1.0, high)])
+    return np.asarray(np.where((met | within)[:, None], ends, np.inf))
+
+
+def _excursion(passing: Array, peak: int) -> int:
+    """Return how many samples the tip is outside the band for, about one of them, before it passes it again."""
+    met = np.isfinite(passing[:, 0])
+    before = np.flatnonzero(met[:peak])
+    after = np.flatnonzero(met[peak:])
+    first = int(before[-1]) + 1 if len(before) else 0
+    return (peak + int(after[0]) if len(after) else len(met)) - first + 1
 
 
 def _crossing(time: Array, distance: Array, band: float, first: int) -> float:
@@ -215,17 +240,23 @@ def _crossing(time: Array, distance: Array, band: float, first: int) -> float:
     return float(time[first - 1] + (time[first] - time[first - 1]) * (before - band) / (before - after))
 
 
-def _start(time: Array, travelled: Array, band: float) -> float:
+def _start(time: Array, position: Array, band: float) -> float:
     """Return when the motion begins.
 
     The tip leaves a band round where it stood, and one four times as wide. With a constant acceleration it does so
     after times of which the second is twice the first, so that the begin lies as long before the first as that before
     the second.
     """
-    left = [int(np.flatnonzero(travelled <= width)[-1]) for width in (band, 4 * band)]
+    away = np.linalg.norm(position - position[0], axis=1)
+    gone = int((away > 10 * band).argmax()) or len(away)
+    stood = position[: int(np.flatnonzero(away[:gone] <= band)[-1]) + 1]
+    travelled = np.linalg.norm(position - np.median(stood, axis=0), axis=1)[: gone + 1]
     times = []
-    for k, width in zip(left, (band, 4 * band), strict=True):
-        after = min(k + 1, len(time) - 1)
-        rise = max(travelled[after] - travelled[k], 1e-15)
-        times.append(float(time[k] + (time[after] - time[k]) * (width - travelled[k]) / rise))
+    for width in (band, 4 * band):
+        inside = np.flatnonzero(travelled <= width)
+        k = int(inside[-1]) if len(inside) else 0
+        after = min(k + 1, len(travelled) - 1)
+        rise = max(float(travelled[after] - travelled[k]), 1e-15)
+        share = min(max((width - float(travelled[k])) / rise, 0.0), 1.0)
+        times.append(float(time[k] + (time[after] - time[k]) * share))
     return max(2 * times[0] - times[1], 0.0)

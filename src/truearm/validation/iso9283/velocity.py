@@ -24,7 +24,7 @@ from truearm.validation.iso9283.values import COARSE, Instrument, Value
 #: The part of the path over which velocity is judged.
 _MIDDLE = (0.25, 0.75)
 #: Noise may be this share of the commanded velocity, if a window of at most this share of the middle half does it.
-_QUIET, _LONGEST_WINDOW = 0.003, 0.02
+_QUIET, _LONGEST_WINDOW = 0.002, 0.05
 #: Standard normal samples from which the factors of FV's interval come.
 _DRAWS = 20_000
 
@@ -121,8 +121,8 @@ def _cycle(
 ) -> tuple[float, Array, Array, Array, float, tuple[float, float], float]:
     """Return window, time, arc length, velocity, mean, range and noise of a cycle.
 
-    The window is the shortest with five samples whose noise is 0.3 % of the commanded velocity, and at most 2 % of the
-    time that the middle half takes: a swing of that period or less cannot be told from noise.
+    The window is the shortest with five samples whose noise is 0.2 % of the commanded velocity, and at most 5 % of the
+    time that the middle half takes: a swing of that period or less is flattened out with the noise.
     """
     time = cycle.time - cycle.time[0]
     step = float(np.median(np.diff(time)))
@@ -156,10 +156,10 @@ def _values(curve: VelocityCurves, instrument: Instrument) -> list[Value]:
     noise_of_mean = v * ends / (curve.middle[1] - curve.middle[0])
     coarse = n > 1 and 3 * noise_of_mean > COARSE * max(3 * spread, 1e-300)
     independent = max((curve.middle[1] - curve.middle[0]) / v / float(curve.window.mean()), 2.0)
-    noise_range = 2.0 * float(curve.noise.mean()) * np.sqrt(2.0 * np.log(independent * max(n, 1)))
+    noise_range = float(2.0 * curve.noise.mean() * np.sqrt(2.0 * np.log(independent * max(n, 1))))
     coarse_range = noise_range > COARSE * fluctuation
     if n > 1:
-        half = float(stats.t.ppf(0.975, n - 1)) * spread / np.sqrt(n) / v
+        half = float(stats.t.ppf(0.975, n - 1) * spread / np.sqrt(n) / v)
         interval_av = (accuracy - half, accuracy + half)
         low, high = (float(np.sqrt((n - 1) / stats.chi2.ppf(p, n - 1))) for p in (0.975, 0.025))
         interval_rv = (3 * spread / v * low, 3 * spread / v * high)

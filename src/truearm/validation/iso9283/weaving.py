@@ -154,7 +154,10 @@ def _read(cycle: Cycle, across: Array, stroke: float, source: str) -> tuple[floa
 
 
 def _top(time: Array, across: Array, peak: int) -> float:
-    """Return the largest value of a parabola through the samples about the largest, within their span."""
+    """Return the largest value of a parabola through the samples about the largest, or that sample if it is larger.
+
+    The parabola finds the top between two samples; the sample that of a turn so sharp that no parabola fits it.
+    """
     first, last = max(peak - _ABOUT, 0), min(peak + _ABOUT + 1, len(time))
     t, y = time[first:last] - time[peak], across[first:last]
     if len(t) < 4:
@@ -163,4 +166,4 @@ def _top(time: Array, across: Array, peak: int) -> float:
     if a >= 0:
         return float(y.mean())
     at = float(np.clip(-b / (2 * a), t[0] / (t[-1] - t[0]), t[-1] / (t[-1] - t[0])))
-    return float(a * at * at + b * at + c)
+    return max(float(a * at * at + b * at + c), float(across[peak]))

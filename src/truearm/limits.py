@@ -55,6 +55,8 @@ LIMITS: Final[Mapping[str, Limit]] = {
     "entries": Limit(100_000, "the file has too many entries", "entries"),
     "nesting": Limit(100, "the entries are nested too deep", "levels"),
     "rows": Limit(500_000, "the table has too many lines", "lines"),
+    "samples_size": Limit(400_000_000, "the file of samples is too large", "bytes", "Split it by tests."),
+    "samples_read": Limit(2_000_000, "the file has too many samples", "samples", "Split it by tests."),
     "columns": Limit(10_000, "the table has too many columns", "columns"),
     "cells": Limit(5_000_000, "the table has too many cells", "cells"),
     "steps": Limit(3_000_000_000, "the pattern takes too long for so many names", "steps", "Write a shorter pattern."),

@@ -183,7 +183,8 @@ class MovingArm:
         force
             With which the tip is pushed, in the axes of the twin's base frame [N], ``(n, 3)``.
         """
-        warm = self.warming.temperature(working)
+        # Of hundredths of a kelvin links are made once: that is less than 0.1 um.
+        warm = np.round(self.warming.temperature(working), 2)
         if force is None:
             return np.asarray(self.true.frames(joints, approach=approach, temperature=warm)[TIP])
         wrench = np.concatenate([force, np.zeros_like(force)], axis=1)

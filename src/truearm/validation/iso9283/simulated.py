@@ -402,7 +402,7 @@ class _Cell:
     ) -> None:
         """Note the samples of a cycle, and let the clock run on."""
         self.samples += len(motion.time)
-        refuse_beyond("performance_samples", self.samples, parameter="rate")
+        refuse_beyond("samples_read", self.samples, parameter="rate")
         position, turn = motion.with_offset(self.rng.normal(0.0, self.drives.scatter, motion.by_joints.shape[2]))
         slower = 1.0 + self.drives.pace * float(self.rng.standard_normal())
         time = self.now + (motion.time - motion.time[0]) * slower

@@ -1,0 +1,586 @@
+"""A whole campaign of tests by ISO 9283 on a twin that moves: what the instrument would have read, row by row.
+
+A path is followed once for each velocity and load. From cycle to cycle the joints are a little elsewhere, the run is a
+little slower or faster, and the instrument reads with noise. The drift is measured first, from cold; where it is not
+planned, the arm has warmed up before. The criteria have no part in this: how they are evaluated is not known here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from truearm.errors import InputError
+from truearm.limits import refuse_beyond
+from truearm.measurement.performance.records import AttainedPoses, Names, Pushes, Samples
+from truearm.modeling.chain import Array
+from truearm.modeling.transform import (
+    Transform,
+    homogeneous,
+    rotation_from_quaternion,
+    rotation_from_vector,
+)
+from truearm.modeling.parts import Payload
+from truearm.planning.iso9283.planned import PerformancePlan, PlannedPath, PlannedTest
+from truearm.simulation.moving.arm import Drives, Motion, MovingArm, Warming
+from truearm.simulation.moving.interpolator import Commands, Pace, along_circle, along_lines, joint_move
+from truearm.simulation.twin import Twin
+
+#: Stretches in each of which the orientation turns from one to the other on a path with two.
+TURNS: Final = 4
+#: Radius about the corners in which a rectangle is left where corners are judged, and that of a weave in strokes.
+ZONE: Final = 2e-3
+_WEAVE_ZONE: Final = 0.05
+#: The controller commands so often [s].
+_STEP: Final = 1e-3
+#: Each so many commands a correction is computed, and evenly changed between.
+_CORRECTED: Final = 10
+#: A joint that is commanded further in a millisecond has changed its posture [rad or m].
+_JUMP: Final = 0.1
+#: The arm stands before it is read, before and behind a path, and behind a move that is watched [s].
+_DWELL: Final = 3.0
+_BEFORE: Final = 0.3
+_BEHIND: Final = 0.5
+_WATCHED: Final = 1.0
+#: From one group of cycles to the next where the drift is watched [s].
+_BETWEEN_GROUPS: Final = 1800.0
+#: Pushes in shares of the rated load.
+_PUSHES: Final = tuple(k / 10 for k in range(11))
+_GRAVITY: Final = 9.80665
+#: How many robots are exchanged.
+ROBOTS: Final = 5
+
+#: Joint positions to command for poses of the tip ``(n, 4, 4)`` in the base frame, carrying a mass [kg], near to those
+#: of the nominal robot ``(n, joints)``.
+Corrected = Callable[[float, Array, Array], Array]
+
+
+@dataclass(frozen=True, eq=False)
+class TrueRobot:
+    """A robot as it is.
+
+    Attributes
+    ----------
+    twin
+        Its truth, where it stands in the instrument's frame.
+    tip
+        Where the tip is on its flange.
+    """
+
+    twin: Twin
+    tip: Transform
+
+
+@dataclass(frozen=True)
+class Tracker:
+    """What reads the tip.
+
+    Attributes
+    ----------
+    sigma
+        Standard deviation of each coordinate [m].
+    sigma_rot
+        Of each angle [rad].
+    rate
+        Readings in a second [Hz].
+    """
+
+    sigma: float
+    sigma_rot: float
+    rate: float
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedCampaign:
+    """What was read; None of what no test needs.
+
+    Attributes
+    ----------
+    poses, paths, settling, forces
+        In the instrument's frame.
+    duration
+        How long the campaign would take in the cell [s].
+    """
+
+    poses: AttainedPoses | None
+    paths: Samples | None
+    settling: Samples | None
+    forces: Pushes | None
+    duration: float
+
+
+def simulated_campaign(
+    plan: PerformancePlan,
+    robots: Sequence[TrueRobot],
+    base: Array,
+    tracker: Tracker,
+    rng: np.random.Generator,
+    *,
+    corrected: Corrected | None = None,
+    drives: Drives = Drives(),
+    warming: Warming = Warming(),
+    progress: Callable[[str], None] = lambda _: None,
+) -> SimulatedCampaign:
+    """Run every test of a plan on twins.
+
+    Parameters
+    ----------
+    plan
+        What is commanded.
+    robots
+        The robot under test; where the exchange of robots is tested, all that are exchanged.
+    base
+        The robot's base frame in the instrument's, ``(4, 4)`` [m]: pushes are along its axes.
+    tracker
+        What reads the tip.
+    rng
+        For what is drawn.
+    corrected
+        Joint positions to command in place of the nominal robot's.
+    drives, warming
+        What the truths do not say.
+    progress
+        Called with a few words at each test.
+
+    Raises
+    ------
+    InputError
+        If a truth has other joints than the plan's robot, a pose or path cannot be commanded, or there would be too
+        many samples.
+    """
+    cell = _Cell(plan, robots, base, tracker, rng, corrected, drives, warming)
+    drift = plan.test("dAP")
+    ordered = [*([drift] if drift else []), *(test for test in plan.tests if test.id != "dAP")]
+    for number, test in enumerate(ordered, 1):
+        progress(f"test {number} of {len(ordered)}: {test.id}")
+        cell.run(test)
+    return cell.read()
+
+
+@dataclass(frozen=True, eq=False)
+class _Stand:
+    """A pose at which the arm stands to be read."""
+
+    criterion: str
+    robot: int
+    pose: str
+    cycle: int
+    approach: str
+    velocity: float
+    load: float
+    time: float
+    working: float
+    joints: Array
+    came: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Stream:
+    """Samples of one cycle."""
+
+    criterion: str
+    place: str
+    cycle: int
+    velocity: float
+    load: float
+    time: Array
+    position: Array
+    quaternion: Array | None
+    turn: Array | None
+
+
+class _Cell:
+    """The robots, their controller, the instrument and the clock."""
+
+    def __init__(
+        self,
+        plan: PerformancePlan,
+        robots: Sequence[TrueRobot],
+        base: Array,
+        tracker: Tracker,
+        rng: np.random.Generator,
+        corrected: Corrected | None,
+        drives: Drives,
+        warming: Warming,
+    ) -> None:
+        self.plan, self.robots, self.base, self.tracker, self.rng = plan, robots, base, tracker, rng
+        self.corrected, self.drives, self.warming = corrected, drives, warming
+        self.now, self.samples = 0.0, 0
+        self.ahead = 0.0 if plan.test("dAP") is not None else plan.hours * 3600.0
+        self.stands: list[_Stand] = []
+        self.paths: list[_Stream] = []
+        self.settling: list[_Stream] = []
+        self.pushes: list[tuple[str, int, Array, Array]] = []
+        self.arms: dict[tuple[int, float], MovingArm] = {}
+        self.commands: dict[tuple[str, float], Array] = {}
+        self.motions: dict[tuple[object, ...], Motion] = {}
+
+    def run(self, test: PlannedTest) -> None:
+        """Run a test."""
+        if test.id == "dAP":
+            self._drift(test)
+        elif test.id == "vAP":
+            for load, velocity in _conditions(test):
+                for place in test.places:
+                    for cycle in range(1, test.cycles + 1):
+                        for approach in test.approaches:
+                            start = self._joints(f"{place} from {approach}", load)
+                            self._stand(test, 0, place, cycle, approach, velocity, load, start)
+        elif test.id in ("t", "posing-time"):
+            self._settle(test)
+        elif test.id == "compliance":
+            self._push(test)
+        elif test.id in ("AP", "AD", "E"):
+            for robot in range(ROBOTS if test.id == "E" else 1):
+                for load, velocity in _conditions(test):
+                    came = self._joints(test.places[0] if len(test.places) > 1 else self._other(test.places[0]), load)
+                    for cycle in range(1, test.cycles + 1):
+                        for place in reversed(test.places):
+                            came = self._stand(test, robot, place, cycle, "", velocity, load, came)
+        else:
+            self._along_paths(test)
+
+    # -- poses ---------------------------------------------------------------------------------------------
+
+    def _drift(self, test: PlannedTest) -> None:
+        """Measure groups of cycles from cold, every half hour; cycles are counted through all groups."""
+        load, velocity = test.loads[0], test.velocities[0]
+        place = test.places[0]
+        away = self._joints(self._other(place), load)
+        cycle, begin = 0, self.now
+        while self.now - begin <= self.plan.hours * 3600.0:
+            group = self.now
+            for _ in range(test.cycles):
+                cycle += 1
+                self._stand(test, 0, place, cycle, "", velocity, load, away)
+            self.now = max(self.now, group + _BETWEEN_GROUPS)
+
+    def _stand(
+        self,
+        test: PlannedTest,
+        robot: int,
+        place: str,
+        cycle: int,
+        approach: str,
+        velocity: float,
+        load: float,
+        came: Array,
+    ) -> Array:
+        """Go to a pose and note where the arm stands; return what was commanded."""
+        joints = self._joints(place, load)
+        way = joints - came
+        fast, change = self.drives.velocity * velocity, self.drives.acceleration
+        longest = float(np.abs(way).max())
+        self.now += longest / fast + fast / change + _DWELL
+        scatter = self.rng.normal(0.0, self.drives.scatter, len(joints))
+        self.stands.append(
+            _Stand(
+                test.id,
+                robot,
+                place,
+                cycle,
+                approach,
+                velocity,
+                load,
+                self.now,
+                self.now + self.ahead,
+                joints + scatter,
+                np.where(np.abs(way) > 1e-9, np.sign(way), 0.0),
+            )
+        )
+        return joints
+
+    def _other(self, place: str) -> str:
+        """Return a pose to come from: of the measuring points the last other one."""
+        others = [name for name in self.plan.poses if name != place]
+        if not others:
+            raise InputError(
+                "the plan has one pose alone, and there is none to come from",
+                parameter="plan",
+                came=place,
+                allowed="two poses or more",
+            )
+        return "P5" if "P5" in others else others[-1]
+
+    def _joints(self, name: str, load: float) -> Array:
+        """Return what is commanded for a pose of the plan, or for where an approach begins."""
+        key = (name, load)
+        if key not in self.commands:
+            starts = {f"{pose} from {way}": start for (pose, way), start in self.plan.starts.items()}
+            poses = {**self.plan.poses, **starts}
+            if name not in poses:
+                raise InputError("the plan has no such pose", parameter="plan", came=name, allowed=", ".join(poses))
+            pose = poses[name]
+            frame = homogeneous(pose.rotation[None], pose.position[None])
+            joints = pose.joints[None]
+            if self.corrected is not None:
+                joints = self.corrected(load * self.plan.rated_load, frame, joints)
+            self.commands[key] = joints[0]
+        return self.commands[key]
+
+    def _arm(self, robot: int, load: float) -> MovingArm:
+        key = (robot, load)
+        if key not in self.arms:
+            true = self.robots[robot]
+            mass = load * self.plan.rated_load
+            payload = Payload(mass, true.tip.translation if mass else (0.0, 0.0, 0.0))
+            nominal, target = self.plan.robot, self.plan.target
+            self.arms[key] = MovingArm(nominal, target, true.twin, true.tip, payload, self.drives, self.warming)
+        return self.arms[key]
+
+    # -- motions -------------------------------------------------------------------------------------------
+
+    def _settle(self, test: PlannedTest) -> None:
+        """Watch how the tip comes to rest: at a pose, or at others to which it goes from there."""
+        for load, velocity in _conditions(test):
+            place = test.places[0]
+            ways = [(self._other(place), place)] if test.id == "t" else [(place, end) for end in test.approaches]
+            for start, end in ways:
+                motion = self._move(start, end, velocity, load)
+                for cycle in range(1, test.cycles + 1):
+                    self._cycle(self.settling, test.id, end, cycle, velocity, load, motion)
+
+    def _move(self, start: str, end: str, velocity: float, load: float) -> Motion:
+        fast, change = self.drives.velocity * velocity, self.drives.acceleration
+        command = joint_move(self._joints(start, load), self._joints(end, load), fast, change, _STEP)
+        time = self._times(_STEP * (len(command) - 1) + _WATCHED)
+        return self._arm(0, load).in_motion(command, _STEP, time, self.now + self.ahead)
+
+    def _along_paths(self, test: PlannedTest) -> None:
+        for load, velocity in _conditions(test):
+            for place in test.places:
+                motion = self._path_motion(test, place, velocity, load)
+                for cycle in range(1, test.cycles + 1):
+                    self._cycle(self.paths, test.id, place, cycle, velocity, load, motion)
+
+    def _path_motion(self, test: PlannedTest, place: str, velocity: float, load: float) -> Motion:
+        path = self.plan.paths.get(place)
+        if path is None:
+            raise InputError(
+                "the plan has no such path", parameter="plan", came=place, allowed=", ".join(self.plan.paths) or None
+            )
+        reoriented = test.id == "AT-reorientation"
+        zone = ZONE if test.id in ("CR", "AT-reorientation") else 0.0
+        key = (place, reoriented, zone, velocity, load)
+        if key not in self.motions:
+            pace = Pace(velocity * self.plan.rated_velocity, zone=_WEAVE_ZONE * path.stroke or zone)
+            commands = path_commands(path, pace, _STEP, reoriented=reoriented)
+            arm = self._arm(0, load)
+            frames = homogeneous(commands.rotation, commands.position)
+            near = min(self.plan.poses.values(), key=lambda p: float(np.linalg.norm(p.position - frames[0, :3, 3])))
+            joints = arm.joints_for(frames, near.joints)
+            if len(joints) > 1 and np.abs(np.diff(joints, axis=0)).max() > _JUMP:
+                raise InputError(
+                    "the robot cannot run a path of the plan without changing its posture",
+                    parameter="plan",
+                    came=place,
+                    cure="Plan in another cube, or with another orientation.",
+                )
+            if self.corrected is not None:
+                joints = joints + self._correction(frames, joints, load)
+            time = self._times(commands.time[-1] + _BEHIND, _BEFORE)
+            self.motions[key] = arm.in_motion(joints, _STEP, time, self.now + self.ahead)
+        return self.motions[key]
+
+    def _correction(self, frames: Array, joints: Array, load: float) -> Array:
+        """Return what a correction adds to joint positions along a path, ``(n, joints)``."""
+        assert self.corrected is not None
+        rows = np.unique(np.append(np.arange(0, len(frames), _CORRECTED), len(frames) - 1))
+        added = self.corrected(load * self.plan.rated_load, frames[rows], joints[rows]) - joints[rows]
+        every = np.arange(len(frames))
+        return np.stack([np.interp(every, rows, column) for column in added.T], axis=1)
+
+    def _times(self, end: float, before: float = 0.0) -> Array:
+        step = 1.0 / self.tracker.rate
+        return np.arange(-round(before / step), int(end / step) + 1) * step
+
+    def _cycle(
+        self, into: list[_Stream], test: str, place: str, cycle: int, velocity: float, load: float, motion: Motion
+    ) -> None:
+        """Note the samples of a cycle, and let the clock run on."""
+        self.samples += len(motion.time)
+        refuse_beyond("samples_read", self.samples, parameter="rate")
+        position, turn = motion.with_offset(self.rng.normal(0.0, self.drives.scatter, motion.by_joints.shape[2]))
+        slower = 1.0 + self.drives.pace * float(self.rng.standard_normal())
+        time = self.now + (motion.time - motion.time[0]) * slower
+        oriented = into is self.paths
+        into.append(
+            _Stream(
+                test,
+                place,
+                cycle,
+                velocity,
+                load,
+                time,
+                position + self.rng.normal(0.0, self.tracker.sigma, position.shape),
+                motion.quaternion if oriented else None,
+                turn + self.rng.normal(0.0, self.tracker.sigma_rot, turn.shape) if oriented else None,
+            )
+        )
+        self.now = float(time[-1]) + _DWELL
+
+    def _push(self, test: PlannedTest) -> None:
+        """Push the tip in steps up to the rated load."""
+        load = test.loads[0]
+        place = test.places[0]
+        joints, came = self._joints(place, load), self._joints(self._other(place), load)
+        arm, force = self._arm(0, load), np.array(_PUSHES) * self.plan.rated_load * _GRAVITY
+        to_base = self.robots[0].twin.robot.base.rotation.T @ self.base[:3, :3]
+        for cycle in range(1, test.cycles + 1):
+            for way in test.approaches:
+                along = np.zeros(3)
+                along["xyz".index(way[1])] = 1.0 if way[0] == "+" else -1.0
+                stood = joints + self.rng.normal(0.0, self.drives.scatter, len(joints))
+                n = len(force)
+                self.now += _DWELL * n
+                frames = arm.at_rest(
+                    np.tile(stood, (n, 1)),
+                    np.tile(np.sign(joints - came), (n, 1)),
+                    np.full(n, self.now + self.ahead),
+                    force[:, None] * (to_base @ along),
+                )
+                read = frames[:, :3, 3] + self.rng.normal(0.0, self.tracker.sigma, (n, 3))
+                self.pushes.append((way, cycle, force, read))
+
+    # -- what was read -------------------------------------------------------------------------------------
+
+    def read(self) -> SimulatedCampaign:
+        """Return everything that was noted, as the instrument read it."""
+        return SimulatedCampaign(
+            self._poses_read() if self.stands else None,
+            _samples(self.paths, "simulated paths") if self.paths else None,
+            _samples(self.settling, "simulated settling") if self.settling else None,
+            self._pushes_read() if self.pushes else None,
+            self.now,
+        )
+
+    def _poses_read(self) -> AttainedPoses:
+        stands = self.stands
+        frames = np.empty((len(stands), 4, 4))
+        for key in dict.fromkeys((s.robot, s.load) for s in stands):
+            rows = np.array([row for row, s in enumerate(stands) if (s.robot, s.load) == key])
+            came = [stands[row] for row in rows.tolist()]
+            frames[rows] = self._arm(*key).at_rest(
+                np.array([s.joints for s in came]),
+                np.array([s.came for s in came]),
+                np.array([s.working for s in came]),
+            )
+        n = len(stands)
+        turned = rotation_from_vector(self.rng.normal(0.0, self.tracker.sigma_rot, (n, 3)))
+        return AttainedPoses(
+            Names.of(s.criterion for s in stands),
+            Names.of(f"r{s.robot + 1}" if s.criterion == "E" else "" for s in stands),
+            Names.of(s.pose for s in stands),
+            Names.of(s.approach for s in stands),
+            np.array([s.cycle for s in stands], dtype=np.intp),
+            np.array([s.velocity for s in stands]),
+            np.array([s.load for s in stands]),
+            np.array([s.time for s in stands]),
+            frames[:, :3, 3] + self.rng.normal(0.0, self.tracker.sigma, (n, 3)),
+            turned @ frames[:, :3, :3],
+            np.arange(2, n + 2),
+            "simulated poses",
+        )
+
+    def _pushes_read(self) -> Pushes:
+        rows = sum(len(force) for _, _, force, _ in self.pushes)
+        return Pushes(
+            Names.of(way for way, _, force, _ in self.pushes for _ in force),
+            np.concatenate([force for _, _, force, _ in self.pushes]),
+            np.repeat([cycle for _, cycle, _, _ in self.pushes], [len(force) for _, _, force, _ in self.pushes]),
+            np.concatenate([read for _, _, _, read in self.pushes]),
+            np.arange(2, rows + 2),
+            "simulated forces",
+        )
+
+
+def path_commands(path: PlannedPath, pace: Pace, step: float, *, reoriented: bool = False) -> Commands:
+    """Return what a controller commands along a planned path.
+
+    A weave runs in straight lines from side to side, its first and last stretch from and to the middle. Its velocity is
+    that of the advance along the line in the middle, so that its frequency is the velocity over the wavelength.
+
+    Parameters
+    ----------
+    path
+        In the robot's base frame.
+    pace
+        How fast.
+    step
+        Between two commands [s].
+    reoriented
+        Whether the orientation alternates: from one to the other and back, :data:`TURNS` times.
+
+    Raises
+    ------
+    InputError
+        If the orientation shall alternate and the path has one alone.
+    """
+    if path.kind == "circle":
+        return along_circle(path.points[0], path.points[1], path.normal, path.rotation, pace, step)
+    points = path.points
+    if path.kind == "weave":
+        points, longer = _weave(path)
+        pace = Pace(pace.velocity * longer, pace.acceleration, pace.zone, pace.turning, pace.turning_acceleration)
+    rotations = np.broadcast_to(path.rotation, (len(points), 3, 3))
+    if reoriented:
+        if path.other is None:
+            raise InputError(
+                "this path has one orientation, and another is needed for the orientation to change",
+                parameter="plan",
+                came=path.name,
+            )
+        share = np.linspace(0.0, 1.0, TURNS + 1)[:, None]
+        points = points[0] + share * (points[-1] - points[0])
+        rotations = np.stack([path.rotation if k % 2 == 0 else path.other for k in range(TURNS + 1)])
+    return along_lines(points, rotations, pace, step)
+
+
+def _weave(path: PlannedPath) -> tuple[Array, float]:
+    """Return the corners of a weave ``(k, 3)``, and how much longer its way is than the line in the middle."""
+    way = path.points[-1] - path.points[0]
+    length = float(np.linalg.norm(way))
+    along = way / length
+    aside = np.cross(path.normal, along)
+    half = path.wavelength / 2
+    count = int(length / half + 1e-9)
+    middle = (np.arange(count) + 0.5) * half
+    sides = np.where(np.arange(count) % 2 == 0, 1.0, -1.0) * path.stroke / 2
+    corners = path.points[0] + middle[:, None] * along + sides[:, None] * aside
+    end = path.points[0] + count * half * along
+    return np.concatenate([path.points[:1], corners, end[None]]), float(np.hypot(half, path.stroke) / half)
+
+
+def _conditions(test: PlannedTest) -> Iterator[tuple[float, float]]:
+    """Give each load with each velocity."""
+    return ((load, velocity) for load in test.loads for velocity in test.velocities)
+
+
+def _samples(streams: Sequence[_Stream], source: str) -> Samples:
+    counts = [len(s.time) for s in streams]
+    n = sum(counts)
+
+    def named(texts: Sequence[str]) -> Names:
+        each = Names.of(texts)
+        return Names(each.names, np.repeat(each.code, counts))
+
+    quaternions = [s.quaternion for s in streams if s.quaternion is not None]
+    rotation = None
+    if quaternions:
+        turned = rotation_from_vector(np.concatenate([s.turn for s in streams if s.turn is not None]))
+        rotation = turned @ rotation_from_quaternion(np.concatenate(quaternions))
+    return Samples(
+        named([s.criterion for s in streams]),
+        named([s.place for s in streams]),
+        np.repeat(np.array([s.cycle for s in streams], dtype=np.intp), counts),
+        np.repeat([s.velocity for s in streams], counts),
+        np.repeat([s.load for s in streams], counts),
+        np.concatenate([s.time for s in streams]),
+        np.concatenate([s.position for s in streams]),
+        rotation,
+        np.arange(2, n + 2),
+        source,
+    )

@@ -167,9 +167,7 @@ class MovingArm:
             )
         return found.joints
 
-    def at_rest(
-        self, joints: Array, approach: Array, working: Array, force: Array | None = None
-    ) -> Array:
+    def at_rest(self, joints: Array, approach: Array, working: Array, force: Array | None = None) -> Array:
         """Return where the tip stands in the world, ``(n, 4, 4)`` [m].
 
         Parameters

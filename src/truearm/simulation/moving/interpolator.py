@@ -179,9 +179,7 @@ def along_lines(points: Array, rotations: Array, pace: Pace, step: float) -> Com
     return Commands(time, position, turned)
 
 
-def _corners(
-    length: Array, along: Array, turning: Array, fastest: Array, pace: Pace
-) -> tuple[Array, Array]:
+def _corners(length: Array, along: Array, turning: Array, fastest: Array, pace: Pace) -> tuple[Array, Array]:
     """Return how far ahead of each point its blend begins, and the speed there, ``(k,)`` each; both 0 at the ends."""
     bend = np.linalg.norm(np.diff(along, axis=0), axis=1)
     twist = np.linalg.norm(np.diff(turning, axis=0), axis=1)

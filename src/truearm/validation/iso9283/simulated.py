@@ -17,13 +17,13 @@ from truearm.errors import InputError
 from truearm.limits import refuse_beyond
 from truearm.measurement.performance.records import AttainedPoses, Names, Pushes, Samples
 from truearm.modeling.chain import Array
+from truearm.modeling.parts import Payload
 from truearm.modeling.transform import (
     Transform,
     homogeneous,
     rotation_from_quaternion,
     rotation_from_vector,
 )
-from truearm.modeling.parts import Payload
 from truearm.planning.iso9283.planned import PerformancePlan, PlannedPath, PlannedTest
 from truearm.simulation.moving.arm import Drives, Motion, MovingArm, Warming
 from truearm.simulation.moving.interpolator import Commands, Pace, along_circle, along_lines, joint_move

@@ -45,6 +45,7 @@ JOBS: Final = (
     "hexapod_plan",
     "hexapod_solve",
     "hexapod_world_frame",
+    "iso9283_simulate",
     "compensate",
     "revert",
     "convert",

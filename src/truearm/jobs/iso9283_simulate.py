@@ -54,7 +54,7 @@ def iso9283_simulate(
     *,
     truth: Robot | str | Path = "random",
     noise: float = 1e-5,
-    noise_rot: float = 1e-4,
+    noise_rot: float = math.radians(0.005),
     rate: float = 500.0,
     seed: int = 0,
     corrected: Robot | str | Path | None = None,

@@ -86,6 +86,10 @@ class Warming:
         return np.asarray(REFERENCE_TEMPERATURE - self.rise * np.exp(-np.asarray(working) / self.time))
 
 
+DRIVES: Final = Drives()
+WARMING: Final = Warming()
+
+
 @dataclass(frozen=True, eq=False)
 class MovingArm:
     """A true arm with its controller, carrying something.
@@ -111,8 +115,8 @@ class MovingArm:
     twin: Twin
     tip: Transform
     payload: Payload
-    drives: Drives = Drives()
-    warming: Warming = Warming()
+    drives: Drives = DRIVES
+    warming: Warming = WARMING
 
     def __post_init__(self) -> None:
         kinds = [[joint.kind for joint in robot.joints] for robot in (self.nominal, self.twin.robot)]
@@ -167,9 +171,7 @@ class MovingArm:
             )
         return found.joints
 
-    def at_rest(
-        self, joints: Array, approach: Array, working: Array, force: Array | None = None
-    ) -> Array:
+    def at_rest(self, joints: Array, approach: Array, working: Array, force: Array | None = None) -> Array:
         """Return where the tip stands in the world, ``(n, 4, 4)`` [m].
 
         Parameters

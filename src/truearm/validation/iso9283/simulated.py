@@ -17,23 +17,19 @@ from truearm.errors import InputError
 from truearm.limits import refuse_beyond
 from truearm.measurement.performance.records import AttainedPoses, Names, Pushes, Samples
 from truearm.modeling.chain import Array
+from truearm.modeling.parts import Payload
 from truearm.modeling.transform import (
     Transform,
     homogeneous,
     rotation_from_quaternion,
     rotation_from_vector,
 )
-from truearm.modeling.parts import Payload
-from truearm.planning.iso9283.planned import PerformancePlan, PlannedPath, PlannedTest
-from truearm.simulation.moving.arm import Drives, Motion, MovingArm, Warming
-from truearm.simulation.moving.interpolator import Commands, Pace, along_circle, along_lines, joint_move
+from truearm.planning.iso9283.planned import PerformancePlan, PlannedTest
+from truearm.simulation.moving.arm import DRIVES, WARMING, Drives, Motion, MovingArm, Warming
+from truearm.simulation.moving.interpolator import Pace, joint_move
 from truearm.simulation.twin import Twin
+from truearm.validation.iso9283.controller_commands import path_commands, zone_of
 
-#: Stretches in each of which the orientation turns from one to the other on a path with two.
-TURNS: Final = 4
-#: Radius about the corners in which a rectangle is left where corners are judged, and that of a weave in strokes.
-ZONE: Final = 2e-3
-_WEAVE_ZONE: Final = 0.05
 #: The controller commands so often [s].
 _STEP: Final = 1e-3
 #: Each so many commands a correction is computed, and evenly changed between.
@@ -120,8 +116,8 @@ def simulated_campaign(
     rng: np.random.Generator,
     *,
     corrected: Corrected | None = None,
-    drives: Drives = Drives(),
-    warming: Warming = Warming(),
+    drives: Drives = DRIVES,
+    warming: Warming = WARMING,
     progress: Callable[[str], None] = lambda _: None,
 ) -> SimulatedCampaign:
     """Run every test of a plan on twins.
@@ -275,7 +271,7 @@ class _Cell:
         fast, change = self.drives.velocity * velocity, self.drives.acceleration
         longest = float(np.abs(way).max())
         self.now += longest / fast + fast / change + _DWELL
-        scatter = self.rng.normal(0.0, self.drives.scatter, len(joints))
+        scatter = self._scatter(len(joints))
         self.stands.append(
             _Stand(
                 test.id,
@@ -292,6 +288,9 @@ class _Cell:
             )
         )
         return joints
+
+    def _scatter(self, joints: int) -> Array:
+        return np.asarray(self.rng.normal(0.0, self.drives.scatter, joints))
 
     def _other(self, place: str) -> str:
         """Return a pose to come from: of the measuring points the last other one."""
@@ -362,11 +361,10 @@ class _Cell:
             raise InputError(
                 "the plan has no such path", parameter="plan", came=place, allowed=", ".join(self.plan.paths) or None
             )
-        reoriented = test.id == "AT-reorientation"
-        zone = ZONE if test.id in ("CR", "AT-reorientation") else 0.0
+        reoriented, zone = test.id == "AT-reorientation", zone_of(test.id, path)
         key = (place, reoriented, zone, velocity, load)
         if key not in self.motions:
-            pace = Pace(velocity * self.plan.rated_velocity, zone=_WEAVE_ZONE * path.stroke or zone)
+            pace = Pace(velocity * self.plan.rated_velocity, zone=zone)
             commands = path_commands(path, pace, _STEP, reoriented=reoriented)
             arm = self._arm(0, load)
             frames = homogeneous(commands.rotation, commands.position)
@@ -395,7 +393,7 @@ class _Cell:
 
     def _times(self, end: float, before: float = 0.0) -> Array:
         step = 1.0 / self.tracker.rate
-        return np.arange(-round(before / step), int(end / step) + 1) * step
+        return np.arange(-round(before / step), int(end / step) + 1, dtype=float) * step
 
     def _cycle(
         self, into: list[_Stream], test: str, place: str, cycle: int, velocity: float, load: float, motion: Motion
@@ -403,7 +401,7 @@ class _Cell:
         """Note the samples of a cycle, and let the clock run on."""
         self.samples += len(motion.time)
         refuse_beyond("samples_read", self.samples, parameter="rate")
-        position, turn = motion.with_offset(self.rng.normal(0.0, self.drives.scatter, motion.by_joints.shape[2]))
+        position, turn = motion.with_offset(self._scatter(motion.by_joints.shape[2]))
         slower = 1.0 + self.drives.pace * float(self.rng.standard_normal())
         time = self.now + (motion.time - motion.time[0]) * slower
         oriented = into is self.paths
@@ -433,7 +431,7 @@ class _Cell:
             for way in test.approaches:
                 along = np.zeros(3)
                 along["xyz".index(way[1])] = 1.0 if way[0] == "+" else -1.0
-                stood = joints + self.rng.normal(0.0, self.drives.scatter, len(joints))
+                stood = joints + self._scatter(len(joints))
                 n = len(force)
                 self.now += _DWELL * n
                 frames = arm.at_rest(
@@ -495,63 +493,6 @@ class _Cell:
             np.arange(2, rows + 2),
             "simulated forces",
         )
-
-
-def path_commands(path: PlannedPath, pace: Pace, step: float, *, reoriented: bool = False) -> Commands:
-    """Return what a controller commands along a planned path.
-
-    A weave runs in straight lines from side to side, its first and last stretch from and to the middle. Its velocity is
-    that of the advance along the line in the middle, so that its frequency is the velocity over the wavelength.
-
-    Parameters
-    ----------
-    path
-        In the robot's base frame.
-    pace
-        How fast.
-    step
-        Between two commands [s].
-    reoriented
-        Whether the orientation alternates: from one to the other and back, :data:`TURNS` times.
-
-    Raises
-    ------
-    InputError
-        If the orientation shall alternate and the path has one alone.
-    """
-    if path.kind == "circle":
-        return along_circle(path.points[0], path.points[1], path.normal, path.rotation, pace, step)
-    points = path.points
-    if path.kind == "weave":
-        points, longer = _weave(path)
-        pace = Pace(pace.velocity * longer, pace.acceleration, pace.zone, pace.turning, pace.turning_acceleration)
-    rotations = np.broadcast_to(path.rotation, (len(points), 3, 3))
-    if reoriented:
-        if path.other is None:
-            raise InputError(
-                "this path has one orientation, and another is needed for the orientation to change",
-                parameter="plan",
-                came=path.name,
-            )
-        share = np.linspace(0.0, 1.0, TURNS + 1)[:, None]
-        points = points[0] + share * (points[-1] - points[0])
-        rotations = np.stack([path.rotation if k % 2 == 0 else path.other for k in range(TURNS + 1)])
-    return along_lines(points, rotations, pace, step)
-
-
-def _weave(path: PlannedPath) -> tuple[Array, float]:
-    """Return the corners of a weave ``(k, 3)``, and how much longer its way is than the line in the middle."""
-    way = path.points[-1] - path.points[0]
-    length = float(np.linalg.norm(way))
-    along = way / length
-    aside = np.cross(path.normal, along)
-    half = path.wavelength / 2
-    count = int(length / half + 1e-9)
-    middle = (np.arange(count) + 0.5) * half
-    sides = np.where(np.arange(count) % 2 == 0, 1.0, -1.0) * path.stroke / 2
-    corners = path.points[0] + middle[:, None] * along + sides[:, None] * aside
-    end = path.points[0] + count * half * along
-    return np.concatenate([path.points[:1], corners, end[None]]), float(np.hypot(half, path.stroke) / half)
 
 
 def _conditions(test: PlannedTest) -> Iterator[tuple[float, float]]:

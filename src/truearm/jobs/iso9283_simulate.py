@@ -33,7 +33,8 @@ from truearm.simulation.gear_errors import DRAWN
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import Twin
 from truearm.units import sized_si
-from truearm.validation.iso9283.simulated import ROBOTS, Corrected, Tracker, TrueRobot, simulated_campaign
+from truearm.validation.iso9283.simulated import ROBOTS, Corrected, TrueRobot, simulated_campaign
+from truearm.validation.iso9283.simulated_readings import Tracker
 
 #: Readings in a second that an instrument can take.
 _RATES: Final = (10.0, 2000.0)

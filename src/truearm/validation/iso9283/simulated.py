@@ -15,20 +15,25 @@ import numpy as np
 
 from truearm.errors import InputError
 from truearm.limits import refuse_beyond
-from truearm.measurement.performance.records import AttainedPoses, Names, Pushes, Samples
+from truearm.measurement.performance.records import AttainedPoses
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import Payload
-from truearm.modeling.transform import (
-    Transform,
-    homogeneous,
-    rotation_from_quaternion,
-    rotation_from_vector,
-)
+from truearm.modeling.transform import Transform, homogeneous
 from truearm.planning.iso9283.planned import PerformancePlan, PlannedTest
 from truearm.simulation.moving.arm import DRIVES, WARMING, Drives, Motion, MovingArm, Warming
 from truearm.simulation.moving.interpolator import Pace, joint_move
 from truearm.simulation.twin import Twin
 from truearm.validation.iso9283.controller_commands import path_commands, zone_of
+from truearm.validation.iso9283.simulated_readings import (
+    Pushed,
+    SimulatedCampaign,
+    Stand,
+    Stream,
+    Tracker,
+    poses_of,
+    pushes_of,
+    samples_of,
+)
 
 #: The controller commands so often [s].
 _STEP: Final = 1e-3
@@ -68,44 +73,6 @@ class TrueRobot:
 
     twin: Twin
     tip: Transform
-
-
-@dataclass(frozen=True)
-class Tracker:
-    """What reads the tip.
-
-    Attributes
-    ----------
-    sigma
-        Standard deviation of each coordinate [m].
-    sigma_rot
-        Of each angle [rad].
-    rate
-        Readings in a second [Hz].
-    """
-
-    sigma: float
-    sigma_rot: float
-    rate: float
-
-
-@dataclass(frozen=True, eq=False)
-class SimulatedCampaign:
-    """What was read; None of what no test needs.
-
-    Attributes
-    ----------
-    poses, paths, settling, forces
-        In the instrument's frame.
-    duration
-        How long the campaign would take in the cell [s].
-    """
-
-    poses: AttainedPoses | None
-    paths: Samples | None
-    settling: Samples | None
-    forces: Pushes | None
-    duration: float
 
 
 def simulated_campaign(
@@ -156,38 +123,6 @@ def simulated_campaign(
     return cell.read()
 
 
-@dataclass(frozen=True, eq=False)
-class _Stand:
-    """A pose at which the arm stands to be read."""
-
-    criterion: str
-    robot: int
-    pose: str
-    cycle: int
-    approach: str
-    velocity: float
-    load: float
-    time: float
-    working: float
-    joints: Array
-    came: Array
-
-
-@dataclass(frozen=True, eq=False)
-class _Stream:
-    """Samples of one cycle."""
-
-    criterion: str
-    place: str
-    cycle: int
-    velocity: float
-    load: float
-    time: Array
-    position: Array
-    quaternion: Array | None
-    turn: Array | None
-
-
 class _Cell:
     """The robots, their controller, the instrument and the clock."""
 
@@ -206,10 +141,10 @@ class _Cell:
         self.corrected, self.drives, self.warming = corrected, drives, warming
         self.now, self.samples = 0.0, 0
         self.ahead = 0.0 if plan.test("dAP") is not None else plan.hours * 3600.0
-        self.stands: list[_Stand] = []
-        self.paths: list[_Stream] = []
-        self.settling: list[_Stream] = []
-        self.pushes: list[tuple[str, int, Array, Array]] = []
+        self.stands: list[Stand] = []
+        self.paths: list[Stream] = []
+        self.settling: list[Stream] = []
+        self.pushes: list[Pushed] = []
         self.arms: dict[tuple[int, float], MovingArm] = {}
         self.commands: dict[tuple[str, float], Array] = {}
         self.motions: dict[tuple[object, ...], Motion] = {}
@@ -273,7 +208,7 @@ class _Cell:
         self.now += longest / fast + fast / change + _DWELL
         scatter = self._scatter(len(joints))
         self.stands.append(
-            _Stand(
+            Stand(
                 test.id,
                 robot,
                 place,
@@ -338,14 +273,17 @@ class _Cell:
             place = test.places[0]
             ways = [(self._other(place), place)] if test.id == "t" else [(place, end) for end in test.approaches]
             for start, end in ways:
-                motion = self._move(start, end, velocity, load)
+                motion = self._move(start, end, velocity, load, whole=test.id == "posing-time")
                 for cycle in range(1, test.cycles + 1):
                     self._cycle(self.settling, test.id, end, cycle, velocity, load, motion)
 
-    def _move(self, start: str, end: str, velocity: float, load: float) -> Motion:
+    def _move(self, start: str, end: str, velocity: float, load: float, *, whole: bool) -> Motion:
         fast, change = self.drives.velocity * velocity, self.drives.acceleration
         command = joint_move(self._joints(start, load), self._joints(end, load), fast, change, _STEP)
-        time = self._times(_STEP * (len(command) - 1) + _WATCHED)
+        arrived = _STEP * (len(command) - 1)
+        # Of a long way its end is watched; how long the move takes is told by the whole of it.
+        watched = self._times(arrived + _WATCHED, _BEFORE)
+        time = watched if whole else watched[watched >= arrived - _WATCHED]
         return self._arm(0, load).in_motion(command, _STEP, time, self.now + self.ahead)
 
     def _along_paths(self, test: PlannedTest) -> None:
@@ -396,7 +334,7 @@ class _Cell:
         return np.arange(-round(before / step), int(end / step) + 1, dtype=float) * step
 
     def _cycle(
-        self, into: list[_Stream], test: str, place: str, cycle: int, velocity: float, load: float, motion: Motion
+        self, into: list[Stream], test: str, place: str, cycle: int, velocity: float, load: float, motion: Motion
     ) -> None:
         """Note the samples of a cycle, and let the clock run on."""
         self.samples += len(motion.time)
@@ -406,7 +344,7 @@ class _Cell:
         time = self.now + (motion.time - motion.time[0]) * slower
         oriented = into is self.paths
         into.append(
-            _Stream(
+            Stream(
                 test,
                 place,
                 cycle,
@@ -441,17 +379,15 @@ class _Cell:
                     force[:, None] * (to_base @ along),
                 )
                 read = frames[:, :3, 3] + self.rng.normal(0.0, self.tracker.sigma, (n, 3))
-                self.pushes.append((way, cycle, force, read))
-
-    # -- what was read -------------------------------------------------------------------------------------
+                self.pushes.append(Pushed(way, cycle, force, read))
 
     def read(self) -> SimulatedCampaign:
         """Return everything that was noted, as the instrument read it."""
         return SimulatedCampaign(
             self._poses_read() if self.stands else None,
-            _samples(self.paths, "simulated paths") if self.paths else None,
-            _samples(self.settling, "simulated settling") if self.settling else None,
-            self._pushes_read() if self.pushes else None,
+            samples_of(self.paths, "simulated paths") if self.paths else None,
+            samples_of(self.settling, "simulated settling") if self.settling else None,
+            pushes_of(self.pushes) if self.pushes else None,
             self.now,
         )
 
@@ -459,69 +395,16 @@ class _Cell:
         stands = self.stands
         frames = np.empty((len(stands), 4, 4))
         for key in dict.fromkeys((s.robot, s.load) for s in stands):
-            rows = np.array([row for row, s in enumerate(stands) if (s.robot, s.load) == key])
-            came = [stands[row] for row in rows.tolist()]
+            rows = [row for row, s in enumerate(stands) if (s.robot, s.load) == key]
+            came = [stands[row] for row in rows]
             frames[rows] = self._arm(*key).at_rest(
                 np.array([s.joints for s in came]),
                 np.array([s.came for s in came]),
                 np.array([s.working for s in came]),
             )
-        n = len(stands)
-        turned = rotation_from_vector(self.rng.normal(0.0, self.tracker.sigma_rot, (n, 3)))
-        return AttainedPoses(
-            Names.of(s.criterion for s in stands),
-            Names.of(f"r{s.robot + 1}" if s.criterion == "E" else "" for s in stands),
-            Names.of(s.pose for s in stands),
-            Names.of(s.approach for s in stands),
-            np.array([s.cycle for s in stands], dtype=np.intp),
-            np.array([s.velocity for s in stands]),
-            np.array([s.load for s in stands]),
-            np.array([s.time for s in stands]),
-            frames[:, :3, 3] + self.rng.normal(0.0, self.tracker.sigma, (n, 3)),
-            turned @ frames[:, :3, :3],
-            np.arange(2, n + 2),
-            "simulated poses",
-        )
-
-    def _pushes_read(self) -> Pushes:
-        rows = sum(len(force) for _, _, force, _ in self.pushes)
-        return Pushes(
-            Names.of(way for way, _, force, _ in self.pushes for _ in force),
-            np.concatenate([force for _, _, force, _ in self.pushes]),
-            np.repeat([cycle for _, cycle, _, _ in self.pushes], [len(force) for _, _, force, _ in self.pushes]),
-            np.concatenate([read for _, _, _, read in self.pushes]),
-            np.arange(2, rows + 2),
-            "simulated forces",
-        )
+        return poses_of(stands, frames, self.tracker, self.rng)
 
 
 def _conditions(test: PlannedTest) -> Iterator[tuple[float, float]]:
     """Give each load with each velocity."""
     return ((load, velocity) for load in test.loads for velocity in test.velocities)
-
-
-def _samples(streams: Sequence[_Stream], source: str) -> Samples:
-    counts = [len(s.time) for s in streams]
-    n = sum(counts)
-
-    def named(texts: Sequence[str]) -> Names:
-        each = Names.of(texts)
-        return Names(each.names, np.repeat(each.code, counts))
-
-    quaternions = [s.quaternion for s in streams if s.quaternion is not None]
-    rotation = None
-    if quaternions:
-        turned = rotation_from_vector(np.concatenate([s.turn for s in streams if s.turn is not None]))
-        rotation = turned @ rotation_from_quaternion(np.concatenate(quaternions))
-    return Samples(
-        named([s.criterion for s in streams]),
-        named([s.place for s in streams]),
-        np.repeat(np.array([s.cycle for s in streams], dtype=np.intp), counts),
-        np.repeat([s.velocity for s in streams], counts),
-        np.repeat([s.load for s in streams], counts),
-        np.concatenate([s.time for s in streams]),
-        np.concatenate([s.position for s in streams]),
-        rotation,
-        np.arange(2, n + 2),
-        source,
-    )

@@ -214,19 +214,21 @@ class MovingArm:
         command
             Joint positions ``(n, joints)``, `step` [s] apart; behind the last one the joints are commanded to stay.
         time
-            When to look, from the first command [s], ``(m,)``; before it the joints stand still.
+            When to look, evenly, from the first command [s], ``(m,)``; before it the joints stand still.
         working
             How long the arm has been working [s].
         """
-        left = max(0, math.ceil(float(time.max(initial=0.0)) / step) + 2 - len(command))
-        held = np.concatenate([command, np.repeat(command[-1:], left, axis=0)])
+        ahead = max(0, math.ceil(-float(time[0]) / step)) + 2
+        left = max(0, math.ceil(float(time[-1]) / step) + 2 - len(command))
+        held = np.concatenate([np.repeat(command[:1], ahead, axis=0), command, np.repeat(command[-1:], left, axis=0)])
         position, velocity = self.drives.servo.follow(held, step)
         acceleration = np.gradient(velocity, step, axis=0)
         ways = last_moves(held)
 
         def at(time: Array) -> tuple[NDArray[np.intp], Array]:
-            k = np.clip((time / step + 1e-9).astype(np.intp), 0, len(held) - 2)
-            return k, np.clip(time / step - k, 0.0, 1.0)[:, None]
+            steps = time / step + ahead
+            k = np.clip((steps + 1e-9).astype(np.intp), 0, len(held) - 2)
+            return k, np.clip(steps - k, 0.0, 1.0)[:, None]
 
         often = len(time) > 2 and float(time[1] - time[0]) < _FINEST * (1 - 1e-9)
         grid = np.arange(time[0], time[-1] + _FINEST, _FINEST) if often else time

@@ -140,7 +140,7 @@ class _Cell:
         self.plan, self.robots, self.base, self.tracker, self.rng = plan, robots, base, tracker, rng
         self.corrected, self.drives, self.warming = corrected, drives, warming
         self.now, self.samples = 0.0, 0
-        self.ahead = 0.0 if plan.test("dAP") is not None else plan.hours * 3600.0
+        self.ahead = 0.0 if plan.test("dAP") is not None else np.inf
         self.stands: list[Stand] = []
         self.paths: list[Stream] = []
         self.settling: list[Stream] = []

@@ -139,7 +139,8 @@ def test_what_cannot_be_simulated_is_refused(calibrated: Robot, tmp_path: Path) 
         truearm.iso9283_simulate("irb120", 3)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="this robot is not calibrated"):
         truearm.iso9283_simulate("irb120", plan, corrected="irb120")
-    moved = replace(calibrated.base, translation=tuple(v + 0.1 for v in calibrated.base.translation))
+    x, y, z = calibrated.base.translation
+    moved = replace(calibrated.base, translation=(x + 0.1, y, z))
     elsewhere = calibrated.with_frames(moved, {})
     with pytest.raises(InputError, match="calibrated in the frame of another instrument"):
         truearm.iso9283_simulate("irb120", plan, truth=TRUTH, corrected=elsewhere)

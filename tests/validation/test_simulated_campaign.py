@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from tests.performance_plan import DOWN, small_plan
 
 from truearm.errors import InputError
@@ -14,10 +15,11 @@ from truearm.measurement.performance.records import Samples
 from truearm.modeling.chain import Array
 from truearm.modeling.transform import IDENTITY, rotation_vector
 from truearm.planning.iso9283.planned import PerformancePlan
+from truearm.planning.iso9283.way import TURNS
 from truearm.simulation.moving.arm import DRIVES, WARMING, Drives
 from truearm.simulation.moving.servo import Servo
 from truearm.simulation.truths import truth_twin
-from truearm.validation.iso9283.controller_commands import TURNS, ZONE
+from truearm.validation.iso9283.controller_commands import ZONE
 from truearm.validation.iso9283.simulated import TrueRobot, simulated_campaign
 from truearm.validation.iso9283.simulated_readings import SimulatedCampaign, Tracker
 
@@ -45,9 +47,9 @@ def in_base(position: Array, base: Array) -> Array:
     return np.asarray((position - base[:3, 3]) @ base[:3, :3])
 
 
-def of(samples: Samples | None, test: str, place: str, cycle: int = 1) -> np.ndarray:
+def of(samples: Samples | None, test: str, place: str, cycle: int = 1) -> NDArray[np.bool_]:
     assert samples is not None
-    return samples.criterion.are(test) & samples.place.are(place) & (samples.cycle == cycle)
+    return np.asarray(samples.criterion.are(test) & samples.place.are(place) & (samples.cycle == cycle))
 
 
 @pytest.fixture(scope="module")

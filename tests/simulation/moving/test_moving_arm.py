@@ -102,8 +102,8 @@ def test_a_motion_ends_where_the_arm_then_stands(arm: MovingArm, rate: float) ->
 def test_a_fast_stream_agrees_with_a_slow_one(arm: MovingArm) -> None:
     share = (1 - np.cos(np.linspace(0.0, np.pi, 500)))[:, None] / 2
     command = JOINTS[0] + share * (JOINTS[1] - JOINTS[0])
-    slow = arm.in_motion(command, 1e-3, np.arange(250) * 4e-3, np.inf)
-    fast = arm.in_motion(command, 1e-3, np.arange(1997) * 5e-4, np.inf)
+    slow = arm.in_motion(command, 1e-3, 4e-3 * np.arange(250.0), np.inf)
+    fast = arm.in_motion(command, 1e-3, 5e-4 * np.arange(1997.0), np.inf)
     np.testing.assert_allclose(fast.position[::8], slow.position, atol=2e-6)
     np.testing.assert_allclose(fast.quaternion[::8], slow.quaternion, atol=2e-6)
 

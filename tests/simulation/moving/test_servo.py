@@ -15,7 +15,7 @@ STEP = 2e-3
 
 def test_a_step_overshoots_as_the_closed_form_says() -> None:
     w, d = 40.0, 0.3
-    time = STEP * np.arange(600)
+    time = STEP * np.arange(600.0)
     position, velocity = Servo(w, d).follow(np.ones((600, 2)), STEP, np.zeros(2))
     turn = w * math.sqrt(1 - d * d)
     expected = 1 - np.exp(-d * w * time) * (np.cos(turn * time) + d * w / turn * np.sin(turn * time))
@@ -37,7 +37,7 @@ def test_steps_added_up_and_step_by_step_are_one_motion(damping: float) -> None:
 
 @pytest.mark.parametrize(("share", "lag"), [(0.0, 2 * 0.7 / 60.0), (1.0, 0.0)])
 def test_a_steady_motion_lags_by_what_is_not_fed_forward(share: float, lag: float) -> None:
-    command = 0.5 * STEP * np.arange(1000)[:, None]
+    command = 0.5 * STEP * np.arange(1000.0)[:, None]
     position, velocity = Servo(60.0, 0.7, feedforward=share).follow(command, STEP)
     assert command[-1, 0] - position[-1, 0] == pytest.approx(0.5 * lag, abs=1e-12)
     assert velocity[-1, 0] == pytest.approx(0.5, abs=1e-12)

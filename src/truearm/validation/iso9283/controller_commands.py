@@ -9,10 +9,9 @@ import numpy as np
 from truearm.errors import InputError
 from truearm.modeling.chain import Array
 from truearm.planning.iso9283.planned import PlannedPath
+from truearm.planning.iso9283.way import TURNS
 from truearm.simulation.moving.interpolator import Commands, Pace, along_circle, along_lines
 
-#: Stretches in each of which the orientation turns from one to the other on a path with two.
-TURNS: Final = 4
 #: Radius about a corner in which a rectangle is left where corners are judged [m], and that of a weave in strokes.
 ZONE: Final = 2e-3
 _WEAVE_ZONE: Final = 0.05
@@ -42,7 +41,7 @@ def path_commands(path: PlannedPath, pace: Pace, step: float, *, reoriented: boo
     step
         Between two commands [s].
     reoriented
-        Whether the orientation alternates: from one to the other and back, :data:`TURNS` times.
+        Whether the orientation alternates: from one to the other and back, as :class:`.way.Way` has it.
 
     Raises
     ------

@@ -118,7 +118,7 @@ def simulated_campaign(
     drift = plan.test("dAP")
     ordered = [*([drift] if drift else []), *(test for test in plan.tests if test.id != "dAP")]
     for number, test in enumerate(ordered, 1):
-        progress(f"test {number} of {len(ordered)}: {test.id}")
+        cell.say = lambda words, n=number: progress(f"test {n} of {len(ordered)}: {words}")
         cell.run(test)
     return cell.read()
 
@@ -140,6 +140,7 @@ class _Cell:
         self.plan, self.robots, self.base, self.tracker, self.rng = plan, robots, base, tracker, rng
         self.corrected, self.drives, self.warming = corrected, drives, warming
         self.now, self.samples = 0.0, 0
+        self.say: Callable[[str], None] = lambda _: None
         self.ahead = 0.0 if plan.test("dAP") is not None else np.inf
         self.stands: list[Stand] = []
         self.paths: list[Stream] = []
@@ -151,6 +152,7 @@ class _Cell:
 
     def run(self, test: PlannedTest) -> None:
         """Run a test."""
+        self.say(test.id)
         if test.id == "dAP":
             self._drift(test)
         elif test.id == "vAP":
@@ -289,6 +291,7 @@ class _Cell:
     def _along_paths(self, test: PlannedTest) -> None:
         for load, velocity in _conditions(test):
             for place in test.places:
+                self.say(f"{test.id}, {place} at {velocity:.0%} of the velocity")
                 motion = self._path_motion(test, place, velocity, load)
                 for cycle in range(1, test.cycles + 1):
                     self._cycle(self.paths, test.id, place, cycle, velocity, load, motion)

@@ -109,6 +109,9 @@ def iso9283_simulate(
         raise wrong_kind(
             "a truth belongs here", truth, "truth", "nominal, random, gear-errors, a truth's name, or a robot"
         )
+    for name, given in (("plan", plan), ("truth", truth), ("corrected", corrected)):
+        if isinstance(given, str | Path):
+            path_argument(given, name)
     folder = None if out is None else folder_for(FILES, out, robot, plan, truth, corrected, ours=True)
     call = command_argument(command) or python_call(
         "iso9283_simulate",

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -118,7 +119,7 @@ def simulated_campaign(
     drift = plan.test("dAP")
     ordered = [*([drift] if drift else []), *(test for test in plan.tests if test.id != "dAP")]
     for number, test in enumerate(ordered, 1):
-        cell.say = lambda words, n=number: progress(f"test {n} of {len(ordered)}: {words}")
+        cell.say = partial(_say, progress, f"test {number} of {len(ordered)}")
         cell.run(test)
     return cell.read()
 
@@ -406,6 +407,10 @@ class _Cell:
                 np.array([s.working for s in came]),
             )
         return poses_of(stands, frames, self.tracker, self.rng)
+
+
+def _say(progress: Callable[[str], None], test: str, words: str) -> None:
+    progress(f"{test}: {words}")
 
 
 def _conditions(test: PlannedTest) -> Iterator[tuple[float, float]]:

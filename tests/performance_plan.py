@@ -35,10 +35,12 @@ def small_plan(
     points = plane.measuring_points
     places = {f"P{k}": p for k, p in enumerate(points, 1)}
     begin = {(p, a): places[p] - 0.02 * np.eye(3)["xyz".index(a)] for p in ("P1", "P2", "P4") for a in "xyz"}
-    distances = {f"D{d}": points[0] + 1e-3 * d * (points[1] - points[0]) / np.linalg.norm(points[1] - points[0])
-                 for d in (10, 50)}  # fmt: skip
+    outwards = (points[1] - points[0]) / np.linalg.norm(points[1] - points[0])
+    distances = {f"D{d}": points[0] + 1e-3 * d * outwards for d in (10, 50)}
     position = np.array([*places.values(), *distances.values(), *begin.values()])
-    found = inverse(robot, position, np.broadcast_to(DOWN, (len(position), 3, 3)), seed=np.radians([0, 20, 0, 0, 60, 0]))
+    found = inverse(
+        robot, position, np.broadcast_to(DOWN, (len(position), 3, 3)), seed=np.radians([0, 20, 0, 0, 60, 0])
+    )
     joints = found.without_unreached().joints
     poses = [PlannedPose(name, p, DOWN, q) for name, p, q in zip([*places, *distances], position, joints, strict=False)]
     starts = {

@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from truearm.jobs.influence import influence
     from truearm.jobs.inverse import inverse
     from truearm.jobs.iso9283_plan import iso9283_plan
+    from truearm.jobs.iso9283_simulate import iso9283_simulate
     from truearm.jobs.lines import lines
     from truearm.jobs.load_data import load_data
     from truearm.jobs.load_robot import load_robot
@@ -105,6 +106,7 @@ __all__ = [
     "influence",
     "inverse",
     "iso9283_plan",
+    "iso9283_simulate",
     "lines",
     "load_data",
     "load_robot",

@@ -39,6 +39,7 @@ JOBS: Final = (
     "tolerance",
     "lines",
     "iso9283_plan",
+    "iso9283_simulate",
     "influence",
     "sphere",
     "hexapod_enumerate",

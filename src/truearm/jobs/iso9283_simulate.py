@@ -33,7 +33,8 @@ from truearm.simulation.gear_errors import DRAWN
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import Twin
 from truearm.units import sized_si
-from truearm.validation.iso9283.simulated import ROBOTS, Corrected, Tracker, TrueRobot, simulated_campaign
+from truearm.validation.iso9283.simulated import ROBOTS, Corrected, TrueRobot, simulated_campaign
+from truearm.validation.iso9283.simulated_readings import Tracker
 
 #: Readings in a second that an instrument can take.
 _RATES: Final = (10.0, 2000.0)
@@ -54,7 +55,7 @@ def iso9283_simulate(
     *,
     truth: Robot | str | Path = "random",
     noise: float = 1e-5,
-    noise_rot: float = 1e-4,
+    noise_rot: float = math.radians(0.005),
     rate: float = 500.0,
     seed: int = 0,
     corrected: Robot | str | Path | None = None,
@@ -108,6 +109,9 @@ def iso9283_simulate(
         raise wrong_kind(
             "a truth belongs here", truth, "truth", "nominal, random, gear-errors, a truth's name, or a robot"
         )
+    for name, given in (("plan", plan), ("truth", truth), ("corrected", corrected)):
+        if isinstance(given, str | Path):
+            path_argument(given, name)
     folder = None if out is None else folder_for(FILES, out, robot, plan, truth, corrected, ours=True)
     call = command_argument(command) or python_call(
         "iso9283_simulate",

@@ -11,7 +11,7 @@ from truearm.modeling.transform import Transform
 from truearm.results.record import Record
 from truearm.shown import counted
 from truearm.units import from_si
-from truearm.validation.iso9283.simulated import SimulatedCampaign, Tracker
+from truearm.validation.iso9283.simulated_readings import SimulatedCampaign, Tracker
 from truearm.writing import write_files
 
 #: What a campaign may write.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -73,9 +74,7 @@ def _sample_lines(read: Samples, *, conditions: bool) -> Iterator[str]:
     keys = np.column_stack([read.criterion.code, read.place.code, read.cycle, shares])
     new = np.flatnonzero((keys[1:] != keys[:-1]).any(axis=1)) + 1
     bounds = [0, *new.tolist(), len(keys)]
-    for first, end in zip(bounds[:-1], bounds[1:], strict=True):
-        if first == end:
-            continue
+    for first, end in pairwise(bounds):
         words = [read.criterion.names[read.criterion.code[first]], read.place.names[read.place.code[first]]]
         words.append(str(int(read.cycle[first])))
         if conditions:

@@ -15,13 +15,19 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truearm.errors import InputError
 from truearm.modeling.chain import Array
 from truearm.modeling.inverse.kinematics import inverse
 from truearm.modeling.parts import Payload
 from truearm.modeling.robot import Robot
-from truearm.modeling.transform import Transform, quaternion_from_rotation
+from truearm.modeling.transform import (
+    Transform,
+    quaternion_from_rotation,
+    rotation_from_vector,
+    rotation_vector,
+)
 from truearm.simulation.moving.servo import Servo
 from truearm.simulation.twin import REFERENCE_TEMPERATURE, Twin
 from truearm.simulation.twin_joint import PERFECT
@@ -30,6 +36,8 @@ from truearm.simulation.twin_joint import PERFECT
 Commanded = Callable[[Array, Array], Array]
 TIP: Final = "tip"
 _FLANGE: Final = "flange"
+#: The truth is followed this often; between, it is as far from the nominal tip as around [s].
+_FINEST: Final = 2e-3
 #: A joint that is commanded to move by less does not change the direction of its last move [rad or m].
 _STILL: Final = 1e-9
 
@@ -86,6 +94,10 @@ class Warming:
         return np.asarray(REFERENCE_TEMPERATURE - self.rise * np.exp(-np.asarray(working) / self.time))
 
 
+DRIVES: Final = Drives()
+WARMING: Final = Warming()
+
+
 @dataclass(frozen=True, eq=False)
 class MovingArm:
     """A true arm with its controller, carrying something.
@@ -111,8 +123,8 @@ class MovingArm:
     twin: Twin
     tip: Transform
     payload: Payload
-    drives: Drives = Drives()
-    warming: Warming = Warming()
+    drives: Drives = DRIVES
+    warming: Warming = WARMING
 
     def __post_init__(self) -> None:
         kinds = [[joint.kind for joint in robot.joints] for robot in (self.nominal, self.twin.robot)]
@@ -202,31 +214,51 @@ class MovingArm:
         command
             Joint positions ``(n, joints)``, `step` [s] apart; behind the last one the joints are commanded to stay.
         time
-            When to look, from the first command [s], ``(m,)``; before it the joints stand still.
+            When to look, evenly, from the first command [s], ``(m,)``; before it the joints stand still.
         working
             How long the arm has been working [s].
         """
-        left = max(0, math.ceil(float(time.max(initial=0.0)) / step) + 2 - len(command))
-        held = np.concatenate([command, np.repeat(command[-1:], left, axis=0)])
+        ahead = max(0, math.ceil(-float(time[0]) / step)) + 2
+        left = max(0, math.ceil(float(time[-1]) / step) + 2 - len(command))
+        held = np.concatenate([np.repeat(command[:1], ahead, axis=0), command, np.repeat(command[-1:], left, axis=0)])
         position, velocity = self.drives.servo.follow(held, step)
         acceleration = np.gradient(velocity, step, axis=0)
         ways = last_moves(held)
-        k = np.clip((time / step + 1e-9).astype(int), 0, len(held) - 2)
-        x = np.clip(time / step - k, 0.0, 1.0)[:, None]
+
+        def at(time: Array) -> tuple[NDArray[np.intp], Array]:
+            steps = time / step + ahead
+            k = np.clip((steps + 1e-9).astype(np.intp), 0, len(held) - 2)
+            return k, np.clip(steps - k, 0.0, 1.0)[:, None]
+
+        often = len(time) > 2 and float(time[1] - time[0]) < _FINEST * (1 - 1e-9)
+        grid = np.arange(time[0], time[-1] + _FINEST, _FINEST) if often else time
+        k, x = at(grid)
         joints = _between(position, velocity, k, x, step)
-        speed = (1 - x) * velocity[k] + x * velocity[k + 1]
-        change = (1 - x) * acceleration[k] + x * acceleration[k + 1]
         frames = self.true.frames(
             joints,
             approach=ways[k],
-            temperature=np.full(len(time), float(self.warming.temperature(np.array(working)))),
-            velocity=speed,
-            acceleration=change,
+            temperature=np.full(len(grid), float(self.warming.temperature(np.array(working)))),
+            velocity=(1 - x) * velocity[k] + x * velocity[k + 1],
+            acceleration=(1 - x) * acceleration[k] + x * acceleration[k + 1],
         )[TIP]
-        turned = self.twin.robot.base.rotation
+        place, turned = frames[:, :3, 3], frames[:, :3, :3]
+        base = self.twin.robot.base
+        if often:
+            nominal, believed = self._believed(joints)
+            joints = _between(position, velocity, *at(time), step)
+            there, oriented = self._believed(joints)
+            place = there + _interpolated(time, grid, place - nominal)
+            off = rotation_vector(turned @ believed.transpose(0, 2, 1))
+            turned = rotation_from_vector(_interpolated(time, grid, off)) @ oriented
         by_joints = self.nominal.jacobian(joints, frame="base", target=self.target)
-        by_joints = np.concatenate([turned @ by_joints[:, :3], turned @ by_joints[:, 3:]], axis=1)
-        return Motion(time, frames[:, :3, 3], quaternion_from_rotation(frames[:, :3, :3]), by_joints)
+        by_joints = np.concatenate([base.rotation @ by_joints[:, :3], base.rotation @ by_joints[:, 3:]], axis=1)
+        return Motion(time, place, quaternion_from_rotation(turned), by_joints)
+
+    def _believed(self, joints: Array) -> tuple[Array, Array]:
+        """Return where the nominal robot has its tip if it stands on the true base, ``(n, 3)`` and ``(n, 3, 3)``."""
+        position, rotation = self.nominal.forward(joints, frame="base", target=self.target)
+        base = self.twin.robot.base
+        return position @ base.rotation.T + np.array(base.translation), base.rotation @ rotation
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,7 +301,11 @@ def last_moves(joints: Array) -> Array:
     return np.asarray(np.where(found == 0.0, starts, found))
 
 
-def _between(position: Array, velocity: Array, k: Array, x: Array, step: float) -> Array:
+def _interpolated(time: Array, grid: Array, values: Array) -> Array:
+    return np.stack([np.interp(time, grid, column) for column in values.T], axis=1)
+
+
+def _between(position: Array, velocity: Array, k: NDArray[np.intp], x: Array, step: float) -> Array:
     """Return positions a share of a step behind the k-th, by the cubic that has positions and velocities."""
     p, q = position[k], position[k + 1]
     v, w = step * velocity[k], step * velocity[k + 1]

@@ -152,13 +152,13 @@ def along_lines(points: Array, rotations: Array, pace: Pace, step: float) -> Com
     pieces: list[tuple[float, Ramp | None, int]] = []  # when it begins; the corner's number where it is a blend
     now = 0.0
     for i, (left, (before, behind)) in enumerate(zip(straight.tolist(), pairwise(speeds.tolist()), strict=True)):
-        ramp = Ramp.over(max(left, 0.0), before, behind, float(fastest[i]), pace.acceleration)
-        pieces.append((now, ramp, i))
-        now += ramp.duration
+        straight_on = Ramp.over(max(left, 0.0), before, behind, float(fastest[i]), pace.acceleration)
+        pieces.append((now, straight_on, i))
+        now += straight_on.duration
         if zones[i + 1] > 0:
             pieces.append((now, None, i + 1))
             now += 2 * zones[i + 1] / behind
-    time = step * np.arange(math.ceil(now / step - 1e-9) + 1)
+    time = step * np.arange(math.ceil(now / step - 1e-9) + 1, dtype=float)
     position, turned = np.zeros((len(time), 3)), np.zeros((len(time), 3, 3))
     starts = np.array([piece[0] for piece in pieces])
     which = np.clip(np.searchsorted(starts, time, side="right") - 1, 0, len(pieces) - 1)
@@ -213,7 +213,7 @@ def along_circle(centre: Array, start: Array, normal: Array, rotation: Array, pa
         raise InputError("a circle must have a radius", where="path", came=0.0, allowed="above 0")
     velocity = min(pace.velocity, math.sqrt(pace.acceleration * radius))
     ramp = Ramp.over(2 * math.pi * radius, 0.0, 0.0, velocity, pace.acceleration)
-    time = step * np.arange(math.ceil(ramp.duration / step - 1e-9) + 1)
+    time = step * np.arange(math.ceil(ramp.duration / step - 1e-9) + 1, dtype=float)
     angle = (ramp.at(time) / radius)[:, None]
     position = centre + np.cos(angle) * out + np.sin(angle) * np.cross(normal, out)
     return Commands(time, position, np.broadcast_to(rotation, (len(time), 3, 3)))
@@ -236,5 +236,5 @@ def joint_move(start: Array, end: Array, velocity: float, acceleration: float, s
     if longest <= 0:
         return np.asarray(start, float)[None].copy()
     ramp = Ramp.over(1.0, 0.0, 0.0, velocity / longest, acceleration / longest)
-    time = step * np.arange(math.ceil(ramp.duration / step - 1e-9) + 1)
-    return np.asarray(start + ramp.at(time)[:, None] * way)
+    time = step * np.arange(math.ceil(ramp.duration / step - 1e-9) + 1, dtype=float)
+    return np.asarray(np.asarray(start) + ramp.at(time)[:, None] * way)

@@ -82,7 +82,7 @@ class Servo:
         n = len(command)
         slope = np.diff(command, axis=0) / step
         taps = min(n, self._memory(step))
-        decay = self._free(step * np.arange(1, n + 1)) if taps == n else self._free(step * np.arange(1, taps + 1))
+        decay = self._free(step * np.arange(1, taps + 1, dtype=float))
         before = np.concatenate([np.eye(2)[None], decay[: taps - 1]])
         answers = (before - decay) @ np.array([self._lag, 1.0])  # to a slope of one step, after 0, 1 .. steps
         position, velocity = command.copy(), np.zeros_like(command)
@@ -91,7 +91,7 @@ class Servo:
                 into[1:, j] += np.convolve(slope[:, j], answers[:, k])[: n - 1]
         off = first - command[0]
         if off.any():
-            rest = self._free(step * np.arange(n))
+            rest = self._free(step * np.arange(n, dtype=float))
             position += rest[:, 0, 0, None] * off
             velocity += rest[:, 1, 0, None] * off
         return position, velocity

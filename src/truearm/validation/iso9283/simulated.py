@@ -9,31 +9,33 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 import numpy as np
 
 from truearm.errors import InputError
 from truearm.limits import refuse_beyond
-from truearm.measurement.performance.records import AttainedPoses, Names, Pushes, Samples
+from truearm.measurement.performance.records import AttainedPoses
 from truearm.modeling.chain import Array
 from truearm.modeling.parts import Payload
-from truearm.modeling.transform import (
-    Transform,
-    homogeneous,
-    rotation_from_quaternion,
-    rotation_from_vector,
-)
-from truearm.planning.iso9283.planned import PerformancePlan, PlannedPath, PlannedTest
-from truearm.simulation.moving.arm import Drives, Motion, MovingArm, Warming
-from truearm.simulation.moving.interpolator import Commands, Pace, along_circle, along_lines, joint_move
+from truearm.modeling.transform import Transform, homogeneous
+from truearm.planning.iso9283.planned import PerformancePlan, PlannedTest
+from truearm.simulation.moving.arm import DRIVES, WARMING, Drives, Motion, MovingArm, Warming
+from truearm.simulation.moving.interpolator import Pace, joint_move
 from truearm.simulation.twin import Twin
+from truearm.validation.iso9283.controller_commands import path_commands, zone_of
+from truearm.validation.iso9283.simulated_readings import (
+    Pushed,
+    SimulatedCampaign,
+    Stand,
+    Stream,
+    Tracker,
+    poses_of,
+    pushes_of,
+    samples_of,
+)
 
-#: Stretches in each of which the orientation turns from one to the other on a path with two.
-TURNS: Final = 4
-#: Radius about the corners in which a rectangle is left where corners are judged, and that of a weave in strokes.
-ZONE: Final = 2e-3
-_WEAVE_ZONE: Final = 0.05
 #: The controller commands so often [s].
 _STEP: Final = 1e-3
 #: Each so many commands a correction is computed, and evenly changed between.
@@ -74,44 +76,6 @@ class TrueRobot:
     tip: Transform
 
 
-@dataclass(frozen=True)
-class Tracker:
-    """What reads the tip.
-
-    Attributes
-    ----------
-    sigma
-        Standard deviation of each coordinate [m].
-    sigma_rot
-        Of each angle [rad].
-    rate
-        Readings in a second [Hz].
-    """
-
-    sigma: float
-    sigma_rot: float
-    rate: float
-
-
-@dataclass(frozen=True, eq=False)
-class SimulatedCampaign:
-    """What was read; None of what no test needs.
-
-    Attributes
-    ----------
-    poses, paths, settling, forces
-        In the instrument's frame.
-    duration
-        How long the campaign would take in the cell [s].
-    """
-
-    poses: AttainedPoses | None
-    paths: Samples | None
-    settling: Samples | None
-    forces: Pushes | None
-    duration: float
-
-
 def simulated_campaign(
     plan: PerformancePlan,
     robots: Sequence[TrueRobot],
@@ -120,8 +84,8 @@ def simulated_campaign(
     rng: np.random.Generator,
     *,
     corrected: Corrected | None = None,
-    drives: Drives = Drives(),
-    warming: Warming = Warming(),
+    drives: Drives = DRIVES,
+    warming: Warming = WARMING,
     progress: Callable[[str], None] = lambda _: None,
 ) -> SimulatedCampaign:
     """Run every test of a plan on twins.
@@ -155,41 +119,9 @@ def simulated_campaign(
     drift = plan.test("dAP")
     ordered = [*([drift] if drift else []), *(test for test in plan.tests if test.id != "dAP")]
     for number, test in enumerate(ordered, 1):
-        progress(f"test {number} of {len(ordered)}: {test.id}")
+        cell.say = partial(_say, progress, f"test {number} of {len(ordered)}")
         cell.run(test)
     return cell.read()
-
-
-@dataclass(frozen=True, eq=False)
-class _Stand:
-    """A pose at which the arm stands to be read."""
-
-    criterion: str
-    robot: int
-    pose: str
-    cycle: int
-    approach: str
-    velocity: float
-    load: float
-    time: float
-    working: float
-    joints: Array
-    came: Array
-
-
-@dataclass(frozen=True, eq=False)
-class _Stream:
-    """Samples of one cycle."""
-
-    criterion: str
-    place: str
-    cycle: int
-    velocity: float
-    load: float
-    time: Array
-    position: Array
-    quaternion: Array | None
-    turn: Array | None
 
 
 class _Cell:
@@ -209,17 +141,19 @@ class _Cell:
         self.plan, self.robots, self.base, self.tracker, self.rng = plan, robots, base, tracker, rng
         self.corrected, self.drives, self.warming = corrected, drives, warming
         self.now, self.samples = 0.0, 0
-        self.ahead = 0.0 if plan.test("dAP") is not None else plan.hours * 3600.0
-        self.stands: list[_Stand] = []
-        self.paths: list[_Stream] = []
-        self.settling: list[_Stream] = []
-        self.pushes: list[tuple[str, int, Array, Array]] = []
+        self.say: Callable[[str], None] = lambda _: None
+        self.ahead = 0.0 if plan.test("dAP") is not None else np.inf
+        self.stands: list[Stand] = []
+        self.paths: list[Stream] = []
+        self.settling: list[Stream] = []
+        self.pushes: list[Pushed] = []
         self.arms: dict[tuple[int, float], MovingArm] = {}
         self.commands: dict[tuple[str, float], Array] = {}
         self.motions: dict[tuple[object, ...], Motion] = {}
 
     def run(self, test: PlannedTest) -> None:
         """Run a test."""
+        self.say(test.id)
         if test.id == "dAP":
             self._drift(test)
         elif test.id == "vAP":
@@ -275,9 +209,9 @@ class _Cell:
         fast, change = self.drives.velocity * velocity, self.drives.acceleration
         longest = float(np.abs(way).max())
         self.now += longest / fast + fast / change + _DWELL
-        scatter = self.rng.normal(0.0, self.drives.scatter, len(joints))
+        scatter = self._scatter(len(joints))
         self.stands.append(
-            _Stand(
+            Stand(
                 test.id,
                 robot,
                 place,
@@ -292,6 +226,9 @@ class _Cell:
             )
         )
         return joints
+
+    def _scatter(self, joints: int) -> Array:
+        return np.asarray(self.rng.normal(0.0, self.drives.scatter, joints))
 
     def _other(self, place: str) -> str:
         """Return a pose to come from: of the measuring points the last other one."""
@@ -339,19 +276,23 @@ class _Cell:
             place = test.places[0]
             ways = [(self._other(place), place)] if test.id == "t" else [(place, end) for end in test.approaches]
             for start, end in ways:
-                motion = self._move(start, end, velocity, load)
+                motion = self._move(start, end, velocity, load, whole=test.id == "posing-time")
                 for cycle in range(1, test.cycles + 1):
                     self._cycle(self.settling, test.id, end, cycle, velocity, load, motion)
 
-    def _move(self, start: str, end: str, velocity: float, load: float) -> Motion:
+    def _move(self, start: str, end: str, velocity: float, load: float, *, whole: bool) -> Motion:
         fast, change = self.drives.velocity * velocity, self.drives.acceleration
         command = joint_move(self._joints(start, load), self._joints(end, load), fast, change, _STEP)
-        time = self._times(_STEP * (len(command) - 1) + _WATCHED)
+        arrived = _STEP * (len(command) - 1)
+        # Of a long way its end is watched; how long the move takes is told by the whole of it.
+        watched = self._times(arrived + _WATCHED, _BEFORE)
+        time = watched if whole else watched[watched >= arrived - _WATCHED]
         return self._arm(0, load).in_motion(command, _STEP, time, self.now + self.ahead)
 
     def _along_paths(self, test: PlannedTest) -> None:
         for load, velocity in _conditions(test):
             for place in test.places:
+                self.say(f"{test.id}, {place} at {velocity:.0%} of the velocity")
                 motion = self._path_motion(test, place, velocity, load)
                 for cycle in range(1, test.cycles + 1):
                     self._cycle(self.paths, test.id, place, cycle, velocity, load, motion)
@@ -362,11 +303,10 @@ class _Cell:
             raise InputError(
                 "the plan has no such path", parameter="plan", came=place, allowed=", ".join(self.plan.paths) or None
             )
-        reoriented = test.id == "AT-reorientation"
-        zone = ZONE if test.id in ("CR", "AT-reorientation") else 0.0
+        reoriented, zone = test.id == "AT-reorientation", zone_of(test.id, path)
         key = (place, reoriented, zone, velocity, load)
         if key not in self.motions:
-            pace = Pace(velocity * self.plan.rated_velocity, zone=_WEAVE_ZONE * path.stroke or zone)
+            pace = Pace(velocity * self.plan.rated_velocity, zone=zone)
             commands = path_commands(path, pace, _STEP, reoriented=reoriented)
             arm = self._arm(0, load)
             frames = homogeneous(commands.rotation, commands.position)
@@ -395,20 +335,20 @@ class _Cell:
 
     def _times(self, end: float, before: float = 0.0) -> Array:
         step = 1.0 / self.tracker.rate
-        return np.arange(-round(before / step), int(end / step) + 1) * step
+        return np.arange(-round(before / step), int(end / step) + 1, dtype=float) * step
 
     def _cycle(
-        self, into: list[_Stream], test: str, place: str, cycle: int, velocity: float, load: float, motion: Motion
+        self, into: list[Stream], test: str, place: str, cycle: int, velocity: float, load: float, motion: Motion
     ) -> None:
         """Note the samples of a cycle, and let the clock run on."""
         self.samples += len(motion.time)
         refuse_beyond("samples_read", self.samples, parameter="rate")
-        position, turn = motion.with_offset(self.rng.normal(0.0, self.drives.scatter, motion.by_joints.shape[2]))
+        position, turn = motion.with_offset(self._scatter(motion.by_joints.shape[2]))
         slower = 1.0 + self.drives.pace * float(self.rng.standard_normal())
         time = self.now + (motion.time - motion.time[0]) * slower
         oriented = into is self.paths
         into.append(
-            _Stream(
+            Stream(
                 test,
                 place,
                 cycle,
@@ -433,7 +373,7 @@ class _Cell:
             for way in test.approaches:
                 along = np.zeros(3)
                 along["xyz".index(way[1])] = 1.0 if way[0] == "+" else -1.0
-                stood = joints + self.rng.normal(0.0, self.drives.scatter, len(joints))
+                stood = joints + self._scatter(len(joints))
                 n = len(force)
                 self.now += _DWELL * n
                 frames = arm.at_rest(
@@ -443,17 +383,15 @@ class _Cell:
                     force[:, None] * (to_base @ along),
                 )
                 read = frames[:, :3, 3] + self.rng.normal(0.0, self.tracker.sigma, (n, 3))
-                self.pushes.append((way, cycle, force, read))
-
-    # -- what was read -------------------------------------------------------------------------------------
+                self.pushes.append(Pushed(way, cycle, force, read))
 
     def read(self) -> SimulatedCampaign:
         """Return everything that was noted, as the instrument read it."""
         return SimulatedCampaign(
             self._poses_read() if self.stands else None,
-            _samples(self.paths, "simulated paths") if self.paths else None,
-            _samples(self.settling, "simulated settling") if self.settling else None,
-            self._pushes_read() if self.pushes else None,
+            samples_of(self.paths, "simulated paths") if self.paths else None,
+            samples_of(self.settling, "simulated settling") if self.settling else None,
+            pushes_of(self.pushes) if self.pushes else None,
             self.now,
         )
 
@@ -461,126 +399,20 @@ class _Cell:
         stands = self.stands
         frames = np.empty((len(stands), 4, 4))
         for key in dict.fromkeys((s.robot, s.load) for s in stands):
-            rows = np.array([row for row, s in enumerate(stands) if (s.robot, s.load) == key])
-            came = [stands[row] for row in rows.tolist()]
+            rows = [row for row, s in enumerate(stands) if (s.robot, s.load) == key]
+            came = [stands[row] for row in rows]
             frames[rows] = self._arm(*key).at_rest(
                 np.array([s.joints for s in came]),
                 np.array([s.came for s in came]),
                 np.array([s.working for s in came]),
             )
-        n = len(stands)
-        turned = rotation_from_vector(self.rng.normal(0.0, self.tracker.sigma_rot, (n, 3)))
-        return AttainedPoses(
-            Names.of(s.criterion for s in stands),
-            Names.of(f"r{s.robot + 1}" if s.criterion == "E" else "" for s in stands),
-            Names.of(s.pose for s in stands),
-            Names.of(s.approach for s in stands),
-            np.array([s.cycle for s in stands], dtype=np.intp),
-            np.array([s.velocity for s in stands]),
-            np.array([s.load for s in stands]),
-            np.array([s.time for s in stands]),
-            frames[:, :3, 3] + self.rng.normal(0.0, self.tracker.sigma, (n, 3)),
-            turned @ frames[:, :3, :3],
-            np.arange(2, n + 2),
-            "simulated poses",
-        )
-
-    def _pushes_read(self) -> Pushes:
-        rows = sum(len(force) for _, _, force, _ in self.pushes)
-        return Pushes(
-            Names.of(way for way, _, force, _ in self.pushes for _ in force),
-            np.concatenate([force for _, _, force, _ in self.pushes]),
-            np.repeat([cycle for _, cycle, _, _ in self.pushes], [len(force) for _, _, force, _ in self.pushes]),
-            np.concatenate([read for _, _, _, read in self.pushes]),
-            np.arange(2, rows + 2),
-            "simulated forces",
-        )
+        return poses_of(stands, frames, self.tracker, self.rng)
 
 
-def path_commands(path: PlannedPath, pace: Pace, step: float, *, reoriented: bool = False) -> Commands:
-    """Return what a controller commands along a planned path.
-
-    A weave runs in straight lines from side to side, its first and last stretch from and to the middle. Its velocity is
-    that of the advance along the line in the middle, so that its frequency is the velocity over the wavelength.
-
-    Parameters
-    ----------
-    path
-        In the robot's base frame.
-    pace
-        How fast.
-    step
-        Between two commands [s].
-    reoriented
-        Whether the orientation alternates: from one to the other and back, :data:`TURNS` times.
-
-    Raises
-    ------
-    InputError
-        If the orientation shall alternate and the path has one alone.
-    """
-    if path.kind == "circle":
-        return along_circle(path.points[0], path.points[1], path.normal, path.rotation, pace, step)
-    points = path.points
-    if path.kind == "weave":
-        points, longer = _weave(path)
-        pace = Pace(pace.velocity * longer, pace.acceleration, pace.zone, pace.turning, pace.turning_acceleration)
-    rotations = np.broadcast_to(path.rotation, (len(points), 3, 3))
-    if reoriented:
-        if path.other is None:
-            raise InputError(
-                "this path has one orientation, and another is needed for the orientation to change",
-                parameter="plan",
-                came=path.name,
-            )
-        share = np.linspace(0.0, 1.0, TURNS + 1)[:, None]
-        points = points[0] + share * (points[-1] - points[0])
-        rotations = np.stack([path.rotation if k % 2 == 0 else path.other for k in range(TURNS + 1)])
-    return along_lines(points, rotations, pace, step)
-
-
-def _weave(path: PlannedPath) -> tuple[Array, float]:
-    """Return the corners of a weave ``(k, 3)``, and how much longer its way is than the line in the middle."""
-    way = path.points[-1] - path.points[0]
-    length = float(np.linalg.norm(way))
-    along = way / length
-    aside = np.cross(path.normal, along)
-    half = path.wavelength / 2
-    count = int(length / half + 1e-9)
-    middle = (np.arange(count) + 0.5) * half
-    sides = np.where(np.arange(count) % 2 == 0, 1.0, -1.0) * path.stroke / 2
-    corners = path.points[0] + middle[:, None] * along + sides[:, None] * aside
-    end = path.points[0] + count * half * along
-    return np.concatenate([path.points[:1], corners, end[None]]), float(np.hypot(half, path.stroke) / half)
+def _say(progress: Callable[[str], None], test: str, words: str) -> None:
+    progress(f"{test}: {words}")
 
 
 def _conditions(test: PlannedTest) -> Iterator[tuple[float, float]]:
     """Give each load with each velocity."""
     return ((load, velocity) for load in test.loads for velocity in test.velocities)
-
-
-def _samples(streams: Sequence[_Stream], source: str) -> Samples:
-    counts = [len(s.time) for s in streams]
-    n = sum(counts)
-
-    def named(texts: Sequence[str]) -> Names:
-        each = Names.of(texts)
-        return Names(each.names, np.repeat(each.code, counts))
-
-    quaternions = [s.quaternion for s in streams if s.quaternion is not None]
-    rotation = None
-    if quaternions:
-        turned = rotation_from_vector(np.concatenate([s.turn for s in streams if s.turn is not None]))
-        rotation = turned @ rotation_from_quaternion(np.concatenate(quaternions))
-    return Samples(
-        named([s.criterion for s in streams]),
-        named([s.place for s in streams]),
-        np.repeat(np.array([s.cycle for s in streams], dtype=np.intp), counts),
-        np.repeat([s.velocity for s in streams], counts),
-        np.repeat([s.load for s in streams], counts),
-        np.concatenate([s.time for s in streams]),
-        np.concatenate([s.position for s in streams]),
-        rotation,
-        np.arange(2, n + 2),
-        source,
-    )

@@ -35,7 +35,6 @@ def plan_of(*, velocity: float = 0.25) -> PerformancePlan:
     def path(name: str, kind: str, points: list[Array], **more: float | Array) -> PlannedPath:
         return PlannedPath(name, kind, np.array(points), NORMAL, rotation, **more)  # type: ignore[arg-type]
 
-    corners = ((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1))
     paths = [
         path("line", "polyline", [CENTRE - u - v, CENTRE + u + v], other=other),
         path(

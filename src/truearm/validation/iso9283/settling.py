@@ -18,10 +18,13 @@ from truearm.measurement.performance.records import Samples
 from truearm.modeling.chain import Array
 from truearm.planning.iso9283.planned import PerformancePlan
 from truearm.validation.iso9283.runs import LEAST_SAMPLES, Part, in_base, parts_of
+from truearm.validation.iso9283.smoothing import local_lines
 from truearm.validation.iso9283.values import COARSE, Conditions, Instrument, Status, Value
 
 #: The final pose is the mean of this last share of the samples.
 _FINAL = 0.1
+#: Share of the band that noise may have, and of the time over which it is taken away, where the final stay is read.
+_QUIET = 0.02
 #: Samples outside the band that show how far an overshoot goes.
 _LEAST_OUTSIDE = 4
 
@@ -84,7 +87,10 @@ def settling_values(
         known = () if planned is None else tuple(dict.fromkeys((*planned.places, *planned.approaches)))
         for part in parts_of(samples, test, known):
             assert planned is not None
-            here = [_cycle(plan, samples, transform, test, part, number, rows) for number, rows in part.cycles()]
+            here = [
+                _cycle(plan, samples, transform, test, part, number, rows, instrument.sigma)
+                for number, rows in part.cycles()
+            ]
             curves += here
             values += _values(here, planned.cycles, instrument)
     return values, curves
@@ -130,6 +136,7 @@ def _cycle(
     part: Part,
     number: int,
     rows: NDArray[np.intp],
+    sigma: float,
 ) -> SettlingCurve:
     at = f"{samples.source}, lines {samples.line[rows[0]]} to {samples.line[rows[-1]]}"
     if len(rows) < LEAST_SAMPLES:
@@ -164,9 +171,10 @@ def _cycle(
         )
     passing = _passings(position, _final(position), band)
     entered = int(np.flatnonzero(passing[:, 0] <= 1.0)[0])
-    final = int(np.flatnonzero(outside)[-1])
     entry = float(time[entered] + (time[entered + 1] - time[entered]) * passing[entered, 0])
-    stay = _crossing(time, distance, band, final + 1)
+    stay = _stay(time, position, band, 0.0)
+    if stay > entry:
+        stay = max(_stay(time, position, band, _window(time, stay - entry, sigma, band)), entry)
     later = distance[entered + 1 :]
     settles = not (outside[entered + 1 :].any())
     overshoot = 0.0 if settles else float(later.max())
@@ -232,6 +240,24 @@ def _excursion(passing: Array, peak: int) -> int:
     after = np.flatnonzero(met[peak:])
     first = int(before[-1]) + 1 if len(before) else 0
     return (peak + int(after[0]) if len(after) else len(met)) - first + 1
+
+
+def _window(time: Array, settling: float, sigma: float, band: float) -> float:
+    """Return the window over which positions are smoothed before the final stay is read [s], 0 for none.
+
+    Noise makes the tip leave the band later than it does. The window brings it to a fiftieth of the band, and takes a
+    fiftieth of the time at most, so that an oscillation stays as it is.
+    """
+    step = float(np.median(np.diff(time)))
+    window = min(step * (sigma / (_QUIET * band)) ** 2, _QUIET * settling)
+    return window if window >= 3 * step else 0.0
+
+
+def _stay(time: Array, position: Array, band: float, window: float) -> float:
+    """Return when the band is entered for good [s]."""
+    smooth = local_lines(time, position, time, window / 2)[0] if window else position
+    distance = np.linalg.norm(smooth - _final(position), axis=1)
+    return _crossing(time, distance, band, int(np.flatnonzero(distance > band)[-1]) + 1)
 
 
 def _crossing(time: Array, distance: Array, band: float, first: int) -> float:

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from truearm.errors import InputError
-from truearm.measurement.readers.performance_samples import read_path_samples, read_settling_samples
+from truearm.measurement.readers.performance_samples import TESTS_OF, read_path_samples, read_settling_samples
+from truearm.planning.iso9283.criteria import TESTS
 
 HEADER = "criterion,path,cycle,time [s],x [mm],y [mm],z [mm]"
 SETTLING = "criterion,pose,cycle,time [s],x [mm],y [mm],z [mm]"
@@ -30,6 +31,11 @@ def refused(path: Path, read: Callable[[Path], object] = read_path_samples) -> s
     with pytest.raises(InputError) as caught:
         read(path)
     return str(caught.value)
+
+
+def test_each_file_takes_the_tests_that_are_planned_for_it() -> None:
+    for place, file in (("path", "paths"), ("pose", "settling")):
+        assert set(TESTS_OF[place]) == {test.id for test in TESTS.values() if test.readings == file}  # type: ignore[index]
 
 
 def test_rows_are_read_with_their_names_in_si_units(written: Callable[..., Path]) -> None:
@@ -130,9 +136,7 @@ def test_a_header_that_cannot_be_used_is_refused(written: Callable[..., Path], h
     assert said in refused(written(ROWS[0], header=header))
 
 
-@pytest.mark.parametrize(
-    ("velocity", "load"), [("0", "9"), ("120", "9"), ("9", "110"), ("9", "-1"), ("x", "1")]
-)
+@pytest.mark.parametrize(("velocity", "load"), [("0", "9"), ("120", "9"), ("9", "110"), ("9", "-1"), ("x", "1")])
 def test_a_load_or_velocity_beyond_the_rated_one_is_refused(
     written: Callable[..., Path], velocity: str, load: str
 ) -> None:

@@ -80,7 +80,7 @@ def test_a_path_read_through_another_frame_in_another_order_is_the_same() -> Non
     samples = offset_runs("rectangle", 1e-4 * rng.normal(size=(6, 3)))
     turned = np.eye(4)
     turned[:3, :3], turned[:3, 3] = rotation_from_vector(np.array([[0.3, -1.0, 2.0]]))[0], (1.0, -2.0, 0.5)
-    seen = replace(samples, position=in_base(np.linalg.inv(turned), samples.position))
+    seen = replace(samples, position=in_base(np.asarray(np.linalg.inv(turned), float), samples.position))
     order = np.argsort(-samples.cycle, kind="stable")
     mixed = replace(samples, cycle=samples.cycle[order], time=samples.time[order], position=samples.position[order])
     plain = path_values(PLAN, samples, HERE, EXACT)[0]
@@ -388,6 +388,14 @@ def test_noise_well_within_the_band_changes_little() -> None:
     values, _ = settling_values(PLAN, oscillating(1000.0, sigma=1e-5), HERE, Instrument(1e-5))
     assert the(values, "t").value == pytest.approx(stay - entry, abs=0.03)
     assert the(values, "OV").value == pytest.approx(overshoot, rel=0.002)
+
+
+def test_single_samples_that_noise_puts_outside_the_band_change_nothing() -> None:
+    entry, stay, _ = closed_form()
+    samples = oscillating(1000.0, sigma=1e-5)
+    samples.position[[2000, 2499, 7499]] += 0.11e-3 * NORMAL
+    values, _ = settling_values(PLAN, samples, HERE, Instrument(1e-5))
+    assert the(values, "t").value == pytest.approx(stay - entry, abs=0.03)
 
 
 def test_a_tip_that_does_not_leave_the_band_again_has_no_overshoot() -> None:

@@ -151,7 +151,7 @@ def _cycle(
     position = in_base(transform, samples.position[rows])
     band = plan.limit_band
     distance = np.asarray(np.linalg.norm(position - _final(position), axis=1))
-    outside = distance > band
+    outside = _outside(distance, band, sigma)
     last = max(int(_FINAL * len(rows)), 5)
     if outside[-last:].any():
         raise InputError(
@@ -172,11 +172,12 @@ def _cycle(
     passing = _passings(position, _final(position), band)
     entered = int(np.flatnonzero(passing[:, 0] <= 1.0)[0])
     entry = float(time[entered] + (time[entered + 1] - time[entered]) * passing[entered, 0])
-    stay = _stay(time, position, band, 0.0)
-    if stay > entry:
-        stay = max(_stay(time, position, band, _window(time, stay - entry, sigma, band)), entry)
+    stay = entry
+    if outside[entered + 1 :].any():
+        stay = _stay(time, position, band, sigma, 0.0)
+        stay = max(_stay(time, position, band, sigma, _window(time, stay - entry, sigma, band)), entry)
     later = distance[entered + 1 :]
-    settles = not (outside[entered + 1 :].any())
+    settles = stay <= entry
     overshoot = 0.0 if settles else float(later.max())
     step = float(np.median(np.diff(time)))
     speed = (distance[entered] - distance[entered + 1]) / (time[entered + 1] - time[entered])
@@ -189,7 +190,8 @@ def _cycle(
         crossing = 2 * band / max(float(speed), 1e-12)
         slow = step > COARSE * (crossing if settles else settled)
         few = not settles and _excursion(passing, entered + 1 + int(later.argmax())) < _LEAST_OUTSIDE
-        coarse = (slow, slow or few)
+        blurred = not settles and overshoot - band < 3 * sigma
+        coarse = (slow, slow or few or blurred)
     where = part.place
     if test == "posing-time":
         planned = plan.test(test)
@@ -253,11 +255,18 @@ def _window(time: Array, settling: float, sigma: float, band: float) -> float:
     return window if window >= 3 * step else 0.0
 
 
-def _stay(time: Array, position: Array, band: float, window: float) -> float:
+def _outside(distance: Array, band: float, sigma: float) -> NDArray[np.bool_]:
+    """Return which samples are outside the band, ``(n,)``; one alone that noise can have put there is not."""
+    outside = distance > band
+    beside = np.concatenate([[True], outside[:-1]]) | np.concatenate([outside[1:], [False]])
+    return np.asarray(outside & (beside | (distance > band + 5 * sigma)))
+
+
+def _stay(time: Array, position: Array, band: float, sigma: float, window: float) -> float:
     """Return when the band is entered for good [s]."""
     smooth = local_lines(time, position, time, window / 2)[0] if window else position
     distance = np.linalg.norm(smooth - _final(position), axis=1)
-    return _crossing(time, distance, band, int(np.flatnonzero(distance > band)[-1]) + 1)
+    return _crossing(time, distance, band, int(np.flatnonzero(_outside(distance, band, sigma))[-1]) + 1)
 
 
 def _crossing(time: Array, distance: Array, band: float, first: int) -> float:

@@ -26,6 +26,7 @@ from truearm.cli.hexapod import app as hexapod
 from truearm.cli.ik import ik
 from truearm.cli.importing import app as importing
 from truearm.cli.influence import influence
+from truearm.cli.iso9283 import app as iso9283
 from truearm.cli.library import robots, show
 from truearm.cli.lines import lines
 from truearm.cli.options import CommandError, Commands
@@ -91,6 +92,7 @@ app.command()(simulate)
 app.command()(devices)
 app.add_typer(importing, name="import")
 app.add_typer(hexapod, name="hexapod")
+app.add_typer(iso9283, name="iso9283")
 app.command()(robots)
 app.command()(show)
 app.command()(convert)

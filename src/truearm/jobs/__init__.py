@@ -38,6 +38,7 @@ JOBS: Final = (
     "axes",
     "tolerance",
     "lines",
+    "iso9283_plan",
     "influence",
     "sphere",
     "hexapod_enumerate",

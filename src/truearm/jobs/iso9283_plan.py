@@ -1,0 +1,215 @@
+"""Tests of a robot by ISO 9283, planned."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from truearm.errors import InputError, refusals_of
+from truearm.files import path_argument
+from truearm.jobs.arguments import (
+    choice_argument,
+    choices_argument,
+    command_argument,
+    files_of,
+    folder_beside,
+    length_argument,
+    lengths_argument,
+    numbers_argument,
+    python_call,
+    robot_argument,
+)
+from truearm.modeling.robot import Robot
+from truearm.notices import Notice
+from truearm.planning.iso9283.criteria import CRITERIA, TEST_OF, TESTS
+from truearm.planning.iso9283.plan import VELOCITIES, performance_plan
+from truearm.planning.iso9283.plan_file import PLAN, read_cube
+from truearm.planning.poses.iso9283 import PLANES
+from truearm.planning.poses.largest_cube import DIRECTIONS, Direction
+from truearm.results.iso9283_plan import PLAN_FILES, Iso9283Plan
+
+#: What the tip of a robot is called whose target is given by its place alone.
+TIP = "tip"
+#: Every criterion at once; the largest cube.
+ALL, AUTO = "all", "auto"
+#: Rated velocity along a path where none is stated [m/s].
+_ASSUMED_VELOCITY = 1.0
+
+
+def iso9283_plan(
+    robot: Robot | str | Path,
+    *,
+    criteria: Sequence[str] = (ALL,),
+    cube: str | Path = AUTO,
+    plane: str = "C1-C2-C7-C8",
+    target: str | None = None,
+    tip: Sequence[float] | None = None,
+    load: float | None = None,
+    velocity: float | None = None,
+    velocities: Sequence[float] = VELOCITIES,
+    loads: Sequence[float] = (1.0,),
+    limit_band: float = 0.1e-3,
+    hours: float = 8.0,
+    ahead: Direction = "+x",
+    nearest: float = 0.0,
+    floor: float = 0.0,
+    out: str | Path | None = None,
+    command: str | None = None,
+) -> Iso9283Plan:
+    """Plan the tests of a robot's performance by ISO 9283.
+
+    Parameters
+    ----------
+    robot
+        The nominal robot, as the controller knows it, or what :func:`truearm.load_robot` takes.
+    criteria
+        Ids of criteria, in capitals or not (``ap``, ``rp``), or ``all``.
+    cube
+        ``auto`` for the largest that the robot can be tested in, or a file with one (schema ``truearm-cube/1``).
+    plane
+        Which of the cube's diagonal planes: ``C1-C2-C7-C8``, ``C2-C3-C8-C5``, ``C3-C4-C5-C6`` or ``C4-C1-C6-C7``.
+    target
+        Name of the target that is measured; None for the flange, or `tip`.
+    tip
+        What is measured, by its place in the flange frame [m].
+    load
+        Rated load [kg]; None for that of the robot file.
+    velocity
+        Rated velocity of the tip along a path, that 100 % stands for [m/s]; None for 1 m/s.
+    velocities, loads
+        Shares of them that are tested, 0 to 1.
+    limit_band
+        Within which of the final pose the tip is said to stand [m].
+    hours
+        How long the drift is watched.
+    ahead, nearest, floor
+        Where the largest cube is searched, as for :func:`truearm.poses`.
+    out
+        Folder for ``plan.yaml``, ``robot.yaml`` and ``sheet.html``; None writes nothing.
+    command
+        How to run it again, for the sheet; None writes the call in Python.
+
+    Raises
+    ------
+    InputError
+        If there is no such criterion, plane or target, the arm has fewer than six joints, or it cannot come to all
+        poses and along all paths of the cube.
+    """
+    tests = _tests(criteria)
+    choice_argument(plane, "plane", dict.fromkeys(PLANES))
+    choice_argument(ahead, "ahead", dict.fromkeys(DIRECTIONS))
+    near, low = length_argument(nearest, "nearest"), length_argument(floor, "floor")
+    band = _positive(limit_band, "limit_band", "a length above 0 [m]")
+    watched = _positive(hours, "hours", "hours above 0")
+    shares = _shares(velocities, "velocities", above_zero=True)
+    carried = _shares(loads, "loads", above_zero=False)
+    given_cube = None if cube == AUTO else path_argument(cube, "cube")
+    inputs = files_of(robot, given_cube)
+    folder = None if out is None else folder_beside(PLAN_FILES, PLAN, out, robot, given_cube)
+    call = command_argument(command) or python_call(
+        "iso9283_plan",
+        robot,
+        criteria=list(criteria),
+        cube=cube,
+        plane=plane,
+        target=target,
+        tip=tip,
+        load=load,
+        velocity=velocity,
+        velocities=list(velocities),
+        loads=list(loads),
+        limit_band=limit_band,
+        hours=hours,
+        ahead=ahead,
+        nearest=nearest,
+        floor=floor,
+    )
+    arm = robot_argument(robot)
+    if target is not None and tip is not None:
+        raise InputError(
+            "only one of them can be measured", parameter="target, tip", came=target, cure="Leave one out."
+        )
+    if target is not None:
+        choice_argument(target, "target", {known.name: known for known in arm.targets})
+    if tip is not None:
+        arm, target = arm.with_frames(arm.base, {TIP: lengths_argument(tip, "tip", 3)}), TIP
+    warnings: list[Notice] = []
+    rated = _rated_load(arm, load, warnings)
+    speed = _ASSUMED_VELOCITY
+    if velocity is None:
+        warnings.append(
+            Notice(
+                "rated-velocity-assumed",
+                f"100 % is taken for {_ASSUMED_VELOCITY * 1e3:g} mm/s along a path. State the rated velocity of your "
+                "robot with `velocity`.",
+                "note",
+            )
+        )
+    else:
+        speed = _positive(velocity, "velocity", "a velocity above 0 [m/s]")
+    with refusals_of("cube"):
+        whole = None if given_cube is None else read_cube(given_cube)
+    with refusals_of("cube" if whole is not None else "robot"):
+        plan = performance_plan(
+            arm,
+            target=target,
+            tests=tests,
+            cube=whole,
+            plane=plane,
+            rated_load=rated,
+            rated_velocity=speed,
+            velocities=shares,
+            loads=carried,
+            limit_band=band,
+            hours=watched,
+            ahead=ahead,
+            nearest=near,
+            floor=low,
+        )
+    found = Iso9283Plan(plan, call, tuple(warnings), inputs)
+    if folder is not None:
+        found.save(folder)
+    return found
+
+
+def _tests(criteria: Sequence[str]) -> tuple[str, ...]:
+    """Return the tests that criteria are measured in, in their usual order."""
+    by_small = {name.lower(): name for name in (ALL, *CRITERIA)}
+    if isinstance(criteria, Sequence) and not isinstance(criteria, str):
+        criteria = [by_small.get(one.lower(), one) if isinstance(one, str) else one for one in criteria]
+    wanted = choices_argument(criteria, "criteria", (ALL, *CRITERIA), "criterion")
+    if not wanted:
+        raise InputError("no criterion is given", parameter="criteria", allowed=", ".join((ALL, *CRITERIA)))
+    tests = set(TESTS) if ALL in wanted else {TEST_OF[one] for one in wanted}
+    return tuple(one for one in TESTS if one in tests)
+
+
+def _rated_load(arm: Robot, load: object, warnings: list[Notice]) -> float:
+    if load is not None:
+        return _positive(load, "load", "a mass above 0 [kg]")
+    if arm.rated_load is not None:
+        return arm.rated_load
+    raise InputError(
+        "the robot file does not state the rated load",
+        parameter="load",
+        where=arm.name,
+        allowed="a mass above 0 [kg]",
+        cure="State it.",
+    )
+
+
+def _positive(value: object, parameter: str, allowed: str) -> float:
+    (number,) = numbers_argument([value], parameter, 1, allowed)
+    if number <= 0.0:
+        raise InputError("this is above 0", parameter=parameter, came=number, allowed=allowed)
+    return number
+
+
+def _shares(values: object, parameter: str, *, above_zero: bool) -> tuple[float, ...]:
+    count = len(values) if isinstance(values, Sequence) else 1
+    shares = numbers_argument(values, parameter, count, "shares of the rated one, 0 to 1")
+    if not shares or not all(0.0 <= v <= 1.0 and (v > 0.0 or not above_zero) for v in shares):
+        raise InputError(
+            "these are shares of the rated one", parameter=parameter, came=list(shares), allowed="0 to 1, one or more"
+        )
+    return tuple(dict.fromkeys(shares))

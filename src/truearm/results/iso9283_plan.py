@@ -1,0 +1,109 @@
+"""A plan of tests by ISO 9283: what is measured, and the files with which it is done."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from truearm.modeling.formats.robot_file import robot_text
+from truearm.notices import Notice
+from truearm.planning.iso9283.criteria import TESTS
+from truearm.planning.iso9283.plan_file import PLAN, ROBOT, plan_text
+from truearm.planning.iso9283.planned import PerformancePlan, PlannedTest
+from truearm.results.record import Record, notice_lines, notice_summaries
+from truearm.shown import counted, millimetres
+from truearm.writing import output_folder, write_files
+
+#: What the operator takes along.
+SHEET: Final = "sheet.html"
+PLAN_FILES: Final = (PLAN, ROBOT, SHEET)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Iso9283Plan(Record):
+    """Tests of a robot's performance, planned.
+
+    Attributes
+    ----------
+    plan
+        What is commanded.
+    command
+        How to run it again.
+    warnings
+        What to know about it.
+    inputs
+        The files that were read: none of them is overwritten.
+    """
+
+    plan: PerformancePlan
+    command: str
+    warnings: tuple[Notice, ...] = ()
+    inputs: tuple[Path, ...] = ()
+
+    def summary(self) -> dict[str, Any]:
+        """Return the plan as JSON holds it: lengths in mm, velocities and loads in percent of the rated ones."""
+        plan = self.plan
+        return {
+            "robot": plan.robot.name,
+            "target": plan.target,
+            "cube_mm": {"centre": (plan.cube.centre * 1e3).tolist(), "side": plan.cube.side * 1e3, "plane": plan.plane},
+            "rated_load_kg": plan.rated_load,
+            "rated_velocity_mm_s": plan.rated_velocity * 1e3,
+            "tests": [
+                {
+                    "criterion": test.id,
+                    "criteria": list(TESTS[test.id].criteria),
+                    "places": list(test.places),
+                    "cycles": test.cycles,
+                    "velocities_percent": [round(v * 100.0, 6) for v in test.velocities],
+                    "loads_percent": [round(v * 100.0, 6) for v in test.loads],
+                }
+                for test in plan.tests
+            ],
+            "warnings": notice_summaries(self.warnings),
+        }
+
+    @property
+    def answer(self) -> list[str]:
+        """What is planned, in words."""
+        plan = self.plan
+        centre = ", ".join(millimetres(value) for value in plan.cube.centre)
+        return [
+            f"{counted(len(plan.tests), 'test')} of {plan.robot.title}, plane {plan.plane} of the cube of "
+            f"{millimetres(plan.cube.side)} mm about ({centre}) mm.",
+            f"Rated: {plan.rated_load:g} kg, {millimetres(plan.rated_velocity)} mm/s along a path.",
+        ]
+
+    def lines(self) -> list[str]:
+        """Return what is planned, test by test."""
+        rows = [
+            (", ".join(TESTS[test.id].criteria), TESTS[test.id].name, ", ".join(test.places), how_often(test))
+            for test in self.plan.tests
+        ]
+        wide = [max(len(row[k]) for row in rows) for k in range(3)]
+        table = ["  ".join([*(row[k].ljust(wide[k]) for k in range(3)), row[3]]).rstrip() for row in rows]
+        return [*self.answer, *table, *notice_lines(self.warnings)]
+
+    def contents(self) -> dict[str, str]:
+        """Return the texts of all files by their names."""
+        from truearm.reporting.iso9283_sheet import iso9283_sheet
+
+        return {PLAN: plan_text(self.plan), ROBOT: robot_text(self.plan.robot), SHEET: iso9283_sheet(self)}
+
+    def save(self, folder: str | Path) -> tuple[Path, ...]:
+        """Write all files into a folder; return them."""
+        contents = self.contents()
+        out = output_folder(folder, contents, self.inputs, "folder")
+        write_files(out, contents, self.command)
+        return tuple(out / name for name in contents)
+
+
+def how_often(test: PlannedTest) -> str:
+    """Return in words how often a test is done, and under what."""
+    speeds = ", ".join(f"{100 * v:g}" for v in test.velocities)
+    loads = ", ".join(f"{100 * v:g}" for v in test.loads)
+    often = counted(test.cycles, "cycle")
+    if test.id == "compliance":
+        return f"{often}, up to {loads} % of the rated load"
+    return f"{often}, {speeds} % velocity, {loads} % load"

@@ -46,6 +46,10 @@ PATHS = ("line", "rectangle", "large-circle", "small-circle")
 RATES = (25.0, 50.0, 100.0, 250.0, 1000.0)
 
 
+def say(text: str) -> None:
+    sys.stdout.write(f"{text}\n")
+
+
 def streams(count: int = 30) -> dict[str, object]:
     rows = []
     for seed in range(count):
@@ -65,22 +69,20 @@ def streams(count: int = 30) -> dict[str, object]:
         assert found is not None
         at = the(values, "AT").value / np.linalg.norm(aside(np.linspace(0, length, 1001)), axis=1).max() - 1
         off = [max(abs(t[a] - b), abs(t[c] - d)) for (a, c), (b, d) in zip(found.cycles, truth, strict=False)]
-        motions = 20 if name == "line" else 10
+        there = 20 if name == "line" else 10
         rows.append(
             {
                 "rate": rate,
                 "path": name,
                 "cycles": len(found.cycles) == 10,
-                "motions": len(found.motions) == motions and len(found.dwells) == motions + 1,
+                "motions": len(found.motions) == there and len(found.dwells) == there + 1,
                 "ends_s": round(max(off), 4),
                 "AT": round(float(at), 4),
             }
         )
     worst = max(abs(float(str(row["AT"]))) for row in rows)
-    print(
-        sum(bool(r["cycles"]) for r in rows), "of", count, "cycles;", sum(bool(r["motions"]) for r in rows), "motions"
-    )
-    print("largest error of AT", worst, "largest error of an end", max(float(str(r["ends_s"])) for r in rows))
+    cycles, motions = (sum(bool(row[name]) for row in rows) for name in ("cycles", "motions"))
+    say(f"{cycles} of {count} cycles, {motions} motions, largest error of AT {worst}")
     return {"rows": rows, "largest_error_of_AT": worst}
 
 
@@ -121,7 +123,7 @@ def coverage(count: int = 1000) -> dict[str, object]:
             "RV": float(inside[:, 1].mean()),
             "width over oracle": [round(float(w / o), 3) for w, o in zip(width.mean(axis=0), oracle, strict=True)],
         }
-        print(law, told[law])
+        say(f"{law} {told[law]}")
     return told
 
 
@@ -169,7 +171,7 @@ def paths(count: int = 300) -> dict[str, object]:
                 assert interval is not None
                 inside[trial, k] = interval[0] <= truth <= interval[1]
         told[f"AT {1e3 * size:g} mm"] = {"AT": float(inside[:, 0].mean()), "RT": float(inside[:, 1].mean())}
-        print(size, told[f"AT {1e3 * size:g} mm"])
+        say(f"{size} {told[f'AT {1e3 * size:g} mm']}")
     return told
 
 
@@ -228,7 +230,7 @@ def size(rows: int = 1_000_000) -> dict[str, object]:
     }
     file.unlink()
     folder.rmdir()
-    print(told)
+    say(str(told))
     return told
 
 

@@ -27,7 +27,7 @@ ACROSS = np.cross(NORMAL, ALONG)
 TURN = np.array([0.2, -0.1, 0.3])
 
 
-def plan_of(*, velocity: float = 0.25, cycles: dict[str, int] | None = None) -> PerformancePlan:
+def plan_of(*, velocity: float = 0.25) -> PerformancePlan:
     """Return a plan with all paths; `velocity` is the rated one [m/s]."""
     u, v = 0.2 * ALONG, 0.15 * ACROSS
     rotation, other = np.eye(3), rotation_from_vector(TURN[None])[0]
@@ -47,9 +47,7 @@ def plan_of(*, velocity: float = 0.25, cycles: dict[str, int] | None = None) -> 
     P1 = PlannedPose("P1", CENTRE, rotation, np.zeros(6))
     D100 = PlannedPose("D100", CENTRE + 0.1 * ALONG, rotation, np.zeros(6))
     tests = [
-        PlannedTest(
-            t.id, t.places, (cycles or {}).get(t.id, t.cycles), approaches=("D100",) if t.id == "posing-time" else ()
-        )
+        PlannedTest(t.id, t.places, t.cycles, approaches=("D100",) if t.id == "posing-time" else ())
         for t in TESTS.values()
     ]
     return PerformancePlan(

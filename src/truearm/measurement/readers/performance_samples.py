@@ -26,7 +26,6 @@ from truearm.measurement.readers.canonical import refuse_other_separators
 from truearm.measurement.readers.rows import unit_quaternions
 from truearm.modeling.chain import Array
 from truearm.modeling.transform import rotation_from_quaternion
-from truearm.planning.iso9283.criteria import TESTS
 from truearm.printable import is_one_line
 from truearm.units import LENGTH_UNITS, as_number, checked_unit, from_si
 
@@ -42,6 +41,12 @@ _BLOCK: Final = 4_000_000
 _LARGEST: Final = 1e6
 
 Place = Literal["path", "pose"]
+#: Tests of which each file has rows, by what it has in place of a path: ids of
+#: :data:`truearm.planning.iso9283.criteria.TESTS`.
+TESTS_OF: Final[dict[Place, tuple[str, ...]]] = {
+    "path": ("AT", "AT-reorientation", "CR", "AV", "WS"),
+    "pose": ("t", "posing-time"),
+}
 
 
 @dataclass(frozen=True)
@@ -236,15 +241,13 @@ def _codes(
 
 def _check_labels(labels: dict[str, str], line: int, header: _Header) -> None:
     place: Place = "path" if "path" in labels else "pose"
-    file = "paths" if place == "path" else "settling"
-    known = [test.id for test in TESTS.values() if test.readings == file]
+    known = TESTS_OF[place]
     criterion = labels["criterion"]
     if criterion not in known:
         near = nearest_names(criterion, known, 1)
-        other = TESTS.get(criterion)
         cure = f"Did you mean {near[0]}?" if near else "Name the test for which it was measured."
-        if other is not None:
-            cure = f"Samples of {criterion} belong into the file of {other.readings}."
+        if criterion in TESTS_OF["pose" if place == "path" else "path"]:
+            cure = f"Samples of {criterion} belong into the file of {'paths' if place == 'pose' else 'settling'}."
         raise InputError(
             "there is no such test in this file",
             where=header.at(line, "criterion"),

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truearm.modeling.chain import Array
 from truearm.planning.iso9283.planned import PlannedPath
@@ -72,8 +73,9 @@ class CommandedPath:
         out = (self.vertices[0] - self.centre) / self.radius
         return out, np.cross(self.path.normal, out)
 
-    def _side(self, along: Array) -> tuple[Array, Array]:
-        side = np.clip(np.searchsorted(self.starts, along, side="right") - 1, 0, len(self.starts) - 2)
+    def _side(self, along: Array) -> tuple[NDArray[np.intp], Array]:
+        last = len(self.starts) - 2
+        side: NDArray[np.intp] = np.clip(np.searchsorted(self.starts, along, side="right") - 1, 0, last)
         ends = self.vertices[1:] - self.vertices[:-1]
         return side, (ends / np.linalg.norm(ends, axis=1)[:, None])[side]
 

@@ -250,8 +250,13 @@ def _accuracy_interval(deviation: Array, tie: Array | None, rng: np.random.Gener
 
     Errors of the mean path are drawn with the covariance of the cycles along it, each campaign with a covariance that
     n cycles might show (scaled inverse chi-square, which is Student's t at every station), and set upon the mean path
-    shrunk by what noise adds to its square at the station where it is largest.
+    shrunk by what noise adds to its square: the lower end is the estimate less what noise then adds to the largest,
+    and 0 where errors alone give as much.
+    The upper end is the largest over stations of the upper end of each for itself, Student's t in the direction in
+    which cycles scatter most: it lies above the truth if that at the station with the largest true distance does.
     """
+    from scipy import stats
+
     n, m, d = deviation.shape
     mean = deviation.mean(axis=0)
     residual = (deviation - mean).reshape(n, m * d)
@@ -266,9 +271,16 @@ def _accuracy_interval(deviation: Array, tie: Array | None, rng: np.random.Gener
     centre = mean * share[:, None]
     true = float(np.linalg.norm(centre, axis=1).max())
     largest = np.linalg.norm(centre + error, axis=2).max(axis=1)
-    low, high = np.quantile(largest - true, [0.025, 0.975])
     estimate = float(distance.max())
-    return max(estimate - float(high), 0.0), max(estimate - float(low), 0.0)
+    low = estimate - float(np.quantile(largest - true, 0.975))
+    if estimate <= float(np.quantile(np.linalg.norm(error, axis=2).max(axis=1), 0.975)):
+        low = 0.0
+    away = residual.reshape(n, m, d)
+    scatter = np.einsum("nmi,nmj->mij", away, away) / (n * (n - 1))
+    half = stats.t.ppf(0.975, n - 1) * np.sqrt(np.maximum(np.linalg.eigvalsh(scatter)[:, -1], 0.0))
+    if tie is not None and d == 3:
+        half = np.hypot(half, stats.norm.ppf(0.975) * float(np.max(tie)))
+    return max(low, 0.0), float((distance + half).max())
 
 
 def _repeatability_interval(

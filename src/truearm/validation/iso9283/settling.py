@@ -18,10 +18,13 @@ from truearm.measurement.performance.records import Samples
 from truearm.modeling.chain import Array
 from truearm.planning.iso9283.planned import PerformancePlan
 from truearm.validation.iso9283.runs import LEAST_SAMPLES, Part, in_base, parts_of
+from truearm.validation.iso9283.smoothing import local_lines
 from truearm.validation.iso9283.values import COARSE, Conditions, Instrument, Status, Value
 
 #: The final pose is the mean of this last share of the samples.
 _FINAL = 0.1
+#: Share of the band that noise may have, and of the time over which it is taken away, where the final stay is read.
+_QUIET = 0.02
 #: Samples outside the band that show how far an overshoot goes.
 _LEAST_OUTSIDE = 4
 
@@ -84,7 +87,10 @@ def settling_values(
         known = () if planned is None else tuple(dict.fromkeys((*planned.places, *planned.approaches)))
         for part in parts_of(samples, test, known):
             assert planned is not None
-            here = [_cycle(plan, samples, transform, test, part, number, rows) for number, rows in part.cycles()]
+            here = [
+                _cycle(plan, samples, transform, test, part, number, rows, instrument.sigma)
+                for number, rows in part.cycles()
+            ]
             curves += here
             values += _values(here, planned.cycles, instrument)
     return values, curves
@@ -130,6 +136,7 @@ def _cycle(
     part: Part,
     number: int,
     rows: NDArray[np.intp],
+    sigma: float,
 ) -> SettlingCurve:
     at = f"{samples.source}, lines {samples.line[rows[0]]} to {samples.line[rows[-1]]}"
     if len(rows) < LEAST_SAMPLES:
@@ -144,7 +151,7 @@ def _cycle(
     position = in_base(transform, samples.position[rows])
     band = plan.limit_band
     distance = np.asarray(np.linalg.norm(position - _final(position), axis=1))
-    outside = distance > band
+    outside = _outside(distance, band, sigma)
     last = max(int(_FINAL * len(rows)), 5)
     if outside[-last:].any():
         raise InputError(
@@ -164,11 +171,13 @@ def _cycle(
         )
     passing = _passings(position, _final(position), band)
     entered = int(np.flatnonzero(passing[:, 0] <= 1.0)[0])
-    final = int(np.flatnonzero(outside)[-1])
     entry = float(time[entered] + (time[entered + 1] - time[entered]) * passing[entered, 0])
-    stay = _crossing(time, distance, band, final + 1)
+    stay = entry
+    if outside[entered + 1 :].any():
+        stay = _stay(time, position, band, sigma, 0.0)
+        stay = max(_stay(time, position, band, sigma, _window(time, stay - entry, sigma, band)), entry)
     later = distance[entered + 1 :]
-    settles = not (outside[entered + 1 :].any())
+    settles = stay <= entry
     overshoot = 0.0 if settles else float(later.max())
     step = float(np.median(np.diff(time)))
     speed = (distance[entered] - distance[entered + 1]) / (time[entered + 1] - time[entered])
@@ -181,7 +190,8 @@ def _cycle(
         crossing = 2 * band / max(float(speed), 1e-12)
         slow = step > COARSE * (crossing if settles else settled)
         few = not settles and _excursion(passing, entered + 1 + int(later.argmax())) < _LEAST_OUTSIDE
-        coarse = (slow, slow or few)
+        blurred = not settles and overshoot - band < 3 * sigma
+        coarse = (slow, slow or few or blurred)
     where = part.place
     if test == "posing-time":
         planned = plan.test(test)
@@ -232,6 +242,31 @@ def _excursion(passing: Array, peak: int) -> int:
     after = np.flatnonzero(met[peak:])
     first = int(before[-1]) + 1 if len(before) else 0
     return (peak + int(after[0]) if len(after) else len(met)) - first + 1
+
+
+def _window(time: Array, settling: float, sigma: float, band: float) -> float:
+    """Return the window over which positions are smoothed before the final stay is read [s], 0 for none.
+
+    Noise makes the tip leave the band later than it does. The window brings it to a fiftieth of the band, and takes a
+    fiftieth of the time at most, so that an oscillation stays as it is.
+    """
+    step = float(np.median(np.diff(time)))
+    window = min(step * (sigma / (_QUIET * band)) ** 2, _QUIET * settling)
+    return window if window >= 3 * step else 0.0
+
+
+def _outside(distance: Array, band: float, sigma: float) -> NDArray[np.bool_]:
+    """Return which samples are outside the band, ``(n,)``; one alone that noise can have put there is not."""
+    outside = distance > band
+    beside = np.concatenate([[True], outside[:-1]]) | np.concatenate([outside[1:], [False]])
+    return np.asarray(outside & (beside | (distance > band + 5 * sigma)))
+
+
+def _stay(time: Array, position: Array, band: float, sigma: float, window: float) -> float:
+    """Return when the band is entered for good [s]."""
+    smooth = local_lines(time, position, time, window / 2)[0] if window else position
+    distance = np.linalg.norm(smooth - _final(position), axis=1)
+    return _crossing(time, distance, band, int(np.flatnonzero(_outside(distance, band, sigma))[-1]) + 1)
 
 
 def _crossing(time: Array, distance: Array, band: float, first: int) -> float:

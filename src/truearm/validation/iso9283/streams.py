@@ -65,13 +65,10 @@ def noise_of(position: Array) -> float:
     """
     if len(position) < 8:
         return 0.0
-    third = np.abs(np.diff(position, n=3, axis=0)).max(axis=1) if len(position) < 400 else None
-    if third is None:
-        differences = np.diff(position, n=3, axis=0)
-        blocks = differences[: len(differences) // 50 * 50].reshape(-1, 50, 3)
-        squares = np.sqrt((blocks**2).mean(axis=(1, 2)))
-        return float(np.quantile(squares, 0.2)) / np.sqrt(20.0)
-    return float(np.median(third)) / np.sqrt(20.0) / 1.5
+    differences = np.diff(position, n=3, axis=0)
+    length = min(50, len(differences))
+    blocks = differences[: len(differences) // length * length].reshape(-1, length * 3)
+    return float(np.quantile(np.sqrt((blocks**2).mean(axis=1)), 0.2) / np.sqrt(20.0))
 
 
 def speeds(time: Array, position: Array) -> tuple[Array, float]:

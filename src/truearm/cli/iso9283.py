@@ -136,7 +136,7 @@ def evaluate(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="How the instrument was tied to the robot's base.",
+            help="How the instrument was tied to the base.",
             show_default="best fit, with a warning",
         ),
     ] = None,

@@ -22,6 +22,7 @@ from truearm.measurement.readers.performance_samples import read_path_samples, r
 from truearm.notices import Notice
 from truearm.planning.iso9283.plan_file import read_plan
 from truearm.results.iso9283_evaluation import EVALUATION_FILES, RESULT, Iso9283Evaluation
+from truearm.shown import listed
 from truearm.validation.iso9283.alignment import Alignment, read_alignment
 from truearm.validation.iso9283.comparison import compared
 from truearm.validation.iso9283.evaluation import Evaluation, Measurements, evaluated
@@ -129,25 +130,23 @@ def _warnings(found: Evaluation) -> tuple[Notice, ...]:
         notices.append(
             Notice(
                 "best-fit-alignment",
-                "The frame of the instrument was fitted to the attained poses. That hides a part of the error that pose "
-                "and path accuracy shall tell, and is not what the standard asks for: AP and AT are too small. Tie the "
-                "instrument to the base and give `alignment`.",
+                "The frame of the instrument was fitted to the attained poses. That hides a part of the error that "
+                "pose and path accuracy shall tell, and is not what the standard asks for: AP and AT are too small. "
+                "Tie the instrument to the base and give `alignment`.",
             )
         )
     few = sorted({value.id for value in found.values if value.status == "too-few-cycles"})
     if few:
         notices.append(
-            Notice(
-                "too-few-cycles", f"Fewer cycles than planned were measured for {', '.join(few)}; their values stand."
-            )
+            Notice("too-few-cycles", f"Fewer cycles than planned were measured for {listed(few)}; their values stand.")
         )
     coarse = sorted({value.id for value in found.values if value.status == "instrument-too-coarse"})
     if coarse:
         notices.append(
             Notice(
                 "instrument-too-coarse",
-                f"What the instrument and its tie leave open is more than a quarter of some values of {', '.join(coarse)}: "
-                "these say more about the measurement than about the robot.",
+                f"What the instrument and its tie leave open is more than a quarter of some values of {listed(coarse)}. "
+                "They say more about the measurement than about the robot.",
             )
         )
     return tuple(notices)

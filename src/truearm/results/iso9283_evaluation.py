@@ -100,9 +100,8 @@ class Iso9283Evaluation(Record):
         wide = [max((len(row[k]) for row in rows), default=0) for k in range(5)]
         table = ["  ".join(cell.ljust(wide[k]) for k, cell in enumerate(row)).rstrip() for row in rows]
         others = len(measured) - len(shown)
-        text = [
-            f"{self.plan.robot.title}: {counted(len(measured), 'value')} of {len(set(v.id for v in measured))} criteria."
-        ]
+        criteria = len({value.id for value in measured})
+        text = [f"{self.plan.robot.title}: {counted(len(measured), 'value')} of {criteria} criteria."]
         text += [self.tied, *table]
         if others:
             text.append(f"And {counted(others, 'value')} of single axes and of angles, in the report and in {RESULT}.")
@@ -119,7 +118,7 @@ class Iso9283Evaluation(Record):
         how = {
             "base-features": "measured features of the base",
             "controller-frame": "a frame of the controller",
-            "best-fit": "a best fit of the attained poses to the commanded ones, which is not what the standard asks for",
+            "best-fit": "a best fit of the attained poses to the commanded ones, which the standard does not allow",
         }[tie.kind]
         known = f", known to {tie.sigma * 1e3:.3f} mm and {math.degrees(tie.sigma_rot):.4f} deg" if tie.sigma else ""
         return f"The instrument was tied to the robot's base by {how}{known}."

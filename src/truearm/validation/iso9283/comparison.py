@@ -40,6 +40,11 @@ class Compared:
     other: float
     verdict: Verdict
 
+    @property
+    def change(self) -> str:
+        """From the other result's value to this one's, in words."""
+        return f"{self.other:.4f} -> {self.value:.4f} {self.unit}"
+
 
 @dataclass(frozen=True)
 class Comparison:

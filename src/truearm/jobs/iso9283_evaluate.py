@@ -145,7 +145,7 @@ def _warnings(found: Evaluation) -> tuple[Notice, ...]:
         notices.append(
             Notice(
                 "instrument-too-coarse",
-                f"What the instrument and its tie leave open is more than a quarter of some values of {listed(coarse)}. "
+                f"What instrument and tie leave open is more than a quarter of some values of {listed(coarse)}. "
                 "They say more about the measurement than about the robot.",
             )
         )

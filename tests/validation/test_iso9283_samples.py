@@ -160,6 +160,22 @@ def test_cycles_dwells_and_the_deviation_are_found_in_a_stream(name: str, rate: 
         assert np.diff(cycle.along).min() > -1e-3  # noise and nothing else
 
 
+def test_cycles_of_a_robot_that_is_far_off_are_found_on_a_small_circle() -> None:
+    off = 4e-3 * ALONG + 3e-3 * NORMAL
+    t, p, _ = stream_of(
+        PLAN,
+        "small-circle",
+        100.0,
+        np.random.default_rng(1),
+        cycles=10,
+        offset=lambda s: np.tile(off, (len(s), 1)),
+        velocity=V,
+    )
+    values, (record,) = path_values(PLAN, samples_of("AT", "small-circle", [(0, t, p)]), HERE, TRACKER)
+    assert len(record.run.cycles) == 10
+    assert the(values, "AT").value == pytest.approx(5e-3, rel=0.02)
+
+
 def test_a_pause_on_the_way_leaves_one_cycle() -> None:
     t = times(LENGTH / V + 1.0, 100.0)
     s = np.where(t < 0.5, V * t, np.where(t < 1.3, V * 0.5, V * (t - 0.8)))

@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 from tests.jobs.examples import EXAMPLES
+from tests.performance_plan import small_plan
 
 import truearm
 from truearm.errors import InputError
@@ -18,12 +19,14 @@ from truearm.fleets.recorded import RECORD
 from truearm.jobs import JOBS
 from truearm.manifest import MANIFEST, UNFINISHED
 from truearm.modeling.formats.robot_file import robot_text
+from truearm.planning.iso9283.plan_file import PLAN, ROBOT, plan_text
 from truearm.results.axis_calibration import AXIS_FILES
 from truearm.results.calibration import RESULT_FILES
 from truearm.results.fleet import FLEET_FILES
 from truearm.results.followed_path import MOTION
 from truearm.results.followed_path import REPORT as PATH_REPORT
 from truearm.results.influence import INFLUENCE_FILES
+from truearm.results.iso9283_simulation import FILES as SIMULATED_FILES
 from truearm.results.program_correction import REPORT
 from truearm.results.tilting import GEOMETRY, TILTING_FILES
 from truearm.results.validation import VALIDATION_FILES
@@ -57,6 +60,12 @@ def _katana_poses(folder: Path) -> Path:
     path = folder / "katana-poses.csv"
     truearm.simulate("katana450", truth="tilting", poses=12, noise=1e-5, out=path)
     return path
+
+
+def _performance_plan(folder: Path) -> Path:
+    plan = small_plan(["AP"], cycles={"AP": 2})
+    _written(folder / ROBOT, robot_text(plan.robot))
+    return _written(folder / PLAN, plan_text(plan))
 
 
 _UNITS = "units: {length: mm, angle: deg}\n"
@@ -102,6 +111,12 @@ READ: dict[str, Callable[[Path], Arguments]] = {
         "poses": EXAMPLES["load_data"](folder)["data"],
         "device": None,
     },
+    "iso9283_simulate": lambda folder: {
+        "robot": _robot(folder),
+        "plan": _performance_plan(folder),
+        "truth": EXAMPLES["validate"](folder)["robot"],
+        "corrected": EXAMPLES["validate"](folder)["robot"],
+    },
     "inverse": lambda folder: {
         "robot": _robot(folder),
         "poses": _written(folder / "p.csv", "pose,x [mm],y [mm],z [mm],qw,qx,qy,qz\n1,300,0,500,0,0,1,0\n"),
@@ -143,6 +158,7 @@ INTO_FOLDERS = {
     "revert": ("plate.mod",),
     "path": (MOTION, PATH_REPORT),
     "fleet": (*FLEET_FILES, RECORD),
+    "iso9283_simulate": SIMULATED_FILES,
 }
 #: The names of what a job writes where `out` is one of them, or the parameter beside it.
 BESIDE = {

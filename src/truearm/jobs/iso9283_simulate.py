@@ -17,6 +17,7 @@ from truearm.errors import InputError, refusals_of, wrong_kind
 from truearm.files import path_argument
 from truearm.jobs.arguments import (
     command_argument,
+    files_of,
     folder_for,
     progress_argument,
     python_call,
@@ -155,6 +156,7 @@ def iso9283_simulate(
         tuple(test.id for test in planned.tests),
         folder,
         call,
+        files_of(robot, plan, truth, corrected),
     )
     if folder is not None:
         progress("writing")

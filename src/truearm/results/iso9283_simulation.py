@@ -12,7 +12,7 @@ from truearm.results.record import Record
 from truearm.shown import counted
 from truearm.units import from_si
 from truearm.validation.iso9283.simulated_readings import SimulatedCampaign, Tracker
-from truearm.writing import write_files
+from truearm.writing import output_folder, write_files
 
 #: What a campaign may write.
 FILES: Final = ("poses.csv", "paths.csv", "settling.csv", "forces.csv", "alignment.yaml")
@@ -75,6 +75,8 @@ class Iso9283Simulation(Record):
         The folder of the files; None if none were written.
     command
         How to simulate it again.
+    inputs
+        The files that were read: none of them is overwritten.
     """
 
     robot: str
@@ -86,6 +88,7 @@ class Iso9283Simulation(Record):
     tests: tuple[str, ...]
     out: Path | None
     command: str
+    inputs: tuple[Path, ...] = ()
 
     def _counts(self) -> dict[str, int]:
         campaign = self.campaign
@@ -130,8 +133,9 @@ class Iso9283Simulation(Record):
         counts = self._counts()
         return tuple(name for name in FILES if counts.get(name.partition(".")[0], 1))
 
-    def save(self, folder: Path) -> None:
+    def save(self, folder: str | Path) -> None:
         """Write the files into a folder."""
+        place = output_folder(folder, self.files(), self.inputs, "folder", ours=True)
         campaign, texts = self.campaign, {}
         if campaign.poses is not None:
             texts["poses.csv"] = poses_text(campaign.poses)
@@ -141,4 +145,4 @@ class Iso9283Simulation(Record):
             texts["settling.csv"] = samples_text(campaign.settling, "pose", conditions=False)
         if campaign.forces is not None:
             texts["forces.csv"] = forces_text(campaign.forces)
-        write_files(folder, {**texts, "alignment.yaml": self.tie.text()}, self.command)
+        write_files(place, {**texts, "alignment.yaml": self.tie.text()}, self.command)

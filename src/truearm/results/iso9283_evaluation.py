@@ -4,34 +4,24 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 from truearm.notices import Notice
-from truearm.planning.iso9283.criteria import TEST_OF, TESTS
 from truearm.planning.iso9283.planned import PerformancePlan
+from truearm.results.iso9283_table import HEADING, UNITS, counted_criteria, worst_places
 from truearm.results.record import Record, notice_lines, notice_summaries
 from truearm.shown import counted
 from truearm.validation.iso9283.comparison import Comparison
 from truearm.validation.iso9283.evaluation import Evaluation
-from truearm.validation.iso9283.values import Instrument, Quantity, Value
+from truearm.validation.iso9283.values import Instrument, Value
 from truearm.writing import output_folder, write_files
 
 RESULT: Final = "iso9283.json"
 REPORT: Final = "report.html"
 EVALUATION_FILES: Final = (RESULT, REPORT)
 SCHEMA: Final = "truearm-iso9283-result/1"
-#: Unit of each kind of number at the edges, and how many of it one SI unit is.
-UNITS: Final[Mapping[Quantity, tuple[str, float]]] = {
-    "length": ("mm", 1e3),
-    "angle": ("deg", math.degrees(1.0)),
-    "time": ("s", 1.0),
-    "ratio": ("%", 100.0),
-    "speed": ("mm/s", 1e3),
-    "compliance": ("mm/N", 1e3),
-}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -92,19 +82,22 @@ class Iso9283Evaluation(Record):
         }
 
     def lines(self) -> list[str]:
-        """Return every value of position with its interval, and how many others there are."""
+        """Return each criterion at its worst place, at the fastest velocity and at others; the rest is in the files."""
         measured = [value for value in self.values if value.status != "not-measured"]
         absent = list(dict.fromkeys(value.id for value in self.values if value.status == "not-measured"))
-        shown = [value for value in measured if value.component == "position"]
-        rows = [value_words(value) for value in shown]
-        wide = [max((len(row[k]) for row in rows), default=0) for k in range(5)]
-        table = ["  ".join(cell.ljust(wide[k]) for k, cell in enumerate(row)).rstrip() for row in rows]
-        others = len(measured) - len(shown)
+        absent = [id_ for id_ in absent if id_ not in {value.id for value in measured}]
         criteria = len({value.id for value in measured})
-        text = [f"{self.plan.robot.title}: {counted(len(measured), 'value')} of {criteria} criteria."]
-        text += [self.tied, *table]
-        if others:
-            text.append(f"And {counted(others, 'value')} of single axes and of angles, in the report and in {RESULT}.")
+        text = [f"{self.plan.robot.title}: {counted(len(measured), 'value')} of {counted_criteria(criteria)}."]
+        text.append(self.tied)
+        rows = [worst.cells for worst in worst_places(measured)]
+        if rows:
+            text.append(
+                "Each at its worst place and fastest velocity, with its 95 % interval or the range of its cycles."
+            )
+        wide = [max((len(row[k]) for row in rows), default=0) for k in range(len(HEADING))]
+        text += ["  " + "  ".join(cell.ljust(wide[k]) for k, cell in enumerate(row)).rstrip() for row in rows]
+        if rows:
+            text.append(f"All places, axes and angles are in the report and in {RESULT}.")
         if absent:
             text.append(f"Not measured: {', '.join(absent)}.")
         if self.comparison is not None:
@@ -164,47 +157,3 @@ def value_summary(value: Value) -> dict[str, Any]:
         "status": value.status,
         **({} if least is None else {"range": [least, largest]}),
     }
-
-
-def value_words(value: Value) -> tuple[str, str, str, str, str]:
-    """Return a value as a row of text: id, where, conditions, the figure, its interval and whether it holds."""
-    unit, per_si = UNITS[value.quantity]
-    under = conditions_words(value)
-    number = f"{_number(value.value * per_si, value.quantity)} {unit}"
-    beside = ""
-    if value.interval is not None:
-        low, high = (_number(end * per_si, value.quantity) for end in value.interval)
-        beside = f"95 %: {low} to {high}"
-    elif value.least is not None and value.largest is not None:
-        low, high = (_number(end * per_si, value.quantity) for end in (value.least, value.largest))
-        beside = f"{counted(value.cycles, 'cycle')}: {low} to {high}"
-    if value.status != "measured":
-        beside = f"{beside}, {value.status}" if beside else value.status
-    return value.id, value.where, under, number, beside
-
-
-def conditions_words(value: Value) -> str:
-    """Return under what a value was measured, in words."""
-    parts = []
-    if value.conditions.velocity is not None:
-        parts.append(f"{100 * value.conditions.velocity:g} %")
-    if value.conditions.load is not None:
-        parts.append(f"load {100 * value.conditions.load:g} %")
-    if value.conditions.robot:
-        parts.append(value.conditions.robot)
-    return ", ".join(parts)
-
-
-def test_name(value: Value) -> str:
-    """Return the name of the test that a value belongs to."""
-    return TESTS[TEST_OF[value.id]].name
-
-
-def _number(number: float, quantity: Quantity) -> str:
-    decimals = {"length": 4, "angle": 4, "time": 3, "ratio": 3, "speed": 2, "compliance": 6}[quantity]
-    return f"{number:.{decimals}f}"
-
-
-def values_of(values: Sequence[Value], criterion: str) -> list[Value]:
-    """Return the values of one criterion."""
-    return [value for value in values if value.id == criterion]

@@ -1,0 +1,200 @@
+"""Pictures of tests by ISO 9283 along paths: deviations, corners, velocity, weaves, and what was found in a stream."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Sequence
+from typing import Final, TypeVar
+
+import numpy as np
+
+from truearm.reporting.drawing import AFTER, BEFORE, COLOURS, Figure, axis, figure
+from truearm.reporting.iso9283_figures import HUES, INK, SHADE, line, thinned
+from truearm.reporting.numbers import rounded_to
+from truearm.reporting.panels import Panel, panels
+from truearm.reporting.picture_page import Drawing
+from truearm.validation.iso9283.corners import CornerCurves
+from truearm.validation.iso9283.evaluation import Evaluation
+from truearm.validation.iso9283.paths import PathDeviations
+from truearm.validation.iso9283.runs import Run
+from truearm.validation.iso9283.streams import FoundStream
+from truearm.validation.iso9283.velocity import VelocityCurves
+from truearm.validation.iso9283.weaving import WeaveCurves
+
+#: A corner is drawn so many times the largest of its deviations about it.
+_ROOM: Final = 4.0
+#: So many whole waves of a weave are drawn.
+_WAVES: Final = 5
+_STREAM_SAMPLES: Final = 1500
+#: Of streams so many are drawn.
+_STREAMS: Final = 3
+_BAND: Final = "#c3d5e3"
+
+_Curves = TypeVar("_Curves", PathDeviations, CornerCurves, VelocityCurves, WeaveCurves)
+
+
+def path_pictures(found: Evaluation) -> list[Drawing]:
+    """Return the pictures of what was measured along paths, those at the fastest velocity of each test."""
+    drawings: list[Drawing] = []
+    for test, name, title in (
+        ("AT", "paths", "Deviation along the paths"),
+        ("AT-reorientation", "paths-reoriented", "Deviation along the path on reorientation"),
+    ):
+        courses = _fastest([one for one in found.deviations if one.run.test == test])
+        if courses:
+            words = (
+                f"Distance from the command in planes at right angles to it, {_under(courses[0].run)}. "
+                "AT is the largest of the barycentre's; the band is its 95 % interval at each station for itself."
+            )
+            drawings.append(Drawing(name, title, words, _deviations(courses)))
+    corners = _fastest(found.corners)
+    if corners:
+        words = (
+            f"In the plane of the two sides, {_under(corners[0].run)}. The commanded path comes from the left and goes "
+            "on upwards. CR is the least distance to the corner, CO how far the tip goes beyond the second side."
+        )
+        drawings.append(Drawing("corners", "Corners", words, _corners(corners)))
+    velocities = _fastest(found.velocities)
+    if velocities:
+        words = f"Each cycle, {_under(velocities[0].run)}. AV, RV and FV are read in the grey middle half."
+        drawings.append(Drawing("velocity", "Velocity along the path", words, _velocity(velocities)))
+    weaves = _fastest(found.weaves)
+    if weaves:
+        words = f"The first {_WAVES} waves of the first cycle beside the command, {_under(weaves[0].run)}."
+        drawings.append(Drawing("weave", "Weave", words, _weave(weaves[0])))
+    streams = [run.found for run in _runs(found) if run.found is not None]
+    if streams:
+        words = (
+            "Speed of the tip in streams whose cycles are not numbered. Cycles found are blue, dwells grey; faster than "
+            "the dashed line is motion."
+        )
+        drawings.append(Drawing("streams", "What was found in streams", words, _streams(streams[:_STREAMS])))
+    return drawings
+
+
+def _runs(found: Evaluation) -> list[Run]:
+    curves = (*found.deviations, *found.corners, *found.velocities, *found.weaves)
+    return list({id(one.run): one.run for one in curves}.values())
+
+
+def _fastest(curves: Sequence[_Curves]) -> list[_Curves]:
+    """Return those at the fastest velocity and the largest load."""
+
+    def of(one: _Curves) -> tuple[float, float]:
+        return one.run.conditions.velocity or 0.0, one.run.conditions.load or 0.0
+
+    most = max(map(of, curves), default=(0.0, 0.0))
+    return [one for one in curves if of(one) == most]
+
+
+def _under(run: Run) -> str:
+    under = run.conditions
+    return f"at {100 * (under.velocity or 0.0):g} % of the rated velocity and {100 * (under.load or 0.0):g} % load"
+
+
+def _deviations(courses: Sequence[PathDeviations]) -> Figure:
+    drawn = []
+    for course in courses:
+        along = course.along * 1e3
+        low = np.maximum(course.distance - course.half_width, 0.0) * 1e3
+        high = (course.distance + course.half_width) * 1e3
+        traces = [
+            line("", along, low, _BAND, 0),
+            line("95 %", along, high, _BAND, 0, fill="tonexty", fillcolor=_BAND),
+            *(line("cycles", along, np.linalg.norm(cycle, axis=1) * 1e3, BEFORE, 1) for cycle in course.deviation),
+            line("barycentre", along, course.distance * 1e3, AFTER, 2.2),
+        ]
+        title = f"{html.escape(course.path)}: AT {np.nanmax(course.distance) * 1e3:.3f} mm"
+        drawn.append(Panel(title, traces, "along the path [mm]", "distance [mm]"))
+    return panels(drawn, 2 if len(drawn) > 1 else 1, 230)
+
+
+def _corners(corners: Sequence[CornerCurves]) -> Figure:
+    drawn = []
+    for corner in corners:
+        room = _ROOM * 1e3 * float(max(corner.rounding.max(), corner.overshoot.max(), 1e-4))
+        command = np.array([[-room, 0.0], [0.0, 0.0], [0.0, room]])
+        traces = [line("command", command[:, 0], command[:, 1], INK, 1.5)]
+        for number, points in enumerate(corner.attained):
+            away = (points - corner.corner) * 1e3
+            at = np.stack([away @ corner.before, away @ corner.after], axis=1)
+            at = at[(np.abs(at) <= room).all(axis=1)]
+            at = at[thinned(len(at))] if len(at) else at
+            traces.append(line(f"cycle {number + 1}", at[:, 0], at[:, 1], HUES[number % len(HUES)], 1.5))
+        title = f"{html.escape(corner.where)}: CR {corner.rounding.mean() * 1e3:.3f}, CO {corner.overshoot.mean() * 1e3:.3f} mm"
+        limits = {"range": [-room, room]}
+        drawn.append(
+            Panel(title, traces, "way before [mm]", "way after [mm]", equal=True, more_x=limits, more_y=limits)
+        )
+    return panels(drawn, 3, 260)
+
+
+def _velocity(curves: Sequence[VelocityCurves]) -> Figure:
+    drawn = []
+    for curve in curves:
+        traces = []
+        for along, velocity in zip(curve.along, curve.velocity, strict=True):
+            rows = thinned(len(along))
+            traces.append(line("cycles", along[rows] * 1e3, velocity[rows] * 1e3, BEFORE, 1))
+        ends = np.array([0.0, curve.run.path.length]) * 1e3
+        traces.append(line("commanded", ends, np.full(2, curve.commanded * 1e3), COLOURS[0], 1.5))
+        middle = {
+            "type": "rect",
+            "yref": "paper",
+            "x0": round(curve.middle[0] * 1e3, 3),
+            "x1": round(curve.middle[1] * 1e3, 3),
+            "y0": 0,
+            "y1": 1,
+            "fillcolor": SHADE,
+            "line": {"width": 0},
+            "layer": "below",
+        }
+        drawn.append(Panel(html.escape(curve.path), traces, "along the path [mm]", "velocity [mm/s]", shapes=[middle]))
+    return panels(drawn, 1, 280)
+
+
+def _weave(curve: WeaveCurves) -> Figure:
+    path = curve.run.path.path
+    reach = _WAVES * path.wavelength
+    near = np.flatnonzero((curve.along[0] >= 0.0) & (curve.along[0] <= reach))
+    rows = near[thinned(len(near), 800)] if len(near) else near
+    half = path.stroke / 2.0 * 1e3
+    edges = [
+        line("commanded stroke", np.array([0.0, reach * 1e3]), np.full(2, side * half), INK, 1, hoverinfo="skip")
+        | {"showlegend": side > 0}
+        for side in (1.0, -1.0)
+    ]
+    attained = line("attained", curve.along[0][rows] * 1e3, curve.across[0][rows] * 1e3, AFTER)
+    return figure([*edges, attained], 320, xaxis=axis("along [mm]"), yaxis=axis("to the side [mm]"))
+
+
+def _streams(streams: Sequence[FoundStream]) -> Figure:
+    drawn = []
+    for stream in streams:
+        rows = thinned(len(stream.time), _STREAM_SAMPLES)
+        start = float(stream.time[0])
+        time = stream.time - start
+        limit = np.full(2, stream.threshold * 1e3)
+        traces = [
+            line("speed", time[rows], stream.speed[rows] * 1e3, BEFORE, 1.2),
+            line("motion", time[[0, -1]], limit, COLOURS[0], 1)
+            | {"line": {"color": COLOURS[0], "width": 1, "dash": "dash"}},
+        ]
+        shapes = [
+            {
+                "type": "rect",
+                "yref": "paper",
+                "x0": at[0],
+                "x1": at[1],
+                "y0": bottom,
+                "y1": 1,
+                "fillcolor": colour,
+                "line": {"width": 0},
+                "layer": "below",
+            }
+            for spans, colour, bottom in ((stream.cycles, _BAND, 0), (stream.dwells, "#9aa0a6", 0.94))
+            for at in rounded_to(time[np.array(spans, dtype=int).reshape(-1, 2)], 4)
+        ]
+        title = f"{html.escape(stream.path)}: {len(stream.cycles)} cycles"
+        drawn.append(Panel(title, traces, "time [s]", "speed [mm/s]", shapes=shapes))
+    return panels(drawn, 1, 220)

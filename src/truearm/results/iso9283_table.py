@@ -1,0 +1,147 @@
+"""The values of a test by ISO 9283 as cells of tables: for the command, and for the report."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from truearm.planning.iso9283.criteria import CRITERIA, TEST_OF, TESTS
+from truearm.shown import counted
+from truearm.validation.iso9283.values import Conditions, Quantity, Value
+
+#: Unit of each kind of number at the edges, and how many of it one SI unit is.
+UNITS: Final[Mapping[Quantity, tuple[str, float]]] = {
+    "length": ("mm", 1e3),
+    "angle": ("deg", math.degrees(1.0)),
+    "time": ("s", 1.0),
+    "ratio": ("%", 100.0),
+    "speed": ("mm/s", 1e3),
+    "compliance": ("mm/N", 1e3),
+}
+_DECIMALS: Final[Mapping[Quantity, int]] = {
+    "length": 4,
+    "angle": 4,
+    "time": 3,
+    "ratio": 3,
+    "speed": 2,
+    "compliance": 6,
+}
+#: Columns of :attr:`Worst.cells`.
+HEADING: Final = (
+    "Criterion",
+    "Worst place",
+    "Value",
+    "95 % interval, or range of cycles",
+    "At other velocities",
+    "Status",
+)
+#: Where the value is the worst of several places already.
+_ALL_PLACES: Final = "all poses"
+
+
+@dataclass(frozen=True)
+class Worst:
+    """A criterion at its worst place at the fastest velocity.
+
+    Attributes
+    ----------
+    value
+        The largest of them without its sign.
+    places
+        How many there are.
+    others
+        The worst at each other velocity.
+    """
+
+    value: Value
+    places: int
+    others: tuple[Value, ...]
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """The cells of its row: criterion, place, value, interval, other velocities, status."""
+        value = self.value
+        where = value.where
+        if self.places > 1 and where != _ALL_PLACES:
+            where = f"{where}, worst of {self.places}"
+        besides = [f"{velocity_words(other.conditions)}: {number_words(other)}" for other in self.others]
+        name = f"{value.id} {value.conditions.robot}".rstrip()
+        load = value.conditions.load
+        if load is not None and load < 1.0:
+            where = f"{where}, load {100 * load:g} %"
+        status = "" if value.status == "measured" else value.status
+        return (
+            name,
+            where,
+            f"{number_words(value)} {UNITS[value.quantity][0]}",
+            beside_words(value),
+            ", ".join(besides),
+            status,
+        )
+
+
+def worst_places(values: Sequence[Value]) -> list[Worst]:
+    """Return each criterion of position at its worst place; loads and robots apart, in the order of the standard."""
+    groups: dict[tuple[str, float | None, str], dict[float, list[Value]]] = {}
+    for value in values:
+        if value.component == "position" and math.isfinite(value.value):
+            under = value.conditions
+            by_velocity = groups.setdefault((value.id, under.load, under.robot), {})
+            by_velocity.setdefault(under.velocity or 0.0, []).append(value)
+    found = []
+    for by_velocity in groups.values():
+        fastest, *others = (by_velocity[velocity] for velocity in sorted(by_velocity, reverse=True))
+        places = len([value for value in fastest if value.where != _ALL_PLACES])
+        found.append(Worst(_worst(fastest), places, tuple(map(_worst, others))))
+    return sorted(found, key=lambda one: CRITERIA.index(one.value.id))
+
+
+def _worst(values: Sequence[Value]) -> Value:
+    whole = [value for value in values if value.where == _ALL_PLACES]
+    return max(whole or values, key=lambda value: abs(value.value))
+
+
+def number_words(value: Value) -> str:
+    """Return a value in its unit, without naming it."""
+    return _number(value.value, value.quantity)
+
+
+def beside_words(value: Value) -> str:
+    """Return its interval, or the range of its cycles where they are too few for one."""
+    if value.interval is not None:
+        low, high = (_number(end, value.quantity) for end in value.interval)
+        return f"{low} to {high}"
+    if value.least is not None and value.largest is not None:
+        low, high = (_number(end, value.quantity) for end in (value.least, value.largest))
+        return f"{low} to {high} in {counted(value.cycles, 'cycle')}"
+    return ""
+
+
+def velocity_words(under: Conditions) -> str:
+    """Return the velocity in percent."""
+    return "" if under.velocity is None else f"{100 * under.velocity:g} %"
+
+
+def conditions_words(value: Value) -> str:
+    """Return under what a value was measured, in words."""
+    under = value.conditions
+    parts = [velocity_words(under)] if under.velocity is not None else []
+    if under.load is not None:
+        parts.append(f"load {100 * under.load:g} %")
+    return ", ".join([*parts, under.robot] if under.robot else parts)
+
+
+def test_name(value: Value) -> str:
+    """Return the name of the test that a value belongs to."""
+    return TESTS[TEST_OF[value.id]].name
+
+
+def counted_criteria(count: int) -> str:
+    """Return how many criteria, in words."""
+    return f"{count} criteri{'on' if count == 1 else 'a'}"
+
+
+def _number(number: float, quantity: Quantity) -> str:
+    return f"{number * UNITS[quantity][1]:.{_DECIMALS[quantity]}f}"

@@ -181,8 +181,7 @@ def _accuracy(plan: PerformancePlan, clouds: Sequence[PoseCloud], under: str) ->
     length = np.linalg.norm(away, axis=1)
     largest = float(length.max())
     times = 10.0 ** np.floor(np.log10(_ARROW * plan.cube.side / largest)) if largest > 0.0 else 1.0
-    corners = plan.cube.plane(plan.plane).corners
-    around = np.vstack([corners, corners[:1]]) * 1e3
+    around = plan.cube.plane(plan.plane).points([1, -1, -1, 1, 1], [1, 1, -1, -1, 1]) * 1e3
     tips = (command + times * away) * 1e3
     feet = command * 1e3
     gap = np.full((len(clouds), 1), np.nan)

@@ -65,7 +65,7 @@ def path_pictures(found: Evaluation) -> list[Drawing]:
     streams = [run.found for run in _runs(found) if run.found is not None]
     if streams:
         words = (
-            "Speed of the tip in streams whose cycles are not numbered. Cycles found are blue, dwells grey; faster than "
+            "Speed of the tip in streams whose cycles are not numbered. Cycles found are blue, dwells grey; above "
             "the dashed line is motion."
         )
         drawings.append(Drawing("streams", "What was found in streams", words, _streams(streams[:_STREAMS])))
@@ -121,7 +121,8 @@ def _corners(corners: Sequence[CornerCurves]) -> Figure:
             at = at[(np.abs(at) <= room).all(axis=1)]
             at = at[thinned(len(at))] if len(at) else at
             traces.append(line(f"cycle {number + 1}", at[:, 0], at[:, 1], HUES[number % len(HUES)], 1.5))
-        title = f"{html.escape(corner.where)}: CR {corner.rounding.mean() * 1e3:.3f}, CO {corner.overshoot.mean() * 1e3:.3f} mm"
+        rounding, overshoot = (1e3 * float(one.mean()) for one in (corner.rounding, corner.overshoot))
+        title = f"{html.escape(corner.where)}: CR {rounding:.3f}, CO {overshoot:.3f} mm"
         limits = {"range": [-room, room]}
         drawn.append(
             Panel(title, traces, "way before [mm]", "way after [mm]", equal=True, more_x=limits, more_y=limits)

@@ -41,10 +41,10 @@ def iso9283_report(found: Iso9283Evaluation) -> str:
         found.tied,
         f"Rated: {plan.rated_load:g} kg, {plan.rated_velocity * 1e3:g} mm/s along a path. A reading of the instrument "
         f"has a standard deviation of {found.instrument.sigma * 1e3:g} mm.",
-        "Intervals are of 95 %. Criteria of three cycles have their range instead. Of several velocities the fastest is "
-        "in the first table and in the pictures.",
-        "Evaluated by what the literature says of ISO 9283:1998. Who wants to claim conformity needs the standard's own "
-        "text.",
+        "Intervals are of 95 %. Criteria of three cycles have their range instead. Of several velocities the fastest "
+        "is in the first table and in the pictures.",
+        "Evaluated by what the literature says of ISO 9283:1998. Who wants to claim conformity needs the standard's "
+        "own text.",
     ]
     if unread:
         words.append(f"Planned and not measured: {', '.join(TESTS[test.id].name for test in unread)}.")

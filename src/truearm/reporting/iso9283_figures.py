@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import math
 from collections.abc import Callable, Sequence
 from typing import Final
 
@@ -180,7 +181,7 @@ def _accuracy(plan: PerformancePlan, clouds: Sequence[PoseCloud], under: str) ->
     away = np.array([cloud.barycentre for cloud in clouds]) - command
     length = np.linalg.norm(away, axis=1)
     largest = float(length.max())
-    times = 10.0 ** np.floor(np.log10(_ARROW * plan.cube.side / largest)) if largest > 0.0 else 1.0
+    times = _times(_ARROW * plan.cube.side / largest) if largest > 0.0 else 1.0
     around = plan.cube.plane(plan.plane).points([1, -1, -1, 1, 1], [1, 1, -1, -1, 1]) * 1e3
     tips = (command + times * away) * 1e3
     feet = command * 1e3
@@ -221,6 +222,12 @@ def _accuracy(plan: PerformancePlan, clouds: Sequence[PoseCloud], under: str) ->
     return Drawing("accuracy", "Pose accuracy in the cube", words, drawn)
 
 
+def _times(most: float) -> float:
+    """Return the largest of 1, 2 and 5 times a power of ten that is not above a number."""
+    decade = 10.0 ** math.floor(math.log10(most))
+    return max(step * decade for step in (1.0, 2.0, 5.0) if step * decade <= most)
+
+
 def _in_space(name: str, points: Array, mode: str, **more: object) -> Figure:
     columns = {
         letter: [None if np.isnan(v) else round(float(v), 4) for v in column]
@@ -246,7 +253,7 @@ def _together(clouds: Sequence[PoseCloud], series: Callable[[PoseCloud], str]) -
                 colour = HUES[names.index(series(cloud)) % len(HUES)]
                 points = (cloud.points - middles[pose]) * per_m
                 middle = points.mean(axis=0)
-                traces.append(dots("", points[:, right], points[:, up], colour, 2.5))
+                traces.append(dots("", points[:, right], points[:, up], colour, 3.5))
                 traces.append(dots(series(cloud), middle[[right]], middle[[up]], colour, 11, "cross"))
             drawn.append(
                 Panel(html.escape(pose), traces, f"{'xyz'[right]} [{unit}]", f"{'xyz'[up]} [{unit}]", equal=True)
@@ -275,7 +282,8 @@ def _drift(course: DriftCourse) -> Figure:
 def _settling(curves: Sequence[SettlingCurve]) -> Figure:
     first = curves[0]
     traces = []
-    start, end = first.entry - 0.5 * (first.entry - first.start), first.stay + 1.5 * (first.stay - first.entry) + 0.02
+    around = 1.5 * (first.stay - first.entry) + 0.02
+    start, end = max(first.entry - around, first.start), first.stay + around
     for number, curve in enumerate(curves):
         inside = np.flatnonzero((curve.time >= start) & (curve.time <= end))
         if len(inside) == 0:

@@ -32,8 +32,9 @@ def iso9283_report(found: Iso9283Evaluation) -> str:
     tables = [Figures("Criteria at their worst places", HEADING, tuple(one.cells for one in worst_places(measured)))]
     if found.comparison is not None:
         tables.append(_compared(found.comparison))
+    details: list[Figures] = []
     for name in dict.fromkeys(test_name(value) for value in found.values):
-        tables += _tables(name, [value for value in found.values if test_name(value) == name])
+        details += _tables(name, [value for value in found.values if test_name(value) == name])
     evaluation = found.evaluation
     plan = found.plan
     unread = [test for test in plan.tests if not any(value.id in TESTS[test.id].criteria for value in measured)]
@@ -58,6 +59,7 @@ def iso9283_report(found: Iso9283Evaluation) -> str:
             *path_pictures(evaluation),
         ],
         tables=tables,
+        details=details,
         notices=found.warnings,
     )
 

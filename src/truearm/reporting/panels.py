@@ -11,7 +11,7 @@ from truearm.reporting.drawing import Figure, axis, figure
 
 #: Between two panels, as a share of the width, and of the height [pixels].
 _GAP: Final = 0.09
-_ROW_GAP: Final = 78
+_ROW_GAP: Final = 104
 
 
 @dataclass(frozen=True, eq=False)

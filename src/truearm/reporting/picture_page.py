@@ -57,6 +57,7 @@ def picture_page(
     *,
     pictures: Sequence[Drawing],
     tables: Sequence[Figures] = (),
+    details: Sequence[Figures] = (),
     notices: Sequence[Notice] = (),
 ) -> str:
     """Return the page.
@@ -71,6 +72,8 @@ def picture_page(
         How to run it again.
     pictures, tables
         What is shown.
+    details
+        Tables below the pictures.
     notices
         What to know about the result.
     """
@@ -83,5 +86,6 @@ def picture_page(
         command=command,
         pictures=pictures,
         tables=tables,
+        details=details,
         notices=worst_first(notices),
     )

@@ -33,8 +33,8 @@ HEADING: Final = (
     "Criterion",
     "Worst place",
     "Value",
-    "95 % interval, or range of cycles",
-    "At other velocities",
+    "95 %, or range",
+    "Other velocities",
     "Status",
 )
 #: Where the value is the worst of several places already.

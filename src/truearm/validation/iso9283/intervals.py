@@ -40,8 +40,8 @@ from truearm.modeling.chain import Array
 LEAST_CYCLES: Final = 5
 #: What may lie beyond either end.
 TAIL: Final = 0.025
-#: The same for RP, whose covariance is estimated: 95 % of the simulated quotients would hold 93 % to 95 %.
-_TAIL_RP: Final = 0.015
+#: The same for RP, whose covariance is estimated: with 0.025 the intervals would hold 93 % to 95 %.
+_TAIL_RP: Final = 0.021
 #: Campaigns simulated for RP.
 _CAMPAIGNS: Final = 2000
 #: The standard error of RP is at least this share of a Gaussian's: cycles on a circle have none.

@@ -23,6 +23,10 @@ _TESTED: Final = 80
 _HALVINGS: Final = 20
 _HALVINGS_FACTOR: Final = 60
 
+#: What may lie below the lower end of a largest difference: places that seem apart by scatter make it too high, so that
+#: it would be missed twice as often.
+_TAIL_BELOW: Final = 0.5 * TAIL
+
 Statistic = Callable[[Array], Array]
 
 
@@ -124,9 +128,9 @@ def largest_interval(statistic: Statistic, found: Array, noise: Array, other: Ar
 
     at_zero = share_below(0.0)
     upper = _where(share_below, TAIL * max(at_zero, 1.0 / _DRAWS), value, value + scale)
-    if at_zero <= 1.0 - TAIL:
+    if at_zero <= 1.0 - _TAIL_BELOW:
         return 0.0, upper
-    return _where(share_below, 1.0 - TAIL, max(0.0, value - scale), value), upper
+    return _where(share_below, 1.0 - _TAIL_BELOW, max(0.0, value - scale), value), upper
 
 
 def _where(falling: Callable[[float], float], level: float, low: float, high: float) -> float:

@@ -55,6 +55,7 @@ def norm_interval(mean: Array, covariance: Array, cycles: int, known: Array) -> 
     variances, axes = np.linalg.eigh(covariance / cycles + known)
     if not variances[-1] > 0:
         return None
+    axes = axes * np.where(mean @ axes < 0, -1.0, 1.0)  # so that no frame draws another noise
     noise = barycentre_scatter(axes.T @ covariance @ axes, cycles, axes.T @ known @ axes, 0)
     squares = (noise**2).sum(axis=1)
     norm = float(np.linalg.norm(mean))
@@ -186,9 +187,9 @@ def _chi_square(shares: Array, freedom: int) -> Array:
 
 
 def _root(covariance: Array) -> Array:
-    """Return a square root of a covariance, which may be singular, ``(d, d)``."""
+    """Return the symmetric square root of a covariance, which may be singular, ``(d, d)``."""
     variances, axes = np.linalg.eigh(covariance)
-    return np.asarray(axes * np.sqrt(np.maximum(variances, 0.0)))
+    return np.asarray((axes * np.sqrt(np.maximum(variances, 0.0))) @ axes.T)
 
 
 def largest_difference(places: Sequence[Array], pairs: Sequence[tuple[int, int]]) -> tuple[float, Interval | None]:

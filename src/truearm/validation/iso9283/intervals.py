@@ -43,7 +43,7 @@ TAIL: Final = 0.025
 #: The same for RP, whose covariance is estimated: with 0.025 the intervals would hold 93 % to 95 %.
 _TAIL_RP: Final = 0.021
 #: Campaigns simulated for RP.
-_CAMPAIGNS: Final = 2000
+_CAMPAIGNS: Final = 8000
 #: The standard error of RP is at least this share of a Gaussian's: cycles on a circle have none.
 _LEAST_ERROR: Final = 0.4
 

@@ -35,6 +35,8 @@ from truearm.validation.iso9283.values import Instrument
 
 CYCLES = 30
 MANY = 300_000
+#: Campaigns of which the oracle is asked.
+ORACLES = 100
 NOTHING = np.zeros((3, 3))
 Draw = Callable[[np.random.Generator, tuple[int, ...]], Array]
 
@@ -94,6 +96,8 @@ def accuracy(draw: Draw, covariance: Array, true: Array, campaigns: int, rng: np
     for points in draw(rng, (campaigns, CYCLES)) + true:
         mean = points.mean(axis=0)
         found.append(norm_interval(mean, np.cov(points.T), CYCLES, NOTHING))
+        if len(oracles) == ORACLES:
+            continue
         oracle = norm_interval(mean, covariance * MANY, CYCLES * MANY, NOTHING)
         assert oracle is not None
         oracles.append(oracle[1] - oracle[0])
@@ -173,7 +177,10 @@ def main(campaigns: int = 1000, fewer: int = 300) -> dict[str, Any]:
             both = distances(draw, np.array(unit), campaigns, rng)
             for id, figures in both.items():
                 made[id][f"{name}, along {way}"] = figures
-        sys.stderr.write(f"{name} {made['RP'][name]}\n")
+        worst = {
+            id: min(v["holds"] for k, v in made[id].items() if k.split(",")[0] == name) for id in ("AP", "AD", "RD")
+        }
+        sys.stderr.write(f"{name} {made['RP'][name]} {worst}\n")
     rng = np.random.default_rng(9283)
     shapes = {
         "three equal": np.zeros((3, 3)),

@@ -93,10 +93,11 @@ def test_what_does_not_scatter_or_is_too_little_has_no_interval() -> None:
 
 def test_intervals_have_the_unit_of_the_values() -> None:
     points = np.random.default_rng(5).standard_normal((30, 3)) + 1.0
-    for made in (
-        lambda p: repeatability_interval(p),
-        lambda p: norm_interval(p.mean(axis=0), np.cov(p.T), 30, np.zeros((3, 3))),
-    ):
+
+    def of_norm(p: Array) -> Interval | None:
+        return norm_interval(p.mean(axis=0), np.cov(p.T), 30, np.zeros((3, 3)))
+
+    for made in (repeatability_interval, of_norm):
         metres, millimetres = made(points), made(1e3 * points)
         assert metres is not None
         assert millimetres is not None

@@ -69,6 +69,7 @@ PLACES: dict[str, Arguments] = {
     "influence": {"out": "."},
     "hexapod_plan": {"out": "sheet.csv", "steps": "steps.txt"},
     "hexapod_solve": {"out": "cups.csv"},
+    "iso9283_simulate": {"out": "."},
     "compensate": {"out": "."},
     "revert": {"out": "."},
     "convert": {"out": "robot.yaml"},
@@ -91,6 +92,7 @@ EARLIER: dict[str, Arguments] = {
     "influence": {"seed": 2},
     "axes": {"frame": "instrument"},
     "hexapod_plan": {"fixture": (0.24, 0.0, 0.1, -0.5)},
+    "iso9283_simulate": {"seed": 2},
     "compensate": {"split": None, "accept": ["not-better-here"]},
     "study": {"seeds": 2},
 }

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from tests.identification.test_axes import runs
+from tests.performance_plan import small_plan
 from tests.simulated import campaign
 from tests.ur_controller import UR10_CONF
 
@@ -362,6 +363,13 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
     },
     "hexapod_solve": lambda _: {"pose": 7, "legs": (0.3,) * 6, "base": (0.3,) * 3, "tool": (0.15,) * 3},
     "hexapod_world_frame": lambda _: _touches(),
+    "iso9283_simulate": lambda _: {
+        "robot": "irb120",
+        "plan": small_plan(["AP"], cycles={"AP": 2}),
+        "noise": 1e-5,
+        "rate": 100.0,
+        "seed": 1,
+    },
     "compensate": lambda folder: {
         "robot": _calibrated(folder),
         "programs": [_program(folder)],

@@ -9,7 +9,7 @@ import typer
 
 from truearm.cli.loading import read_lengths, read_numbers
 from truearm.cli.options import Commands, command_line
-from truearm.cli.output import Json, end_on_error, print_json, print_line, print_record
+from truearm.cli.output import Json, end_on_error, print_json, print_line, print_record, progress
 
 app = Commands(no_args_is_help=True, help="Test a robot by the criteria of ISO 9283: plan, simulate, evaluate.")
 
@@ -75,6 +75,101 @@ def plan(
     end_on_error(found.warnings)
 
 
+@app.command()
+def simulate(
+    robot: Annotated[str, typer.Argument(metavar="ROBOT", help="The robot that the plan was made for.")],
+    plan: Annotated[Path, typer.Option(metavar="PLAN.yaml", help="Of 'truearm iso9283 plan'.")],
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for what is read.")],
+    truth: Annotated[
+        str, typer.Option(metavar="NAME|FILE", help="What the robot truly is, as in 'truearm simulate'.")
+    ] = "random",
+    noise: Annotated[float, typer.Option(metavar="MM", min=0.0, help="Standard deviation of a coordinate.")] = 0.01,
+    noise_rot: Annotated[
+        float, typer.Option("--noise-rot", metavar="DEG", min=0.0, help="Standard deviation of an angle.")
+    ] = 0.005,
+    rate: Annotated[float, typer.Option(metavar="HZ", help="Readings in a second, 10 to 2000.")] = 500.0,
+    seed: Annotated[int, typer.Option(metavar="S", min=0, help="Of all that is drawn.")] = 0,
+    corrected: Annotated[
+        str | None,
+        typer.Option(metavar="ROBOT", help="Correct commands by this calibrated robot.", show_default=False),
+    ] = None,
+) -> None:
+    """Run the tests of a plan on a twin that moves, and read it with a simulated instrument."""
+    from truearm.jobs.iso9283_simulate import iso9283_simulate
+    from truearm.units import sized_si
+
+    with progress() as say:
+        found = iso9283_simulate(
+            robot,
+            plan,
+            truth=truth,
+            noise=sized_si(noise, "mm", parameter="noise", deviation=True) if noise else 0.0,
+            noise_rot=sized_si(noise_rot, "deg", parameter="noise_rot", deviation=True) if noise_rot else 0.0,
+            rate=rate,
+            seed=seed,
+            corrected=corrected,
+            out=out,
+            command=command_line(),
+            progress=say,
+        )
+    print_record(found)
+
+
 def _shares(text: str, parameter: str) -> list[float]:
     """Return shares where the text has percent."""
     return [value / 100.0 for value in read_numbers(text, parameter, "percent, as 100,50,10")]
+
+
+@app.command()
+def evaluate(
+    plan: Annotated[Path, typer.Argument(metavar="PLAN.yaml", help="Of 'truearm iso9283 plan'.")],
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for iso9283.json and report.html.")],
+    poses: Annotated[Path | None, typer.Option(metavar="CSV", help="Attained poses.", show_default=False)] = None,
+    paths: Annotated[Path | None, typer.Option(metavar="CSV", help="Samples along paths.", show_default=False)] = None,
+    settling: Annotated[
+        Path | None, typer.Option(metavar="CSV", help="Samples on the way to a pose.", show_default=False)
+    ] = None,
+    forces: Annotated[
+        Path | None, typer.Option(metavar="CSV", help="The tip under forces.", show_default=False)
+    ] = None,
+    alignment: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="How the instrument was tied to the base.",
+            show_default="best fit, with a warning",
+        ),
+    ] = None,
+    noise: Annotated[float, typer.Option(metavar="MM", help="Of the instrument, of a coordinate.")] = 0.01,
+    noise_rot: Annotated[float, typer.Option(metavar="DEG", help="Of the instrument, of an angle.")] = 0.005,
+    compare: Annotated[
+        Path | None, typer.Option(metavar="RESULT.json", help="iso9283.json of another result.", show_default=False)
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Evaluate what was measured: every criterion with its 95 % interval, and a report."""
+    from truearm.cli.output import progress
+    from truearm.jobs.iso9283_evaluate import iso9283_evaluate
+    from truearm.units import sized_si
+
+    with progress() as say:
+        found = iso9283_evaluate(
+            plan,
+            poses=poses,
+            paths=paths,
+            settling=settling,
+            forces=forces,
+            alignment=alignment,
+            noise=sized_si(noise, "mm", parameter="noise", deviation=True),
+            noise_rot=sized_si(noise_rot, "deg", parameter="noise_rot", deviation=True),
+            compare=compare,
+            out=out,
+            command=command_line(),
+            progress=say,
+        )
+    if json:
+        print_json(found.summary())
+    else:
+        print_record(found)
+        print_line(f"Written to {out}: {', '.join(found.contents())}")
+    end_on_error(found.warnings)

@@ -39,6 +39,8 @@ JOBS: Final = (
     "tolerance",
     "lines",
     "iso9283_plan",
+    "iso9283_simulate",
+    "iso9283_evaluate",
     "influence",
     "sphere",
     "hexapod_enumerate",

@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from truearm.jobs.import_ur_kinematics import import_ur_kinematics
     from truearm.jobs.influence import influence
     from truearm.jobs.inverse import inverse
+    from truearm.jobs.iso9283_evaluate import iso9283_evaluate
     from truearm.jobs.iso9283_plan import iso9283_plan
     from truearm.jobs.iso9283_simulate import iso9283_simulate
     from truearm.jobs.lines import lines
@@ -105,6 +106,7 @@ __all__ = [
     "import_ur_kinematics",
     "influence",
     "inverse",
+    "iso9283_evaluate",
     "iso9283_plan",
     "iso9283_simulate",
     "lines",

@@ -118,3 +118,58 @@ def simulate(
 def _shares(text: str, parameter: str) -> list[float]:
     """Return shares where the text has percent."""
     return [value / 100.0 for value in read_numbers(text, parameter, "percent, as 100,50,10")]
+
+
+@app.command()
+def evaluate(
+    plan: Annotated[Path, typer.Argument(metavar="PLAN.yaml", help="Of 'truearm iso9283 plan'.")],
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for iso9283.json and report.html.")],
+    poses: Annotated[Path | None, typer.Option(metavar="CSV", help="Attained poses.", show_default=False)] = None,
+    paths: Annotated[Path | None, typer.Option(metavar="CSV", help="Samples along paths.", show_default=False)] = None,
+    settling: Annotated[
+        Path | None, typer.Option(metavar="CSV", help="Samples on the way to a pose.", show_default=False)
+    ] = None,
+    forces: Annotated[
+        Path | None, typer.Option(metavar="CSV", help="The tip under forces.", show_default=False)
+    ] = None,
+    alignment: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="How the instrument was tied to the base.",
+            show_default="best fit, with a warning",
+        ),
+    ] = None,
+    noise: Annotated[float, typer.Option(metavar="MM", help="Of the instrument, of a coordinate.")] = 0.01,
+    noise_rot: Annotated[float, typer.Option(metavar="DEG", help="Of the instrument, of an angle.")] = 0.005,
+    compare: Annotated[
+        Path | None, typer.Option(metavar="RESULT.json", help="iso9283.json of another result.", show_default=False)
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Evaluate what was measured: every criterion with its 95 % interval, and a report."""
+    from truearm.cli.output import progress
+    from truearm.jobs.iso9283_evaluate import iso9283_evaluate
+    from truearm.units import sized_si
+
+    with progress() as say:
+        found = iso9283_evaluate(
+            plan,
+            poses=poses,
+            paths=paths,
+            settling=settling,
+            forces=forces,
+            alignment=alignment,
+            noise=sized_si(noise, "mm", parameter="noise", deviation=True),
+            noise_rot=sized_si(noise_rot, "deg", parameter="noise_rot", deviation=True),
+            compare=compare,
+            out=out,
+            command=command_line(),
+            progress=say,
+        )
+    if json:
+        print_json(found.summary())
+    else:
+        print_record(found)
+        print_line(f"Written to {out}: {', '.join(found.contents())}")
+    end_on_error(found.warnings)

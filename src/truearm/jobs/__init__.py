@@ -40,6 +40,7 @@ JOBS: Final = (
     "lines",
     "iso9283_plan",
     "iso9283_simulate",
+    "iso9283_evaluate",
     "influence",
     "sphere",
     "hexapod_enumerate",

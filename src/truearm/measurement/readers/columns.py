@@ -43,14 +43,33 @@ def columns_beside_joints(
     optional
         Those that may be left out.
     """
+    columns = _found_columns(cells, shown, units, _JOINTS)
+    joint_names(columns, f"{cells.source}, line {cells.header}")
+    return _complete(cells, columns, shown, optional, _JOINTS)
+
+
+def named_columns(
+    cells: Cells, shown: Mapping[str, str], units: Mapping[str, tuple[str, ...]], optional: Sequence[str] = ()
+) -> Columns:
+    """Return place and unit of every column by its name in a table without joint positions, or refuse the header.
+
+    Parameters
+    ----------
+    shown, units, optional
+        As for :func:`columns_beside_joints`.
+    """
+    return _complete(cells, _found_columns(cells, shown, units), shown, optional)
+
+
+def _found_columns(cells: Cells, shown: Mapping[str, str], units: Mapping[str, tuple[str, ...]], *more: str) -> Columns:
     columns: Columns = {}
     header = f"{cells.source}, line {cells.header}"
-    allowed = ", ".join([*shown.values(), _JOINTS])
+    allowed = ", ".join([*shown.values(), *more])
     for place, heading in enumerate(cells.names):
         where = f"{header}, column {place + 1}"
         match = _HEADING.fullmatch(heading)
         name, unit = (match["name"], match["unit"]) if match else (heading, None)
-        fitting = (*ANGLE_UNITS, *LENGTH_UNITS) if JOINT_COLUMN.fullmatch(name) else units.get(name)
+        fitting = (*ANGLE_UNITS, *LENGTH_UNITS) if more and JOINT_COLUMN.fullmatch(name) else units.get(name)
         if fitting is None and name not in shown:
             near = nearest_names(name, shown, 1)
             raise InputError(
@@ -69,10 +88,19 @@ def columns_beside_joints(
                 "this column takes no unit", where=where, came=heading, allowed=name, cure="Remove the unit."
             )
         columns[name] = (place, unit or "1")
-    joint_names(columns, header)
+    return columns
+
+
+def _complete(cells: Cells, columns: Columns, shown: Mapping[str, str], optional: Sequence[str], *more: str) -> Columns:
+    """Return columns if none is missing that may not be."""
     for name in shown:
         if name not in columns and name not in optional:
-            raise InputError(f"the column {name} is missing", where=header, allowed=allowed, cure=f"Add {shown[name]}.")
+            raise InputError(
+                f"the column {name} is missing",
+                where=f"{cells.source}, line {cells.header}",
+                allowed=", ".join([*shown.values(), *more]),
+                cure=f"Add {shown[name]}.",
+            )
     return columns
 
 

@@ -1,0 +1,164 @@
+"""Tests of a robot by ISO 9283, evaluated."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from truearm.errors import refusals_of
+from truearm.files import path_argument
+from truearm.jobs.arguments import (
+    command_argument,
+    deviation_argument,
+    files_of,
+    folder_beside,
+    numbers_argument,
+    progress_argument,
+    python_call,
+)
+from truearm.measurement.readers.performance_poses import read_attained_poses, read_pushes
+from truearm.measurement.readers.performance_samples import read_path_samples, read_settling_samples
+from truearm.notices import Notice
+from truearm.planning.iso9283.plan_file import read_plan
+from truearm.results.iso9283_evaluation import EVALUATION_FILES, RESULT, Iso9283Evaluation
+from truearm.shown import listed
+from truearm.validation.iso9283.alignment import Alignment, read_alignment
+from truearm.validation.iso9283.comparison import compared
+from truearm.validation.iso9283.evaluation import Evaluation, Measurements, evaluated
+from truearm.validation.iso9283.values import Instrument
+
+
+def iso9283_evaluate(
+    plan: str | Path,
+    *,
+    poses: str | Path | None = None,
+    paths: str | Path | None = None,
+    settling: str | Path | None = None,
+    forces: str | Path | None = None,
+    alignment: str | Path | None = None,
+    noise: float = 0.01e-3,
+    noise_rot: float = 1e-4,
+    compare: str | Path | None = None,
+    out: str | Path | None = None,
+    command: str | None = None,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Iso9283Evaluation:
+    """Evaluate the tests of a plan by ISO 9283, every value with a 95 % interval.
+
+    Parameters
+    ----------
+    plan
+        ``plan.yaml`` of :func:`truearm.iso9283_plan`, with ``robot.yaml`` beside it.
+    poses, paths, settling, forces
+        Files of what was measured, in the instrument's frame; None for what was not.
+    alignment
+        How the instrument was tied to the robot's base, a file (schema ``truearm-alignment/1``); None for the best fit
+        of the attained poses to the commanded ones, which hides what pose accuracy measures.
+    noise, noise_rot
+        Standard deviation of the instrument: of each coordinate [m], of each angle [rad].
+    compare
+        ``iso9283.json`` of another evaluation, set beside this one.
+    out
+        Folder for ``iso9283.json`` and ``report.html``; None writes nothing.
+    command
+        How to run it again, for the report; None writes the call in Python.
+    progress
+        Called with a few words at each step.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be used or does not fit the plan; the message names the row.
+    """
+    progress_argument(progress)
+    given = {"poses": poses, "paths": paths, "settling": settling, "forces": forces}
+    files = {name: None if file is None else path_argument(file, name) for name, file in given.items()}
+    plan_path = path_argument(plan, "plan")
+    tie_path = None if alignment is None else path_argument(alignment, "alignment")
+    other = None if compare is None else path_argument(compare, "compare")
+    sigma = deviation_argument(noise, "noise")
+    (sigma_rot,) = numbers_argument([noise_rot], "noise_rot", 1, "a standard deviation above 0 [rad]")
+    inputs = files_of(plan_path, *files.values(), tie_path, other)
+    folder = None if out is None else folder_beside(EVALUATION_FILES, RESULT, out, *inputs)
+    call = command_argument(command) or python_call(
+        "iso9283_evaluate",
+        plan,
+        **given,
+        alignment=alignment,
+        noise=noise,
+        noise_rot=noise_rot,
+        compare=compare,
+    )
+    with refusals_of("plan"):
+        planned = read_plan(plan_path)
+    tie: Alignment | None = None
+    if tie_path is not None:
+        with refusals_of("alignment"):
+            tie = read_alignment(tie_path)
+    read = Measurements()
+    for name, file in files.items():
+        if file is None:
+            continue
+        progress(f"reading {file.name}")
+        with refusals_of(name):
+            read = replace(read, **{name: _READERS[name](file)})
+    instrument = Instrument(sigma, sigma_rot)
+    found = evaluated(planned, read, tie, instrument, progress)
+    made = Iso9283Evaluation(planned, found, instrument, None, call, _warnings(found), inputs)
+    if other is not None:
+        with refusals_of("compare"):
+            made = replace(made, comparison=compared(made.summary(), other))
+        made = replace(made, warnings=(*made.warnings, *_warnings_of_comparison(made)))
+    if folder is not None:
+        progress("writing the report")
+        made.save(folder)
+    return made
+
+
+_READERS = {
+    "poses": read_attained_poses,
+    "paths": read_path_samples,
+    "settling": read_settling_samples,
+    "forces": read_pushes,
+}
+
+
+def _warnings(found: Evaluation) -> tuple[Notice, ...]:
+    notices: list[Notice] = []
+    if not found.alignment.is_standard:
+        notices.append(
+            Notice(
+                "best-fit-alignment",
+                "The frame of the instrument was fitted to the attained poses. That hides a part of the error that "
+                "pose and path accuracy shall tell, and is not what the standard asks for: AP and AT are too small. "
+                "Tie the instrument to the base and give `alignment`.",
+            )
+        )
+    few = sorted({value.id for value in found.values if value.status == "too-few-cycles"})
+    if few:
+        notices.append(
+            Notice("too-few-cycles", f"Fewer cycles than planned were measured for {listed(few)}; their values stand.")
+        )
+    coarse = sorted({value.id for value in found.values if value.status == "instrument-too-coarse"})
+    if coarse:
+        notices.append(
+            Notice(
+                "instrument-too-coarse",
+                f"What instrument and tie leave open is more than a quarter of some values of {listed(coarse)}. "
+                "They say more about the measurement than about the robot.",
+            )
+        )
+    return tuple(notices)
+
+
+def _warnings_of_comparison(made: Iso9283Evaluation) -> tuple[Notice, ...]:
+    if made.comparison is None or not made.comparison.left_out:
+        return ()
+    return (
+        Notice(
+            "alignment-differs",
+            f"The two results were tied to the base in different ways: {', '.join(made.comparison.left_out)} are not "
+            "compared.",
+        ),
+    )

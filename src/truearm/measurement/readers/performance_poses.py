@@ -1,0 +1,181 @@
+"""Poses that a robot attained in tests of its performance, and where its tip was while it was pushed: two CSV."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.errors import InputError
+from truearm.measurement.performance.records import AttainedPoses, Names, Pushes
+from truearm.measurement.readers.cells import Cells
+from truearm.measurement.readers.columns import Columns, named_columns, read_named
+from truearm.measurement.readers.rows import unit_quaternions
+from truearm.modeling.chain import Array
+from truearm.modeling.transform import rotation_from_quaternion
+from truearm.units import LENGTH_UNITS
+
+#: Of drift, whose groups have the same cycles again.
+DRIFT: Final = "dAP"
+_POSITION: Final = ("x", "y", "z")
+_QUATERNION: Final = ("qw", "qx", "qy", "qz")
+_LENGTHS: Final[dict[str, tuple[str, ...]]] = dict.fromkeys(_POSITION, LENGTH_UNITS)
+_POSE_UNITS: Final[dict[str, tuple[str, ...]]] = {"velocity": ("%",), "load": ("%",), "time": ("s",)} | _LENGTHS
+_POSES: Final = (
+    {name: name for name in ("criterion", "robot", "pose", "cycle", "approach")}
+    | {"velocity": "velocity [%]", "load": "load [%]", "time": "time [s]"}
+    | {axis: f"{axis} [mm]" for axis in _POSITION}
+    | {part: part for part in _QUATERNION}
+)
+_OPTIONAL: Final = ("robot", "approach", "time")
+_PUSH_UNITS: Final[dict[str, tuple[str, ...]]] = {"force": ("N",)} | _LENGTHS
+_PUSHES: Final = {"direction": "direction", "force": "force [N]", "cycle": "cycle"} | {
+    axis: f"{axis} [mm]" for axis in _POSITION
+}
+_DIRECTIONS: Final = ("+x", "-x", "+y", "-y", "+z", "-z")
+_LARGEST_CYCLE: Final = 10**6
+
+
+def read_attained_poses(path: Path) -> AttainedPoses:
+    """Read ``poses.csv``: a row for each attained pose, in the instrument's frame.
+
+    Columns: ``criterion``, ``robot`` (may be left out), ``pose``, ``cycle``, ``approach`` (may be left out), ``velocity
+    [%]``, ``load [%]``, ``time [s]`` (may be left out), ``x [mm]``, ``y [mm]``, ``z [mm]``, and ``qw``, ``qx``,
+    ``qy``, ``qz`` or none of them. Cells of columns that may be left out may be empty.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be used: a column or unit that is missing or not known, cells that are empty or no numbers,
+        cycles that are not whole, velocities or loads that are not between 0 and 100 %, quaternions that do not have
+        length 1, or two rows of one cycle. Whether criteria and poses are those of a plan is not asked here.
+    """
+    cells = read_named(path)
+    quaternion = () if any(name.startswith("q") for name in cells.names) else _QUATERNION
+    columns = named_columns(cells, _POSES, _POSE_UNITS, (*_OPTIONAL, *quaternion))
+    criterion, pose = (Names.of(cells.texts(columns[name][0])) for name in ("criterion", "pose"))
+    robot, approach = (
+        Names.of(cells.texts(columns[name][0], missing=True) if name in columns else [""] * len(cells.lines))
+        for name in ("robot", "approach")
+    )
+    cycle = _cycles(cells, columns)
+    velocity = _share(cells, columns, "velocity", "the velocity must be a share of the rated one")
+    load = _share(cells, columns, "load", "the load is not between none and the rated one")
+    time = np.full(len(cells.lines), np.nan)
+    if "time" in columns:
+        time = cells.numbers(columns["time"][0], "1", missing=True)
+    rotation = None
+    if "qw" in columns:
+        parts = np.column_stack([cells.numbers(*columns[part]) for part in _QUATERNION])
+        rotation = rotation_from_quaternion(unit_quaternions(parts, str(path), cells.lines))
+    read = AttainedPoses(
+        criterion=criterion,
+        robot=robot,
+        pose=pose,
+        approach=approach,
+        cycle=cycle,
+        velocity=velocity,
+        load=load,
+        time=time,
+        position=_positions(cells, columns),
+        rotation=rotation,
+        line=np.array(cells.lines, dtype=np.intp),
+        source=str(path),
+    )
+    _refuse_repeated(read)
+    return read
+
+
+def read_pushes(path: Path) -> Pushes:
+    """Read ``forces.csv``: a row for each force, in the instrument's frame.
+
+    Columns: ``direction`` (``+x`` to ``-z`` of the robot's base), ``force [N]``, ``cycle``, ``x [mm]``, ``y [mm]``,
+    ``z [mm]``.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be used: a column or unit that is missing or not known, cells that are empty or no numbers, a
+        direction that is not known, a force below zero, or cycles that are not whole.
+    """
+    cells = read_named(path)
+    columns = named_columns(cells, _PUSHES, _PUSH_UNITS)
+    place = columns["direction"][0]
+    directions = cells.texts(place)
+    for row, direction in enumerate(directions):
+        if direction not in _DIRECTIONS:
+            raise InputError(
+                "the direction is not known",
+                where=cells.place(row, place),
+                came=direction,
+                allowed=", ".join(_DIRECTIONS),
+                cure="Name the axis of the robot's base along which the force acts, with its sign.",
+            )
+    force = cells.numbers(*columns["force"])
+    _refuse_first(
+        cells, columns, "force", force < 0, "the force is below zero", "0 N or more", "Its sense is the direction's."
+    )
+    return Pushes(
+        direction=Names.of(directions),
+        force=force,
+        cycle=_cycles(cells, columns),
+        position=_positions(cells, columns),
+        line=np.array(cells.lines, dtype=np.intp),
+        source=str(path),
+    )
+
+
+def _positions(cells: Cells, columns: Columns) -> Array:
+    return np.column_stack([cells.numbers(*columns[axis]) for axis in _POSITION])
+
+
+def _cycles(cells: Cells, columns: Columns) -> NDArray[np.intp]:
+    cycle = cells.numbers(columns["cycle"][0], "1")
+    wrong = (cycle < 1) | (cycle > _LARGEST_CYCLE) | (cycle != np.round(cycle))
+    _refuse_first(
+        cells, columns, "cycle", wrong, "a cycle is a whole number from 1", "1, 2, 3 ..", "Number the cycles from 1."
+    )
+    return cycle.astype(np.intp)
+
+
+def _share(cells: Cells, columns: Columns, name: str, what: str) -> Array:
+    percent = cells.numbers(columns[name][0], "1")
+    lowest_too = name == "velocity"
+    wrong = (percent > 100.0) | (percent < 0.0) | ((percent == 0.0) & lowest_too)
+    allowed = f"{'above 0' if lowest_too else '0'} to 100 %"
+    _refuse_first(
+        cells, columns, name, wrong, what, allowed, "Tests go up to the rated one: correct or remove the row."
+    )
+    return percent / 100.0
+
+
+def _refuse_first(
+    cells: Cells, columns: Columns, name: str, wrong: NDArray[np.bool_], what: str, allowed: str, cure: str
+) -> None:
+    if wrong.any():
+        row, place = int(np.argmax(wrong)), columns[name][0]
+        raise InputError(
+            what, where=cells.place(row, place), came=cells.columns[place][row], allowed=allowed, cure=cure
+        )
+
+
+def _refuse_repeated(read: AttainedPoses) -> None:
+    """Refuse two rows of one cycle; those of drift begin again."""
+    codes = (read.criterion.code, read.robot.code, read.pose.code, read.approach.code)
+    first: dict[tuple[object, ...], int] = {}
+    drift = read.criterion.are(DRIFT)
+    keys = zip(
+        *(code.tolist() for code in codes), read.cycle.tolist(), read.velocity.tolist(), read.load.tolist(), strict=True
+    )
+    for row, key in enumerate(keys):
+        before = row if drift[row] else first.setdefault(key, row)
+        if before != row:
+            pose, cycle = read.pose.names[read.pose.code[row]], int(read.cycle[row])
+            raise InputError(
+                f"cycle {cycle} of pose {pose!r} appears twice under the same conditions",
+                where=f"{read.source}, lines {read.line[before]} and {read.line[row]}",
+                allowed="one row for each criterion, robot, pose, approach, velocity, load and cycle",
+                cure="Correct the cycle, or remove one of the rows.",
+            )

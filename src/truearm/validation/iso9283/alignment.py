@@ -1,0 +1,185 @@
+"""How the instrument was tied to the robot's base: without it no pose can be compared with its command.
+
+A file says it::
+
+    truearm: truearm-alignment/1
+    units: {length: mm, angle: deg}
+    kind: base-features
+    position: [1500.2, -310.4, 12.1]
+    quaternion: [1, 0, 0, 0]
+    sigma: 0.03
+    sigma_rot: 0.002
+
+``position`` and ``quaternion`` are of the instrument's frame in the robot's base frame, ``sigma`` and ``sigma_rot`` the
+standard deviations of each coordinate and each angle, as they are at the origin of the base. ``base-features`` were
+measured on the robot's foot; ``controller-frame`` is a frame that the controller was taught. Both tell how far the
+robot is from its commands in a frame that others can find again. A best fit of the attained poses to the commanded ones
+hides what pose accuracy measures, and is not what the standard asks for.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, Literal
+
+import numpy as np
+from pydantic import BaseModel
+
+from truearm.errors import InputError, refusals_at
+from truearm.files import read_yaml
+from truearm.modeling.chain import Array
+from truearm.modeling.formats.entries import STRICT, Number, Triple
+from truearm.modeling.transform import Transform, rigid_motion
+from truearm.units import sized_si
+
+SCHEMA: Final = "truearm-alignment/1"
+Kind = Literal["base-features", "controller-frame", "best-fit"]
+#: How far a quaternion's length may be from 1.
+_TOLERANCE: Final = 1e-3
+#: Poses that nearly lie on a line leave a turn about it open: their second extent over the first.
+_LINE: Final = 1e-3
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """How the instrument was tied to the robot's base.
+
+    Attributes
+    ----------
+    kind
+        Of what.
+    T_base_instrument
+        The instrument's frame in the robot's base frame.
+    sigma
+        Standard deviation of each coordinate at `about` [m].
+    sigma_rot
+        Of each angle [rad].
+    about
+        The point of the base frame that the tie is known best at: the origin of the base, the middle of the poses for a
+        best fit [m].
+    """
+
+    kind: Kind
+    T_base_instrument: Transform
+    sigma: float
+    sigma_rot: float
+    about: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    @property
+    def is_standard(self) -> bool:
+        """Whether it is one that the standard knows."""
+        return self.kind != "best-fit"
+
+    def in_base(self, position: Array) -> Array:
+        """Return positions ``(n, 3)`` of the instrument's frame in the base frame [m]."""
+        place = self.T_base_instrument
+        return np.asarray(position @ place.rotation.T + np.array(place.translation))
+
+    def turned_to_base(self, rotation: Array) -> Array:
+        """Return rotations ``(n, 3, 3)`` of the instrument's frame in the base frame."""
+        return np.asarray(self.T_base_instrument.rotation @ rotation)
+
+    def covariance_at(self, position: Array) -> Array:
+        """Return what the tie leaves open of a position ``(3,)`` in the base frame: its covariance ``(3, 3)`` [m^2].
+
+        ``sigma^2 I + sigma_rot^2 (|r|^2 I - r r^T)``, r the lever from :attr:`about`.
+        """
+        lever = position - np.array(self.about)
+        return np.asarray(
+            self.sigma**2 * np.eye(3) + self.sigma_rot**2 * ((lever @ lever) * np.eye(3) - np.outer(lever, lever))
+        )
+
+
+class _Units(BaseModel):
+    model_config = STRICT
+
+    length: Literal["mm", "m", "um"]
+    angle: Literal["deg", "rad", "mrad"]
+
+
+class _AlignmentFile(BaseModel):
+    """Schema ``truearm-alignment/1``."""
+
+    model_config = STRICT
+
+    truearm: Literal["truearm-alignment/1"]
+    units: _Units
+    kind: Literal["base-features", "controller-frame"]
+    position: Triple
+    quaternion: tuple[Number, Number, Number, Number]
+    sigma: Number
+    sigma_rot: Number
+
+
+def read_alignment(path: Path) -> Alignment:
+    """Read a file of the schema above.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be used: an entry that is missing or not known, a quaternion that does not have length 1, or
+        a standard deviation that is not above zero.
+    """
+    content = read_yaml(path, _AlignmentFile)
+    units = content.units
+    q = np.array(content.quaternion)
+    length = float(np.linalg.norm(q))
+    if abs(length - 1.0) > _TOLERANCE:
+        raise InputError(
+            "the quaternion (w, x, y, z) does not have length 1",
+            where=f"{path}, quaternion",
+            came=f"length {length:.6g}",
+            allowed=f"1 within {_TOLERANCE:g}",
+            cure="Check the order of its numbers, and that all digits were written.",
+        )
+    x, y, z = (sized_si(value, units.length, f"{path}, position") for value in content.position)
+    with refusals_at(f"{path}, sigma"):
+        sigma = sized_si(content.sigma, units.length, deviation=True)
+    with refusals_at(f"{path}, sigma_rot"):
+        sigma_rot = sized_si(content.sigma_rot, units.angle, deviation=True)
+    qw, qx, qy, qz = (float(part) for part in q / length)
+    return Alignment(content.kind, Transform((x, y, z), (qw, qx, qy, qz)), sigma, sigma_rot)
+
+
+def best_fit(attained: Array, commanded: Array) -> Alignment:
+    """Return the tie that brings attained barycentres nearest to their commands, in the sum of squares.
+
+    Its standard deviations are those that the distances which remain leave open.
+
+    Parameters
+    ----------
+    attained
+        Barycentres in the instrument's frame [m], ``(k, 3)``.
+    commanded
+        In the base frame [m], ``(k, 3)``.
+
+    Raises
+    ------
+    InputError
+        For fewer than three poses, or poses on a line.
+    """
+    k = len(attained)
+    middle = commanded.mean(axis=0)
+    extent = np.linalg.svd(commanded - middle, compute_uv=False) if k >= 3 else np.zeros(3)
+    if not extent[1] > _LINE * extent[0]:
+        raise InputError(
+            "a best fit needs three poses or more that do not lie on a line",
+            parameter="alignment",
+            came=f"{k} pose{'s' * (k != 1)}",
+            allowed="P1 to P5 of the test AP",
+            cure="Measure all poses, or tie the instrument to the robot's base.",
+        )
+    R, p = rigid_motion(attained, commanded)
+    left = attained @ R.T + p - commanded
+    deviation = math.sqrt(float((left**2).sum()) / (3 * k - 6))
+    # Each angle is known from the levers at right angles to it; the least known one counts.
+    lever = math.sqrt(float(extent[1] ** 2 + extent[2] ** 2))
+    return Alignment(
+        "best-fit",
+        Transform.from_matrix(R, p),
+        deviation / math.sqrt(k),
+        deviation / lever,
+        (float(middle[0]), float(middle[1]), float(middle[2])),
+    )

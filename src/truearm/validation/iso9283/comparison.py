@@ -1,0 +1,193 @@
+"""Two results beside each other: which differences are larger than what is not known of them."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from truearm.errors import InputError
+from truearm.files import read_text
+
+Verdict = Literal["smaller", "larger", "not told apart", "no interval"]
+
+
+@dataclass(frozen=True)
+class Compared:
+    """A value and the same of another result, in the units of the files.
+
+    Attributes
+    ----------
+    id, component, where, under, unit
+        Which; under what, as the files have it.
+    value, other
+        This result's, and the other's.
+    verdict
+        Whether this one's is smaller or larger by more than both intervals leave open.
+    """
+
+    id: str
+    component: str
+    where: str
+    under: str
+    unit: str
+    value: float
+    other: float
+    verdict: Verdict
+
+    @property
+    def change(self) -> str:
+        """From the other result's value to this one's, in words."""
+        return f"{self.other:.4f} -> {self.value:.4f} {self.unit}"
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A result beside another one.
+
+    Attributes
+    ----------
+    other
+        The file of the other one.
+    rows
+        All values that both have.
+    left_out
+        Ids of criteria that were not compared, because the two were tied to the base in different ways.
+    """
+
+    other: str
+    rows: tuple[Compared, ...]
+    left_out: tuple[str, ...] = ()
+
+    def summary(self) -> dict[str, Any]:
+        """Return it as JSON holds it."""
+        return {
+            "other": self.other,
+            "values": [vars(row) for row in self.rows],
+            "left_out": list(self.left_out),
+        }
+
+    def lines(self) -> list[str]:
+        """Return what is smaller and what is larger than in the other result."""
+        text = [f"Beside {self.other}: {len(self.rows)} values that both have."]
+        for verdict in ("smaller", "larger", "not told apart", "no interval"):
+            rows = [row for row in self.rows if row.verdict == verdict]
+            shown = [row for row in rows if row.component == "position"][:8]
+            if rows and verdict in ("smaller", "larger"):
+                text.append(f"  {verdict} by more than both intervals leave open: {len(rows)}")
+                text += [
+                    f"    {row.id} {row.where} {row.under}: {row.other:.4f} -> {row.value:.4f} {row.unit}"
+                    for row in shown
+                ]
+            elif rows:
+                text.append(f"  {verdict}: {len(rows)}")
+        return text
+
+
+class _Entry(BaseModel):
+    model_config = ConfigDict(extra="ignore", frozen=True)
+    id: str
+    component: str
+    where: str
+    value: Annotated[float, Field(allow_inf_nan=False)] | None
+    unit: str
+    interval_95: tuple[float, float] | None
+    conditions: dict[str, float | str]
+    status: str
+
+
+class _Tie(BaseModel):
+    model_config = ConfigDict(extra="ignore", frozen=True)
+    kind: str
+
+
+class _Result(BaseModel):
+    model_config = ConfigDict(extra="ignore", frozen=True)
+    truearm: Literal["truearm-iso9283-result/1"]
+    robot: str
+    alignment: _Tie
+    criteria: tuple[_Entry, ...]
+
+
+#: Criteria whose values depend on how the instrument was tied to the base.
+_TIED = ("AP", "AT", "AT-reorientation")
+
+
+def compared(summary: dict[str, Any], other: Path) -> Comparison:
+    """Set a result beside another one.
+
+    The difference of two values is larger than what is not known of it where it exceeds the root sum of squares of the
+    two intervals' sides that face each other.
+
+    Parameters
+    ----------
+    summary
+        This result, as JSON holds it.
+    other
+        The file of the other one.
+
+    Raises
+    ------
+    InputError
+        If the file is no such result, or one of another robot, or both have no value of the same kind.
+    """
+    text = read_text(other)
+    try:
+        second = _Result.model_validate_json(text)
+    except ValidationError as error:
+        fault = error.errors()[0]
+        raise InputError(
+            "this is no result of tests by ISO 9283",
+            where=f"{other}, {'.'.join(map(str, fault['loc']))}".rstrip(", "),
+            came=fault["msg"],
+            allowed="iso9283.json of an evaluation",
+        ) from error
+    first = _Result.model_validate_json(json.dumps(summary))
+    if first.robot != second.robot:
+        raise InputError(
+            "the other result is of another robot", where=str(other), came=second.robot, allowed=first.robot
+        )
+    same_tie = first.alignment.kind == second.alignment.kind
+    known = {_key(entry): entry for entry in second.criteria}
+    rows: list[Compared] = []
+    left: list[str] = []
+    for entry in first.criteria:
+        beside = known.get(_key(entry))
+        if beside is None or entry.value is None or beside.value is None:
+            continue
+        if entry.id in _TIED and not same_tie:
+            left.append(entry.id)
+            continue
+        under = ", ".join(f"{value:g}" if isinstance(value, float) else value for value in entry.conditions.values())
+        verdict = _verdict(entry.value, entry.interval_95, beside.value, beside.interval_95)
+        rows.append(
+            Compared(entry.id, entry.component, entry.where, under, entry.unit, entry.value, beside.value, verdict)
+        )
+    if not rows:
+        raise InputError(
+            "the two results have no value of the same kind",
+            where=str(other),
+            cure="Evaluate the same criteria of both.",
+        )
+    return Comparison(str(other), tuple(rows), tuple(dict.fromkeys(left)))
+
+
+def _key(entry: _Entry) -> tuple[object, ...]:
+    return entry.id, entry.component, entry.where, entry.unit, tuple(sorted(entry.conditions.items()))
+
+
+def _verdict(
+    value: float, interval: Sequence[float] | None, other: float, other_interval: Sequence[float] | None
+) -> Verdict:
+    if interval is None or other_interval is None:
+        return "no interval"
+    if value < other:
+        open_ = math.hypot(max(interval[1] - value, 0.0), max(other - other_interval[0], 0.0))
+        return "smaller" if other - value > open_ else "not told apart"
+    open_ = math.hypot(max(value - interval[0], 0.0), max(other_interval[1] - other, 0.0))
+    return "larger" if value - other > open_ else "not told apart"

@@ -1,0 +1,151 @@
+"""Static compliance: how far the tip gives way to a force at it, along the axes of the robot's base.
+
+Public descriptions of ISO 9283:1998: the tip is pushed and pulled along each base axis in steps of a tenth of the rated
+load, and the displacement is given per force. Here it is the slope of a straight line through the steps of each cycle,
+along the force, so that the place of the unloaded tip and play at its first steps do not count as compliance.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from truearm.errors import InputError
+from truearm.measurement.performance.records import Pushes
+from truearm.modeling.chain import Array
+from truearm.planning.iso9283.planned import PerformancePlan
+from truearm.validation.iso9283.alignment import Alignment
+from truearm.validation.iso9283.pose_values import AXES, valued
+from truearm.validation.iso9283.values import Conditions, Instrument, Value
+
+#: Standard gravity [m/s^2]: what the rated load weighs.
+GRAVITY: Final = 9.80665
+#: Forces may exceed the rated load's weight by rounding, as people round 98.07 N to 100 N.
+_ROUNDING: Final = 0.05
+_NOTHING: Final = math.nan
+
+
+@dataclass(frozen=True, eq=False)
+class PushLine:
+    """Displacements of one direction in one cycle, and the line through them.
+
+    Attributes
+    ----------
+    direction, cycle
+        Which.
+    force
+        [N], ``(n,)``.
+    displacement
+        Along the force, from where the line is without force [m], ``(n,)``.
+    slope
+        [m/N].
+    """
+
+    direction: str
+    cycle: int
+    force: Array
+    displacement: Array
+    slope: float
+
+
+def evaluate_pushes(
+    plan: PerformancePlan, pushes: Pushes, alignment: Alignment, instrument: Instrument
+) -> tuple[tuple[Value, ...], tuple[PushLine, ...]]:
+    """Return the compliance of each direction, the mean of its cycles with the least and the largest, and all lines.
+
+    There is no interval: three cycles say too little of their own scatter.
+
+    Raises
+    ------
+    InputError
+        For forces above the weight of the rated load, a direction that the plan does not have, a test that it does not
+        have, and a cycle whose forces are all the same.
+    """
+    test = plan.test("compliance")
+    if test is None:
+        raise InputError(
+            "the plan has no test of compliance", where=pushes.source, cure="Plan the test, or leave the file out."
+        )
+    directions = test.approaches or tuple(sign + axis for axis in AXES for sign in "+-")
+    _check(plan, pushes, directions)
+    turn = alignment.T_base_instrument.rotation
+    values, lines = [], []
+    for direction in directions:
+        along = np.zeros(3)
+        along["xyz".index(direction[1])] = 1.0 if direction[0] == "+" else -1.0
+        way = pushes.position @ (turn.T @ along)
+        mine = pushes.direction.are(direction)
+        found = [
+            _line(pushes, direction, int(cycle), np.flatnonzero(mine & (pushes.cycle == cycle)), way)
+            for cycle in np.unique(pushes.cycle[mine])
+        ]
+        slopes = np.array([line.slope for line in found])
+        # What a reading leaves open of a slope, as the steps spread over the forces.
+        unknown = max((instrument.sigma / _spread(line.force) for line in found), default=0.0)
+        values.append(
+            valued(
+                "compliance",
+                "position",
+                direction,
+                len(found),
+                test.cycles,
+                Conditions(),
+                float(slopes.mean()) if found else _NOTHING,
+                "compliance",
+                None,
+                unknown,
+                least=float(slopes.min()) if found else None,
+                largest=float(slopes.max()) if found else None,
+            )
+        )
+        lines += found
+    return tuple(values), tuple(lines)
+
+
+def _spread(force: Array) -> float:
+    """Return the root of the sum of squares of forces about their mean [N]."""
+    return float(np.linalg.norm(force - force.mean()))
+
+
+def _line(pushes: Pushes, direction: str, cycle: int, rows: np.typing.NDArray[np.intp], way: Array) -> PushLine:
+    force = pushes.force[rows]
+    if not _spread(force) > 1e-9 * max(float(force.max()), 1.0):
+        raise InputError(
+            f"cycle {cycle} of the direction {direction} has one force alone",
+            where=f"{pushes.source}, line {int(pushes.line[rows[0]])}",
+            came=f"{force[0]:.6g} N",
+            allowed="two forces or more",
+            cure="Push in steps of a tenth of the rated load, the unloaded tip first.",
+        )
+    about = force - force.mean()
+    moved = way[rows]
+    slope = float(about @ moved / (about @ about))
+    rest = float(moved.mean() - slope * force.mean())
+    return PushLine(direction, cycle, force, moved - rest, slope)
+
+
+def _check(plan: PerformancePlan, pushes: Pushes, directions: tuple[str, ...]) -> None:
+    for direction in pushes.direction.names:
+        rows = pushes.direction.are(direction)
+        if direction not in directions and rows.any():
+            raise InputError(
+                "the plan does not have this direction",
+                where=f"{pushes.source}, line {int(pushes.line[np.argmax(rows)])}, column direction",
+                came=direction,
+                allowed=", ".join(directions),
+                cure="Remove its rows, or use the plan that was measured.",
+            )
+    most = GRAVITY * plan.rated_load
+    above = pushes.force > most * (1.0 + _ROUNDING)
+    if above.any():
+        row = int(np.argmax(above))
+        raise InputError(
+            "the force is above the weight of the rated load",
+            where=f"{pushes.source}, line {int(pushes.line[row])}, column force",
+            came=f"{pushes.force[row]:.6g} N",
+            allowed=f"up to {most:.4g} N, the weight of {plan.rated_load:.4g} kg",
+            cure="Correct the row or its unit, or the rated load of the plan.",
+        )

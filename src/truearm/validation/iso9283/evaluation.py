@@ -1,0 +1,181 @@
+"""All criteria of a plan, from the files that were measured for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from truearm.errors import InputError
+from truearm.measurement.performance.records import AttainedPoses, Pushes, Samples
+from truearm.modeling.chain import Array
+from truearm.modeling.transform import homogeneous
+from truearm.planning.iso9283.criteria import CRITERIA, TESTS
+from truearm.planning.iso9283.planned import PerformancePlan, PlannedTest
+from truearm.validation.iso9283.alignment import Alignment
+from truearm.validation.iso9283.compliance import PushLine, evaluate_pushes
+from truearm.validation.iso9283.corners import CornerCurves, corner_values
+from truearm.validation.iso9283.drift import DriftCourse
+from truearm.validation.iso9283.paths import PathDeviations, path_values
+from truearm.validation.iso9283.pose_rows import best_fit_of
+from truearm.validation.iso9283.poses import PoseCloud, evaluate
+from truearm.validation.iso9283.settling import SettlingCurve, settling_values
+from truearm.validation.iso9283.values import Conditions, Instrument, Quantity, Value
+from truearm.validation.iso9283.velocity import VelocityCurves, velocity_values
+from truearm.validation.iso9283.weaving import WeaveCurves, weaving_values
+
+#: What kind of number each criterion is; a length if it is not here.
+_QUANTITIES: dict[str, Quantity] = {
+    "t": "time",
+    "posing-time": "time",
+    "AV": "ratio",
+    "RV": "ratio",
+    "FV": "speed",
+    "WS": "ratio",
+    "WF": "ratio",
+    "compliance": "compliance",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Measurements:
+    """The files of a plan that were measured; None for one that was not.
+
+    Attributes
+    ----------
+    poses, paths, settling, forces
+        As read.
+    """
+
+    poses: AttainedPoses | None = None
+    paths: Samples | None = None
+    settling: Samples | None = None
+    forces: Pushes | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """The values of all criteria, and what they come from.
+
+    Attributes
+    ----------
+    values
+        In the order of :data:`truearm.planning.iso9283.criteria.CRITERIA`.
+    alignment
+        How the instrument was tied to the robot's base.
+    clouds, drift, deviations, corners, velocities, weaves, settling, pushes
+        For pictures.
+    """
+
+    values: tuple[Value, ...]
+    alignment: Alignment
+    clouds: tuple[PoseCloud, ...] = ()
+    drift: tuple[DriftCourse, ...] = ()
+    deviations: tuple[PathDeviations, ...] = ()
+    corners: tuple[CornerCurves, ...] = ()
+    velocities: tuple[VelocityCurves, ...] = ()
+    weaves: tuple[WeaveCurves, ...] = ()
+    settling: tuple[SettlingCurve, ...] = ()
+    pushes: tuple[PushLine, ...] = ()
+
+
+def evaluated(
+    plan: PerformancePlan,
+    measured: Measurements,
+    alignment: Alignment | None,
+    instrument: Instrument,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Evaluation:
+    """Evaluate all criteria of a plan.
+
+    Parameters
+    ----------
+    alignment
+        How the instrument was tied to the robot's base; None for the best fit of the attained poses to the commanded.
+    progress
+        Called with a few words at each step.
+
+    Raises
+    ------
+    InputError
+        If nothing was measured, the tie is not known and there are no poses for a best fit, or rows do not fit the
+        plan.
+    """
+    poses, paths = measured.poses, measured.paths
+    if poses is None and paths is None and measured.settling is None and measured.forces is None:
+        raise InputError(
+            "nothing was measured",
+            parameter="poses, paths, settling, forces",
+            cure="Give the files that were measured.",
+        )
+    if alignment is None:
+        if poses is None:
+            raise InputError(
+                "how the instrument was tied to the robot's base is not known",
+                parameter="alignment",
+                cure="Give it, or the poses of the test AP, to which the frame is then fitted.",
+            )
+        alignment = best_fit_of(plan, poses)
+    values: list[Value] = []
+    clouds: tuple[PoseCloud, ...] = ()
+    drift: tuple[DriftCourse, ...] = ()
+    pushes: tuple[PushLine, ...] = ()
+    deviations: list[PathDeviations] = []
+    corners: list[CornerCurves] = []
+    velocities: list[VelocityCurves] = []
+    weaves: list[WeaveCurves] = []
+    settling: list[SettlingCurve] = []
+    place = alignment.T_base_instrument
+    transform: Array = homogeneous(place.rotation[None], np.array(place.translation)[None])[0]
+    if poses is not None:
+        progress("poses")
+        of_poses = evaluate(plan, poses, alignment, instrument)
+        values += of_poses.values
+        clouds, drift = of_poses.clouds, of_poses.drift
+    if paths is not None:
+        tie = np.sqrt(np.diag(alignment.covariance_at(plan.cube.centre)))
+        for test in ("AT", "AT-reorientation"):
+            progress(TESTS[test].name)
+            found, courses = path_values(plan, paths, transform, instrument, test, tie)
+            values += found
+            deviations += courses
+        progress(TESTS["CR"].name)
+        found, corners = corner_values(plan, paths, transform, instrument)
+        values += found
+        progress(TESTS["AV"].name)
+        found, velocities = velocity_values(plan, paths, transform, instrument)
+        values += found
+        progress(TESTS["WS"].name)
+        found, weaves = weaving_values(plan, paths, transform, instrument)
+        values += found
+    if measured.settling is not None:
+        progress(TESTS["t"].name)
+        found, settling = settling_values(plan, measured.settling, transform, instrument)
+        values += found
+    if measured.forces is not None:
+        progress(TESTS["compliance"].name)
+        stiff, pushes = evaluate_pushes(plan, measured.forces, alignment, instrument)
+        values += stiff
+    there = {value.id for value in values}
+    for test in plan.tests:
+        values += [_nothing(criterion, test) for criterion in TESTS[test.id].criteria if criterion not in there]
+    return Evaluation(
+        tuple(sorted(values, key=lambda value: CRITERIA.index(value.id))),
+        alignment,
+        clouds,
+        drift,
+        tuple(deviations),
+        tuple(corners),
+        tuple(velocities),
+        tuple(weaves),
+        tuple(settling),
+        pushes,
+    )
+
+
+def _nothing(criterion: str, test: PlannedTest) -> Value:
+    """Return the value of a criterion that was planned and not measured."""
+    quantity = _QUANTITIES.get(criterion, "length")
+    where = ", ".join(test.places)
+    return Value(criterion, "position", where, float("nan"), quantity, None, 0, Conditions(), "not-measured")

@@ -1,0 +1,225 @@
+"""Intervals of norms and of largest differences, by inverting tests: the values under which what was found is not rare.
+
+Why, and what they are meant to hold, is said in :mod:`truearm.validation.iso9283.intervals`. How often they hold was
+measured in ``benchmarks/iso9283_coverage.py``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+
+from truearm.modeling.chain import Array
+from truearm.validation.iso9283.intervals import LEAST_CYCLES, TAIL, Interval
+
+#: Barycentres simulated for a test.
+_DRAWS: Final = 2000
+#: Values of a norm that are tested; between them the test is interpolated.
+_TESTED: Final = 80
+#: Halvings that find an end of other intervals, to 1e-6 of what is searched, and Lagrange's factor of a norm.
+_HALVINGS: Final = 20
+_HALVINGS_FACTOR: Final = 60
+
+Statistic = Callable[[Array], Array]
+
+
+def norm_interval(mean: Array, covariance: Array, cycles: int, known: Array) -> Interval | None:
+    """Return the interval of the norm of the true mean, from the mean of a few cycles.
+
+    Under each value to be tested the true mean is the place of that norm that is likeliest, the nearest to the mean in
+    the metric of its scatter, as in a profile likelihood; about it the mean is simulated.
+
+    Parameters
+    ----------
+    mean
+        ``(d,)``.
+    covariance
+        Of the cycles with n - 1, ``(d, d)``.
+    cycles
+        Two or more.
+    known
+        Covariance of what all cycles share, ``(d, d)``.
+
+    Returns
+    -------
+    tuple or None
+        From zero where zero cannot be ruled out. None if nothing scatters.
+    """
+    variances, axes = np.linalg.eigh(covariance / cycles + known)
+    if not variances[-1] > 0:
+        return None
+    noise = barycentre_scatter(axes.T @ covariance @ axes, cycles, axes.T @ known @ axes, 0)
+    squares = (noise**2).sum(axis=1)
+    norm = float(np.linalg.norm(mean))
+    span = float(np.sqrt(squares.max()))
+    tested = np.linspace(max(0.0, norm - span), norm + span, _TESTED)
+    places = _likeliest(axes.T @ mean, np.maximum(variances, 1e-9 * variances[-1]), tested)
+    found = tested[:, None] ** 2 + 2.0 * places @ noise.T + squares
+    share_below = np.minimum.accumulate((found <= norm**2).mean(axis=1))
+    at_zero = float(np.mean(squares <= norm**2))
+    upper = float(np.interp(-TAIL * max(at_zero, 1.0 / _DRAWS), -share_below, tested))
+    if at_zero <= 1.0 - TAIL:
+        return 0.0, max(upper, norm)
+    return float(np.interp(TAIL - 1.0, -share_below, tested)), upper
+
+
+def _likeliest(mean: Array, variances: Array, norms: Array) -> Array:
+    """Return the places of these norms ``(k,)`` that are nearest to a mean in the metric of its variances, ``(k, d)``.
+
+    They are ``mean / (1 + f variance)`` axis by axis with Lagrange's factor f, of which the norm falls.
+    """
+    lowest = 1.0 / float(variances.max())
+    low, high = np.full(len(norms), -lowest), np.full(len(norms), lowest)
+
+    def too_long(factor: Array) -> Array:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(np.linalg.norm(mean / (1.0 + factor[:, None] * variances), axis=1) > norms)
+
+    for _ in range(_HALVINGS_FACTOR):
+        long = too_long(high)
+        if not long.any():
+            break
+        high = np.where(long, 4.0 * high, high)
+    for _ in range(_HALVINGS_FACTOR):
+        middle = 0.5 * (low + high)
+        long = too_long(middle)
+        low, high = np.where(long, middle, low), np.where(long, high, middle)
+    place = mean / np.maximum(1.0 + high[:, None] * variances, 1e-12)
+    size = np.linalg.norm(place, axis=1)
+    return np.asarray(place * np.where(size > 0, norms / np.where(size > 0, size, 1.0), 0.0)[:, None])
+
+
+def largest_interval(statistic: Statistic, found: Array, noise: Array, other: Array) -> Interval | None:
+    """Return the interval of a largest difference between places.
+
+    For each value to be tested the true places differ by as much, with a shape that is drawn from what the measured
+    places leave open; they scatter, and the statistic of the scattered ones is compared with that of the measured.
+
+    Parameters
+    ----------
+    statistic
+        Of places ``(m, ...)``, ``(m,)``: never negative, and k times as large for places k times as large.
+    found
+        The measured places, ``(...)``.
+    noise, other
+        Two drawings of how the places scatter, ``(m, ...)``.
+
+    Returns
+    -------
+    tuple or None
+        From zero where zero cannot be ruled out. None if nothing scatters.
+    """
+    value = float(statistic(found[None])[0])
+    scale = float(statistic(noise).max())
+    if not scale > 0:
+        return None
+    shapes = found[None] + other
+    shapes = shapes / statistic(shapes).reshape(-1, *(1,) * found.ndim)
+
+    def share_below(tested: float) -> float:
+        return float(np.mean(statistic(tested * shapes + noise) <= value))
+
+    at_zero = share_below(0.0)
+    upper = _where(share_below, TAIL * max(at_zero, 1.0 / _DRAWS), value, value + scale)
+    if at_zero <= 1.0 - TAIL:
+        return 0.0, upper
+    return _where(share_below, 1.0 - TAIL, max(0.0, value - scale), value), upper
+
+
+def _where(falling: Callable[[float], float], level: float, low: float, high: float) -> float:
+    """Return where a function that falls comes down to a level."""
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        if falling(middle) > level:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
+
+
+def barycentre_scatter(covariance: Array, cycles: int, known: Array | None, stream: int) -> Array:
+    """Return how a barycentre may lie beside the true mean, drawn: multivariate t, and what all cycles share.
+
+    Parameters
+    ----------
+    covariance
+        Of the cycles with n - 1, ``(d, d)`` with d up to 3.
+    cycles
+        Two or more.
+    known
+        Covariance of what all cycles share, ``(d, d)``; None for nothing.
+    stream
+        Which drawing: one number for each barycentre, and each use.
+
+    Returns
+    -------
+    Array
+        ``(m, d)``.
+    """
+    d = len(covariance)
+    drawn, shares = _drawn(stream)
+    scale = np.sqrt((cycles - 1) / _chi_square(shares, cycles - 1))
+    made = scale[:, None] * (drawn[:, :d] @ _root(covariance / cycles).T)
+    if known is not None:
+        made = made + drawn[:, 3 : 3 + d] @ _root(known).T
+    return np.asarray(made)
+
+
+@lru_cache(maxsize=256)
+def _drawn(stream: int) -> tuple[Array, Array]:
+    """Return standard normal numbers ``(m, 6)``, and evenly spread ones between 0 and 1, ``(m,)``."""
+    rng = np.random.default_rng((9283, stream))
+    return rng.standard_normal((_DRAWS, 6)), rng.random(_DRAWS)
+
+
+def _chi_square(shares: Array, freedom: int) -> Array:
+    from scipy.special import gammaincinv
+
+    return np.asarray(2.0 * gammaincinv(0.5 * freedom, shares))
+
+
+def _root(covariance: Array) -> Array:
+    """Return a square root of a covariance, which may be singular, ``(d, d)``."""
+    variances, axes = np.linalg.eigh(covariance)
+    return np.asarray(axes * np.sqrt(np.maximum(variances, 0.0)))
+
+
+def largest_difference(places: Sequence[Array], pairs: Sequence[tuple[int, int]]) -> tuple[float, Interval | None]:
+    """Return the largest distance between barycentres, and its interval.
+
+    Parameters
+    ----------
+    places
+        The cycles at each place, ``(n, d)``.
+    pairs
+        Between which places, one pair or more.
+
+    Returns
+    -------
+    tuple
+        The interval is None where a place has fewer than :data:`LEAST_CYCLES` cycles, or nothing scatters.
+    """
+    one, other = np.array(pairs, dtype=np.intp).T
+    found = np.array([place.mean(axis=0) for place in places])
+
+    def largest(simulated: Array) -> Array:
+        return np.asarray(np.linalg.norm(simulated[:, one] - simulated[:, other], axis=-1).max(axis=-1))
+
+    value = float(largest(found[None])[0])
+    if min(map(len, places)) < LEAST_CYCLES:
+        return value, None
+    covariances = [np.atleast_2d(np.cov(place.T)) for place in places]
+    noise, shapes = (
+        np.stack(
+            [
+                barycentre_scatter(covariance, len(place), None, 2 * k + which)
+                for k, (covariance, place) in enumerate(zip(covariances, places, strict=True))
+            ],
+            axis=1,
+        )
+        for which in (1, 2)
+    )
+    return value, largest_interval(largest, found - found.mean(axis=0), noise, shapes)

@@ -1,0 +1,231 @@
+"""Rows of attained poses, checked against the plan and put together: the cycles of one pose under one condition."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.errors import InputError, nearest_names
+from truearm.measurement.performance.records import AttainedPoses, Names
+from truearm.modeling.chain import Array
+from truearm.modeling.transform import rotation_vector
+from truearm.planning.iso9283.criteria import TEST_OF, TESTS
+from truearm.planning.iso9283.planned import PerformancePlan
+from truearm.validation.iso9283.alignment import Alignment, best_fit
+
+#: How far outside the cube is rounding [m].
+_ROUNDING: Final = 1e-9
+_FILES: Final = {"paths": "paths", "settling": "poses over time", "forces": "pushes"}
+
+
+@dataclass(frozen=True, eq=False)
+class Cycles:
+    """The cycles of one pose under one condition, in the order of their numbers, those of drift in the order of time.
+
+    Attributes
+    ----------
+    test, robot, pose, approach, velocity, load
+        What they have in common; the approach is empty but in ``vAP``.
+    cycle
+        ``(n,)``.
+    time
+        [s], ``(n,)``; NaN where it is not given.
+    points
+        In the base frame [m], ``(n, 3)``.
+    angles
+        a, b, c: rotation vectors from the commanded to the attained orientation, about the base's axes [rad], ``(n,
+        3)``; None where no orientation was read.
+    command
+        [m], ``(3,)``.
+    """
+
+    test: str
+    robot: str
+    pose: str
+    approach: str
+    velocity: float
+    load: float
+    cycle: NDArray[np.intp]
+    time: Array
+    points: Array
+    angles: Array | None
+    command: Array
+
+    @property
+    def barycentre(self) -> Array:
+        """Mean of the points [m], ``(3,)``."""
+        return np.asarray(self.points.mean(axis=0))
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+
+def best_fit_of(plan: PerformancePlan, readings: AttainedPoses) -> Alignment:
+    """Return the tie that brings the barycentres of the test AP nearest to the commanded poses.
+
+    Raises
+    ------
+    InputError
+        If rows do not fit the plan, or there are too few poses.
+    """
+    _check_names(plan, readings)
+    rows = readings.criterion.are("AP")
+    poses = [name for name in plan.poses if (rows & readings.pose.are(name)).any()]
+    attained = [readings.position[rows & readings.pose.are(name)].mean(axis=0) for name in poses]
+    commanded = [plan.poses[name].position for name in poses]
+    return best_fit(np.reshape(attained, (-1, 3)), np.reshape(commanded, (-1, 3)))
+
+
+def cycles_of(plan: PerformancePlan, readings: AttainedPoses, alignment: Alignment) -> tuple[Cycles, ...]:
+    """Return the rows of a file by test, robot, pose, approach, velocity and load.
+
+    Raises
+    ------
+    InputError
+        For a test, a pose or an approach that the plan does not have, a robot without a name where robots are compared,
+        poses outside the cube, and a cycle that appears twice.
+    """
+    _check_names(plan, readings)
+    position = alignment.in_base(readings.position)
+    _check_cube(plan, readings, position)
+    rotation = None if readings.rotation is None else alignment.turned_to_base(readings.rotation)
+    approaches = readings.approach.code.copy()
+    approaches[~readings.criterion.are("vAP")] = -1
+    conditions = np.column_stack([np.round(readings.velocity, 9), np.round(readings.load, 9)])
+    _, condition = np.unique(conditions, axis=0, return_inverse=True)
+    keys = np.column_stack(
+        [readings.criterion.code, readings.robot.code, readings.pose.code, approaches, condition.reshape(-1)]
+    )
+    _, first, group = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    group = group.reshape(-1)
+    made = []
+    for number in np.argsort(first, kind="stable"):
+        rows = np.flatnonzero(group == number)
+        row = int(rows[0])
+        test, pose = (_name(names, row) for names in (readings.criterion, readings.pose))
+        rows = rows[_order(readings, rows, drift=test == "dAP")]
+        command = plan.poses[pose]
+        made.append(
+            Cycles(
+                test=test,
+                robot=_name(readings.robot, row),
+                pose=pose,
+                approach=_name(readings.approach, row) if test == "vAP" else "",
+                velocity=float(readings.velocity[row]),
+                load=float(readings.load[row]),
+                cycle=readings.cycle[rows],
+                time=readings.time[rows],
+                points=position[rows],
+                angles=None if rotation is None else rotation_vector(rotation[rows] @ command.rotation.T),
+                command=command.position,
+            )
+        )
+    return tuple(made)
+
+
+def _name(names: Names, row: int) -> str:
+    return names.names[int(names.code[row])]
+
+
+def _order(readings: AttainedPoses, rows: NDArray[np.intp], *, drift: bool) -> NDArray[np.intp]:
+    """Return the order of the rows of a group, or refuse a cycle that it has twice."""
+    if drift:
+        time = readings.time[rows]
+        return np.asarray(np.argsort(time, kind="stable") if np.isfinite(time).all() else np.arange(len(rows)))
+    order = np.argsort(readings.cycle[rows], kind="stable")
+    cycle = readings.cycle[rows][order]
+    twice = np.flatnonzero(cycle[1:] == cycle[:-1])
+    if len(twice):
+        one, other = (int(readings.line[rows[order[twice[0] + k]]]) for k in (0, 1))
+        raise InputError(
+            f"cycle {int(cycle[twice[0]])} appears twice under the same conditions",
+            where=f"{readings.source}, lines {one} and {other}",
+            allowed="approaches in rows of vAP alone",
+            cure="Correct the criterion, or the cycle.",
+        )
+    return order
+
+
+def _check_names(plan: PerformancePlan, readings: AttainedPoses) -> None:
+    """Refuse tests, poses, approaches and robots that do not fit the plan."""
+    for test in readings.criterion.names:
+        rows = readings.criterion.are(test)
+        planned = plan.test(test)
+        if planned is None or TESTS[test].readings != "poses":
+            raise _no_such_test(plan, readings, test)
+        for pose in readings.pose.names:
+            here = rows & readings.pose.are(pose)
+            if here.any() and pose not in planned.places:
+                raise _refused(
+                    readings, here, "pose", f"the plan does not have this pose in the test {test}", pose, planned.places
+                )
+        if test == "vAP":
+            for approach in readings.approach.names:
+                here = rows & readings.approach.are(approach)
+                if here.any() and approach not in planned.approaches:
+                    what = "the plan does not have this approach" if approach else "the approach is missing"
+                    raise _refused(readings, here, "approach", what, approach, planned.approaches)
+        nameless = rows & readings.robot.are("")
+        if test == "E" and nameless.any():
+            raise InputError(
+                "robots that are exchanged need names",
+                where=f"{readings.source}, line {int(readings.line[np.argmax(nameless)])}, column robot",
+                allowed="a name for each robot",
+                cure="Name the robot in every row of the test E.",
+            )
+
+
+def _no_such_test(plan: PerformancePlan, readings: AttainedPoses, test: str) -> InputError:
+    known = [planned.id for planned in plan.tests if TESTS[planned.id].readings == "poses"]
+    rows = readings.criterion.are(test)
+    if TEST_OF.get(test, test) != test:
+        what = f"{test} is evaluated from the rows of {TEST_OF[test]}"
+        return _refused(readings, rows, "criterion", what, test, known, f"Name the test: {TEST_OF[test]}.")
+    if test in TESTS and TESTS[test].readings != "poses":
+        what = f"{test} is not evaluated from poses"
+        cure = f"It belongs in the file of {_FILES[TESTS[test].readings]}."
+        return _refused(readings, rows, "criterion", what, test, known, cure)
+    if test in TESTS:
+        cure = "Plan the test, or remove its rows."
+        return _refused(readings, rows, "criterion", "the plan does not have this test", test, known, cure)
+    return _refused(readings, rows, "criterion", "the criterion is not known", test, known)
+
+
+def _refused(
+    readings: AttainedPoses,
+    rows: NDArray[np.bool_],
+    column: str,
+    what: str,
+    came: str,
+    known: Iterable[str],
+    cure: str | None = None,
+) -> InputError:
+    known = tuple(known)
+    near = nearest_names(came, known, 1)
+    return InputError(
+        what,
+        where=f"{readings.source}, line {int(readings.line[np.argmax(rows)])}, column {column}",
+        came=came or None,
+        allowed=", ".join(known) or "nothing: the plan has no tests of poses",
+        cure=cure or (f"Did you mean {near[0]}?" if near else "Correct it, or use the plan that was measured."),
+    )
+
+
+def _check_cube(plan: PerformancePlan, readings: AttainedPoses, position: Array) -> None:
+    beyond = np.abs(position - plan.cube.centre).max(axis=1) - plan.cube.side / 2.0
+    outside = np.flatnonzero(beyond > _ROUNDING)
+    if len(outside):
+        row = int(outside[0])
+        x, y, z = (f"{1e3 * value:.4g}" for value in position[row])
+        low, high = (1e3 * (plan.cube.centre + sign * plan.cube.side / 2.0) for sign in (-1, 1))
+        raise InputError(
+            f"{len(outside)} pose{'s' * (len(outside) != 1)} outside the cube, the first {1e3 * beyond[row]:.4g} mm",
+            where=f"{readings.source}, line {int(readings.line[row])}",
+            came=f"x {x}, y {y}, z {z} mm in the base frame",
+            allowed=", ".join(f"{axis} {a:.4g} to {b:.4g} mm" for axis, a, b in zip("xyz", low, high, strict=True)),
+            cure="Check the unit, the pose's name, and how the instrument was tied to the robot's base.",
+        )

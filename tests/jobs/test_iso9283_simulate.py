@@ -146,3 +146,8 @@ def test_what_cannot_be_simulated_is_refused(calibrated: Robot, tmp_path: Path) 
         truearm.iso9283_simulate("irb120", plan, truth=TRUTH, corrected=elsewhere)
     with pytest.raises(InputError, match="this is another robot than irb120"):
         truearm.iso9283_simulate("irb120", plan, corrected="katana450")
+    ur5 = load_robot("ur5")
+    with pytest.raises(InputError, match="this is another robot than irb120"):
+        truearm.iso9283_simulate(
+            "irb120", plan, corrected=ur5.with_values({"theta_offset_2": ur5.values["theta_offset_2"] + 1e-3})
+        )

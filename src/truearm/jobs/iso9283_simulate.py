@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from truearm.arrays import finite_number
-from truearm.compensation.fake_targets import fake_targets
+from truearm.compensation.fake_targets import fake_targets, nominal_robot
 from truearm.compensation.gauge import best_agreement
 from truearm.errors import InputError, refusals_of, wrong_kind
 from truearm.files import path_argument
@@ -270,12 +270,20 @@ def _correction(
     rng: np.random.Generator,
 ) -> Corrected:
     """Return how commands are corrected: with the tie as it is stated, and a tool that was located by readings."""
+    q = plan.robot.random_configurations(5, np.random.default_rng(0))
+    other = nominal_robot(calibrated).forward(q)[0] - plan.robot.forward(q)[0]
+    if np.abs(other).max() > _SAME_PLACE[0]:
+        raise InputError(
+            f"this is another robot than {plan.robot.name}",
+            where=calibrated.name,
+            cure="Give the calibrated.yaml of the robot that the plan was made for.",
+        )
     stands, stood = calibrated.base.matrix @ best_agreement(calibrated)[0], base
     apart = np.linalg.inv(stood) @ stands
     far, turned = np.linalg.norm(apart[:3, 3]), np.linalg.norm(rotation_vector(apart[:3, :3]))
     if far > _SAME_PLACE[0] or turned > _SAME_PLACE[1]:
         raise InputError(
-            "this robot was calibrated in the frame of another instrument, or is another robot",
+            "this robot was calibrated in the frame of another instrument",
             where=calibrated.name,
             came=f"its base {1e3 * far:.4g} mm and {math.degrees(turned):.3g} deg from that of the truth",
             allowed=f"up to {1e3 * _SAME_PLACE[0]:g} mm and {math.degrees(_SAME_PLACE[1]):g} deg",

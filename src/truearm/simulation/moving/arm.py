@@ -62,7 +62,7 @@ class Drives:
     """
 
     servo: Servo = field(
-        default_factory=lambda: Servo(2 * math.pi * 15.0, 0.7, velocity=10.0, acceleration=200.0, feedforward=1.0)
+        default_factory=lambda: Servo(2 * math.pi * 25.0, 0.7, velocity=10.0, acceleration=200.0, feedforward=1.0)
     )
     velocity: float = math.pi
     acceleration: float = 20.0

@@ -115,5 +115,5 @@ def _compared(comparison: Comparison) -> Figures:
         for row in comparison.rows
         if row.component == "position"
     )
-    heading = ("Criterion", "Where", "Velocity, load [%]", "This", "Other", "This one is")
+    heading = ("Criterion", "Where", "Velocity, load", "This", "Other", "This one is")
     return Figures(f"Beside {comparison.other}", heading, rows)

@@ -80,10 +80,7 @@ class Comparison:
             shown = [row for row in rows if row.component == "position"][:8]
             if rows and verdict in ("smaller", "larger"):
                 text.append(f"  {verdict} by more than both intervals leave open: {len(rows)}")
-                text += [
-                    f"    {row.id} {row.where} {row.under}: {row.other:.4f} -> {row.value:.4f} {row.unit}"
-                    for row in shown
-                ]
+                text += [f"    {row.id} {row.where}, {row.under}: {row.change}" for row in shown]
             elif rows:
                 text.append(f"  {verdict}: {len(rows)}")
         return text
@@ -163,7 +160,7 @@ def compared(summary: dict[str, Any], other: Path) -> Comparison:
         if entry.id in _TIED and not same_tie:
             left.append(entry.id)
             continue
-        under = ", ".join(f"{value:g}" if isinstance(value, float) else value for value in entry.conditions.values())
+        under = ", ".join(_shown(name, value) for name, value in entry.conditions.items())
         verdict = _verdict(entry.value, entry.interval_95, beside.value, beside.interval_95)
         rows.append(
             Compared(entry.id, entry.component, entry.where, under, entry.unit, entry.value, beside.value, verdict)
@@ -175,6 +172,13 @@ def compared(summary: dict[str, Any], other: Path) -> Comparison:
             cure="Evaluate the same criteria of both.",
         )
     return Comparison(str(other), tuple(rows), tuple(dict.fromkeys(left)))
+
+
+def _shown(name: str, value: float | str) -> str:
+    """Return a condition in words."""
+    if isinstance(value, str):
+        return value
+    return f"{'load ' * (name == 'load_percent')}{value:g} %"
 
 
 def _key(entry: _Entry) -> tuple[object, ...]:

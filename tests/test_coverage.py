@@ -38,7 +38,7 @@ def test_the_tests_run_its_command(row: str) -> None:
     if not commands:
         assert listed["what"].startswith("open: ")
         return
-    (page,) = re.findall(r"\((guide/[a-z-]+\.md)\)", listed["page"])
+    (page,) = re.findall(r"\((guide/[a-z0-9-]+\.md)\)", listed["page"])
     run = sessions(DOCS / page)
     for command in commands:
         assert any(one.removeprefix("cd cell && ") == command for one in run), command

@@ -19,9 +19,12 @@ from tests.ur_controller import UR10_CONF
 from truearm.library import load_robot
 from truearm.measurement.hexapod.geometry import triangle
 from truearm.measurement.readers.canonical import csv_text
+from truearm.modeling.formats.robot_file import robot_text
 from truearm.modeling.inverse import inverse
 from truearm.modeling.transform import IDENTITY
 from truearm.planning.hexapod.tool import with_cups
+from truearm.planning.iso9283.plan_file import PLAN, ROBOT, plan_text
+from truearm.results.iso9283_simulation import FILES as SIMULATED_FILES
 from truearm.simulation.truths import truth_twin
 from truearm.simulation.twin import measure
 
@@ -65,6 +68,7 @@ def _written(path: Path, text: str) -> Path:
     return path
 
 
+_CUBE = "truearm: truearm-cube/1\nunits: {length: mm}\ncentre: [350, 0, 350]\nside: 200\n"
 #: Where a target of the IRB 120 is on the flange.
 _KNOWN = """\
 truearm: truearm-cell/1
@@ -151,6 +155,33 @@ def _axes_result() -> dict[str, bytes]:
     with tempfile.TemporaryDirectory() as folder:
         truearm.axes("kr5", _axis_runs(Path(folder)), frame="robot", out=Path(folder) / "axes")
         return {path.name: path.read_bytes() for path in (Path(folder) / "axes").iterdir()}
+
+
+@cache
+def _performance_files() -> dict[str, str]:
+    """Return a plan of few tests and what was read for it, by name."""
+    import truearm
+
+    plan = small_plan(
+        ["AP", "t", "AV", "compliance"], cycles={"AP": 5, "t": 3, "AV": 3, "compliance": 3}, rated_velocity=1.0
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        truearm.iso9283_simulate("irb120", plan, rate=250.0, seed=1, noise=1e-6, out=folder)
+        read = {name: (Path(folder) / name).read_text() for name in SIMULATED_FILES}
+    return {PLAN: plan_text(plan), ROBOT: robot_text(plan.robot), **read}
+
+
+def _performance(folder: Path) -> Arguments:
+    """Return the arguments with which it is evaluated."""
+    for name, text in _performance_files().items():
+        if not (folder / name).exists():
+            _written(folder / name, text)
+    names = ("poses", "paths", "settling", "forces")
+    return {
+        "plan": folder / PLAN,
+        **{name: folder / f"{name}.csv" for name in names},
+        "alignment": folder / "alignment.yaml",
+    }
 
 
 def _touches() -> Arguments:
@@ -363,6 +394,18 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
     },
     "hexapod_solve": lambda _: {"pose": 7, "legs": (0.3,) * 6, "base": (0.3,) * 3, "tool": (0.15,) * 3},
     "hexapod_world_frame": lambda _: _touches(),
+    "iso9283_plan": lambda folder: {
+        "robot": "irb120",
+        "criteria": ["ap", "t"],
+        "cube": _written(folder / "cube.yaml", _CUBE),
+        "tip": (0.0, 0.0, 0.1),
+        "target": None,
+        "load": 2.0,
+        "velocity": 0.5,
+        "velocities": (0.5,),
+        "loads": (1.0,),
+        "out": folder / "performance-plan",
+    },
     "iso9283_simulate": lambda _: {
         "robot": "irb120",
         "plan": small_plan(["AP"], cycles={"AP": 2}),
@@ -370,6 +413,7 @@ EXAMPLES: dict[str, Callable[[Path], Arguments]] = {
         "rate": 100.0,
         "seed": 1,
     },
+    "iso9283_evaluate": lambda folder: _performance(folder) | {"noise": 1e-5, "noise_rot": 1e-4},
     "compensate": lambda folder: {
         "robot": _calibrated(folder),
         "programs": [_program(folder)],

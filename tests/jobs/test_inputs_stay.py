@@ -26,6 +26,8 @@ from truearm.results.fleet import FLEET_FILES
 from truearm.results.followed_path import MOTION
 from truearm.results.followed_path import REPORT as PATH_REPORT
 from truearm.results.influence import INFLUENCE_FILES
+from truearm.results.iso9283_evaluation import EVALUATION_FILES
+from truearm.results.iso9283_plan import PLAN_FILES
 from truearm.results.iso9283_simulation import FILES as SIMULATED_FILES
 from truearm.results.program_correction import REPORT
 from truearm.results.tilting import GEOMETRY, TILTING_FILES
@@ -111,6 +113,8 @@ READ: dict[str, Callable[[Path], Arguments]] = {
         "poses": EXAMPLES["load_data"](folder)["data"],
         "device": None,
     },
+    "iso9283_plan": lambda folder: {"robot": _robot(folder)},
+    "iso9283_evaluate": lambda folder: {"compare": _written(folder / "other.json", "{}")},
     "iso9283_simulate": lambda folder: {
         "robot": _robot(folder),
         "plan": _performance_plan(folder),
@@ -158,7 +162,9 @@ INTO_FOLDERS = {
     "revert": ("plate.mod",),
     "path": (MOTION, PATH_REPORT),
     "fleet": (*FLEET_FILES, RECORD),
+    "iso9283_plan": PLAN_FILES,
     "iso9283_simulate": SIMULATED_FILES,
+    "iso9283_evaluate": EVALUATION_FILES,
 }
 #: The names of what a job writes where `out` is one of them, or the parameter beside it.
 BESIDE = {

@@ -27,6 +27,8 @@ from truearm.measurement.readers.drawn_circles import Page, read_drawn_circles
 from truearm.measurement.readers.hand_eye import read_hand_eye
 from truearm.measurement.readers.inclinations import inclinations_text, read_inclinations
 from truearm.measurement.readers.matrices import read_matrices
+from truearm.measurement.readers.performance_poses import read_attained_poses, read_pushes
+from truearm.measurement.readers.performance_samples import read_path_samples, read_settling_samples
 from truearm.measurement.readers.poses import read_poses
 from truearm.measurement.readers.robodk import read_robodk
 from truearm.measurement.readers.sockets import Apart, read_sockets
@@ -35,7 +37,9 @@ from truearm.modeling.formats.dh_csv import complete_dh_csv, read_dh_csv
 from truearm.modeling.formats.robot_file import robot_text
 from truearm.modeling.robot import Robot
 from truearm.planning.constraints.constraints import read_constraints
+from truearm.planning.iso9283.plan_file import plan_text, read_cube, read_plan
 from truearm.planning.paths.path_file import read_path
+from truearm.validation.iso9283.alignment import read_alignment
 
 
 @dataclass(frozen=True)
@@ -133,6 +137,18 @@ def _inclinations(folder: Path) -> None:
     assert inclinations_text(read_inclinations(folder / "again.csv")) == text, "what was written is not what is read"
 
 
+def _finite(position: np.ndarray) -> None:
+    assert np.isfinite(position).all(), "a position is not finite"
+
+
+def _performance_plan(folder: Path) -> None:
+    """Check that a plan is the same when it is written and read again."""
+    read = read_plan(folder / "performance.yaml")
+    (folder / "robot.yaml").write_text(robot_text(read.robot), encoding="utf-8")
+    (folder / "again.yaml").write_text(plan_text(read), encoding="utf-8")
+    assert plan_text(read_plan(folder / "again.yaml")) == plan_text(read), "what was written is not what is read"
+
+
 def _record(folder: Path) -> None:
     read_programs(restored([folder / "done.mod"]))
 
@@ -201,6 +217,24 @@ READERS: Final[Mapping[str, Reader]] = {
         {"cell.yaml": "cell.yaml"}, lambda folder: read_frames(of_library("irb120"), folder / "cell.yaml")
     ),
     "wrenches": Reader({"forces.yaml": "forces.yaml"}, lambda folder: read_wrenches(folder / "forces.yaml")),
+    "performance-plan": Reader(
+        {"performance.yaml": "performance.yaml", "tested.yaml": "tested.yaml"}, lambda folder: _performance_plan(folder)
+    ),
+    "performance-cube": Reader({"cube.yaml": "cube.yaml"}, lambda folder: read_cube(folder / "cube.yaml")),
+    "performance-alignment": Reader(
+        {"alignment.yaml": "alignment.yaml"}, lambda folder: read_alignment(folder / "alignment.yaml")
+    ),
+    "attained-poses": Reader(
+        {"attained.csv": "attained.csv"}, lambda folder: _finite(read_attained_poses(folder / "attained.csv").position)
+    ),
+    "path-samples": Reader(
+        {"along.csv": "along.csv"}, lambda folder: _finite(read_path_samples(folder / "along.csv").position)
+    ),
+    "settling-samples": Reader(
+        {"settling.csv": "settling.csv"},
+        lambda folder: _finite(read_settling_samples(folder / "settling.csv").position),
+    ),
+    "pushes": Reader({"pushes.csv": "pushes.csv"}, lambda folder: _finite(read_pushes(folder / "pushes.csv").position)),
     "rapid": _programs("rapid", "polish.mod"),
     "rapid-cell": _programs("rapid/cell", "MainModule.mod", "Data.sys"),
     "krl": _programs("krl", "milling.src"),

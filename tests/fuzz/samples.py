@@ -10,7 +10,7 @@ from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
-from tests.jobs.examples import EXAMPLES
+from tests.jobs.examples import EXAMPLES, performance_files
 from tests.measurement.test_fixture_rows import MIXED
 from tests.measurement.test_table import JOINTS, POINTS, SPATIAL
 
@@ -24,6 +24,17 @@ from truearm.simulation.hexapod.simulated import ballbar, measured_legs, measure
 
 PROGRAMS = Path(__file__).parents[1] / "compensation" / "programs" / "samples"
 
+#: What its files are called here.
+PERFORMANCE = {
+    "plan.yaml": "performance.yaml",
+    "robot.yaml": "tested.yaml",
+    "poses.csv": "attained.csv",
+    "paths.csv": "along.csv",
+    "settling.csv": "settling.csv",
+    "forces.csv": "pushes.csv",
+    "alignment.yaml": "alignment.yaml",
+}
+CUBE = "truearm: truearm-cube/1\nunits: {length: mm}\ncentre: [350, 0, 350]\nside: 200\n"
 BOUNDS = """\
 truearm: truearm-bounds/1
 units: {length: mm, angle: deg}
@@ -114,10 +125,11 @@ def folder() -> Path:
         "experiment.yaml": EXPERIMENT,
         "zones.yaml": ZONES,
         "constraints.yaml": CONSTRAINTS,
+        "cube.yaml": CUBE,
         "sheet.csv": _sheet(),
         "touches.csv": _touches(),
     }
-    for name, text in texts.items():
+    for name, text in (texts | _performance()).items():
         (place / name).write_text(text)
     return place
 
@@ -132,6 +144,18 @@ def content(name: str) -> bytes:
 def _rename(place: Path, names: dict[str, str]) -> None:
     for old, new in names.items():
         (place / new).write_bytes((place / old).read_bytes())
+
+
+def _performance() -> dict[str, str]:
+    """Return a plan of tests by ISO 9283 and what was read for it, few samples of each cycle."""
+    texts = performance_files()
+    texts = texts | {name: _thinned(texts[name]) for name in ("paths.csv", "settling.csv")}
+    return {PERFORMANCE[name]: text.replace("robot: robot.yaml", "robot: tested.yaml") for name, text in texts.items()}
+
+
+def _thinned(text: str) -> str:
+    header, *rows = text.splitlines(keepends=True)
+    return header + "".join(rows[::4])
 
 
 def _sheet() -> str:

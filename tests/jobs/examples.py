@@ -158,7 +158,7 @@ def _axes_result() -> dict[str, bytes]:
 
 
 @cache
-def _performance_files() -> dict[str, str]:
+def performance_files() -> dict[str, str]:
     """Return a plan of few tests and what was read for it, by name."""
     import truearm
 
@@ -173,7 +173,7 @@ def _performance_files() -> dict[str, str]:
 
 def _performance(folder: Path) -> Arguments:
     """Return the arguments with which it is evaluated."""
-    for name, text in _performance_files().items():
+    for name, text in performance_files().items():
         if not (folder / name).exists():
             _written(folder / name, text)
     names = ("poses", "paths", "settling", "forces")

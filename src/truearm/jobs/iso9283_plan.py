@@ -103,7 +103,7 @@ def iso9283_plan(
     watched = _positive(hours, "hours", "hours above 0")
     shares = _shares(velocities, "velocities", above_zero=True)
     carried = _shares(loads, "loads", above_zero=False)
-    given_cube = None if cube == AUTO else path_argument(cube, "cube")
+    given_cube = None if isinstance(cube, str) and cube == AUTO else path_argument(cube, "cube")
     inputs = files_of(robot, given_cube)
     folder = None if out is None else folder_beside(PLAN_FILES, PLAN, out, robot, given_cube)
     call = command_argument(command) or python_call(

@@ -128,7 +128,15 @@ def _header(content: bytes, source: str, place: Place) -> tuple[_Header, int]:
             break
     refuse_other_separators(text, f"{source}, line {line}")
     refuse_beyond("columns", text.count(",") + 1, where=f"{source}, line {line}")
-    names = [name.strip() for name in next(csv.reader([text], skipinitialspace=True))]
+    try:
+        names = [name.strip() for name in next(csv.reader([text], skipinitialspace=True))]
+    except csv.Error as error:
+        raise InputError(
+            "the names of the columns cannot be read",
+            where=f"{source}, line {line}",
+            came=str(error),
+            cure="Separate them by commas, and end every line with a line feed.",
+        ) from error
     return _Header(source, line, _columns(names, f"{source}, line {line}", place), len(names)), start
 
 

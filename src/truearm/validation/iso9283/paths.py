@@ -55,6 +55,8 @@ class PathDeviations:
         Mean distance to the barycentre plus three standard deviations [m], ``(m,)``.
     angles
         Rotation vectors from the commanded to the attained orientation [rad], ``(cycles, m, 3)``; None without.
+    pooled
+        So many samples make up an intersection, in the middle of all.
     """
 
     path: str
@@ -66,6 +68,7 @@ class PathDeviations:
     half_width: Array
     spread: Array
     angles: Array | None
+    pooled: float
 
 
 def path_values(
@@ -122,23 +125,31 @@ def path_values(
 
 
 def deviations_of(run: Run, stations: int = STATIONS) -> PathDeviations:
-    """Return the deviations of a run at stations that lie evenly between its ends."""
+    """Return the deviations of a run at stations that lie evenly between its ends.
+
+    Stations that some cycle does not reach, because it begins or ends aside along the path, are left out.
+    """
     length = run.path.length
     along = (np.arange(stations) + 0.5) / stations * length
+    reached = [(float(cycle.along.min()), float(cycle.along.max())) for cycle in run.cycles]
+    along = along[(along >= max(low for low, _ in reached)) & (along <= min(high for _, high in reached))]
     rows = [_intersections(cycle, run, along, _HALF * length / stations) for cycle in run.cycles]
-    deviation = np.stack([row for row, _ in rows])
-    angles = None if rows[0][1] is None else np.stack([row for _, row in rows if row is not None])
+    deviation = np.stack([row for row, _, _ in rows])
+    angles = None if rows[0][1] is None else np.stack([row for _, row, _ in rows if row is not None])
+    pooled = float(np.median(np.concatenate([count for _, _, count in rows])))
     n = len(deviation)
     mean = deviation.mean(axis=0)
     distance = np.linalg.norm(mean, axis=1)
-    half = np.full(stations, np.nan)
+    half = np.full(len(along), np.nan)
     if n > 1:
         from scipy import stats
 
         unit = mean / np.maximum(distance, 1e-12)[:, None]
         of_cycle = (deviation * unit).sum(axis=2)
         half = stats.t.ppf(0.975, n - 1) * of_cycle.std(axis=0, ddof=1) / np.sqrt(n)
-    return PathDeviations(run.path.path.name, run, along, deviation, mean, distance, half, _spread(deviation), angles)
+    return PathDeviations(
+        run.path.path.name, run, along, deviation, mean, distance, half, _spread(deviation), angles, pooled
+    )
 
 
 def _spread(deviation: Array) -> Array:
@@ -150,8 +161,8 @@ def _spread(deviation: Array) -> Array:
     return np.asarray(away.mean(axis=-2) + 3 * away.std(axis=-2, ddof=1))
 
 
-def _intersections(cycle: Cycle, run: Run, along: Array, half: float) -> tuple[Array, Array | None]:
-    """Return deviations at stations, ``(m, 3)``, of position [m] and of orientation [rad].
+def _intersections(cycle: Cycle, run: Run, along: Array, half: float) -> tuple[Array, Array | None, Array]:
+    """Return deviations at stations, ``(m, 3)``, of position [m] and of orientation [rad], and samples for each.
 
     The foot of a point on the path lies at a station if the point lies in the plane there, so that an intersection is
     the deviation interpolated at that arc length.
@@ -165,8 +176,8 @@ def _intersections(cycle: Cycle, run: Run, along: Array, half: float) -> tuple[A
     if cycle.rotation is not None:
         turned = rotation_vector(cycle.rotation[order] @ np.swapaxes(run.path.rotations(s), 1, 2))
         columns = np.concatenate([away, turned], axis=1)
-    found = local_lines(s, columns, along, half)[0]
-    return found[:, :3], found[:, 3:] if cycle.rotation is not None else None
+    found, _, count = local_lines(s, columns, along, half)
+    return found[:, :3], found[:, 3:] if cycle.rotation is not None else None, np.maximum(count, 1.0)
 
 
 def _position_values(
@@ -175,6 +186,7 @@ def _position_values(
     run = here.run
     n = len(here.deviation)
     accuracy = float(here.distance.max())
+    sigma = instrument.sigma / np.sqrt(here.pooled)
     known = 0.0 if tie is None else float(np.linalg.norm(tie) / np.sqrt(3.0))
     values = [
         Value(
@@ -186,7 +198,7 @@ def _position_values(
             _accuracy_interval(here.deviation, tie, rng) if n > 1 else None,
             n,
             run.conditions,
-            run.status(coarse=np.hypot(instrument.sigma / np.sqrt(n), known) > COARSE * accuracy),
+            run.status(coarse=np.hypot(sigma / np.sqrt(n), known) > COARSE * accuracy),
         )
     ]
     repeatability = float(here.spread.max())
@@ -200,7 +212,7 @@ def _position_values(
             _repeatability_interval(here.deviation, repeatability, rng, factor=None) if n > 1 else None,
             n,
             run.conditions,
-            run.status(coarse=instrument.sigma > COARSE * repeatability) if n > 1 else "not-measured",
+            run.status(coarse=sigma > COARSE * repeatability) if n > 1 else "not-measured",
         )
     )
     return values
@@ -210,7 +222,7 @@ def _angle_values(here: PathDeviations, suffix: str, instrument: Instrument, rng
     run = here.run
     values = []
     assert here.angles is not None
-    sigma = instrument.sigma_rot or 0.0
+    sigma = (instrument.sigma_rot or 0.0) / np.sqrt(here.pooled)
     for axis, component in enumerate(_ANGLES):
         angle = here.angles[:, :, axis : axis + 1]
         n = len(angle)

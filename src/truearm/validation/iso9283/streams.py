@@ -24,8 +24,10 @@ _NOISE = 6.0
 _SHORTEST = {False: 0.03, True: 0.1}
 #: Within this share of the length of a path from one of its ends the tip is said to be there; of its extent at most.
 _AT_END, _AT_END_OF_EXTENT = 0.05, 0.1
-#: A cycle is no further from the path than this share of its extent, for all but a tenth of its way.
-_NEAR = 0.1
+#: A robot whose path is off comes no nearer than so; it is at the end within this many times that.
+_NEAREST = 1.5
+#: A cycle is no further from the path than this share of its extent.
+_NEAR = 0.2
 #: In so many places between its ends it is seen whether a path was run, and in which direction.
 _CHECKED = (0.25, 0.5, 0.75)
 
@@ -134,8 +136,10 @@ def _cycles(path: CommandedPath, position: Array, speed: Array, moving: NDArray[
     radius = min(_AT_END * path.length, _AT_END_OF_EXTENT * path.extent)
     begin, end = path.points(np.array([0.0])), path.points(np.array([path.length]))
     at_begin, at_end = (np.linalg.norm(position - point, axis=1) for point in (begin, end))
-    visits = [(*span, "begin") for span in spans_of(at_begin < radius)]
-    visits += [] if path.closed else [(*span, "end") for span in spans_of(at_end < radius)]
+    most = _NEAR * path.extent
+    around = [min(max(radius, _NEAREST * float(distance.min())), most) for distance in (at_begin, at_end)]
+    visits = [(*span, "begin") for span in spans_of(at_begin < around[0])]
+    visits += [] if path.closed else [(*span, "end") for span in spans_of(at_end < around[1])]
     visits.sort()
     cycles: list[Span] = []
     for before, after in itertools.pairwise(visits):

@@ -14,7 +14,7 @@ from truearm.validation.iso9283.commanded import CommandedPath
 #: Samples and places of the path that are compared with each other.
 _SAMPLES, _PLACES = 500, 400
 #: Farther from the path than this share of its extent, in the middle of all samples, it is another path.
-_FAR = 0.1
+_FAR = 0.2
 #: From so little of the path a cycle cannot be judged.
 _LEAST_RUN = 0.8
 

@@ -25,6 +25,8 @@ R = TypeVar("R")
 PATIENCE: Final = 4.0
 #: How long to wait for its first words [s].
 _GREETING: Final = 2.0
+#: How much longer than that reaching it may take in all [s].
+_MARGIN: Final = 1.0
 #: How long scheduler and workers may take to answer while they work [s].
 _ANSWER: Final = 60.0
 #: How long there may be no worker before the work is given up [s].
@@ -84,7 +86,7 @@ class Cluster:
             client.__init__(self._address, timeout=PATIENCE, set_as_default=False)
 
         try:
-            _within(PATIENCE + 1.0, connect)
+            _within(PATIENCE + _MARGIN, connect)
         except Exception as error:  # whatever the words of something else are taken for
             client.status = "closed"  # or it would be waited for when it is forgotten
             if isinstance(error, InputError):

@@ -16,7 +16,7 @@ from truearm.modeling.effects.joint_curve import JointCurve
 from truearm.modeling.fixtures import Fixture
 from truearm.modeling.formats.balancer_entry import check_anchors
 from truearm.modeling.formats.controller_entry import STATED
-from truearm.modeling.formats.curve_entry import curve_parameters
+from truearm.modeling.formats.curve_entry import coefficient_si, curve_parameters
 from truearm.modeling.formats.robot_file.schema import JointEntry, ProofEntry, RobotFile
 from truearm.modeling.parameters import SCALE, SCALE_GROUP, Parameter
 from truearm.modeling.parts import NO_PAYLOAD, Inertia, Joint, LinkMass, Payload, Target, Tool, Truth
@@ -207,6 +207,9 @@ def _with_values(robot: Robot, content: RobotFile, where: str) -> Robot:
             raise InputError(
                 "the unit differs from the file's", where=f"{where}, {place}", came=entry.unit, allowed=unit
             )
+        if plain.group == JointCurve.name:
+            for key in ("nominal", "value", "prior"):
+                coefficient_si(getattr(entry, key), unit, f"{where}, {place}.{key}", deviation=key == "prior")
         parameters.append(
             Parameter(
                 name,

@@ -155,7 +155,11 @@ def test_a_term_that_stands_alone_is_no_larger_and_its_share_is_a_share(tmp_path
     entry = "{nominal: 0.0, value: 0.1, prior: 0.1, unit: deg, informed: 0.9}"
     for old, new, told in (
         ("0.9", "0.9", None),
-        ("value: 0.1", "value: 31.0", "curve_sin1_2.value: the number is too large for a curve of a joint; got '31 deg'"),
+        (
+            "value: 0.1",
+            "value: 31.0",
+            "curve_sin1_2.value: the number is too large for a curve of a joint; got '31 deg'",
+        ),
         ("0.9", "2.0", "curve_sin1_2.informed: the number is too large; got 2.0; allowed: 1 or less"),
     ):
         path.write_text(f"{text}\nparameters:\n  curve_sin1_2: {entry.replace(old, new)}\n")

@@ -190,7 +190,9 @@ class ProofEntry(_Entry):
     held: list[TargetName] = []
     loads: list[tuple[Number, Number]] = []
     deviations: dict[str, NotNegative] = {}
-    correlations: list[Annotated[str, StringConstraints(strict=True)]] = []
+    correlations: (
+        list[Annotated[str, StringConstraints(strict=True)]] | Annotated[str, StringConstraints(strict=True)]
+    ) = []
     measured: list[Annotated[str, StringConstraints(strict=True)]] = []
     sha256: Annotated[str, StringConstraints(strict=True, pattern="^[0-9a-f]{64}$")]
 

@@ -31,7 +31,7 @@ from truearm.identification.solving.models import named_model
 from truearm.identification.solving.problem import Problem
 from truearm.identification.start_values.frames import initial_frames, placed_errors
 from truearm.identification.start_values.from_readings import start_from_readings
-from truearm.identification.start_values.quick_distances import can_be_quick, quick_misfit
+from truearm.identification.start_values.quick_distances import quick_misfit
 from truearm.measurement.dataset import Dataset
 from truearm.measurement.observations import OBSERVATIONS
 from truearm.measurement.statistics import Errors, errors_of
@@ -160,7 +160,8 @@ def slips_in_lengths(robot: Robot, data: Dataset) -> list[Notice]:
     ):
         if np.ptp(slip.data.joints, axis=0).max() < _LEAST_TRAVEL:
             continue  # an arm that hardly moves fits any fixture
-        if can_be_quick(slip.data) and quick_misfit(robot, slip.data) > _PLAINLY_OFF * _PLACED_WITHIN_BY_FIXTURES:
+        quick = quick_misfit(robot, slip.data)
+        if quick is not None and quick > _PLAINLY_OFF * _PLACED_WITHIN_BY_FIXTURES:
             continue
         mended = _misfit(robot, slip.data)
         if mended <= _PLACED_WITHIN_BY_FIXTURES and _LEAST_IMPROVEMENT * mended / _spread(slip.data) < size / _spread(

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from truearm.identification.start_values.quick_distances import quick_misfit
+from truearm.jobs.check import check
 from truearm.library import load_robot
 from truearm.measurement.dataset import Dataset
 from truearm.simulation.devices import measured_with, named_device
@@ -35,3 +36,11 @@ def test_right_signs_fit_and_a_wrong_one_does_not(device: str) -> None:
 @pytest.mark.parametrize("device", ["tracker", "plane", "point", "strings"])
 def test_other_readings_are_not_judged(device: str) -> None:
     assert quick_misfit(ROBOT, campaign(device)) is None
+
+
+def test_rows_in_another_order_are_not_called_a_joint_in_another_unit() -> None:
+    """A joint that would hardly move lets any sphere fit a little better."""
+    data = campaign("ballbar")
+    codes = [notice.code for notice in check("irb120", replace(data, joints=data.joints[::-1].copy())).warnings]
+    assert "unit-angle" not in codes
+    assert "fixtures-unlikely" in codes

@@ -158,8 +158,10 @@ def slips_in_lengths(robot: Robot, data: Dataset) -> list[Notice]:
         *as_noted(robot, data, sign_slips),
         *as_noted(robot, data, order_slips),
     ):
-        if np.ptp(slip.data.joints, axis=0).max() < _LEAST_TRAVEL:
-            continue  # an arm that hardly moves fits any fixture
+        travel, before = (np.ptp(one.joints, axis=0) for one in (slip.data, data))
+        less = travel < 0.5 * before
+        if min(travel.max(), travel[less].max(initial=0.0) if less.any() else np.inf) < _LEAST_TRAVEL:
+            continue  # an arm that hardly moves fits any fixture, and so does a joint that would hardly move
         quick = quick_misfit(robot, slip.data)
         if quick is not None and quick > _PLAINLY_OFF * _PLACED_WITHIN_BY_FIXTURES:
             continue

@@ -9,7 +9,7 @@ import pytest
 from tests.fleets.simulated_series import campaign, rows
 
 from truearm.fleets.analysis.analysis import analysed
-from truearm.fleets.rows import Accuracy, Row
+from truearm.fleets.rows import Accuracy, FoundParameters, Row
 from truearm.results.fleet_words import analysis_lines, analysis_notices, analysis_summary
 
 COUNT = len(campaign().own)
@@ -36,7 +36,9 @@ def test_robots_are_looked_at_in_the_order_of_their_reasons() -> None:
     zero = fleet[11].parameters["theta_offset_3"]
     fleet[11] = replace(
         fleet[11],
-        parameters={**fleet[11].parameters, "theta_offset_3": replace(zero, value=zero.value + np.radians(2.0))},
+        parameters=FoundParameters.of(
+            {**fleet[11].parameters, "theta_offset_3": replace(zero, value=zero.value + np.radians(2.0))}
+        ),
     )
     found = analysed(fleet)
     why = {look.robot: [reason.why for reason in look.reasons] for look in found.looks}

@@ -20,7 +20,7 @@ HEADER = "name,robot,data,of,date,model,train,effects\n"
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     for name in ("a.csv", "b.csv", "arm.yaml", "bounds.yaml"):
-        (tmp_path / name).write_text("x\n", "utf-8")
+        (tmp_path / name).write_text(f"{name}\n", "utf-8")
     return tmp_path
 
 

@@ -9,14 +9,15 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
 
 from truearm.errors import InputError, name_parameter, name_place
 from truearm.fleets.manifest import ExperimentEntry
-from truearm.fleets.rows import Accuracy, FoundParameter, Row
+from truearm.fleets.rows import Accuracy, FoundParameters, Row
 from truearm.identification.judging.monte_carlo import calibrated, of_itself
 from truearm.identification.solving.models import FRAMES, named_model
 from truearm.identification.solving.problem import Problem
@@ -112,14 +113,23 @@ class Series:
         self.frames = Problem(robot, self.problem.data, FRAMES.free(robot), {})
         self.drawn = np.array([p.group not in PLACES for p in self.problem.free.parameters])
 
+    @cached_property
+    def _kept(self) -> tuple[list[int], FoundParameters]:
+        """The places of the arm's parameters among those identified, and what is the same of every robot's."""
+        free = self.problem.free.parameters
+        kept = np.flatnonzero(self.drawn).tolist()
+        those = [free[k] for k in kept]
+        return kept, FoundParameters(
+            tuple(p.name for p in those),
+            tuple(p.unit for p in those),
+            tuple(p.nominal for p in those),
+            tuple(p.prior for p in those),
+        )
+
     @property
-    def shared(self) -> dict[str, dict[str, Any]]:
-        """What is the same of every robot's parameters, by their names."""
-        return {
-            p.name: {"unit": p.unit, "nominal": p.nominal, "prior": p.prior}
-            for p in self.problem.free.parameters
-            if p.group not in PLACES
-        }
+    def shared(self) -> dict[str, Any]:
+        """What is the same of every robot's parameters, column by column."""
+        return self._kept[1].shared
 
     def rows(self, numbers: Sequence[int]) -> list[Row]:
         """Return what is found of some robots, counted from 0."""
@@ -150,7 +160,7 @@ class Series:
         }
         lengths = {name: np.linalg.norm(apart, axis=2).reshape(len(numbers), -1) for name, apart in errors.items()}
         seconds = (time.perf_counter() - began) / len(numbers)
-        kept = np.flatnonzero(self.drawn)
+        kept, shared = self._kept
         rows = []
         for i, number in enumerate(numbers):
             name = made.asked.name(number)
@@ -159,17 +169,12 @@ class Series:
                     Row(name, "failed", "the calibration did not settle", seconds=seconds, robot=made.robot.name)
                 )
                 continue
-            parameters = {
-                free.parameters[k].name: FoundParameter(
-                    free.parameters[k].unit,
-                    float(found[i, k]),
-                    float(deviation[i, k]),
-                    free.parameters[k].nominal,
-                    free.parameters[k].prior,
-                    float(truth[i, k]),
-                )
-                for k in kept
-            }
+            parameters = replace(
+                shared,
+                value=tuple(found[i, kept].tolist()),
+                deviation=tuple(deviation[i, kept].tolist()),
+                truth=tuple(truth[i, kept].tolist()),
+            )
             rows.append(
                 Row(
                     name,

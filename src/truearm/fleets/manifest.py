@@ -30,7 +30,7 @@ from pydantic import BaseModel, Field
 
 from truearm.errors import InputError, refusals_at
 from truearm.files import read_bytes, read_yaml
-from truearm.fleets.entries import RobotEntry, robots_of
+from truearm.fleets.entries import RobotEntry, refuse_respelled, robots_of
 from truearm.limits import refuse_beyond
 from truearm.modeling.formats.entries import STRICT, NotNegative
 from truearm.units import sized_si
@@ -164,6 +164,14 @@ class Manifest:
         told = json.dumps([self.content, self.hashes], sort_keys=True, default=str)
         return hashlib.sha256(told.encode()).hexdigest()
 
+    def key(self, part: int) -> str:
+        """Return the hash of what is asked of a part, counted from 0: robots beside it change nothing of it."""
+        if self.experiment is not None:
+            return self.digest
+        robots = [self.content["robots"][number] for number in self.numbers(part)]
+        files = [[*self.robots[number].hashes.values()] for number in self.numbers(part)]
+        return hashlib.sha256(json.dumps([robots, files], sort_keys=True, default=str).encode()).hexdigest()
+
     def numbers(self, part: int) -> range:
         """Return which robots are in a part; both are counted from 0."""
         return range(part * self.chunk, min((part + 1) * self.chunk, self.count))
@@ -197,9 +205,11 @@ def read_manifest(path: Path) -> Manifest:
         return Manifest(path, experiment, (), said.chunk or SIMULATED_TOGETHER, content, _hashes(files))
     if said.units is not None:
         raise InputError("nothing here has a unit", where=f"{path}, units", cure="Remove it.")
+    if isinstance(said.robots, list):
+        refuse_respelled(said.robots, path)
     named = robots_of(said.robots or [], said.options, path)
     content |= {"robots": named.content}
-    return Manifest(path, None, named.entries, said.chunk or MEASURED_TOGETHER, content, _hashes(named.files))
+    return Manifest(path, None, named.entries, said.chunk or MEASURED_TOGETHER, content, named.hashes)
 
 
 def _experiment(said: ManifestFile, path: Path) -> tuple[ExperimentEntry, dict[str, Path]]:

@@ -149,8 +149,9 @@ def parameters_figure(found: KindFound) -> Figure:
                 "showlegend": False,
             }
         )
-    at = {(kind.names[int(r)], kind.parameters[c]): (i, j) for i, r in enumerate(rows) for j, c in enumerate(chosen)}
-    marks = [(one, at[one.robot, one.parameter]) for one in found.differences[:_MOST_MARKS]]
+    row_of = {kind.names[row]: place for place, row in enumerate(rows.tolist())}
+    column_of = {kind.parameters[column]: place for place, column in enumerate(chosen.tolist())}
+    marks = [(one, (row_of[one.robot], column_of[one.parameter])) for one in found.differences[:_MOST_MARKS]]
     if marks:
         traces.append(
             {

@@ -23,7 +23,7 @@ ACCURACIES: Final = ("nominal", "held_out", "truth")
 
 @dataclass(frozen=True, eq=False)
 class Errors:
-    """Errors of robots, one machine an entry, by its last measurement [m].
+    """Errors of robots, one machine an entry, by its last measurement that can be used [m].
 
     Attributes
     ----------
@@ -65,6 +65,8 @@ class Analysis:
         How many there are.
     failed
         Names of those that could not be calibrated, with the reason.
+    left_out
+        Names of those whose result should not be used as it is: nothing of it is in the figures.
     errors
         By what they are of, see :data:`ACCURACIES`; those that were not judged are left out.
     kinds
@@ -76,6 +78,7 @@ class Analysis:
     measurements: int
     machines: int
     failed: tuple[tuple[str, str], ...]
+    left_out: tuple[str, ...]
     errors: Mapping[str, Errors]
     kinds: tuple[KindFound, ...]
     looks: tuple[Look, ...]
@@ -92,7 +95,7 @@ class Analysis:
 
 
 def analysed(rows: Iterable[Row]) -> Analysis:
-    """Return what a fleet says."""
+    """Return what a fleet says; a result that ends with an error is named and has no part in any figure."""
     kinds: dict[str, Gathered] = {}
     judged: list[Judged] = []
     last: dict[str, tuple[float, dict[str, Accuracy]]] = {}
@@ -101,8 +104,10 @@ def analysed(rows: Iterable[Row]) -> Analysis:
     for row in rows:
         count += 1
         machines.add(row.machine)
-        kinds.setdefault(row.robot, Gathered(row.robot)).add(row)
         judged.append(Judged.of(row))
+        if row.errors:
+            continue
+        kinds.setdefault(row.robot, Gathered(row.robot)).add(row)
         known = {name: accuracy for name in ACCURACIES if (accuracy := getattr(row, name)) is not None}
         day = day_of(row.date)
         when = -np.inf if np.isnan(day) else day
@@ -116,6 +121,7 @@ def analysed(rows: Iterable[Row]) -> Analysis:
         measurements=count,
         machines=len(machines),
         failed=tuple((one.name, one.message) for one in judged if one.message),
+        left_out=tuple(one.name for one in judged if one.errors),
         errors=_errors([known for _, known in last.values()]),
         kinds=tuple(found),
         looks=first_looks(

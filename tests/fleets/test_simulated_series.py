@@ -17,10 +17,11 @@ import truearm
 from truearm import writing
 from truearm.errors import InputError
 from truearm.fleets import recorded
-from truearm.fleets.experiment import Series, experiment
-from truearm.fleets.manifest import ExperimentEntry, read_manifest
+from truearm.fleets.experiment import experiment
+from truearm.fleets.manifest import read_manifest
 from truearm.fleets.recorded import Recorded
 from truearm.fleets.rows import Row
+from truearm.fleets.series import ExperimentEntry, Series
 from truearm.identification.judging.monte_carlo import calibrated
 from truearm.identification.solving.fit import identify
 from truearm.identification.solving.models import named_model
@@ -209,7 +210,7 @@ def test_robots_of_lost_parts_are_named_and_an_error(tmp_path: Path) -> None:
 
 
 def test_a_calibration_that_does_not_settle_is_a_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from truearm.fleets import experiment as module
+    from truearm.fleets import series as module
 
     def unsettled(*given: Any) -> Any:
         found, deviation, settled = calibrated(*given)

@@ -9,13 +9,13 @@ from __future__ import annotations
 import hashlib
 import json
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from pydantic_core import from_json, to_json
+from pydantic_core import from_json
 
 from truearm.errors import InputError
 from truearm.files import exists, read_bytes, read_text
@@ -33,25 +33,6 @@ _RECORD_SCHEMA: Final = "truearm-fleet-record/1"
 _PART_SCHEMA: Final = "truearm-fleet-part/1"
 #: Files of a folder at most.
 _TOGETHER: Final = 1000
-
-
-def part_text(
-    rows: Sequence[Row], shared: Mapping[str, Any], written: Sequence[str] = (), changed: Sequence[str] = ()
-) -> str:
-    """Return robots as a part holds them, behind its first line and before its hash.
-
-    Parameters
-    ----------
-    shared
-        Columns that the parameters of all robots have, see :attr:`truearm.fleets.rows.FoundParameters.shared`.
-    written
-        Files that were written of them, from the folder of the fleet.
-    changed
-        Robots whose files changed while they were computed: they are computed again by the next run.
-    """
-    first = to_json({"shared": shared, "written": [*written], "changed": [*changed]})
-    lines = [first, *(to_json(row.content(shared)) for row in rows)]
-    return b"\n".join([*lines, b""]).decode()
 
 
 @dataclass(frozen=True)
@@ -291,7 +272,7 @@ class Recorded:
         return [part for part in range(self.manifest.parts) if self.file(part).name in names]
 
     def write(self, part: int, text: str) -> None:
-        """Write a part that is done, as a whole or not at all; `text` as of :func:`part_text`."""
+        """Write a part that is done, as a whole or not at all; `text` as of :func:`truearm.fleets.rows.part_text`."""
         first, _, rest = text.partition("\n")
         head = {
             "truearm": _PART_SCHEMA,

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final, Literal
 
 import numpy as np
+from pydantic_core import to_json
 
 from truearm.measurement.statistics import Spread
 from truearm.modeling.chain import Array
@@ -35,9 +36,11 @@ class Accuracy:
     n: int
 
     @classmethod
-    def of(cls, errors: Array) -> Accuracy:
-        """Summarise error norms ``(k,)``, k at least 1."""
-        return cls(float(errors.mean()), float(np.sqrt(np.mean(errors**2))), float(errors.max()), len(errors))
+    def of_each(cls, errors: Array) -> list[Accuracy]:
+        """Summarise error norms of several robots, ``(robots, k)``, k at least 1."""
+        means, squares, largest = errors.mean(axis=1), np.mean(errors**2, axis=1), errors.max(axis=1)
+        figures = zip(means.tolist(), np.sqrt(squares).tolist(), largest.tolist(), strict=True)
+        return [cls(*three, errors.shape[1]) for three in figures]
 
     @classmethod
     def of_spread(cls, spread: Spread, n: int) -> Accuracy:
@@ -266,3 +269,22 @@ class Row:
             drawn=content.get("drawn", True),
             covariance=tuple(content.get("covariance", ())),
         )
+
+
+def part_text(
+    rows: Sequence[Row], shared: Mapping[str, Any], written: Sequence[str] = (), changed: Sequence[str] = ()
+) -> str:
+    """Return robots as a part holds them, behind its first line and before its hash.
+
+    Parameters
+    ----------
+    shared
+        Columns that the parameters of all robots have, see :attr:`FoundParameters.shared`.
+    written
+        Files that were written of them, from the folder of the fleet.
+    changed
+        Robots whose files changed while they were computed: they are computed again by the next run.
+    """
+    first = to_json({"shared": shared, "written": [*written], "changed": [*changed]})
+    lines = [first, *(to_json(row.content(shared)) for row in rows)]
+    return b"\n".join([*lines, b""]).decode()

@@ -6,12 +6,15 @@ import pickle
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from truearm.errors import InputError
-from truearm.fleets.entries import RobotEntry
-from truearm.fleets.experiment import Experiment, Series
-from truearm.fleets.recorded import part_text
+from truearm.fleets.rows import part_text
+from truearm.fleets.series import Experiment, Series
 from truearm.version import __version__
+
+if TYPE_CHECKING:  # with all that a calibration needs
+    from truearm.fleets.entries import RobotEntry
 
 
 @dataclass(frozen=True)

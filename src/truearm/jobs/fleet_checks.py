@@ -6,12 +6,12 @@ import json
 from pathlib import Path
 from typing import Final, NoReturn
 
-from truearm.errors import InputError, name_place, refusals_at
+from truearm.errors import InputError, Words, refusals_at, with_parameters
 from truearm.fleets.entries import RobotEntry
 from truearm.fleets.manifest import Manifest
 from truearm.fleets.options import OPTIONS
 from truearm.fleets.recorded import ROBOTS
-from truearm.jobs.arguments import folder_for, robot_argument
+from truearm.jobs.arguments import folder_for, robot_argument, whole_argument
 from truearm.jobs.calibrate import ACCEPTED, calibrate
 from truearm.results.calibration import RESULT_FILES
 
@@ -41,6 +41,9 @@ def check_options(asked: Manifest) -> None:
         if not Path(robot.robot).suffix:
             with refusals_at(robot.places["robot"]):
                 robot_argument(robot.robot)
+        if _OF_THE_SPLIT in robot.options:
+            with refusals_at(robot.places[_OF_THE_SPLIT]):
+                whole_argument(robot.options[_OF_THE_SPLIT], _OF_THE_SPLIT)
         own = {name: value for name, value in robot.options.items() if name != _OF_THE_SPLIT}
         groups.setdefault(json.dumps(own, sort_keys=True, default=str), []).append(robot)
     for robots in groups.values():
@@ -56,12 +59,27 @@ def _try(robots: list[RobotEntry]) -> None:
             return
         except InputError as error:
             if refused is None and (place := _place_of(error, robot)) is not None:
-                name_place(error, place)
-                refused = error
+                refused = _in_the_manifest(error, place)
         except (ArithmeticError, ValueError, LookupError):  # of this robot: its row will say so
             continue
     if refused is not None:
         raise refused
+
+
+def _in_the_manifest(error: InputError, place: str) -> InputError:
+    """Return a refusal of an option as the manifest spells options."""
+
+    def spelled(name: str, value: str | None) -> str:
+        return f"'{name}'" if value is None else f"'{name}: {value}'"
+
+    came = error.came
+    return InputError(
+        with_parameters(error.what, spelled),
+        where=place,
+        came=Words(with_parameters(came, spelled)) if isinstance(came, str) and "`" in came else came,
+        allowed=None if error.allowed is None else with_parameters(error.allowed, spelled),
+        cure=None if error.cure is None else with_parameters(error.cure, spelled),
+    )
 
 
 def _stop(words: str) -> None:

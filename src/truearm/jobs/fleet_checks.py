@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Final, NoReturn
 
-from truearm.errors import InputError, Words, refusals_at, with_parameters
+from truearm.errors import InputError, Words, with_parameters
 from truearm.fleets.entries import RobotEntry
 from truearm.fleets.manifest import Manifest
 from truearm.fleets.options import OPTIONS
@@ -39,10 +41,10 @@ def check_options(asked: Manifest) -> None:
     groups: dict[str, list[RobotEntry]] = {}
     for robot in asked.robots:
         if not Path(robot.robot).suffix:
-            with refusals_at(robot.places["robot"]):
+            with _refusals_at(robot.places["robot"]):
                 robot_argument(robot.robot)
         if _OF_THE_SPLIT in robot.options:
-            with refusals_at(robot.places[_OF_THE_SPLIT]):
+            with _refusals_at(robot.places[_OF_THE_SPLIT]):
                 whole_argument(robot.options[_OF_THE_SPLIT], _OF_THE_SPLIT)
         own = {name: value for name, value in robot.options.items() if name != _OF_THE_SPLIT}
         groups.setdefault(json.dumps(own, sort_keys=True, default=str), []).append(robot)
@@ -64,6 +66,14 @@ def _try(robots: list[RobotEntry]) -> None:
             continue
     if refused is not None:
         raise refused
+
+
+@contextmanager
+def _refusals_at(place: str) -> Iterator[None]:
+    try:
+        yield
+    except InputError as error:
+        raise _in_the_manifest(error, place) from error
 
 
 def _in_the_manifest(error: InputError, place: str) -> InputError:

@@ -29,10 +29,13 @@ class Errors:
     ----------
     mean, largest
         Over the configurations of each robot that its calibration has not seen, ``(machines,)``.
+    names
+        Of these measurements.
     """
 
     mean: Array
     largest: Array
+    names: tuple[str, ...]
 
     @property
     def of_means(self) -> tuple[Quantile, ...]:
@@ -98,7 +101,7 @@ def analysed(rows: Iterable[Row]) -> Analysis:
     """Return what a fleet says; a result that ends with an error is named and has no part in any figure."""
     kinds: dict[str, Gathered] = {}
     judged: list[Judged] = []
-    last: dict[str, tuple[float, dict[str, Accuracy]]] = {}
+    last: dict[str, tuple[float, str, dict[str, Accuracy]]] = {}
     count = 0
     machines = set()
     for row in rows:
@@ -112,7 +115,7 @@ def analysed(rows: Iterable[Row]) -> Analysis:
         day = day_of(row.date)
         when = -np.inf if np.isnan(day) else day
         if known and (row.machine not in last or when >= last[row.machine][0]):
-            last[row.machine] = (when, known)
+            last[row.machine] = (when, row.name, known)
     found = []
     for kind in sorted((g.kind for g in kinds.values() if g.names), key=lambda kind: -len(kind.names)):
         differing = differences(kind)
@@ -122,7 +125,7 @@ def analysed(rows: Iterable[Row]) -> Analysis:
         machines=len(machines),
         failed=tuple((one.name, one.message) for one in judged if one.message),
         left_out=tuple(one.name for one in judged if one.errors),
-        errors=_errors([known for _, known in last.values()]),
+        errors=_errors([(name, known) for _, name, known in last.values()]),
         kinds=tuple(found),
         looks=first_looks(
             judged,
@@ -132,10 +135,11 @@ def analysed(rows: Iterable[Row]) -> Analysis:
     )
 
 
-def _errors(known: list[dict[str, Accuracy]]) -> dict[str, Errors]:
+def _errors(known: list[tuple[str, dict[str, Accuracy]]]) -> dict[str, Errors]:
     made = {}
-    for name in ACCURACIES:
-        those = [one[name] for one in known if name in one]
+    for kind in ACCURACIES:
+        those = [(name, one[kind]) for name, one in known if kind in one]
         if those:
-            made[name] = Errors(np.array([one.mean for one in those]), np.array([one.max for one in those]))
+            mean, largest = np.array([(one.mean, one.max) for _, one in those]).T
+            made[kind] = Errors(mean, largest, tuple(name for name, _ in those))
     return made

@@ -123,10 +123,10 @@ def histogram_figure(errors: Errors) -> Figure:
                 "text": f"beyond: {told}{more}",
                 "xref": "paper",
                 "yref": "paper",
-                "x": 1,
-                "y": 1,
-                "xanchor": "right",
-                "yanchor": "top",
+                "x": 0,
+                "y": 1.02,
+                "xanchor": "left",
+                "yanchor": "bottom",
                 "showarrow": False,
                 "font": {"color": _ALARM},
             }
@@ -148,9 +148,10 @@ def parameters_figure(found: KindFound) -> Figure:
     names = [html.escape(kind.parameters[i]) for i in chosen.tolist()]
     robots = [html.escape(kind.names[i]) for i in rows.tolist()]
     traces: list[Figure] = []
+    each = len(rows) <= _EACH // 4
     edge = _edge(values)
     shown = np.clip(values, -edge, edge)
-    if len(rows) <= _EACH // 4:
+    if each:
         for row, robot in enumerate(robots):
             those = [
                 (n, v) for n, v in zip(names, values[row].tolist(), strict=True) if np.isfinite(v) and abs(v) <= edge
@@ -201,10 +202,10 @@ def parameters_figure(found: KindFound) -> Figure:
                 "hovertemplate": "%{text}, %{x}: %{customdata} of its prior<extra></extra>",
             }
         )
-    out = np.argwhere(np.abs(values) > edge).tolist()
-    told = {(one.robot, one.parameter) for one, _ in marks}
-    unmarked = [(i, j) for i, j in out if (kind.names[int(rows[i])], kind.parameters[int(chosen[j])]) not in told]
-    if unmarked and len(rows) <= _EACH // 4:
+    marked = {place for _, place in marks}
+    out = [(i, j) for i, j in np.argwhere(np.abs(values) > edge).tolist() if each or (i, j) in marked]
+    unmarked = [place for place in out if place not in marked]
+    if unmarked:
         traces.append(
             {
                 "type": "scatter",
@@ -220,7 +221,7 @@ def parameters_figure(found: KindFound) -> Figure:
         )
     far = list(dict.fromkeys(robots[i] for i, _ in sorted(out, key=lambda at: -abs(values[at[0], at[1]]))))
     title = "difference from nominal [priors]"
-    if far and len(far) <= _EACH // 4:
+    if far:
         more = f" and {len(far) - _NAMED} more" if len(far) > _NAMED else ""
         title = f"{title}<br>triangles: beyond ({', '.join(far[:_NAMED])}{more})"
     return figure(
@@ -236,7 +237,7 @@ def _edge(values: NDArray[np.float64]) -> float:
     """Return how far out values are drawn at their places: as most of them need, so that one does not hide the rest."""
     sizes = np.sort(np.abs(values[np.isfinite(values)]))
     usual = max(float(np.quantile(sizes, 0.75)), 1.0) if len(sizes) else 1.0
-    return _FAR * usual if len(sizes) and sizes[-1] > 2.0 * _FAR * usual else np.inf
+    return _FAR * usual if len(sizes) and sizes[-1] > _FAR**2 * usual else np.inf
 
 
 def _symbol(value: float, edge: float) -> str:

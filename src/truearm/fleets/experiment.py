@@ -13,7 +13,7 @@ from truearm.identification.solving.models import named_model
 from truearm.library import load_robot
 from truearm.measurement.controller_joints import in_model_joints
 from truearm.measurement.readers.canonical import read_csv
-from truearm.planning.choosing.measurement_plan import with_targets
+from truearm.simulation.truths import carrying_targets
 
 
 def experiment(asked: ExperimentEntry) -> Experiment:
@@ -28,7 +28,7 @@ def experiment(asked: ExperimentEntry) -> Experiment:
         nominal = load_robot(asked.robot)
     with _refusals_of_entry("model"):
         model = named_model(asked.model)
-    known = with_targets(nominal)
+    known = carrying_targets(nominal)
     places = {target.name: tuple(known.values[target.parameter(axis)] for axis in "xyz") for target in known.targets}
     if asked.targets > len(places):
         raise InputError(

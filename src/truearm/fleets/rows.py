@@ -54,8 +54,7 @@ class Accuracy:
     @classmethod
     def read(cls, content: Mapping[str, Any]) -> Accuracy:
         """Read what :meth:`content` returned."""
-        mean, rms, largest = (float(content[name]) / 1e3 for name in ("mean_mm", "rms_mm", "max_mm"))
-        return cls(mean, rms, largest, int(content["n"]))
+        return cls(content["mean_mm"] / 1e3, content["rms_mm"] / 1e3, content["max_mm"] / 1e3, content["n"])
 
 
 @dataclass(frozen=True)
@@ -157,10 +156,9 @@ class FoundParameters(Mapping[str, FoundParameter]):
             If columns are not equally long.
         """
         columns = {kind: tuple(column) for kind, column in {**shared, **content}.items()}
-        made = cls(**columns)
-        if any(len(column) != len(made.name) for column in columns.values()):
+        if len({*map(len, columns.values())}) > 1:
             raise ValueError("columns of different lengths")
-        return made
+        return cls(**columns)
 
 
 @dataclass(frozen=True)

@@ -110,7 +110,9 @@ def analysed(rows: Iterable[Row]) -> Analysis:
         judged.append(Judged.of(row))
         if row.errors:
             continue
-        kinds.setdefault(row.robot, Gathered(row.robot)).add(row)
+        if row.robot not in kinds:
+            kinds[row.robot] = Gathered(row.robot)
+        kinds[row.robot].add(row)
         known = {name: accuracy for name in ACCURACIES if (accuracy := getattr(row, name)) is not None}
         day = day_of(row.date)
         when = -np.inf if np.isnan(day) else day

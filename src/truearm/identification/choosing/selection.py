@@ -42,7 +42,7 @@ from truearm.identification.choosing.search import (
     without,
 )
 from truearm.identification.held import NOTHING_HELD, Held
-from truearm.identification.judging.transmission import FEWEST, PeriodicError, Pulls, lines_of
+from truearm.identification.judging.transmission import FEWEST, LEAST_CONFIGURATIONS, PeriodicError, Pulls, lines_of
 from truearm.identification.solving.bounds import Bounds
 from truearm.identification.solving.losses import Loss
 from truearm.identification.solving.models import named_model
@@ -209,6 +209,14 @@ class _Choice:
             return False
         pulls = self.ground.pulls(search.left(chosen), search.spent(chosen))
         self.lines = () if pulls is None else self._lines_of(pulls, chosen)
+        if not self.lines and TRANSMISSION in self.reasons:
+            self.reasons[TRANSMISSION] = (
+                "no position was read in which to look for errors that repeat with a joint's angle"
+                if pulls is None
+                else f"fewer than {LEAST_CONFIGURATIONS} configurations cannot tell how often a joint's errors repeat"
+                if len(pulls.joints) < LEAST_CONFIGURATIONS
+                else "no error that repeats with a joint's angle was found"
+            )
         return bool(self.lines)
 
     def _lines_of(self, pulls: Pulls, chosen: frozenset[str]) -> tuple[PeriodicError, ...]:

@@ -392,9 +392,10 @@ def test_few_configurations_end_no_worse_than_the_better_plain_model() -> None:
 
 
 def test_a_choice_is_held_against_the_next_smaller_and_the_better_plain_one() -> None:
-    chosen = select(arm(), seen(twin_of(backlash=math.radians(0.05), hysteresis=3e-4), 50, 2), candidates=FEW)
+    twin = twin_of(backlash=math.radians(0.05), growth=23e-6)
+    chosen = select(arm(), seen(twin, 50, 2, warming=15.0), candidates=("backlash", "thermal-growth"))
     effects = frozenset(chosen.model.effects)
-    assert {"backlash", "approach"} < effects
+    assert {"backlash", "thermal-growth"} < effects
     held = [frozenset(one.smaller) for one in chosen.confirmations if frozenset(one.effects) == effects]
     assert len(held[0]) == len(effects) - 1
     assert held[-1] == {"compliance"}

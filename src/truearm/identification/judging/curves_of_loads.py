@@ -33,8 +33,8 @@ def check_curves_of_loads(left: LeftOver) -> list[Notice]:
     return [
         Notice(
             "curves-of-loads",
-            f"Joints that give way under their loads would do {share:.0%} of what the curves of the joints do, with one "
-            "number a joint. The curves are then right for this payload and mounting only. Compare with "
+            f"Joints that give way under their loads would do {share:.0%} of what the curves of the joints do, with "
+            "one number a joint. The curves are then right for this payload and mounting only. Compare with "
             "`effects=compliance` beside them, or with `model=auto`.",
             "warning",
         )

@@ -106,8 +106,8 @@ def other_model(fit: Fit, found: Explanation, known: float) -> NextStep:
         )
     if found.cause == Fourier.name:
         words = (
-            f"Add `effects={found.cause}`, or `effects={JointCurve.name}`, which contains it and is found from some 100 "
-            f"configurations on, or let `model=auto` choose: it explains {share} of what is left."
+            f"Add `effects={found.cause}`, or `effects={JointCurve.name}`, which contains it and is found from some "
+            f"100 configurations on, or let `model=auto` choose: it explains {share} of what is left."
         )
         return NextStep("other-model", words, gain)
     words = f"Add `effects={found.cause}`, or let `model=auto` choose: it explains {share} of what is left."

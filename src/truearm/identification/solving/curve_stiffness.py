@@ -225,7 +225,7 @@ class _Marginal:
 
 
 def _log_determinant(matrix: Array) -> float:
-    """Return the logarithm of the determinant; infinite where rounding left the matrix indefinite: nothing is less likely."""
+    """Return the logarithm of the determinant; infinite where rounding left the matrix indefinite."""
     sign, logarithm = np.linalg.slogdet(matrix)
     return float(logarithm) if sign > 0.0 else np.inf
 

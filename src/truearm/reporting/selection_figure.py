@@ -56,8 +56,8 @@ def choice_sentence(selection: Selection) -> str:
         f"error of the geometric model there is {selection.geometric * 1e3:.4f} mm{elastic}, that of the chosen model "
         f"{selection.error * 1e3:.4f} mm. Errors of every choice follow in closed form from one fit; of those that are "
         "not worse than the best one by a standard error, the one with the fewest parameters was taken. Gains are "
-        "those over the chosen model without the effect, or what it would gain with it. A fold trains on four fifths of "
-        "the configurations, and what is chosen looked best in these folds; the error of held-out readings may be "
+        "those over the chosen model without the effect, or what it would gain with it. A fold trains on four fifths "
+        "of the configurations, and what is chosen looked best in these folds; the error of held-out readings may be "
         "smaller or larger than the one here: believe the held-out one."
     )
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from truearm.identification.solving.fit import Fit
 from truearm.measurement.dataset import Dataset
+from truearm.modeling.effects.fourier import Fourier
 from truearm.modeling.effects.joint_curve import JointCurve
 from truearm.notices import Notice
 
@@ -61,6 +62,15 @@ def check_curves(fit: Fit, training: Dataset) -> list[Notice]:
                 "curve-expected",
                 "With curves of the joints the interval of the expected error is rough: on twins it held 8 times of "
                 "31. Believe the held-out error, and a validation where the robot works.",
+                "note",
+            )
+        )
+    if Fourier.name in fit.model.effects:
+        found.append(
+            Notice(
+                "curves-and-fourier",
+                "The model has curves of the joints and the effect fourier, whose one and two periods a turn curves "
+                "contain. The readings do not tell the two apart: leave fourier out.",
                 "note",
             )
         )

@@ -28,6 +28,8 @@ from truearm.identification.solving.problem import Problem
 from truearm.limits import limit
 from truearm.measurement.observations import OBSERVATIONS
 from truearm.modeling.chain import Array
+from truearm.modeling.effects.fourier import Fourier
+from truearm.modeling.effects.joint_curve import JointCurve
 from truearm.modeling.loads import has_weight, joint_loads
 from truearm.modeling.parameters import FreeParameters, Parameter
 from truearm.modeling.parts import Payload
@@ -240,7 +242,9 @@ def _candidates(
     robot = fit.robot
     freed = set(fit.free.names) | {r.dropped for r in fit.redundancies}
     own = [effect.name for effect in robot.effects if any(p.name in freed for p in effect.parameters)]
-    closed = (*own, *fit.model.tried)
+    closed = [*own, *fit.model.tried]
+    if JointCurve.name in (*own, *fit.model.effects):
+        closed += [JointCurve.name, Fourier.name]  # the curves contain it, and found what there is
     unloaded = not has_weight(robot) and problem.data.wrench is None
     names = open_effects(robot, closed, problem.data)
     if unloaded and "compliance" not in closed:

@@ -201,14 +201,14 @@ class _Marginal:
             inverse = np.linalg.inv(M)
             self.found[used] = root * (inverse @ (root * b)) / noise
             self.known[used] = 1.0 - np.diag(inverse)
-            logs = 2.0 * float(np.log(np.diag(np.linalg.cholesky(M))).sum())
+            logs = _log_determinant(M)
         else:
             part = of.F[:, used]
             V = np.eye(len(part)) + (part * (v / noise)) @ part.T
             turned = np.linalg.solve(V, np.column_stack([part, of.z]))
             self.found[used] = v * (part.T @ turned[:, -1]) / noise
             self.known[used] = v * np.einsum("ij,ij->j", part, turned[:, :-1]) / noise
-            logs = 2.0 * float(np.log(np.diag(np.linalg.cholesky(V))).sum())
+            logs = _log_determinant(V)
         c = self.found[used]
         explained = float(b @ c)
         moved = of.F[:, used] @ c
@@ -222,6 +222,12 @@ class _Marginal:
     def without(self, coefficients: NDArray[np.bool_]) -> float:
         """Return the likelihood without some coefficients."""
         return self.at(np.where(coefficients, 0.0, self.variance), self.noise).likelihood
+
+
+def _log_determinant(matrix: Array) -> float:
+    """Return the logarithm of the determinant; infinite where rounding left the matrix indefinite."""
+    sign, logarithm = np.linalg.slogdet(matrix)
+    return float(logarithm) if sign > 0.0 else np.inf
 
 
 class _Climb:

@@ -6,8 +6,8 @@ band, which has the level of noise, is taken so many times larger or smaller as 
 a grid). A term that the data could not tell is expected to be of the size that the same number of periods, and its
 neighbours, have in the joints where they could: with the probability p that there is a line at all, and of the line's
 size (George and McCulloch 1993, "Variable selection via Gibbs sampling"). The probability that a line is there although
-none was seen is ``p (1 - k) / (p (1 - k) + 1 - p)`` with k the share that the data know of a line. Where no joint tells,
-the prior of the effect holds, and falls as one by the number of periods.
+none was seen is ``p (1 - k) / (p (1 - k) + 1 - p)`` with k the share that the data know of a line. Where no joint
+tells, the prior of the effect holds, and falls as one by the number of periods.
 
 With those variances the parameters have a posterior of their own. The covariance returned is its covariance and the
 square of the difference of its mean from what was fitted: the mean squared error of the fitted values.
@@ -30,10 +30,11 @@ _LEVELS: Final = (0.03, 0.1, 0.3, 1.0, 3.0)
 #: Times the level of its band, or the median of its joint, above which a variance is that of a line.
 _ABOVE_BAND: Final = 4.0
 _ABOVE_JOINT: Final = 100.0
-#: Terms that what is believed beforehand counts for: of a band, and of a band for each of its numbers of periods.
-_BELIEVED: Final = 2.0
-#: Probability of a line beforehand: at one and two periods, where encoders err, and above.
-_PROBABLE: Final = (0.5, 0.1)
+#: Terms that what is believed of a band beforehand counts for, and the band for each of its numbers of periods.
+_BELIEVED: Final = 4.0
+_BELIEVED_OF_BAND: Final = 2.0
+#: Probability of a line beforehand, above two periods. At one and two, where encoders err, there is one.
+_PROBABLE: Final = 0.1
 _LEAST_PROBABLE: Final = 0.02
 #: Only what the data know well counts as told: the share is taken to this power.
 _WELL: Final = 3
@@ -88,12 +89,10 @@ def expected_variances(of: CurveMoments, likeliest: Array) -> Array:
     weights = np.exp(np.array(heights) - max(heights))
     level = float(weights @ _LEVELS / weights.sum())
     seen = np.where(line, likeliest, level * quiet)
-    found = seen
-    size, probable = (PRIOR / of.period) ** 2, np.where(band == 1, *_PROBABLE)
-    squares = np.zeros(0)
+    size, probable = (PRIOR / of.period) ** 2, np.where(band == 1, 1.0, _PROBABLE)
+    found = np.maximum(seen, size)  # from above: what is taken for zero would tell its neighbours
     for _ in range(_ROUNDS):
-        information, second = _told(equations.F, equations.z, found)
-        squares = squares if len(squares) else second
+        information, squares = _told(equations.F, equations.z, found)
         known = size * information / (1.0 + size * information)
         size, probable = _levels(known**_WELL, squares, line, of.period, band)
         of_line = size / probable
@@ -171,8 +170,11 @@ def _levels(
     size, probable = np.zeros(count), np.zeros(count)
     for b in np.unique(band):
         mine = np.unique(period[band == b])
-        before = float(np.mean((PRIOR / mine) ** 2)), _PROBABLE[0] if b == 1 else _PROBABLE[1]
-        for of, level, believed in ((size, square, before[0]), (probable, lines, before[1])):
-            of_band = (level[mine].sum() + _BELIEVED * believed) / (told[mine].sum() + _BELIEVED)
-            of[mine] = (level[mine] + _BELIEVED * of_band) / (told[mine] + _BELIEVED)
-    return size[period], np.clip(probable, _LEAST_PROBABLE, 1.0 - _LEAST_PROBABLE)[period]
+        before = float(np.mean((PRIOR / mine) ** 2))
+        # The expectation of a variance is larger than its scale, by two degrees of freedom.
+        of_band = (square[mine].sum() + _BELIEVED * before) / (told[mine].sum() + _BELIEVED - 2.0)
+        size[mine] = (square[mine] + _BELIEVED_OF_BAND * of_band) / (told[mine] + _BELIEVED_OF_BAND)
+        share = (lines[mine].sum() + _BELIEVED * _PROBABLE) / (told[mine].sum() + _BELIEVED)
+        probable[mine] = (lines[mine] + _BELIEVED_OF_BAND * share) / (told[mine] + _BELIEVED_OF_BAND)
+    probable = np.clip(probable, _LEAST_PROBABLE, 1.0 - _LEAST_PROBABLE)
+    return size[period], np.where(band == 1, 1.0, probable[period])

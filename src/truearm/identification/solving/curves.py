@@ -29,9 +29,9 @@ from truearm.modeling.robot import Robot
 _ROUNDS: Final = 2
 #: Equations whose products are summed at once.
 _AT_ONCE: Final = 3000
-#: Degrees of freedom of the level of the errors: variances of curves are known from a few dozen lines, and what errs more
-#: than 60 times in a turn is in none. With it the interval of the expected error holds as often as it says on twins
-#: (docs/benchmarks.md); targets of programs have as many.
+#: Degrees of freedom of the level of the errors: variances of curves are known from a few dozen lines, and what errs
+#: more than 60 times in a turn is in none of them. With so many the interval of the expected error holds about as
+#: often as it says on twins (docs/benchmarks.md); targets of programs have as many.
 _FREEDOM: Final = 12.0
 #: Coordinates that say where a target is.
 _COORDINATES: Final = 3

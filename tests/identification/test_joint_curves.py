@@ -226,6 +226,21 @@ def test_outside_the_measured_range_the_curve_is_uncertain() -> None:
     assert ((off < 1.96 * np.hypot(spread, NOISE)[wide.configuration[mine]]).mean()) > 0.7
 
 
+def test_the_expected_error_holds_where_a_joint_was_measured_through_a_sixth_of_its_turn() -> None:
+    robot, rng = load_robot("ur5"), np.random.default_rng((1, 7))
+    twin = truth_twin(robot, "gear-errors", np.random.default_rng(1001))
+    joints = rng.uniform(-math.pi, math.pi, (150, 6))
+    joints[:, 1] /= 6.0
+    fit = identify(robot, measure(twin, joints, 3e-5, rng), CURVED)
+    stated = expected_error(fit).overall
+    true = mean_error(fit.robot, measure(twin, rng.uniform(-math.pi, math.pi, (300, 6)), 2e-9, rng))
+    assert stated.interval_90[0] < true < stated.interval_90[1]  # it was said to be at most a third of the truth
+    assert stated.interval_90[1] < 4.0 * true
+    zero = [name for name in fit.unfitted if name.endswith("_2")]
+    assert zero
+    assert all(fit.robot.values[name] == 0.0 for name in zero)
+
+
 def test_without_errors_of_gears_there_are_no_curves() -> None:
     twin = truth_twin(load_robot("irb120"), "random", np.random.default_rng(2))
     data = campaign(twin, 40, 31)

@@ -83,7 +83,7 @@ def test_curves_of_a_fit_are_those_of_its_parameters() -> None:
     fit = identify(nominal, data, named_model("geometric").also(["joint-curve"]))
     found = found_curves(fit, data)
     q = np.linspace(-1.0, 1.0, 7)
-    values = fit.robot.values
+    values, uncertain, covariance = fit.robot.values, (*fit.free.names, *fit.unfitted), fit.covariance_with_unfitted
     for one in found:
         expected = sum(
             values[f"curve_sin{k}_{one.number}"] * np.sin(k * q) + values[f"curve_cos{k}_{one.number}"] * np.cos(k * q)
@@ -91,8 +91,8 @@ def test_curves_of_a_fit_are_those_of_its_parameters() -> None:
         )
         assert_allclose(one.at(q)[0], expected, atol=1e-15)
         for place, name in enumerate(curve_names(one.number)):
-            index = fit.free.names.index(name) if name in fit.free.names else None
-            assert one.covariance[place, place] == (0.0 if index is None else fit.covariance[index, index])
+            index = uncertain.index(name) if name in uncertain else None
+            assert one.covariance[place, place] == (0.0 if index is None else covariance[index, index])
     assert found
     without = replace(fit, robot=fit.robot.with_values({n: 0.0 for n in fit.free.names if n.startswith("curve_")}))
     assert found_curves(without, data) == ()

@@ -143,7 +143,8 @@ def found_curves(fit: Fit, training: Dataset) -> tuple[FoundCurve, ...]:
 
 
 def _curves(fit: Fit, training: Dataset) -> Iterator[FoundCurve]:
-    place = {name: i for i, name in enumerate(fit.free.names)}
+    place = {name: i for i, name in enumerate((*fit.free.names, *fit.unfitted))}
+    uncertain = fit.covariance_with_unfitted
     for number, joint in enumerate(fit.robot.joints, 1):
         names = curve_names(number)
         known = [i for i, name in enumerate(names) if name in place]
@@ -153,7 +154,7 @@ def _curves(fit: Fit, training: Dataset) -> Iterator[FoundCurve]:
         if not (np.abs(amounts) > _NOTHING).any():
             continue
         covariance, rows = np.zeros((2 * HIGHEST, 2 * HIGHEST)), [place[names[i]] for i in known]
-        covariance[np.ix_(known, known)] = fit.covariance[np.ix_(rows, rows)]
+        covariance[np.ix_(known, known)] = uncertain[np.ix_(rows, rows)]
         turn = 2.0 * math.pi
         shown = joint.limits
         places = training.joints[:, number - 1]

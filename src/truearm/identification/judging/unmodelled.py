@@ -16,7 +16,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -274,26 +273,24 @@ def _judged(rest: _Remainder, cause: str, columns: Array, mass: float, freedom: 
         Of a payload [kg].
     """
     r, k = rest.residual, columns.shape[1]
-    order = np.argsort(rest.fold, kind="stable")
-    edges = np.searchsorted(rest.fold[order], np.arange(_FOLDS + 1))
-    parts = [order[a:b] for a, b in pairwise(edges.tolist())]
-    pull = np.array([columns[part].T @ r[part] for part in parts])
-    inner = np.array([columns[part].T @ columns[part] for part in parts])
-    everything = inner.sum(axis=0)
+    everything, pull = columns.T @ columns, columns.T @ r
     ridge = np.eye(k) + 1e-9 * np.trace(everything) * np.eye(k)
-    values = np.linalg.solve(everything - inner + ridge, (pull.sum(axis=0) - pull)[:, :, None])[:, :, 0]
-    gains = np.array(
-        [2.0 * v @ g - v @ G @ v for v, g, G in zip(values, pull, inner, strict=True)]
-    )  # of squares, on each fold
+    found = np.linalg.solve(everything + ridge, np.column_stack([pull, columns.T]))
+    value, spread = found[:, 0], found[:, 1:]
+    left = r - columns @ value
+    # What a fold is off by, estimated from the others, follows from one solution for all (Allen 1974, "The relationship
+    # between variable selection and data augmentation and a method for prediction"): no system for each fold.
+    parts = [np.flatnonzero(rest.fold == fold) for fold in range(_FOLDS)]
+    unseen = [np.linalg.solve(np.eye(len(p)) - columns[p] @ spread[:, p], left[p]) for p in parts]
+    gains = np.array([float(r[p] @ r[p] - e @ e) for p, e in zip(parts, unseen, strict=True)])  # of squares
     total = float(r @ r)
     gain = float(gains.sum())
     error = math.sqrt(_FOLDS) * float(gains.std(ddof=1))
     remaining = math.sqrt(max(1.0 - gain / total, 0.0))
     if remaining > 1.0 - _LEAST_GAIN or gain < _LEAST_DEVIATIONS * error:
         return None
-    value = np.linalg.solve(everything + ridge, pull.sum(axis=0))
-    share = min(float(2.0 * value @ pull.sum(axis=0) - value @ everything @ value) / total, 1.0 - 1e-12)
-    rank = int(np.linalg.matrix_rank(everything + 1e-12 * np.eye(k), tol=1.0))
+    share = min(float(2.0 * value @ pull - value @ everything @ value) / total, 1.0 - 1e-12)
+    rank = int(np.linalg.matrix_rank(everything + 1e-12 * np.eye(k), tol=1.0, hermitian=True))
     if freedom <= rank + _LEAST_FREEDOM // 2:
         return None
     # F of two mean squares, times its numerator's freedom, as chi squared: the denominator has many degrees.

@@ -275,6 +275,7 @@ def test_a_joint_that_hardly_turned_has_no_curve() -> None:
     fit = identify(load_robot("irb120"), data, CURVED)
     message = next(notice.message for notice in check_curves(fit, data) if notice.code == "curve-left-out")
     assert "axis_4 (1 deg) turned" in message
+    assert {"curve_sin1_4", "curve_cos1_4"} <= set(fit.unfitted)  # the others have some
 
 
 def test_under_another_payload_curves_do_no_harm() -> None:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any, Final
 
 from truearm.errors import refusals_of
 from truearm.files import path_argument
@@ -96,15 +97,15 @@ def iso9283_evaluate(
     if tie_path is not None:
         with refusals_of("alignment"):
             tie = read_alignment(tie_path)
-    read = Measurements()
+    read: dict[str, Any] = {}
     for name, file in files.items():
         if file is None:
             continue
         progress(f"reading {file.name}")
         with refusals_of(name):
-            read = replace(read, **{name: _READERS[name](file)})
+            read[name] = _READERS[name](file)
     instrument = Instrument(sigma, sigma_rot)
-    found = evaluated(planned, read, tie, instrument, progress)
+    found = evaluated(planned, Measurements(**read), tie, instrument, progress)
     made = Iso9283Evaluation(planned, found, instrument, None, call, _warnings(found), inputs)
     if other is not None:
         with refusals_of("compare"):
@@ -116,7 +117,7 @@ def iso9283_evaluate(
     return made
 
 
-_READERS = {
+_READERS: Final[Mapping[str, Callable[[Path], object]]] = {
     "poses": read_attained_poses,
     "paths": read_path_samples,
     "settling": read_settling_samples,

@@ -73,8 +73,13 @@ def path_pictures(found: Evaluation) -> list[Drawing]:
 
 
 def _runs(found: Evaluation) -> list[Run]:
-    curves = (*found.deviations, *found.corners, *found.velocities, *found.weaves)
-    return list({id(one.run): one.run for one in curves}.values())
+    runs = [
+        *(one.run for one in found.deviations),
+        *(one.run for one in found.corners),
+        *(one.run for one in found.velocities),
+        *(one.run for one in found.weaves),
+    ]
+    return list({id(run): run for run in runs}.values())
 
 
 def _fastest(curves: Sequence[_Curves]) -> list[_Curves]:

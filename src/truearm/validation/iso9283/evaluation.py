@@ -158,8 +158,8 @@ def evaluated(
         stiff, pushes = evaluate_pushes(plan, measured.forces, alignment, instrument)
         values += stiff
     there = {value.id for value in values}
-    for test in plan.tests:
-        values += [_nothing(criterion, test) for criterion in TESTS[test.id].criteria if criterion not in there]
+    for planned in plan.tests:
+        values += [_nothing(criterion, planned) for criterion in TESTS[planned.id].criteria if criterion not in there]
     return Evaluation(
         tuple(sorted(values, key=lambda value: CRITERIA.index(value.id))),
         alignment,

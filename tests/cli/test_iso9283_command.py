@@ -43,7 +43,7 @@ def test_an_evaluation_is_printed_as_a_table_or_as_json(truearm: Truearm, folder
     assert {entry["id"] for entry in found["criteria"] if entry["status"] != "not-measured"} == {"AP", "RP"}
     run = truearm(*words, "--out", "made", "--compare", "made/iso9283.json")
     assert run.code == 2
-    assert "--compare" in run.err
+    assert "would be overwritten. Choose another --out" in run.err
     run = truearm(*words, "--out", "second", "--compare", "made/iso9283.json")
     assert run.code == 0
     assert "Written to second: iso9283.json, report.html" in run.out
@@ -62,11 +62,11 @@ def test_a_campaign_is_simulated_with_an_instrument_in_millimetres(truearm: True
     [
         (("plan", "irb120", "--velocities", "150", "--out", "a"), "--velocities"),
         (("plan", "irb120", "--criteria", "zz", "--out", "a"), "--criteria"),
-        (("plan", "irb120", "--criteria", "ap", "--cube", "none.yaml", "--out", "a"), "--cube"),
+        (("plan", "irb120", "--criteria", "ap", "--cube", "none.yaml", "--out", "a"), "none.yaml"),
         (("simulate", "kr5", "--plan", "plan.yaml", "--out", "a"), "--plan"),
         (("simulate", "irb120", "--plan", "plan.yaml", "--rate", "1", "--out", "a"), "--rate"),
         (("evaluate", "plan.yaml", "--out", "a"), "--poses"),
-        (("evaluate", "plan.yaml", "--poses", "none.csv", "--out", "a"), "--poses"),
+        (("evaluate", "plan.yaml", "--poses", "none.csv", "--out", "a"), "none.csv"),
         (("evaluate", "plan.yaml", "--forces", "forces.csv", "--out", "a"), "--alignment"),
         (("evaluate", "plan.yaml", "--poses", "poses.csv", "--noise", "0", "--out", "a"), "--noise"),
     ],

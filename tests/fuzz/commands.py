@@ -101,7 +101,11 @@ COMMANDS: Final[tuple[str, ...]] = (
     "hexapod world-frame irb120 touches.csv --base 300.3,300,299.6 --target 1",
 )
 #: Files that a sample cannot do without.
-_WITH: Final = {"done.mod": ("done.mod.truearm.json",), "spatial.yaml": ("joints.csv",)}
+_WITH: Final = {
+    "performance.yaml": ("tested.yaml",),
+    "done.mod": ("done.mod.truearm.json",),
+    "spatial.yaml": ("joints.csv",),
+}
 SECONDS: Final = 30.0
 GROWTH: Final = 1_000_000_000
 

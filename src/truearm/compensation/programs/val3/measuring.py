@@ -1,0 +1,72 @@
+"""VAL3 applications with stops, waits and circles.
+
+Source: Staubli, VAL3 reference manual: movej, movel, movec, waitEndMove, delay, and the motion descriptor, whose ``vel``
+is the share of the joints' speed in percent and ``tvel`` the speed of the tip in mm/s. ``delay`` does not wait for the
+arm, so waitEndMove stands before it.
+"""
+
+from __future__ import annotations
+
+from truearm.compensation.programs.motion_program import (
+    CircleMove,
+    JointMove,
+    MotionProgram,
+    Remark,
+    StraightMove,
+    Wait,
+    number,
+    percent,
+)
+from truearm.compensation.programs.val3.new import JOINT, NAMES, POINT, SAME, application, element, variable
+
+
+def motion_program(program: MotionProgram) -> dict[str, str]:
+    """Return data, program and project; moves that stop have the descriptor mStop, others mBlend."""
+    places = program.places()
+    rows = {kind: [row for one, row in places if one == kind] for kind in ("joints", "pose")}
+    keys = {(kind, row): key for kind, known in rows.items() for key, row in enumerate(known)}
+    joints = [
+        element(key, zip("123456", program.axes(row, JOINT), strict=False), "j")
+        for key, row in enumerate(rows["joints"])
+    ]
+    points = [
+        element(key, zip(NAMES, program.pose(row, POINT), strict=True), "", SAME)
+        for key, row in enumerate(rows["pose"])
+    ]
+    data = [variable("jPath", "jointRx", joints)] if joints else []
+    data += [variable("pPath", "pointRx", points)] if points else []
+    data += [variable(name, "mdesc", [_motion(blend)]) for name, blend in (("mStop", "off"), ("mBlend", "joint"))]
+    lines = [f"  // {line}" for line in program.comments]
+    said: dict[str, str] = {}
+
+    def say(name: str, value: str) -> None:
+        if said.get(name) != value:
+            said[name] = value
+            lines.append(f"  {name}={value}")
+
+    for step, near in program.zoned():
+        match step:
+            case JointMove():
+                say("mStop.vel", str(percent(step.share)))
+                lines.append(f"  movej(jPath[{keys['joints', step.target]}],flange,mStop)")
+            case StraightMove() | CircleMove():
+                motion = "mBlend" if near else "mStop"
+                say(f"{motion}.vel", "100")
+                say(f"{motion}.tvel", number(step.speed * 1e3, 3))
+                if near:
+                    say("mBlend.leave", number(near * 1e3, 3))
+                    say("mBlend.reach", number(near * 1e3, 3))
+                end = f"pPath[{keys['pose', step.target]}],flange,{motion})"
+                if isinstance(step, CircleMove):
+                    lines.append(f"  movec(pPath[{keys['pose', step.via]}],{end}")
+                else:
+                    lines.append(f"  movel({end}")
+            case Wait():
+                lines += ["  waitEndMove()", f"  delay({number(step.seconds, 3)})"]
+            case Remark():
+                lines.append(f"  // {step.text}")
+    return application(program.name, data, lines)
+
+
+def _motion(blend: str) -> str:
+    return f'<Value key="0" accel="100" vel="10" decel="100" blend="{blend}" leave="1" reach="1" />'

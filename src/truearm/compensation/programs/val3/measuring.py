@@ -1,8 +1,8 @@
 """VAL3 applications with stops, waits and circles.
 
-Source: Staubli, VAL3 reference manual: movej, movel, movec, waitEndMove, delay, and the motion descriptor, whose ``vel``
-is the share of the joints' speed in percent and ``tvel`` the speed of the tip in mm/s. ``delay`` does not wait for the
-arm, so waitEndMove stands before it.
+Source: Staubli, VAL3 reference manual: movej, movel, movec, waitEndMove, delay, and the motion descriptor, whose
+``vel`` is the share of the joints' speed in percent and ``tvel`` the speed of the tip in mm/s. ``delay`` does not wait
+for the arm, so waitEndMove stands before it.
 """
 
 from __future__ import annotations
@@ -25,14 +25,10 @@ def motion_program(program: MotionProgram) -> dict[str, str]:
     places = program.places()
     rows = {kind: [row for one, row in places if one == kind] for kind in ("joints", "pose")}
     keys = {(kind, row): key for kind, known in rows.items() for key, row in enumerate(known)}
-    joints = [
-        element(key, zip("123456", program.axes(row, JOINT), strict=False), "j")
-        for key, row in enumerate(rows["joints"])
-    ]
-    points = [
-        element(key, zip(NAMES, program.pose(row, POINT), strict=True), "", SAME)
-        for key, row in enumerate(rows["pose"])
-    ]
+    axes = [zip("123456", program.axes(row, JOINT), strict=False) for row in rows["joints"]]
+    poses = [zip(NAMES, program.pose(row, POINT), strict=True) for row in rows["pose"]]
+    joints = [element(key, numbers, "j") for key, numbers in enumerate(axes)]
+    points = [element(key, numbers, "", SAME) for key, numbers in enumerate(poses)]
     data = [variable("jPath", "jointRx", joints)] if joints else []
     data += [variable("pPath", "pointRx", points)] if points else []
     data += [variable(name, "mdesc", [_motion(blend)]) for name, blend in (("mStop", "off"), ("mBlend", "joint"))]

@@ -252,7 +252,7 @@ class _Steps:
                     self.test.id,
                     start.name,
                     lambda start=start, pose=pose: routes.straight(  # type: ignore[misc]
-                        f"vAP, {start.name}", start.position, pose.position, pose.rotation
+                        f"vAP, {start.name}", start, pose.position
                     ),
                 )
                 for cycle in range(self.test.cycles):

@@ -19,10 +19,12 @@ import numpy as np
 from truearm.errors import InputError
 from truearm.modeling.chain import Array
 from truearm.modeling.inverse import inverse
-from truearm.modeling.inverse.turns import beyond_limits
+from truearm.modeling.inverse.branches import BRANCHES, branch_rule
+from truearm.modeling.inverse.closed_form import ClosedForm
+from truearm.modeling.inverse.turns import beyond_limits, nearest_turns
 from truearm.modeling.robot import Robot
 from truearm.modeling.transform import rotation_vector
-from truearm.planning.iso9283.planned import PlannedPath
+from truearm.planning.iso9283.planned import PlannedPath, PlannedPose
 from truearm.planning.iso9283.way import TURNS, Way, weave_corners
 
 #: Radius about a corner within which the robot may leave the way where it does not stop [m]; of a weave, in strokes.
@@ -94,6 +96,7 @@ class Routes:
 
     def __init__(self, robot: Robot, target: str | None, near: Array) -> None:
         self.robot, self.target, self._near = robot, target, near
+        self._rule = branch_rule(robot) if ClosedForm(robot, target).known else None
 
     def check(self, name: str, joints: Array) -> None:
         """Refuse joint positions beyond a limit."""
@@ -106,9 +109,9 @@ class Routes:
                 cure="Plan again, in a smaller cube or elsewhere.",
             )
 
-    def straight(self, name: str, start: Array, end: Array, rotation: Array) -> Route:
-        """Return the way from one position of the tip to another ``(3,)`` [m], with one orientation."""
-        return self._lines(name, np.array([start, end]), rotation, 0.0, 1.0)
+    def straight(self, name: str, start: PlannedPose, end: Array) -> Route:
+        """Return the way from a pose of the tip to a position ``(3,)`` [m], with the orientation of the pose."""
+        return self._lines(name, np.array([start.position, end]), start.rotation, 0.0, 1.0, start.joints)
 
     def of(self, test: str, path: PlannedPath) -> Route:
         """Return the way along a planned path in a test."""
@@ -126,7 +129,9 @@ class Routes:
             return self._lines(name, corners, path.rotation, _WEAVE_ZONE * path.stroke, longer)
         return self._lines(name, path.points, path.rotation, ZONE if test in _BLENDED else 0.0, 1.0)
 
-    def _lines(self, name: str, corners: Array, rotation: Array, zone: float, pace: float) -> Route:
+    def _lines(
+        self, name: str, corners: Array, rotation: Array, zone: float, pace: float, near: Array | None = None
+    ) -> Route:
         """Return straight moves from corner to corner ``(k, 3)``, with one orientation."""
         lengths = np.linalg.norm(np.diff(corners, axis=0), axis=1)
         pieces = np.maximum(2, np.ceil(lengths / _APART)).astype(int)
@@ -135,7 +140,8 @@ class Routes:
         positions = np.column_stack([np.interp(places, np.arange(len(corners)), column) for column in corners.T])
         moves = np.maximum(1, np.ceil(places - 1e-9)).astype(int)
         names = [f"{name}, move {move}" for move in moves] if len(lengths) > 1 else [name] * len(places)
-        joints = self._followed(names, positions, np.broadcast_to(rotation, (len(places), 3, 3)))[marks]
+        turned = np.broadcast_to(rotation, (len(places), 3, 3))
+        joints = self._followed(names, positions, turned, near)[marks]
         legs = tuple(Leg(one, pace=pace) for one in joints[1:])
         return Route(joints[0], legs, min(zone, _ZONE_SHARE * float(lengths.min())))
 
@@ -158,9 +164,18 @@ class Routes:
         legs = tuple(Leg(one, pace=float(pace)) for one, pace in zip(joints[1:], paces, strict=True))
         return Route(joints[0], legs, min(ZONE, _ZONE_SHARE * float(lengths.min())))
 
-    def _followed(self, names: list[str], positions: Array, rotations: Array) -> Array:
-        """Return joint positions ``(n, joints)`` at points of a way, or refuse the move in which it cannot be gone."""
-        found = inverse(self.robot, positions, rotations, target=self.target, seed=self._near)
+    def _followed(self, names: list[str], positions: Array, rotations: Array, near: Array | None = None) -> Array:
+        """Return joint positions ``(n, joints)`` at points of a way, in the posture in which it begins.
+
+        Where it cannot be gone, the move is refused.
+        """
+        near = self._near if near is None else near
+        first = inverse(self.robot, positions[0], rotations[0], target=self.target, seed=near)
+        start = first.joints[0]
+        branch = None
+        if self._rule is not None and first.status[0].usable:
+            branch = BRANCHES[int(self._rule.numbers(self.robot.forward_kinematics(start[None]))[0])]
+        found = inverse(self.robot, positions, rotations, target=self.target, seed=start, branch=branch)
         for row, status in enumerate(found.status):
             if not status.usable:
                 raise InputError(
@@ -169,7 +184,10 @@ class Routes:
                     came=status.value,
                     cure="Plan again, in a smaller cube or elsewhere.",
                 )
-        steps = np.abs(np.diff(found.joints, axis=0)).max(axis=1)
+        joints = found.joints.copy()
+        for row in range(1, len(joints)):
+            joints[row] = nearest_turns(self.robot, joints[row : row + 1], joints[row - 1])[0]
+        steps = np.abs(np.diff(joints, axis=0)).max(axis=1)
         far = np.flatnonzero(steps > _LARGEST_MOVE)
         if len(far):
             raise InputError(
@@ -177,4 +195,4 @@ class Routes:
                 where=names[int(far[0]) + 1],
                 cure="Plan again, in a smaller cube or elsewhere.",
             )
-        return found.joints
+        return joints

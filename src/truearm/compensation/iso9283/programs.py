@@ -165,7 +165,8 @@ class _Programs:
     def _notes(self, test: PlannedTest, share: float, load: float) -> tuple[str, ...]:
         carried = "no load" if test.id == "compliance" else f"load {load * self.plan.rated_load:g} kg"
         return (
-            f"ISO 9283 {test.id} of {self.plan.robot.name}",
+            f"ISO 9283 {test.id}",
+            f"Robot {self.plan.robot.name}",
             f"{100 * share:g} % velocity, {carried}",
             f"Plan {self.mark}",
             "Not verified, no safety function",

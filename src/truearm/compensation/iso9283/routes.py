@@ -96,7 +96,8 @@ class Routes:
 
     def __init__(self, robot: Robot, target: str | None, near: Array) -> None:
         self.robot, self.target, self._near = robot, target, near
-        self._rule = branch_rule(robot) if ClosedForm(robot, target).known else None
+        rule = branch_rule(robot)
+        self._rule = rule if rule is not None and ClosedForm(robot, target).known else None
 
     def check(self, name: str, joints: Array) -> None:
         """Refuse joint positions beyond a limit."""

@@ -21,7 +21,10 @@ from truearm.compensation.programs.val3.new import JOINT, NAMES, POINT, SAME, ap
 
 
 def motion_program(program: MotionProgram) -> dict[str, str]:
-    """Return data, program and project; moves that stop have the descriptor mStop, others mBlend."""
+    """Return data, program and project.
+
+    Joint motions have the descriptor mJoint, straight moves and arcs that stop have the descriptor mStop, others mBlend.
+    """
     places = program.places()
     rows = {kind: [row for one, row in places if one == kind] for kind in ("joints", "pose")}
     keys = {(kind, row): key for kind, known in rows.items() for key, row in enumerate(known)}
@@ -31,7 +34,10 @@ def motion_program(program: MotionProgram) -> dict[str, str]:
     points = [element(key, numbers, "", SAME) for key, numbers in enumerate(poses)]
     data = [variable("jPath", "jointRx", joints)] if joints else []
     data += [variable("pPath", "pointRx", points)] if points else []
-    data += [variable(name, "mdesc", [_motion(blend)]) for name, blend in (("mStop", "off"), ("mBlend", "joint"))]
+    data += [
+        variable(name, "mdesc", [_motion(blend, velocity)])
+        for name, blend, velocity in (("mJoint", "off", 10), ("mStop", "off", 100), ("mBlend", "joint", 100))
+    ]
     lines = [f"  // {line}" for line in program.comments]
     said: dict[str, str] = {}
 
@@ -43,11 +49,10 @@ def motion_program(program: MotionProgram) -> dict[str, str]:
     for step, near in program.zoned():
         match step:
             case JointMove():
-                say("mStop.vel", str(percent(step.share)))
-                lines.append(f"  movej(jPath[{keys['joints', step.target]}],flange,mStop)")
+                say("mJoint.vel", str(percent(step.share)))
+                lines.append(f"  movej(jPath[{keys['joints', step.target]}],flange,mJoint)")
             case StraightMove() | CircleMove():
                 motion = "mBlend" if near else "mStop"
-                say(f"{motion}.vel", "100")
                 say(f"{motion}.tvel", number(step.speed * 1e3, 3))
                 if near:
                     say("mBlend.leave", number(near * 1e3, 3))
@@ -64,5 +69,5 @@ def motion_program(program: MotionProgram) -> dict[str, str]:
     return application(program.name, data, lines)
 
 
-def _motion(blend: str) -> str:
-    return f'<Value key="0" accel="100" vel="10" decel="100" blend="{blend}" leave="1" reach="1" />'
+def _motion(blend: str, velocity: int) -> str:
+    return f'<Value key="0" accel="100" vel="{velocity}" decel="100" blend="{blend}" leave="1" reach="1" />'

@@ -231,20 +231,20 @@ def test_a_tip_has_the_flange_where_it_brings_the_tip_there(test: str) -> None:
 def test_what_cannot_be_gone_is_refused_with_the_move() -> None:
     plan = small_plan(["AP", "CR"])
     far = replace(plan.poses["P3"], joints=plan.poses["P3"].joints + np.radians([0, 300.0, 0, 0, 0, 0]))
-    with pytest.raises(InputError, match=r"AP, P3: a joint would go beyond its limits; got joint_?2"):
+    with pytest.raises(InputError, match=r"AP, P3: a joint would go beyond its limits; got 'axis_2'"):
         measuring_programs(replace(plan, poses={**plan.poses, "P3": far}), 1.0, "abc")
     rectangle = plan.paths["rectangle"]
     points = rectangle.points.copy()
     points[2] += [2.0, 0.0, 0.0]
     away = replace(plan, paths={**plan.paths, "rectangle": replace(rectangle, points=points)})
-    with pytest.raises(InputError, match=r"CR, rectangle, move 2: the robot cannot go this way; got unreachable"):
+    with pytest.raises(InputError, match=r"CR, rectangle, move 2: the robot cannot go this way; got '?unreachable'?"):
         measuring_programs(away, 1.0, "abc")
     behind = points.copy()
     behind[2] = [-0.35, 0.02, 0.35]
     round_ = replace(plan, paths={**plan.paths, "rectangle": replace(rectangle, points=behind)})
     with pytest.raises(InputError, match=r"CR, rectangle, move 2"):
         measuring_programs(round_, 1.0, "abc")
-    with pytest.raises(InputError, match=r"dAP: a pose is not in the plan; got P2"):
+    with pytest.raises(InputError, match=r"dAP: a pose is not in the plan; got 'P2'"):
         measuring_programs(replace(small_plan(["dAP"]), poses={"P1": plan.poses["P1"]}), 1.0, "abc")
     kept = replace(
         plan, paths={"line": replace(plan.paths["line"], other=None)}, tests=small_plan(["AT-reorientation"]).tests
@@ -256,7 +256,7 @@ def test_what_cannot_be_gone_is_refused_with_the_move() -> None:
 def test_robots_that_have_no_such_programs_are_refused() -> None:
     plan = small_plan(["AP"])
     with pytest.raises(InputError, match="arms of six joints; got 7 joints"):
-        measuring_programs(replace(plan, robot=load_robot("iiwa7")), 1.0, "abc")
+        measuring_programs(replace(plan, robot=load_robot("fr3")), 1.0, "abc")
     geometry = next(p for p in plan.robot.parameters.values() if p.group == "geometry")
     calibrated = plan.robot.with_values({geometry.name: geometry.value + 1e-4})
     with pytest.raises(InputError, match="this robot is calibrated"):

@@ -23,7 +23,7 @@ from truearm.compensation.programs.val3.new import JOINT, NAMES, POINT, SAME, ap
 def motion_program(program: MotionProgram) -> dict[str, str]:
     """Return data, program and project.
 
-    Joint motions have the descriptor mJoint, straight moves and arcs that stop have the descriptor mStop, others mBlend.
+    Joint motions have the descriptor mJoint, straight moves and arcs that stop mStop, and others mBlend.
     """
     places = program.places()
     rows = {kind: [row for one, row in places if one == kind] for kind in ("joints", "pose")}

@@ -255,7 +255,7 @@ def test_what_cannot_be_gone_is_refused_with_the_move() -> None:
 
 def test_robots_that_have_no_such_programs_are_refused() -> None:
     plan = small_plan(["AP"])
-    with pytest.raises(InputError, match="arms of six joints; got 7 joints"):
+    with pytest.raises(InputError, match="arms of six joints; got '7 joints'"):
         measuring_programs(replace(plan, robot=load_robot("fr3")), 1.0, "abc")
     geometry = next(p for p in plan.robot.parameters.values() if p.group == "geometry")
     calibrated = plan.robot.with_values({geometry.name: geometry.value + 1e-4})

@@ -110,3 +110,12 @@ def test_a_language_of_another_maker_and_speeds_that_it_does_not_say_are_told(cu
     assert (maker.code, maker.level, speed.code) == ("maker", "warning", "joint-speed-assumed")
     assert "programs were written in URScript." in maker.message
     assert [one.code for one in notices("fanuc")] == ["maker"]
+
+
+def test_a_folder_takes_other_tests_and_all_of_them_again(cube: Path, tmp_path: Path) -> None:
+    for criteria in (["av", "ap"], ["av"], ["av", "ap"]):
+        planned(cube, program="krl", criteria=criteria, out=tmp_path)
+    assert sorted(path.name for path in (tmp_path / "programs").iterdir()) == ["AP_10.src", "AV_10.src"]
+    (tmp_path / "programs" / "AD_10.src").write_text("of somebody else")
+    with pytest.raises(InputError, match="was not written here by truearm, and is not overwritten"):
+        planned(cube, program="krl", criteria=["ad"], out=tmp_path)

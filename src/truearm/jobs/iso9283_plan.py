@@ -14,6 +14,7 @@ from truearm.jobs.arguments import (
     command_argument,
     files_of,
     folder_beside,
+    folder_for,
     length_argument,
     lengths_argument,
     numbers_argument,
@@ -195,7 +196,7 @@ def iso9283_plan(
     found = Iso9283Plan(plan, call, tuple(warnings), inputs, programs)
     if folder is not None:
         if programs is not None:
-            folder_beside(tuple(found.contents()), PLAN, folder, robot, given_cube, record)
+            folder_for(tuple(found.contents()), folder, robot, given_cube, record, ours=True)
             refuse_losing_slow_run(folder, record)
         found.save(folder)
     return found

@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 from tests.performance_plan import small_plan
 
+from truearm.compensation.cell import Cell, read_tools
 from truearm.compensation.iso9283.programs import measuring_programs
 from truearm.compensation.path_program import BY_NAME
+from truearm.compensation.program_correction import commanded
 from truearm.compensation.programs.motion_program import (
     CircleMove,
     JointMove,
@@ -99,6 +101,28 @@ def test_the_own_reader_finds_every_move_again_in_order(name: str, programs: dic
                 check_target(found, move.via, program, via)
 
 
+@pytest.mark.parametrize("name", BY_NAME)
+def test_the_controller_takes_the_joint_positions_that_were_checked(
+    name: str, programs: dict[str, MotionProgram], tmp_path: Path
+) -> None:
+    robot = PLAN.robot
+    geometry = next(p for p in robot.parameters.values() if p.group == "geometry")
+    calibrated = robot.with_values({geometry.name: geometry.value + 1e-4})  # of one that is not, nothing is asked
+    file = tmp_path / "cell.yaml"
+    file.write_text(
+        "truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\n"
+        'tools: {"0": {of: flange, controller: {}}, tcp: {of: flange, controller: {}}}\n'
+    )
+    cell = Cell(read_tools(calibrated, file), {})
+    for key in ("VAP_10", "REORI_10", "CR_10"):
+        program = programs[key]
+        found = read_again(name, program)
+        went = robot.controller.from_model(commanded(calibrated, found, cell))
+        rows = [row for _, _, row in meant(name, program)]
+        ends = [move.target for move in found.moves]
+        assert went[ends] == pytest.approx(program.joints[rows], abs=5e-5)
+
+
 WAITS = {
     "rapid": (r"WaitTime \\InPos,1\.5;", r",fine,tool0;$"),
     "krl": (r"WAIT SEC 1\.5$", r"(PTP|LIN|CIRC) .*\}$"),
@@ -147,7 +171,8 @@ def test_every_test_begins_and_ends_slowly_in_the_first_pose(programs: dict[str,
         moves = [step for step in program.steps if isinstance(step, JointMove)]
         for move in (moves[0], moves[-1]):
             assert program.joints[move.target] == pytest.approx(first)
-            assert (move.share, move.speed) == (0.1, pytest.approx(0.05))
+            assert move.share == 0.1
+            assert move.speed == pytest.approx(0.05)
 
 
 def test_cycles_go_where_the_test_asks(programs: dict[str, MotionProgram]) -> None:

@@ -11,6 +11,7 @@ import truearm
 from truearm.compensation.iso9283.slow_run import SLOW_RUN
 from truearm.errors import InputError
 from truearm.notices import Notice
+from truearm.results.iso9283_plan import Iso9283Plan
 
 CUBE = "truearm: truearm-cube/1\nunits: {length: mm}\ncentre: [350, 0, 350]\nside: 200\n"
 
@@ -22,8 +23,8 @@ def cube(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return file
 
 
-def planned(cube: Path, **more: Any) -> Any:
-    given = {"criteria": ["av"], "cube": cube, "velocities": [1.0, 0.1], "velocity": 0.5, "load": 3.0}
+def planned(cube: Path, **more: Any) -> Iso9283Plan:
+    given: dict[str, Any] = {"criteria": ["av"], "cube": cube, "velocities": [1.0, 0.1], "velocity": 0.5, "load": 3.0}
     return truearm.iso9283_plan("irb120", **(given | more))
 
 

@@ -203,6 +203,10 @@ def test_the_first_run_is_at_a_tenth_and_at_most_250_mm_a_second() -> None:
     assert [one.name for one in fast.slow] == ["AV_5"]
     assert [one.name for one in fast.faster] == ["AV_100", "AV_10"]
     assert max(step.speed for one in fast.slow for step in one.steps if isinstance(step, StraightMove)) <= 0.25
+    weaving = measuring_programs(small_plan(["WS"], velocities=(0.1,), rated_velocity=2.5), 1.0, "abc")
+    assert [one.name for one in weaving.faster] == ["WS_10"]
+    assert weaving.slow[0].name == "WS_7p071"  # the tip goes aside as fast as ahead
+    assert max(step.speed for step in weaving.slow[0].steps if isinstance(step, StraightMove)) <= 0.25 + 1e-12
     loaded = measuring_programs(small_plan(["AP"], loads=(1.0, 0.1)), 1.0, "abc")
     assert [one.name for one in loaded.slow] == ["AP_10_L100", "AP_10_L10"]
     assert loaded.slow[1].notes[2] == "10 % velocity, load 0.3 kg"

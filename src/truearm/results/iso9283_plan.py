@@ -37,7 +37,7 @@ class WrittenPrograms:
     count
         How many programs they are.
     share
-        Velocity of the slow run, in that of the robot.
+        Velocity of the slow run, in that of the robot; that of single tests may be lower.
     """
 
     language: str
@@ -124,7 +124,7 @@ class Iso9283Plan(Record):
         if programs.record is None:
             return [f"{written}, at every velocity."]
         return [
-            f"{written}, at {100 * programs.share:g} % of the velocity. The faster ones are written when {SLOW_RUN} "
+            f"{written}, at up to {100 * programs.share:g} % of the velocity. The faster ones are written when {SLOW_RUN} "
             "says that the slow run is completed."
         ]
 

@@ -51,7 +51,7 @@ class MeasuringPrograms:
     faster
         Those at the velocities of the plan.
     share
-        Velocity of the first run, in that of the robot.
+        Velocity of the first run, in that of the robot; that of single tests may be lower.
     """
 
     slow: tuple[MotionProgram, ...]
@@ -93,18 +93,14 @@ def measuring_programs(plan: PerformancePlan, dwell: float, mark: str) -> Measur
         )
     slow = min(_SLOW, _SLOW_SPEED / plan.rated_velocity)
     made = _Programs(plan, dwell, mark, slow)
-    rest = [
-        (test, share)
-        for test in plan.tests
-        if test.id != "compliance"
-        for share in test.velocities
-        if abs(share - slow) > 1e-9
-    ]
-    return MeasuringPrograms(
-        tuple(one for test in plan.tests for one in made.of(test, slow)),
-        tuple(one for test, share in rest for one in made.of(test, share)),
-        slow,
-    )
+    first: list[MotionProgram] = []
+    faster: list[MotionProgram] = []
+    for test in plan.tests:
+        share = min(slow, _SLOW_SPEED / (plan.rated_velocity * made.pace(test)))
+        first += made.of(test, share)
+        if test.id != "compliance":
+            faster += [one for other in test.velocities if abs(other - share) > 1e-9 for one in made.of(test, other)]
+    return MeasuringPrograms(tuple(first), tuple(faster), slow)
 
 
 def _is_calibrated(robot: Robot) -> bool:
@@ -135,6 +131,16 @@ class _Programs:
         if (test, place) not in self.known:
             self.known[test, place] = found()
         return self.known[test, place]
+
+    def along(self, test: PlannedTest, place: str) -> Route:
+        """Return the way along a path of a test."""
+        return self.route(test.id, place, lambda: self.routes.of(test.id, self.plan.paths[place]))
+
+    def pace(self, test: PlannedTest) -> float:
+        """Return the highest speed of flange or tip in a test, in that of the plan; 1 where it is that."""
+        if TESTS[test.id].readings != "paths":
+            return 1.0
+        return max(1.0, *(leg.pace for place in test.places for leg in self.along(test, place).legs))
 
     def of(self, test: PlannedTest, share: float) -> list[MotionProgram]:
         """Return the programs of a test at a velocity: one for each load, which differ by their name alone."""
@@ -264,10 +270,9 @@ class _Steps:
                     self._stand()
 
     def _paths(self) -> None:
-        plan, test = self.programs.plan, self.test
+        test = self.test
         for place in test.places:
-            path = plan.paths[place]
-            route = self.programs.route(test.id, place, lambda path=path: self.programs.routes.of(test.id, path))  # type: ignore[misc]
+            route = self.programs.along(test, place)
             for cycle in range(test.cycles):
                 self._cycle(cycle, f"{place}, ")
                 self._go(f"start of {place}", route.start, self.share)

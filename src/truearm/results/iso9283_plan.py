@@ -124,8 +124,8 @@ class Iso9283Plan(Record):
         if programs.record is None:
             return [f"{written}, at every velocity."]
         return [
-            f"{written}, at up to {100 * programs.share:g} % of the velocity. The faster ones are written when {SLOW_RUN} "
-            "says that the slow run is completed."
+            f"{written}, at up to {100 * programs.share:g} % of the velocity. The faster ones are written when "
+            f"{SLOW_RUN} says that the slow run is completed."
         ]
 
     def contents(self) -> dict[str, str]:

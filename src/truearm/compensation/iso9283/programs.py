@@ -33,6 +33,8 @@ from truearm.planning.iso9283.planned import PerformancePlan, PlannedPose, Plann
 #: The first run: no more than this share of the rated velocity, and no faster than this [m/s].
 _SLOW: Final = 0.1
 _SLOW_SPEED: Final = 0.25
+#: Controllers take no lower speed [m/s].
+_SLOWEST: Final = 1e-4
 _AXES: Final = 6
 #: Programs have short names, as controllers take few characters.
 _NAMES: Final = {"AT-reorientation": "REORI", "posing-time": "POSING", "compliance": "COMPL"}
@@ -242,7 +244,7 @@ class _Steps:
     def _along(self, route: Route) -> None:
         before = self._target(route.start)
         for leg in route.legs:
-            end, speed = self._target(leg.joints), self.speed * leg.pace
+            end, speed = self._target(leg.joints), max(self.speed * leg.pace, _SLOWEST)
             if leg.via is None:
                 self.steps.append(StraightMove(end, speed, route.zone))
             else:
